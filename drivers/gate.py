@@ -1,0 +1,151 @@
+"""The one gate: no sample reaches a rig's output that has not passed here.
+
+Drivers take a ``GatedWaveform`` and nothing else, and only ``admit`` can make one. Limits are
+errors raised by ordinary code, never ``assert``, which an optimising interpreter would drop.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from drivers.errors import RefusedWaveform
+
+__all__ = ["GatedWaveform", "Limits", "Margin", "admit"]
+
+_KEY = object()
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the film and the amplifier may see, in SI units.
+
+    ``voltage_min`` and ``voltage_max`` in V bound the voltage at the film (their signs are the
+    polarity that is allowed), ``slew`` in V/s its rate, ``field`` in V/m the true electric field.
+    """
+
+    voltage_min: float
+    voltage_max: float
+    slew: float
+    field: float
+
+
+@dataclass(frozen=True)
+class Margin:
+    """How near a waveform comes to one limit: ``reached`` and ``allowed`` in ``unit``."""
+
+    quantity: str
+    reached: float
+    allowed: float
+    unit: str
+
+
+@final
+class GatedWaveform:
+    """A voltage waveform that has passed the gate; read-only.
+
+    ``voltage`` (N,) V at the film on an even clock of ``rate`` Hz, starting and ending at 0 V.
+    """
+
+    __slots__ = ("_limits", "_margins", "_rate", "_voltage")
+
+    def __init__(
+        self,
+        voltage: np.ndarray,
+        rate: float,
+        limits: Limits,
+        margins: tuple[Margin, ...],
+        key: object,
+    ) -> None:
+        if key is not _KEY:
+            raise TypeError("a GatedWaveform comes from drivers.gate.admit and from nowhere else")
+        self._voltage = np.array(voltage, dtype=np.float64)
+        self._voltage.setflags(write=False)
+        self._rate = rate
+        self._limits = limits
+        self._margins = margins
+
+    @property
+    def voltage(self) -> np.ndarray:
+        """(N,) V, read-only."""
+        return self._voltage
+
+    @property
+    def rate(self) -> float:
+        """Sample rate in Hz."""
+        return self._rate
+
+    @property
+    def limits(self) -> Limits:
+        """The limits under which it passed."""
+        return self._limits
+
+    @property
+    def margins(self) -> tuple[Margin, ...]:
+        """How near it comes to each limit."""
+        return self._margins
+
+    @property
+    def duration(self) -> float:
+        """s, from the first to the last sample."""
+        return (self._voltage.size - 1) / self._rate
+
+
+def admit(
+    voltage: np.ndarray,
+    rate: float,
+    limits: Limits,
+    field_per_volt: np.ndarray,
+) -> GatedWaveform:
+    """Let a waveform pass, or raise ``RefusedWaveform`` with a sentence for every limit it breaks.
+
+    ``voltage`` is (N,) V at the film, ``rate`` Hz. ``field_per_volt`` (N,) 1/m is the reciprocal of
+    the film's predicted thickness at each sample, so that the true field is their product; it comes
+    from the model, which this layer does not know.
+    """
+    voltage = np.asarray(voltage, dtype=np.float64)
+    field_per_volt = np.asarray(field_per_volt, dtype=np.float64)
+    if not (math.isfinite(rate) and rate > 0.0):
+        raise RefusedWaveform((f"the sample rate {rate!r} Hz is not a finite number above 0",))
+    if voltage.ndim != 1 or voltage.size < 2 or field_per_volt.shape != voltage.shape:
+        raise RefusedWaveform(
+            (
+                f"a waveform is one row of at least 2 samples with as many field factors, "
+                f"not {voltage.shape} and {field_per_volt.shape}",
+            )
+        )
+    finite = np.isfinite(voltage) & np.isfinite(field_per_volt)
+    if not finite.all():
+        at = int(np.argmin(finite))
+        raise RefusedWaveform((f"sample {at} (at {at / rate:.4g} s) is not a finite number",))
+
+    reasons: list[str] = []
+
+    def check(quantity: str, values: np.ndarray, allowed: float, unit: str, scale: float) -> Margin:
+        at = int(np.argmax(values))
+        reached = float(values[at])
+        # not (<=), so that a limit of NaN refuses everything
+        if not reached <= allowed:
+            reasons.append(
+                f"{quantity} reaches {reached * scale:.6g} {unit} at {at / rate:.4g} s, "
+                f"{allowed * scale:.6g} {unit} is allowed"
+            )
+        return Margin(quantity, reached * scale, allowed * scale, unit)
+
+    margins = (
+        check("voltage", voltage, limits.voltage_max, "kV", 1e-3),
+        check("negative voltage", -voltage, -limits.voltage_min, "kV", 1e-3),
+        check("slew", np.abs(np.diff(voltage)) * rate, limits.slew, "kV/s", 1e-3),
+        check("true field", np.abs(voltage) * field_per_volt, limits.field, "MV/m", 1e-6),
+    )
+    reasons.extend(
+        f"the waveform {'starts' if i == 0 else 'ends'} at {voltage[i] * 1e-3:.6g} kV, not at 0"
+        for i in (0, -1)
+        if voltage[i] != 0.0
+    )
+    if reasons:
+        raise RefusedWaveform(tuple(reasons))
+    return GatedWaveform(voltage, rate, limits, margins, _KEY)

@@ -1,0 +1,109 @@
+"""What every rig can do, whether it is simulated, a local card, or a card behind a server."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+
+from drivers.channels import Channel
+from drivers.gate import GatedWaveform
+
+__all__ = ["Block", "Event", "Instrument", "Rig", "RigIdentity", "RigState"]
+
+
+class RigState(Enum):
+    """Where a rig stands. ``SAFE`` is 0 V with nothing loaded, and where every path ends."""
+
+    SAFE = "safe"
+    LOADED = "loaded"
+    ARMED = "armed"
+    RUNNING = "running"
+    DONE = "done"
+    CLOSED = "closed"
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """One instrument as it identifies itself; ``settings`` are name, value and unit in words."""
+
+    role: str
+    model: str
+    serial: str
+    settings: tuple[tuple[str, str], ...] = field(default=())
+
+
+@dataclass(frozen=True)
+class RigIdentity:
+    """A rig: its address (``sim``, ``sim:7``, ``daqmx:Dev1``), instruments and channels."""
+
+    address: str
+    simulated: bool
+    instruments: tuple[Instrument, ...]
+    channels: tuple[Channel, ...]
+    seed: int | None = None
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened at ``sample`` of the run: ``level`` is info, warning or fault."""
+
+    sample: int
+    level: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Block:
+    """Simultaneous samples: ``counts`` (channels, n) int16, the first being sample ``start``."""
+
+    start: int
+    counts: np.ndarray
+    events: tuple[Event, ...] = field(default=())
+
+
+class Rig(Protocol):
+    """A rig is loaded, armed, started, read until it returns None, and ends safe.
+
+    Calls out of order raise ``RigStateError``; faults of instruments raise ``RigError``. Whatever
+    happened, ``make_safe`` may be called, at any time and more than once.
+    """
+
+    @property
+    def state(self) -> RigState:
+        """Where the rig stands."""
+        ...
+
+    def identify(self) -> RigIdentity:
+        """Say what is there; moves nothing."""
+        ...
+
+    def load(self, waveform: GatedWaveform) -> float:
+        """Take a waveform that has passed the gate; returns the actual sample rate in Hz."""
+        ...
+
+    def arm(self) -> None:
+        """Make ready to start at once; the output is still at 0 V."""
+        ...
+
+    def start(self) -> None:
+        """Start the sample clock."""
+        ...
+
+    def read(self) -> Block | None:
+        """Next block, waiting for it if need be; None when the waveform has been played."""
+        ...
+
+    def stop(self) -> None:
+        """End the run early: ramp down to 0 V in the set time; what was acquired stays readable."""
+        ...
+
+    def make_safe(self) -> None:
+        """Take the output to 0 V, now, and forget the waveform."""
+        ...
+
+    def close(self) -> None:
+        """Make safe and release the instruments."""
+        ...

@@ -1,0 +1,205 @@
+"""What a film is made of and how it hangs: immutable values, in SI units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from model import network
+from model.errors import ModelError
+from model.kinematics import KINEMATICS
+from model.springs import SPRINGS, locking_strain
+
+__all__ = [
+    "STANDARD_GRAVITY",
+    "TABLE_3",
+    "THESIS_FILM",
+    "THESIS_LOAD",
+    "VACUUM_PERMITTIVITY",
+    "Branch",
+    "Film",
+    "Load",
+    "Network",
+    "Spring",
+]
+
+VACUUM_PERMITTIVITY = 8.854e-12  #: F/m
+STANDARD_GRAVITY = 9.80665  #: m/s^2
+
+
+def _positive(owner: str, **values: float) -> None:
+    for name, value in values.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise ModelError(f"{owner}: {name} = {value!r} must be a finite number above 0")
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film before it is loaded: ``length`` L1 (along the motion), ``width`` L2, ``thickness`` Z, m.
+
+    ``density`` in kg/m^3 (the thesis prints none; 1000 is that of PDMS within a few per cent) and
+    the relative ``permittivity``.
+    """
+
+    length: float
+    width: float
+    thickness: float
+    permittivity: float = 4.7
+    density: float = 1000.0
+    kinematics: str = "constrained-width"
+
+    def __post_init__(self) -> None:
+        _positive(
+            "film",
+            length=self.length,
+            width=self.width,
+            thickness=self.thickness,
+            permittivity=self.permittivity,
+            density=self.density,
+        )
+        if self.kinematics not in KINEMATICS:
+            raise ModelError(
+                f"film: kinematics {self.kinematics!r} is not one of {', '.join(KINEMATICS)}"
+            )
+
+    @property
+    def held(self) -> int:
+        """Code of the kinematics, as the kernels use it."""
+        return KINEMATICS.index(self.kinematics)
+
+    @property
+    def inertia(self) -> float:
+        """Coefficient of lam'' in the motion equation, rho L1^2/3, in kg/m (eq. 43)."""
+        return self.density * self.length**2 / 3.0
+
+
+@dataclass(frozen=True)
+class Load:
+    """The hanging load: ``mass`` in kg.
+
+    ``rest_length`` (m) selects the reading of the pre-stretch. None is Table 3's: the rest state
+    follows from the modulus and the weight. A number is the measured length under the load (82 mm
+    in section 4.1.1): then the equilibrium modulus follows from it, and the one written in the
+    network is not used.
+    """
+
+    mass: float
+    rest_length: float | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.mass) and self.mass >= 0.0):
+            raise ModelError(f"load: mass = {self.mass!r} kg must be a finite number, 0 or more")
+        if self.rest_length is not None:
+            _positive("load", rest_length=self.rest_length)
+            _positive("load with a measured rest length", mass=self.mass)
+
+    @property
+    def weight(self) -> float:
+        """N."""
+        return self.mass * STANDARD_GRAVITY
+
+
+@dataclass(frozen=True)
+class Spring:
+    """One spring: ``kind`` of strain energy, ``modulus`` in Pa, ``limit`` J (Gent) or n (links)."""
+
+    modulus: float
+    limit: float = math.inf
+    kind: str = "gent"
+
+    def __post_init__(self) -> None:
+        if self.kind not in SPRINGS:
+            raise ModelError(f"spring: kind {self.kind!r} is not one of {', '.join(SPRINGS)}")
+        if not (math.isfinite(self.modulus) and self.modulus >= 0.0):
+            raise ModelError(f"spring: modulus = {self.modulus!r} Pa must be finite, 0 or more")
+        lowest = 1.0 if self.kind == "arruda-boyce" else 0.0
+        if not self.limit > lowest:
+            raise ModelError(f"spring ({self.kind}): limit = {self.limit!r} must be above {lowest}")
+        if math.isinf(self.limit) and self.kind != "neo-hookean":
+            # without a limit both other springs are the neo-Hookean one
+            object.__setattr__(self, "kind", "neo-hookean")
+
+
+@dataclass(frozen=True)
+class Branch:
+    """A Maxwell branch: a spring in series with a dashpot; ``relaxation_time`` T = eta/mu in s."""
+
+    spring: Spring
+    relaxation_time: float
+
+    def __post_init__(self) -> None:
+        if not self.relaxation_time >= 0.0:
+            raise ModelError(
+                f"branch: relaxation_time = {self.relaxation_time!r} s must be 0 or more"
+            )
+
+
+@dataclass(frozen=True)
+class Network:
+    """A generalised Maxwell network: the equilibrium spring and any number of branches."""
+
+    equilibrium: Spring
+    branches: tuple[Branch, ...] = field(default=())
+
+    @classmethod
+    def gent(
+        cls, moduli: Sequence[float], limits: Sequence[float], times: Sequence[float]
+    ) -> Network:
+        """The thesis's network: ``moduli`` mu_0..n Pa, ``limits`` J_0..n, ``times`` T_1..n s."""
+        if not len(moduli) == len(limits) == len(times) + 1:
+            raise ModelError(
+                f"a network of n branches takes n + 1 moduli, n + 1 limits and n times, "
+                f"not {len(moduli)}, {len(limits)} and {len(times)}"
+            )
+        springs = [Spring(m, j) for m, j in zip(moduli, limits, strict=True)]
+        return cls(
+            springs[0], tuple(Branch(s, t) for s, t in zip(springs[1:], times, strict=True))
+        )
+
+    @property
+    def springs(self) -> tuple[Spring, ...]:
+        """All springs, the equilibrium one first."""
+        return (self.equilibrium, *(b.spring for b in self.branches))
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """Relaxation times of the branches in s."""
+        return tuple(b.relaxation_time for b in self.branches)
+
+    def with_equilibrium_modulus(self, modulus: float) -> Network:
+        """The same network with another mu_0."""
+        return replace(self, equilibrium=replace(self.equilibrium, modulus=modulus))
+
+    def coefficients(self, held: int) -> np.ndarray:
+        """Coefficient vector of the kernels (see ``model.network``), head filled with ``held`` only."""
+        springs = self.springs
+        c = np.zeros(network.HEAD + network.WIDTH * len(springs))
+        c[network.HELD] = held
+        c[network.INERTIA] = 1.0
+        kinds = {SPRINGS.index(spring.kind) for spring in springs}
+        c[network.UNIFORM] = kinds.pop() if len(kinds) == 1 else -1
+        for i, spring in enumerate(springs):
+            k = network.HEAD + network.WIDTH * i
+            kind = SPRINGS.index(spring.kind)
+            c[k + network.KIND] = kind
+            c[k + network.MODULUS] = spring.modulus
+            c[k + network.LIMIT] = spring.limit
+            c[k + network.LOCKING] = locking_strain(kind, spring.limit)
+            if i:
+                # a branch that relaxes within a nanosecond carries nothing; 1/0 would be no number
+                c[k + network.RATE] = 1.0 / max(self.times[i - 1], 1e-9)
+        return c
+
+
+THESIS_FILM = Film(length=0.075, width=0.072, thickness=0.001)
+THESIS_LOAD = Load(mass=0.2)
+
+#: The identified parameters of the thesis's Table 3.
+TABLE_3 = Network.gent(
+    moduli=(4.5772e4, 4.0037e4, 5.1736e4, 2.3021e2),
+    limits=(9.7749e3, 4.2709e3, 9.5677e3, 7.2315e3),
+    times=(0.39802, 0.33969, 8.3874),
+)

@@ -1,0 +1,102 @@
+"""The generalised Maxwell network: stress and stiffness of its springs, flow of its dashpots.
+
+Layout of the coefficient vector that every kernel reads (one row a parameter set, so that a
+population is a matrix): a head of ``HEAD`` numbers, then ``WIDTH`` numbers for each spring, the
+equilibrium spring first.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from model.jit import jit
+from model.kinematics import directions, pull_slope, strain_and_pull
+from model.springs import curvature, slope
+
+__all__ = [
+    "ELECTRIC",
+    "FORCE",
+    "HEAD",
+    "HELD",
+    "INERTIA",
+    "KIND",
+    "LIMIT",
+    "LOCKING",
+    "MODULUS",
+    "RATE",
+    "UNIFORM",
+    "WIDTH",
+    "branch_count",
+    "network_stress",
+    "nominal_pull",
+    "nominal_pull_slope",
+    "true_pull",
+]
+
+# head
+HELD = 0  #: code of the kinematics
+INERTIA = 1  #: kg/m: the coefficient of lam'' in the motion equation (a stress per lam'')
+FORCE = 2  #: Pa: nominal stress of the hanging load, F/(L2 Z)
+ELECTRIC = 3  #: Pa/V^2: eps/Z^2
+UNIFORM = 4  #: code of the strain energy that all springs share, or -1
+HEAD = 5
+
+# each spring
+KIND = 0  #: code of the strain energy
+MODULUS = 1  #: Pa
+LIMIT = 2  #: J or n
+LOCKING = 3  #: I1 - 3 where it locks
+RATE = 4  #: 1/T in 1/s; of no meaning for the equilibrium spring
+WIDTH = 5
+
+
+@jit
+def branch_count(c: np.ndarray) -> int:
+    """Number of Maxwell branches in coefficient vector ``c``."""
+    return (c.shape[0] - HEAD) // WIDTH - 1
+
+
+@jit
+def true_pull(held: int, kind: int, limit: float, s: float, inverse: float) -> float:
+    """True stress over the modulus of one spring at squared stretch ``s``, with 1/s given.
+
+    Beyond locking the value has no meaning: callers check the strain against the locking strain.
+    """
+    strain, pull = strain_and_pull(held, s, inverse)
+    return 2.0 * slope(kind, strain, 1.0, limit) * pull
+
+
+@jit
+def nominal_pull(held: int, kind: int, limit: float, locking: float, e: float) -> float:
+    """g W'(e)/mu of one spring at its own stretch ``e``; inf at and beyond locking."""
+    strain, pull = strain_and_pull(held, e * e, 1.0 / (e * e))
+    if not strain < locking:
+        return np.inf
+    return 2.0 * slope(kind, strain, 1.0, limit) * pull / e
+
+
+@jit
+def nominal_pull_slope(held: int, kind: int, limit: float, locking: float, e: float) -> float:
+    """d(nominal_pull)/de; inf at and beyond locking."""
+    strain, pull = strain_and_pull(held, e * e, 1.0 / (e * e))
+    if not strain < locking:
+        return np.inf
+    pull /= e
+    return 2.0 * (
+        curvature(kind, strain, 1.0, limit) * 2.0 * directions(held) * pull * pull
+        + slope(kind, strain, 1.0, limit) * pull_slope(held, e)
+    )
+
+
+@jit
+def network_stress(c: np.ndarray, lam: float, xi: np.ndarray) -> float:
+    """Nominal stress in Pa of all springs at stretch ``lam`` with inner stretches ``xi`` (n,)."""
+    held = int(c[HELD])
+    total = c[HEAD + MODULUS] * nominal_pull(
+        held, int(c[HEAD + KIND]), c[HEAD + LIMIT], c[HEAD + LOCKING], lam
+    )
+    for i in range(branch_count(c)):
+        k = HEAD + WIDTH * (i + 1)
+        pull = nominal_pull(held, int(c[k + KIND]), c[k + LIMIT], c[k + LOCKING], lam / xi[i])
+        total += c[k + MODULUS] * pull / xi[i]
+    return total
