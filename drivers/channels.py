@@ -19,10 +19,13 @@ CHANNEL_NAMES = (
 
 COUNT_MIN, COUNT_MAX = -32768, 32767
 
+_BEND_MAX = 0.01
+_INVERSION_TOLERANCE = 1e-3  # counts
+
 
 @dataclass(frozen=True)
 class Scaling:
-    """From int16 counts to a physical value: volts = polynomial(counts), value = offset + gain volts.
+    """From int16 counts to a physical value: offset + gain volts, volts = polynomial(counts).
 
     ``coefficients`` are the card's own, lowest power first, in V; ``gain`` is in the channel's unit
     per volt and ``offset`` in its unit.
@@ -40,13 +43,26 @@ class Scaling:
     def counts(self, physical: np.ndarray) -> np.ndarray:
         """Nearest int16 counts of ``physical``, saturating at the converter's ends.
 
-        Only for scalings of first order, as converters' ideal ones are.
+        Raises ``ValueError`` where the higher coefficients bend the scaling by more than 1 % of its
+        first order: then the counts are not found by the iteration used here, and no converter is
+        that crooked.
         """
-        if len(self.coefficients) != 2:
-            raise ValueError(f"only a linear scaling can be inverted, not {self.coefficients}")
+        constant, first, *higher = self.coefficients
+        # how much the higher terms can bend the slope, of the first order
+        bend = sum(p * abs(c / first) * COUNT_MAX ** (p - 1) for p, c in enumerate(higher, start=2))
+        if not bend <= _BEND_MAX:
+            raise ValueError(
+                f"only a nearly linear scaling can be inverted, not {self.coefficients}"
+            )
         volts = (np.asarray(physical, dtype=np.float64) - self.offset) / self.gain
-        raw = np.rint((volts - self.coefficients[0]) / self.coefficients[1])
-        return np.clip(raw, COUNT_MIN, COUNT_MAX).astype(np.int16)
+        raw = (volts - constant) / first
+        linear, error = raw, bend * COUNT_MAX
+        while error > _INVERSION_TOLERANCE:  # each round shrinks the error by the bend
+            raw = np.clip(raw, COUNT_MIN, COUNT_MAX)
+            bent = np.polynomial.polynomial.polyval(raw, higher) * raw * raw
+            raw = linear - bent / first
+            error *= bend
+        return np.clip(np.rint(raw), COUNT_MIN, COUNT_MAX).astype(np.int16)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["RefusedWaveform", "RigError", "RigStateError"]
+__all__ = ["AddressError", "RefusedWaveform", "RigError", "RigStateError"]
 
 
 class RigError(Exception):
@@ -15,6 +15,10 @@ class RigError(Exception):
 
 class RigStateError(RigError):
     """A call that the rig cannot take in the state it is in."""
+
+
+class AddressError(ValueError):
+    """A rig address that no driver understands; the message says what is understood."""
 
 
 class RefusedWaveform(ValueError):  # noqa: N818  (it is a refusal, and reads as one)

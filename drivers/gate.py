@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import final
+from typing import NoReturn, final
 
 import numpy as np
 
 from drivers.errors import RefusedWaveform
 
-__all__ = ["GatedWaveform", "Limits", "Margin", "admit"]
+__all__ = ["GatedWaveform", "Limits", "Margin", "admit", "ramp_down"]
 
 _KEY = object()
 
@@ -45,12 +45,17 @@ class Margin:
 
 @final
 class GatedWaveform:
-    """A voltage waveform that has passed the gate; read-only.
+    """A voltage waveform that has passed the gate; neither changed nor copied afterwards.
 
     ``voltage`` (N,) V at the film on an even clock of ``rate`` Hz, starting and ending at 0 V.
     """
 
     __slots__ = ("_limits", "_margins", "_rate", "_voltage")
+
+    _limits: Limits
+    _margins: tuple[Margin, ...]
+    _rate: float
+    _voltage: np.ndarray
 
     def __init__(
         self,
@@ -62,11 +67,22 @@ class GatedWaveform:
     ) -> None:
         if key is not _KEY:
             raise TypeError("a GatedWaveform comes from drivers.gate.admit and from nowhere else")
-        self._voltage = np.array(voltage, dtype=np.float64)
-        self._voltage.setflags(write=False)
-        self._rate = rate
-        self._limits = limits
-        self._margins = margins
+        # an array over bytes: unlike one with its flag cleared, it cannot be made writeable again
+        held = np.frombuffer(np.asarray(voltage, dtype=np.float64).tobytes())
+        object.__setattr__(self, "_voltage", held)
+        object.__setattr__(self, "_rate", rate)
+        object.__setattr__(self, "_limits", limits)
+        object.__setattr__(self, "_margins", margins)
+
+    def __init_subclass__(cls, **kwargs: object) -> NoReturn:
+        raise TypeError("a GatedWaveform cannot be derived from: it would open the gate")
+
+    def __setattr__(self, name: str, value: object) -> NoReturn:
+        raise AttributeError(f"a GatedWaveform is not changed after the gate ({name!r})")
+
+    def __reduce_ex__(self, protocol: object) -> NoReturn:
+        # copying and unpickling build objects without passing __init__
+        raise TypeError("a GatedWaveform is not copied or pickled: admit the waveform again")
 
     @property
     def voltage(self) -> np.ndarray:
@@ -105,8 +121,12 @@ def admit(
     ``voltage`` is (N,) V at the film, ``rate`` Hz. ``field_per_volt`` (N,) 1/m is the reciprocal of
     the film's predicted thickness at each sample, so that the true field is their product; it comes
     from the model, which this layer does not know.
+
+    Slew is judged sample to sample, as the converter steps; the steps from and to the 0 V before
+    and after the run are none, because the waveform must start and end at 0 V.
     """
-    voltage = np.asarray(voltage, dtype=np.float64)
+    # a copy: what is judged is what goes out, whatever the caller does to its array meanwhile
+    voltage = np.array(voltage, dtype=np.float64)
     field_per_volt = np.asarray(field_per_volt, dtype=np.float64)
     if not (math.isfinite(rate) and rate > 0.0):
         raise RefusedWaveform((f"the sample rate {rate!r} Hz is not a finite number above 0",))
@@ -121,6 +141,14 @@ def admit(
     if not finite.all():
         at = int(np.argmin(finite))
         raise RefusedWaveform((f"sample {at} (at {at / rate:.4g} s) is not a finite number",))
+    if not (field_per_volt > 0.0).all():
+        at = int(np.argmin(field_per_volt))
+        raise RefusedWaveform(
+            (
+                f"the field factor at sample {at} is {field_per_volt[at]:.4g} 1/m: "
+                "it is one over a thickness, and above 0",
+            )
+        )
 
     reasons: list[str] = []
 
@@ -135,11 +163,14 @@ def admit(
             )
         return Margin(quantity, reached * scale, allowed * scale, unit)
 
+    with np.errstate(over="ignore"):  # what overflows is inf, and beyond every limit
+        slew = np.abs(np.diff(voltage)) * rate
+        field = np.abs(voltage) * field_per_volt
     margins = (
         check("voltage", voltage, limits.voltage_max, "kV", 1e-3),
         check("negative voltage", -voltage, -limits.voltage_min, "kV", 1e-3),
-        check("slew", np.abs(np.diff(voltage)) * rate, limits.slew, "kV/s", 1e-3),
-        check("true field", np.abs(voltage) * field_per_volt, limits.field, "MV/m", 1e-6),
+        check("slew", slew, limits.slew, "kV/s", 1e-3),
+        check("true field", field, limits.field, "MV/m", 1e-6),
     )
     reasons.extend(
         f"the waveform {'starts' if i == 0 else 'ends'} at {voltage[i] * 1e-3:.6g} kV, not at 0"
@@ -149,3 +180,18 @@ def admit(
     if reasons:
         raise RefusedWaveform(tuple(reasons))
     return GatedWaveform(voltage, rate, limits, margins, _KEY)
+
+
+def ramp_down(waveform: GatedWaveform, last: int, duration: float) -> np.ndarray:
+    """(M,) V that take the output from sample ``last`` of ``waveform`` to 0 V in a straight line.
+
+    ``duration`` in s is lengthened where the waveform's slew limit asks for it. These are the only
+    samples that reach an output without having been in the waveform; they lie between one that
+    passed the gate and 0 V. Empty when sample ``last`` already is 0 V.
+    """
+    voltage = float(waveform.voltage[last])
+    if voltage == 0.0:
+        return np.empty(0)
+    seconds = max(duration, abs(voltage) / waveform.limits.slew)
+    steps = max(1, math.ceil(seconds * waveform.rate))
+    return voltage * (1.0 - np.arange(1, steps + 1) / steps)

@@ -103,7 +103,9 @@ class Actuator:
                 raise ModelError(f"effect {name!r} is not one of {', '.join(EFFECTS)}")
             wanted = {p.name for p in EFFECTS[name].parameters}
             if {n for n, _ in values} != wanted:
-                raise ModelError(f"effect {name!r} takes the parameters {', '.join(sorted(wanted))}")
+                raise ModelError(
+                    f"effect {name!r} takes the parameters {', '.join(sorted(wanted))}"
+                )
 
     def coefficients(self) -> np.ndarray:
         """The kernel's coefficient vector (see ``model.network``)."""

@@ -39,6 +39,7 @@ from model.network import (
     nominal_pull_slope,
     true_pull,
 )
+from model.rodas import ALPHA, GAMMA, A, C, D
 
 __all__ = [
     "BAD_INPUT",
@@ -61,6 +62,8 @@ BAD_INPUT = 5  #: not finite, or time that does not increase
 _STRETCH_MAX = 100.0  # beyond any elastomer: a runaway, whatever the springs say
 _RK4_STEP_MAX = 2.5e-3  # s; a thesis record is then good to 0.03 um
 _RK4_PHASE_MAX = 1.20  # (angular frequency or flow rate) times step
+_RK4_TOLERANCE = 5e-8  # in stretch, a step: slow lobes stay below it, steps ring above it
+_RK4_REFINE_MAX = 8.0
 _RK4_SUBSTEPS_MAX = 2  # beyond that, one RODAS step is cheaper
 _RODAS_TOLERANCE = 5e-9  # in stretch, a step: 0.4 nm on 75 mm
 _RODAS_STEP_MAX = 2e-2  # s; the error estimate rules below that
@@ -68,36 +71,6 @@ _RODAS_HALVINGS = 2.0**-17
 
 _SHORTEST = WIDTH
 _LONGEST = WIDTH + 1
-
-# RODAS coefficients, as printed in Hairer and Wanner's RODAS code
-_GAMMA = 0.25
-_A = np.array(
-    [
-        [0.0, 0.0, 0.0, 0.0],
-        [1.544, 0.0, 0.0, 0.0],
-        [0.9466785280815826, 0.2557011698983284, 0.0, 0.0],
-        [3.314825187068521, 2.896124015972201, 0.9986419139977817, 0.0],
-        [1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950],
-    ]
-)
-_C = np.array(
-    [
-        [0.0, 0.0, 0.0, 0.0, 0.0],
-        [-5.6688, 0.0, 0.0, 0.0, 0.0],
-        [-2.430093356833875, -0.2063599157091915, 0.0, 0.0, 0.0],
-        [-0.1073529058151375, -9.594562251023355, -20.47028614809616, 0.0, 0.0],
-        [7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160, 0.0],
-        [
-            8.083246795921522,
-            -7.981132988064893,
-            -31.52159432874371,
-            16.31930543123136,
-            -6.058818238834054,
-        ],
-    ]
-)
-_ALPHA = np.array([0.0, 0.386, 0.21, 0.63, 1.0, 1.0])
-_D = np.array([0.25, -0.1043, 0.1035, -0.0362, 0.0, 0.0])
 
 
 @jit
@@ -318,7 +291,7 @@ def _rodas_step(
     held = int(c[HELD])
     lam = y[0]
     mass = c[INERTIA]
-    s = 1.0 / (h * _GAMMA)
+    s = 1.0 / (h * GAMMA)
     jvl = c[ELECTRIC] * v0 * v0 * electric_slope(held, lam)
     jvl -= c[HEAD + MODULUS] * nominal_pull_slope(
         held, int(c[HEAD + KIND]), c[HEAD + LIMIT], c[HEAD + LOCKING], lam
@@ -348,20 +321,20 @@ def _rodas_step(
             if stage < 5:
                 value = y[j]
                 for m in range(stage):
-                    value += _A[stage, m] * work[m, j]
+                    value += A[stage, m] * work[m, j]
             else:
                 value = z[j] + work[4, j]
             z[j] = value
         if not _admissible(springs, z):
             return np.inf
-        v = v0 + dv * _ALPHA[stage]
+        v = v0 + dv * ALPHA[stage]
         _rates(held, int(c[UNIFORM]), c, springs, z, v * v, f)
         for j in range(n):
             value = f[j]
             for m in range(stage):
-                value += _C[stage, m] / h * work[m, j]
+                value += C[stage, m] / h * work[m, j]
             rhs[j] = value
-        rhs[1] += h * _D[stage] * ramp
+        rhs[1] += h * D[stage] * ramp
         a = rhs[1] + s * rhs[0]
         for i in range(branches):
             a += jvx[i] * rhs[2 + i] * dinv[i]
@@ -442,12 +415,13 @@ def drive_by_voltage(
     held, uniform = int(c[HELD]), int(c[UNIFORM])
     thesis = held == 0 and uniform == 1
     springs = _spring_table(c)
-    work = np.empty((15, y.shape[0]))
+    work = np.zeros((15, y.shape[0]))
     before = np.empty(y.shape[0])
     status = OK
     reached = samples
     h = _RODAS_STEP_MAX
     swing, fastest = 0.0, 0.0
+    last = voltage[0]
     for k in range(samples):
         stretch[k] = y[0]
         rate[k] = y[1]
@@ -463,14 +437,26 @@ def drive_by_voltage(
             swing, fastest = _speed_limit(c, y)
         bound = max(max(swing, fastest) / _RK4_PHASE_MAX, 1.0 / _RK4_STEP_MAX)
         steps = math.ceil(dt * bound - 1e-9)
+        # ringing: its amplitude follows from the acceleration (as of the step before) and from what
+        # the drive adds to it; a step of phase p gets it wrong by p^5/120 of that
+        kick = v0 * v0 - last * last if hold else v1 * v1 - 2.0 * v0 * v0 + last * last
+        amplitude = abs(work[0, 1]) + abs(c[ELECTRIC] * kick) * y[0] / c[INERTIA]
+        phase = swing * dt / steps
+        wrong = amplitude * phase**3 * (dt / steps) ** 2 / 120.0
+        if wrong > _RK4_TOLERANCE:
+            more = min((wrong / _RK4_TOLERANCE) ** 0.2, _RK4_REFINE_MAX)
+        else:
+            more = 1.0
+        last = v1
         for j in range(y.shape[0]):
             before[j] = y[j]
         explicit = steps <= max(_RK4_SUBSTEPS_MAX, _RK4_SUBSTEPS_MAX * dt / _RK4_STEP_MAX)
         if explicit:
+            fine = math.ceil(steps * more - 1e-9)
             if thesis:
-                _rk4_steps(0, 1, c, springs, y, v0, v1, dt / steps, int(steps), work)
+                _rk4_steps(0, 1, c, springs, y, v0, v1, dt / fine, fine, work)
             else:
-                _rk4_steps(held, uniform, c, springs, y, v0, v1, dt / steps, int(steps), work)
+                _rk4_steps(held, uniform, c, springs, y, v0, v1, dt / fine, fine, work)
             if not _admissible(springs, y):  # locking came nearer than the stiffness had foretold
                 explicit = False
                 for j in range(y.shape[0]):

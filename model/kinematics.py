@@ -22,8 +22,8 @@ __all__ = [
     "directions",
     "electric",
     "electric_slope",
-    "strain_and_pull",
     "pull_slope",
+    "strain_and_pull",
     "thinning",
 ]
 

@@ -155,9 +155,7 @@ class Network:
                 f"not {len(moduli)}, {len(limits)} and {len(times)}"
             )
         springs = [Spring(m, j) for m, j in zip(moduli, limits, strict=True)]
-        return cls(
-            springs[0], tuple(Branch(s, t) for s, t in zip(springs[1:], times, strict=True))
-        )
+        return cls(springs[0], tuple(Branch(s, t) for s, t in zip(springs[1:], times, strict=True)))
 
     @property
     def springs(self) -> tuple[Spring, ...]:

@@ -68,7 +68,7 @@ def true_pull(held: int, kind: int, limit: float, s: float, inverse: float) -> f
 
 @jit
 def nominal_pull(held: int, kind: int, limit: float, locking: float, e: float) -> float:
-    """g W'(e)/mu of one spring at its own stretch ``e``; inf at and beyond locking."""
+    """G W'(e)/mu of one spring at its own stretch ``e``; inf at and beyond locking."""
     strain, pull = strain_and_pull(held, e * e, 1.0 / (e * e))
     if not strain < locking:
         return np.inf

@@ -30,7 +30,9 @@ EFFECT = Effect(
     family="load_inertia",
     acts_on="inertia",
     parameters=(
-        Parameter("moving_mass", "kg", 0.0, (0.0, 2.0), "mass that moves with the film's lower edge"),
+        Parameter(
+            "moving_mass", "kg", 0.0, (0.0, 2.0), "mass that moves with the film's lower edge"
+        ),
     ),
     contribute=_contribute,
 )

@@ -34,7 +34,7 @@ def langevin(beta: float) -> tuple[float, float]:
 
 @jit
 def inverse_langevin(x: float) -> float:
-    """beta with coth(beta) - 1/beta = x, for 0 <= x < 1, to rounding.
+    """Beta with coth(beta) - 1/beta = x, for 0 <= x < 1, to rounding.
 
     Starts from Kroeger's rational approximation (2015, error below 0.28 %); two Newton steps on the
     Langevin function leave nothing that double precision can show.

@@ -1,0 +1,183 @@
+"""Columns of a CSV file: comma, semicolon or tab, with a line of names.
+
+The numbers are parsed by Arrow. Wherever that does not give a finite number in every place, the
+text is gone through again line by line, more slowly, to say in which line and column and why.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from app.errors import InputError
+from app.recording.importers.source import no_such_column
+
+__all__ = ["CsvSource"]
+
+DELIMITERS = (";", "\t", ",")
+#: A cell is quoted in messages up to this length.
+SHOWN = 30
+
+
+class CsvSource:
+    """The CSV file at ``path``. Raises ``InputError`` if it has no line of names or no data."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        lines = _decoded(path).replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        #: line number in the file (from 1) and text of every line that is neither blank nor comment
+        self._rows = [
+            (number, line)
+            for number, line in enumerate(lines, 1)
+            if line.strip() and not line.lstrip().startswith("#")
+        ]
+        if not self._rows:
+            raise InputError(f"{path} is empty")
+        header = self._rows[0][1]
+        self._delimiter = max(DELIMITERS, key=header.count)
+        if header.count(self._delimiter) == 0:
+            self._delimiter = ","
+        self.names = [name.strip() for name in self._cells(*self._rows[0])]
+        if all(_number(name, False) is not None for name in self.names):
+            raise InputError(
+                f"{path}, line {self._rows[0][0]}: there are numbers where the names of the "
+                f"columns should be; put a line such as time_s,voltage_V,displacement_mm above"
+            )
+        if len(self._rows) == 1:
+            raise InputError(f"{path} has a line of names and no data")
+
+    def _cells(self, number: int, line: str) -> list[str]:
+        try:
+            return next(csv.reader([line], delimiter=self._delimiter))
+        except (csv.Error, StopIteration) as error:
+            raise InputError(f"{self.path}, line {number}: it cannot be split: {error}") from error
+
+    def named(self, name: str) -> list[str]:
+        """The columns called ``name``."""
+        return [n for n in self.names if n == name]
+
+    def row(self, index: int) -> str:
+        """The line of sample ``index``."""
+        return f"line {self._rows[index + 1][0]}"
+
+    def check(self, name: str) -> None:
+        """See ``Source``."""
+        count = self.names.count(name)
+        if count == 0:
+            raise no_such_column(self, name)
+        if count > 1:
+            raise InputError(f"{self.path}: {count} columns are called {name!r}; rename one")
+
+    def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Columns by name; see ``Source``."""
+        wanted = list(dict.fromkeys(names))
+        columns = self._read_fast(wanted)
+        return columns if columns is not None else self._read_slowly(wanted)
+
+    def _read_fast(self, names: list[str]) -> dict[str, np.ndarray] | None:
+        import pyarrow
+        from pyarrow import csv as arrow_csv
+
+        # a comma in a row separated by semicolons is a decimal one; both kinds are looked at slowly
+        decimal = "."
+        body = "\n".join(line for _, line in self._rows[1:])
+        if self._delimiter != "," and "," in body:
+            if "." in body:
+                return None
+            decimal = ","
+        places = [f"column{i}" for i in range(len(self.names))]
+        wanted = {name: places[self.names.index(name)] for name in names}
+        try:
+            table = arrow_csv.read_csv(
+                io.BytesIO(body.encode("utf-8", "replace")),
+                read_options=arrow_csv.ReadOptions(column_names=places),
+                parse_options=arrow_csv.ParseOptions(
+                    delimiter=self._delimiter, ignore_empty_lines=False
+                ),
+                convert_options=arrow_csv.ConvertOptions(
+                    column_types=dict.fromkeys(places, pyarrow.float64()),
+                    include_columns=list(wanted.values()),
+                    decimal_point=decimal,
+                ),
+            )
+        except pyarrow.ArrowException:
+            return None
+        columns = {}
+        for name, place in wanted.items():
+            column = table.column(place)
+            values = column.to_numpy()
+            whole = column.null_count == 0 and len(values) == len(self._rows) - 1
+            if not (whole and np.isfinite(values).all()):
+                return None
+            columns[name] = values
+        return columns
+
+    def _read_slowly(self, names: list[str]) -> dict[str, np.ndarray]:
+        places = [self.names.index(name) for name in names]
+        columns = np.empty((len(names), len(self._rows) - 1))
+        comma = self._delimiter != ","
+        for index, (number, line) in enumerate(self._rows[1:]):
+            cells = self._cells(number, line)
+            if len(cells) != len(self.names):
+                raise InputError(
+                    f"{self.path}, line {number}: {len(cells)} values under {len(self.names)} "
+                    f"column names; every line must have one for each column"
+                )
+            for i, place in enumerate(places):
+                value = _number(cells[place], comma)
+                if value is None or not math.isfinite(value):
+                    raise InputError(
+                        f"{self.path}, line {number}, column {names[i]!r}: "
+                        f"{_complaint(cells[place], comma)}"
+                    )
+                columns[i, index] = value
+        return dict(zip(names, columns, strict=True))
+
+
+def _number(cell: str, decimal_comma: bool) -> float | None:
+    text = cell.strip()
+    if decimal_comma and "." not in text:
+        text = text.replace(",", ".")
+    # float() also takes 1_000 and the digits of other scripts
+    if "_" in text or not text.isascii():
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _complaint(cell: str, decimal_comma: bool) -> str:
+    text = cell.strip()
+    if not text:
+        return "there is no value; fill it in or leave the line out"
+    shown = text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
+    if _number(cell, decimal_comma) is not None:
+        return f"{shown!r} is not a finite number; leave the line out or mend it"
+    if decimal_comma and "," in text and "." in text:
+        return f"{shown!r} has both a comma and a point; write numbers without thousands separators"
+    return f"{shown!r} is not a number"
+
+
+def _decoded(path: Path) -> str:
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error}") from error
+    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+        try:
+            return raw.decode("utf-16")
+        except UnicodeDecodeError as error:
+            raise InputError(f"{path} begins as UTF-16 text and is not: {error}") from error
+    if b"\0" in raw:
+        raise InputError(f"{path} is not a text file; CSV, MAT and TDMS files can be imported")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        # numbers are ASCII in any case; only a column name may look odd
+        return raw.decode("latin-1")

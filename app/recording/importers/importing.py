@@ -1,0 +1,132 @@
+"""Measured data made elsewhere, turned into a recording."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from app.errors import InputError
+from app.recording.files import check_output, file_sha256
+from app.recording.importers.chosen import Chosen
+from app.recording.importers.csv_file import CsvSource
+from app.recording.importers.mat_file import MatSource
+from app.recording.importers.plausible import doubts
+from app.recording.importers.source import Source
+from app.recording.importers.tdms_file import TdmsSource
+from app.recording.quiet import lead_in, mean_beyond_noise
+from app.recording.save import save_recording
+from drivers.rig import Event
+from model.kinematics import KINEMATICS
+from model.material import Film, Load
+
+__all__ = ["import_file"]
+
+
+def import_file(
+    source: str | Path,
+    out: str | Path,
+    columns: Mapping[str, str] | None = None,
+    *,
+    gauge_length_mm: float | None = None,
+    area_mm2: float | None = None,
+    kinematics: str | None = None,
+    film: Film | None = None,
+    load: Load | None = None,
+    film_id: str = "",
+    notes: str = "",
+    configuration: str = "",
+    overwrite: bool = False,
+    now: Callable[[], float] = time.time,
+) -> list[str]:
+    """Bring the CSV, MAT or TDMS file ``source`` in as the recording ``out``.
+
+    ``columns`` maps names such as ``voltage_kV`` to what the file calls them: a CSV column, a MAT
+    path (``data.xdata[0]``), a TDMS ``group/channel``; columns that have such a name already need
+    no mention. Film data with a displacement take ``gauge_length_mm``, with a force ``area_mm2``,
+    and are uniaxial unless ``kinematics`` says otherwise. Time is kept as it is, even or not.
+    Displacement of an actuator is counted from the mean of its lead-in at 0 V, if it has one.
+
+    Returns sentences about values that are possible and look wrong. Raises ``InputError``, with
+    nothing written, for everything that cannot be a recording.
+    """
+    path = Path(source)
+    out = check_output(out, overwrite, path)
+    if kinematics is not None and kinematics not in KINEMATICS:
+        raise InputError(f"kinematics {kinematics!r} is not one of {', '.join(KINEMATICS)}")
+    for name, given in (("gauge length", gauge_length_mm), ("area", area_mm2)):
+        if given is not None and not 0.0 < given < float("inf"):
+            raise InputError(f"the {name} is {given!r}; it must be a finite number above 0")
+    chosen = Chosen(_open(path), columns or {})
+    warnings: list[str] = []
+    kind = chosen.kind(warnings)
+    if kind == "actuator":
+        values = chosen.actuator()
+        if gauge_length_mm is not None or area_mm2 is not None:
+            warnings.append("gauge length and area are for film data, and were not used")
+        rest, events = _from_rest(values)
+        if film is not None and kinematics is not None:
+            film = replace(film, kinematics=kinematics)
+    else:
+        values = chosen.film(gauge_length_mm, area_mm2, warnings)
+        rest, events = 0.0, ()
+        kinematics = kinematics or "uniaxial"
+    warnings += chosen.left_out()
+    warnings += doubts(values, film)
+    save_recording(
+        out,
+        kind,
+        values,
+        title=path.stem,
+        hold=False,
+        kinematics=kinematics,
+        film=film,
+        load=load,
+        film_id=film_id,
+        notes=notes,
+        rest_reading=rest,
+        events=(*events, *(Event(0, "warning", sentence) for sentence in warnings)),
+        configuration=configuration,
+        provenance={
+            "source": path.name,
+            "source_sha256": file_sha256(path),
+            "columns": ", ".join(f"{name}={where}" for name, where, _ in chosen.picked.values()),
+            **({} if gauge_length_mm is None else {"gauge_length_mm": float(gauge_length_mm)}),
+            **({} if area_mm2 is None else {"area_mm2": float(area_mm2)}),
+        },
+        overwrite=overwrite,
+        now=now,
+    )
+    return warnings
+
+
+def _open(path: Path) -> Source:
+    if not path.is_file():
+        raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")
+    suffix = path.suffix.lower()
+    if path.stat().st_size == 0:
+        raise InputError(f"{path} is empty")
+    if suffix in (".csv", ".txt", ".tsv"):
+        return CsvSource(path)
+    if suffix == ".mat":
+        return MatSource(path)
+    if suffix == ".tdms":
+        return TdmsSource(path)
+    raise InputError(f"{path}: files named .csv, .mat and .tdms can be imported, not {suffix!r}")
+
+
+def _from_rest(values: dict[str, np.ndarray]) -> tuple[float, tuple[Event, ...]]:
+    """Count the displacement from its mean over the lead-in, changing ``values``."""
+    quiet = lead_in(values["voltage_command"])
+    rest = mean_beyond_noise(values["displacement"][:quiet])
+    if rest == 0.0:
+        return 0.0, ()
+    values["displacement"] = values["displacement"] - rest
+    message = (
+        f"displacement is counted from its mean over the {quiet} samples at 0 V at the start, "
+        f"which was {rest * 1e6:.6g} um"
+    )
+    return rest, (Event(0, "info", message),)

@@ -1,0 +1,89 @@
+"""What looks like a wrong unit in imported values, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from model.material import Film
+
+__all__ = ["doubts"]
+
+#: A free length that no actuator film on a bench exceeds, m; used where the film is not known.
+LONGEST_FILM = 0.5
+
+
+def _span(values: np.ndarray) -> float:
+    return float(values.max() - values.min())
+
+
+def doubts(values: Mapping[str, np.ndarray], film: Film | None) -> list[str]:
+    """One sentence for each of ``values`` (by the recording's names and units) that is doubtful."""
+    found = []
+
+    def check(name: str, wrong: bool, sentence: str) -> None:
+        if name in values and wrong:
+            found.append(sentence)
+
+    if "displacement" in values:
+        span = _span(values["displacement"])
+        longest, whose = (
+            (film.length, "the film is") if film else (LONGEST_FILM, "a film is hardly")
+        )
+        check(
+            "displacement",
+            span > longest,
+            f"displacement spans {span * 1e3:.4g} mm and {whose} {longest * 1e3:.4g} mm long; "
+            f"is its unit right?",
+        )
+        check(
+            "displacement",
+            span < 1e-7,
+            f"displacement spans {span * 1e6:.4g} um only; is its unit right?",
+        )
+    if "voltage_command" in values:
+        highest = float(np.abs(values["voltage_command"]).max())
+        check(
+            "voltage_command",
+            highest > 30e3,
+            f"voltage reaches {highest * 1e-3:.4g} kV; is it in V and not in kV?",
+        )
+        check("voltage_command", highest == 0.0, "voltage never leaves 0 V")
+        check(
+            "voltage_command",
+            0.0 < highest < 30.0,
+            f"voltage reaches {highest:.4g} V only; is it in kV?",
+        )
+    if "current_monitor" in values:
+        highest = float(np.abs(values["current_monitor"]).max())
+        check(
+            "current_monitor",
+            highest > 1.0,
+            f"current reaches {highest:.4g} A, which no high-voltage amplifier gives; "
+            f"is its unit right?",
+        )
+    if "temperature" in values:
+        low, high = float(values["temperature"].min()), float(values["temperature"].max())
+        check(
+            "temperature",
+            low < -100.0 or high > 150.0,
+            f"temperature lies between {low:.4g} and {high:.4g} degC; is its unit right?",
+        )
+    if "stretch" in values:
+        low, high = float(values["stretch"].min()), float(values["stretch"].max())
+        check(
+            "stretch",
+            low < 0.2 or high > 15.0,
+            f"stretch lies between {low:.4g} and {high:.4g}; is it length over length at rest, "
+            f"and the gauge length right?",
+        )
+        check("stretch", low == high, "stretch never changes")
+    if "nominal_stress" in values:
+        highest = float(np.abs(values["nominal_stress"]).max())
+        check(
+            "nominal_stress",
+            highest > 1e8 or 0.0 < highest < 10.0,
+            f"nominal stress reaches {highest * 1e-3:.4g} kPa; are its unit and the area right?",
+        )
+    return found

@@ -1,0 +1,76 @@
+"""Columns of a TDMS file (LabVIEW): channels, called ``group/channel``."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from app.errors import InputError
+from app.recording.importers.source import PARSER_FAILURES, no_such_column
+
+__all__ = ["TdmsSource"]
+
+
+class TdmsSource:
+    """The TDMS file at ``path``. Raises ``InputError`` if it cannot be read or holds no numbers.
+
+    Where no channel is called ``time_s``, one is made from the waveform timing of the channels, if
+    they have it and it is the same for all.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._columns, timing = _load(path)
+        if not self._columns:
+            raise InputError(f"{path} holds no channels of numbers")
+        if len(timing) == 1 and not self.named("time_s"):
+            ((start, step, size),) = timing
+            self._columns["time_s"] = start + step * np.arange(size)
+
+    @property
+    def names(self) -> list[str]:
+        """All channels as ``group/channel``."""
+        return list(self._columns)
+
+    def named(self, name: str) -> list[str]:
+        """The channels called ``name``, in whichever group."""
+        return [n for n in self._columns if n == name or n.endswith(f"/{name}")]
+
+    def row(self, index: int) -> str:
+        """The sample, counted from 1."""
+        return f"row {index + 1}"
+
+    def check(self, name: str) -> None:
+        """See ``Source``."""
+        if name not in self._columns:
+            raise no_such_column(self, name)
+
+    def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Columns by name; see ``Source``."""
+        return {name: self._columns[name] for name in names}
+
+
+def _load(path: Path) -> tuple[dict[str, np.ndarray], set[tuple[float, float, int]]]:
+    from nptdms import TdmsFile
+
+    columns: dict[str, np.ndarray] = {}
+    timing: set[tuple[float, float, int]] = set()
+    try:
+        with path.open("rb") as stream, warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            for group in TdmsFile.read(stream).groups():
+                for channel in group.channels():
+                    values = np.asarray(channel[:])
+                    if values.dtype.kind not in "fiu" or values.size == 0:
+                        continue
+                    columns[f"{group.name}/{channel.name}"] = values.astype(np.float64)
+                    step = float(channel.properties.get("wf_increment", 0.0))
+                    if step > 0.0:
+                        start = float(channel.properties.get("wf_start_offset", 0.0))
+                        timing.add((start, step, values.size))
+    except PARSER_FAILURES as error:
+        raise InputError(f"{path} cannot be read as a TDMS file: {error}") from error
+    return columns, timing

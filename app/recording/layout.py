@@ -1,0 +1,140 @@
+"""The layout of a recording file: names, units and types of everything in it.
+
+/                       format, default="entry"
+/entry                  NXentry: format, kind, complete, outcome, samples, default="data"
+/entry/title, start_time, end_time
+/entry/data             NXdata: time and the physical values, and beside them NAME_counts
+/entry/instrument/*     one NXinstrument for each instrument; channels/NAME links to the counts
+/entry/sample           NXsample: film and load
+/entry/sequence         TOML (runs only)
+/entry/model            TOML of the live overlay (when there was one)
+/entry/events           sample, time, level, message
+/entry/provenance       versions, configuration and its hash, seed, host, operator
+"""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from types import MappingProxyType
+
+import h5py
+import numpy as np
+
+from app.recording.text import fixed, put_text
+
+__all__ = [
+    "EVENT_LEVELS",
+    "EVENT_TYPE",
+    "FORMAT",
+    "FORMAT_NAME",
+    "KINDS",
+    "LIBVER",
+    "LINEAR",
+    "MESSAGE_BYTES",
+    "REQUIRED",
+    "SIGNALS",
+    "UNITS",
+    "ZERO_ORDER",
+    "counts_name",
+    "describe_field",
+    "iso_time",
+    "lay_out",
+]
+
+FORMAT_NAME = "dearig-recording"
+FORMAT = f"{FORMAT_NAME}/1"
+
+#: The one library version under which a file was found to survive a kill at every write boundary.
+LIBVER = ("v110", "v110")
+
+#: The two kinds: a film driven by voltage, and a film specimen driven by stretch.
+KINDS = ("actuator", "film")
+
+#: What is plotted by default, and what a model of the film has to reproduce.
+SIGNALS = MappingProxyType({"actuator": "displacement", "film": "nominal_stress"})
+
+#: Values without which a recording of a kind says nothing.
+REQUIRED = MappingProxyType(
+    {
+        "actuator": ("time", "displacement", "voltage_command"),
+        "film": ("time", "stretch", "nominal_stress"),
+    }
+)
+
+#: Units of the physical values under /entry/data.
+UNITS = MappingProxyType(
+    {
+        "time": "s",
+        "displacement": "m",
+        "voltage_command": "V",
+        "voltage_monitor": "V",
+        "current_monitor": "A",
+        "temperature": "degC",
+        "displacement_model": "m",
+        "stretch": "1",
+        "nominal_stress": "Pa",
+    }
+)
+
+LONG_NAMES = MappingProxyType(
+    {
+        "displacement": "displacement from the loaded rest state",
+        "voltage_command": "voltage at the film, commanded",
+        "voltage_monitor": "voltage at the film, monitored",
+        "current_monitor": "current, monitored",
+        "displacement_model": "displacement, live model",
+        "nominal_stress": "nominal stress",
+    }
+)
+
+#: How a voltage goes between its samples: a converter holds it, imported data is a polyline.
+ZERO_ORDER, LINEAR = "zero-order", "linear"
+
+EVENT_LEVELS = ("info", "warning", "fault")
+MESSAGE_BYTES = 480
+EVENT_TYPE = np.dtype(
+    [
+        ("sample", "<i8"),
+        ("time", "<f8"),
+        ("level", h5py.string_dtype("utf-8", 8)),
+        ("message", h5py.string_dtype("utf-8", MESSAGE_BYTES)),
+    ]
+)
+
+
+def counts_name(channel: str) -> str:
+    """Name of the raw counts that stand beside the physical values of ``channel``."""
+    return f"{channel}_counts"
+
+
+def iso_time(moment: float) -> str:
+    """ISO 8601 in UTC of a Unix time ``moment`` in s."""
+    return datetime.fromtimestamp(moment, tz=UTC).isoformat(timespec="milliseconds")
+
+
+def describe_field(dataset: h5py.Dataset, name: str) -> None:
+    """Give a physical dataset its ``units`` and, where its own does not do, a name for plots."""
+    dataset.attrs["units"] = fixed(UNITS[name])
+    if name in LONG_NAMES:
+        # viewers show this instead of name and unit
+        dataset.attrs["long_name"] = fixed(f"{LONG_NAMES[name]} ({UNITS[name]})")
+
+
+def lay_out(file: h5py.File, kind: str, title: str, started: float) -> h5py.Group:
+    """Make the root, /entry and an empty /entry/data of a new file; returns /entry."""
+    file.attrs["NX_class"] = fixed("NXroot")
+    file.attrs["format"] = fixed(FORMAT)
+    file.attrs["default"] = fixed("entry")
+    entry = file.create_group("entry")
+    entry.attrs["NX_class"] = fixed("NXentry")
+    entry.attrs["format"] = fixed(FORMAT)
+    entry.attrs["default"] = fixed("data")
+    entry.attrs["kind"] = fixed(kind)
+    entry.attrs["complete"] = False
+    put_text(entry, "title", title)
+    put_text(entry, "start_time", iso_time(started))
+    data = entry.create_group("data")
+    data.attrs["NX_class"] = fixed("NXdata")
+    data.attrs["signal"] = fixed(SIGNALS[kind])
+    data.attrs["axes"] = fixed(["time"])
+    return entry

@@ -1,0 +1,95 @@
+"""Where a recording comes from: program versions, configuration, host, operator."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import shutil
+import subprocess
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from app.recording.layout import iso_time
+from app.recording.text import fixed, put_text, text_of
+
+__all__ = ["gather", "git_revision", "read_provenance", "write_provenance"]
+
+ROOT = Path(__file__).resolve().parents[2]
+
+#: Texts longer than this are datasets: HDF5 takes 64 KB in an attribute.
+LONGEST_ATTRIBUTE = 1000
+
+
+def git_revision(root: Path = ROOT) -> str:
+    """Revision of the checkout at ``root``, ``-dirty`` behind it if it was changed; "" if none."""
+    git = shutil.which("git")
+    # not a parent's repository: an installed copy may lie inside somebody else's
+    if git is None or not (root / ".git").exists():
+        return ""
+    command = [git, "-C", str(root), "describe", "--always", "--dirty", "--abbrev=40"]
+    command += ["--exclude=*"]
+    try:
+        answer = subprocess.run(  # noqa: S603  (fixed arguments, no shell)
+            command, capture_output=True, text=True, timeout=5.0, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return answer.stdout.strip() if answer.returncode == 0 else ""
+
+
+def gather(
+    started: float, configuration: str = "", operator: str = "", seed: int | None = None
+) -> dict[str, object]:
+    """What every recording says about its making; ``started`` is a Unix time in s."""
+    try:
+        version = metadata.version("dearig")
+    except metadata.PackageNotFoundError:
+        version = "unknown"
+    found: dict[str, object] = {
+        "start_time": iso_time(started),
+        "operator": operator,
+        "host": platform.node(),
+        "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "dearig_version": version,
+        "git_revision": git_revision(),
+        "python_version": platform.python_version(),
+        "numpy_version": np.__version__,
+        "h5py_version": h5py.__version__,
+        "hdf5_version": h5py.version.hdf5_version,
+        "configuration": configuration,
+        "configuration_sha256": hashlib.sha256(configuration.encode("utf-8")).hexdigest(),
+    }
+    if seed is not None:
+        found["seed"] = seed
+    return found
+
+
+def write_provenance(entry: h5py.Group, provenance: Mapping[str, object]) -> None:
+    """Write ``provenance`` (texts, numbers and booleans) to ``entry/provenance``."""
+    group = entry.create_group("provenance")
+    group.attrs["NX_class"] = fixed("NXcollection")
+    for name, value in provenance.items():
+        if name == "configuration" or len(str(value)) > LONGEST_ATTRIBUTE:
+            put_text(group, name, str(value))
+        elif isinstance(value, bool | int | float):
+            group.attrs[name] = value
+        else:
+            group.attrs[name] = fixed(str(value))
+
+
+def read_provenance(group: h5py.Group) -> dict[str, object]:
+    """``entry/provenance`` as plain texts, numbers and booleans."""
+    found: dict[str, object] = {}
+    for name, value in group.attrs.items():
+        if name == "NX_class":
+            continue
+        plain = isinstance(value, np.number | np.bool_)
+        found[name] = value.item() if plain else text_of(value)
+    for name, item in group.items():
+        if isinstance(item, h5py.Dataset):
+            found[name] = text_of(item[()])
+    return found

@@ -1,0 +1,109 @@
+"""A recording written at once, from arrays: imported data, or what a model predicts."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from app.recording.files import check_output, replaced_when_done
+from app.recording.layout import (
+    EVENT_TYPE,
+    KINDS,
+    LIBVER,
+    LINEAR,
+    MESSAGE_BYTES,
+    REQUIRED,
+    UNITS,
+    ZERO_ORDER,
+    describe_field,
+    lay_out,
+)
+from app.recording.provenance import gather, write_provenance
+from app.recording.sample import write_sample
+from app.recording.text import clip_text, fixed, put_text
+from drivers.rig import Event
+from model.material import Film, Load
+
+__all__ = ["save_recording"]
+
+
+def save_recording(
+    path: str | Path,
+    kind: str,
+    values: Mapping[str, np.ndarray],
+    *,
+    title: str,
+    hold: bool = False,
+    kinematics: str | None = None,
+    film: Film | None = None,
+    load: Load | None = None,
+    film_id: str = "",
+    notes: str = "",
+    sequence_toml: str = "",
+    model_toml: str = "",
+    rest_reading: float = 0.0,
+    events: Iterable[Event] = (),
+    configuration: str = "",
+    provenance: Mapping[str, object] | None = None,
+    overwrite: bool = False,
+    now: Callable[[], float] = time.time,
+) -> Path:
+    """Write ``values`` ((N,) each, by their names in ``layout.UNITS`` and in those units).
+
+    ``kind`` is actuator or film, ``hold`` as in ``Recording``, ``rest_reading`` m what has been
+    subtracted from the displacement, ``provenance`` anything to note besides the usual. The file
+    appears as a whole or not at all. Raises ``InputError`` if it may not be written, and
+    ``ValueError`` for values that no recording of that kind has.
+    """
+    if kind not in KINDS:
+        raise ValueError(f"kind {kind!r} is not one of {', '.join(KINDS)}")
+    missing = [name for name in REQUIRED[kind] if name not in values]
+    unknown = [name for name in values if name not in UNITS]
+    if missing or unknown:
+        raise ValueError(f"a recording of kind {kind}: missing {missing}, unknown {unknown}")
+    size = np.asarray(values["time"]).size
+    shapes = {name: np.shape(array) for name, array in values.items()}
+    if set(shapes.values()) != {(size,)}:
+        raise ValueError(f"values must be rows of one length, not {shapes}")
+    path = check_output(path, overwrite)
+
+    started = now()
+    noted = gather(started, configuration) | dict(provenance or {})
+    with replaced_when_done(path) as partial, h5py.File(partial, "w", libver=LIBVER) as file:
+        entry = lay_out(file, kind, title, started)
+        data = entry["data"]
+        for name, array in values.items():
+            data.create_dataset(name, data=np.asarray(array, dtype=np.float64))
+            describe_field(data[name], name)
+        if kinematics is not None:
+            data.attrs["kinematics"] = fixed(kinematics)
+        if kind == "actuator":
+            data["voltage_command"].attrs["hold"] = fixed(ZERO_ORDER if hold else LINEAR)
+            data["displacement"].attrs["rest_reading"] = rest_reading
+        write_sample(entry, film, load, film_id, notes)
+        for name, text in (("sequence", sequence_toml), ("model", model_toml)):
+            if text:
+                put_text(entry, name, text)
+        _write_events(entry, tuple(events), np.asarray(values["time"], dtype=np.float64))
+        write_provenance(entry, noted)
+        entry.create_group("instrument").attrs["NX_class"] = fixed("NXcollection")
+        entry.attrs["samples"] = size
+        entry.attrs["outcome"] = fixed("finished")
+        entry.attrs["complete"] = True
+    return path
+
+
+def _write_events(entry: h5py.Group, events: tuple[Event, ...], time_s: np.ndarray) -> None:
+    rows = np.zeros(len(events), dtype=EVENT_TYPE)
+    for i, event in enumerate(events):
+        rows[i] = (
+            event.sample,
+            time_s[event.sample],
+            event.level.encode(),
+            clip_text(event.message, MESSAGE_BYTES),
+        )
+    entry.create_dataset("events", data=rows, dtype=EVENT_TYPE)

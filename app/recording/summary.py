@@ -1,0 +1,156 @@
+"""What is in a recording, as plain values for a program or as lines for a person."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from app.recording.layout import FORMAT, LINEAR, UNITS, ZERO_ORDER
+from app.recording.recording import Recording
+
+__all__ = ["describe", "describe_rows"]
+
+#: Steps of time that differ by less than this of their mean are even (rounding to a file's digits).
+EVEN = 1e-6
+
+
+def describe(recording: Recording) -> dict[str, Any]:
+    """Everything worth knowing but the arrays, ready for JSON; SI units, and names that say so."""
+    steps = np.diff(recording.time)
+    timing: dict[str, Any] = {"even": False, "rate_Hz": None}
+    if steps.size:
+        low, high, mean = float(steps.min()), float(steps.max()), float(steps.mean())
+        even = high - low <= EVEN * mean
+        timing = {
+            "even": even,
+            "rate_Hz": 1.0 / mean if even else None,
+            "step_min_s": low,
+            "step_max_s": high,
+        }
+    film, load = recording.film, recording.load
+    return {
+        "format": FORMAT,
+        "path": str(recording.path),
+        "sha256": recording.sha256,
+        "name": recording.name,
+        "title": recording.title,
+        "kind": recording.kind,
+        "complete": recording.complete,
+        "outcome": recording.outcome,
+        "samples": recording.samples,
+        "samples_expected": recording.samples_expected,
+        "duration_s": recording.duration,
+        "timing": timing,
+        "hold": ZERO_ORDER if recording.hold else LINEAR,
+        "kinematics": recording.kinematics,
+        "channels": [
+            _channel(name, values) for name, values in recording.values.items() if name != "time"
+        ],
+        "quiet_samples": int(recording.quiet.sum()),
+        "noise_floor_m": recording.noise_floor,
+        "rest_reading_m": recording.rest_reading,
+        "displacement_skew_s": recording.displacement_skew,
+        "displacement_delay_s": recording.displacement_delay,
+        "film": asdict(film) | {"id": recording.film_id} if film else None,
+        "load": asdict(load) if load else None,
+        "notes": recording.notes,
+        "sequence": recording.sequence_toml,
+        "model": recording.model_toml,
+        "instruments": [
+            {
+                "role": i.role,
+                "model": i.model,
+                "serial": i.serial,
+                "settings": dict(i.settings),
+            }
+            for i in recording.instruments
+        ],
+        "events": [asdict(event) for event in recording.events],
+        "provenance": recording.provenance,
+    }
+
+
+def _channel(name: str, values: np.ndarray) -> dict[str, Any]:
+    # an overlay may have had nothing to show at times
+    known = values[np.isfinite(values)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (None, None)
+    return {"name": name, "unit": UNITS[name], "min": low, "max": high}
+
+
+#: Units in which a person reads them: what they are multiplied by, and the name.
+_READABLE = MappingProxyType(
+    {
+        "displacement": (1e6, "um"),
+        "displacement_model": (1e6, "um"),
+        "voltage_command": (1e-3, "kV"),
+        "voltage_monitor": (1e-3, "kV"),
+        "current_monitor": (1e3, "mA"),
+        "nominal_stress": (1e-3, "kPa"),
+        "stretch": (1.0, ""),
+        "temperature": (1.0, "°C"),
+    }
+)
+
+
+def describe_rows(recording: Recording) -> list[tuple[str, str]]:
+    """The same as (what, value) pairs of text, in the order in which a person wants them."""
+    d = describe(recording)
+    rows = [("recording", f"{d['name']} ({d['kind']}, {d['title']})")]
+    ended = d["outcome"] if d["complete"] else f"INCOMPLETE: {d['outcome']}"
+    rows.append(("ended", ended))
+    samples = f"{d['samples']} over {d['duration_s']:.6g} s"
+    if d["samples_expected"] is not None and d["samples_expected"] != d["samples"]:
+        samples += f", {d['samples_expected']} were planned"
+    rows.append(("samples", samples))
+    timing = d["timing"]
+    if timing["even"]:
+        rows.append(("rate", f"{timing['rate_Hz']:.6g} Hz"))
+    elif "step_min_s" in timing:
+        rows.append(
+            ("rate", f"uneven, steps of {timing['step_min_s']:.4g} to {timing['step_max_s']:.4g} s")
+        )
+    for channel in d["channels"]:
+        scale, unit = _READABLE[channel["name"]]
+        if channel["min"] is not None:
+            span = f"{channel['min'] * scale:.6g} to {channel['max'] * scale:.6g} {unit}"
+            rows.append((channel["name"].replace("_", " "), span.rstrip()))
+    if d["noise_floor_m"] is not None:
+        floor = f"{d['noise_floor_m'] * 1e6:.3g} um, over {d['quiet_samples']} samples at 0 V"
+        rows.append(("noise floor", floor))
+    elif d["kind"] == "actuator":
+        rows.append(("noise floor", f"unknown: {d['quiet_samples']} samples at 0 V at the start"))
+    if d["kind"] == "actuator":
+        between = "held" if recording.hold else "linear"
+        rows.append(("voltage between samples", between))
+    rows.append(("kinematics", d["kinematics"]))
+    film, load = recording.film, recording.load
+    if film is not None:
+        size = " x ".join(f"{x * 1e3:.6g}" for x in (film.length, film.width, film.thickness))
+        identifier = f"{recording.film_id}, " if recording.film_id else ""
+        rows.append(
+            (
+                "film",
+                f"{identifier}{size} mm, permittivity {film.permittivity:.4g}, "
+                f"density {film.density:.6g} kg/m3",
+            )
+        )
+    if load is not None:
+        rest = "" if load.rest_length is None else f", at rest {load.rest_length * 1e3:.6g} mm"
+        rows.append(("load", f"{load.mass * 1e3:.6g} g{rest}"))
+    if recording.notes:
+        rows.append(("notes", recording.notes))
+    for instrument in recording.instruments:
+        parts = [f"{instrument.model}, serial {instrument.serial or 'unknown'}"]
+        parts += [f"{name} {value}" for name, value in instrument.settings]
+        rows.append((instrument.role, "; ".join(parts)))
+    rows += [(f"{event.level} at {event.time:.4g} s", event.message) for event in recording.events]
+    wanted = ("start_time", "operator", "host", "rig", "source", "seed", "dearig_version")
+    rows += [
+        (name.replace("_", " "), str(recording.provenance[name]))
+        for name in (*wanted, "git_revision")
+        if recording.provenance.get(name) not in (None, "")
+    ]
+    return rows

@@ -1,0 +1,47 @@
+"""Text in a recording file: UTF-8 of fixed length, there and back.
+
+Not of variable length: HDF5 keeps that on a heap without a checksum, which a run that is read while
+it grows cannot append to, and on which one damaged byte can keep the library busy for ever.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import h5py
+import numpy as np
+
+__all__ = ["clip_text", "fixed", "put_text", "text_of"]
+
+
+def _encoded(text: str) -> bytes:
+    return text.replace("\0", " ").encode("utf-8", "replace")
+
+
+def fixed(text: str | Sequence[str]) -> np.ndarray:
+    """``text``, or a row of texts, as an array to give to an attribute or a dataset."""
+    raw = _encoded(text) if isinstance(text, str) else [_encoded(t) for t in text]
+    longest = len(raw) if isinstance(raw, bytes) else max(map(len, raw), default=0)
+    return np.array(raw, dtype=h5py.string_dtype("utf-8", max(longest, 1)))
+
+
+def put_text(group: h5py.Group, name: str, text: str) -> None:
+    """Make the dataset ``name`` that holds ``text``."""
+    group.create_dataset(name, data=fixed(text))
+
+
+def clip_text(text: str, size: int) -> bytes:
+    """UTF-8 of ``text`` in at most ``size`` bytes, cut between characters, marked with ``...``."""
+    raw = _encoded(text)
+    if len(raw) <= size:
+        return raw
+    return raw[: size - 3].decode("utf-8", "ignore").encode("utf-8") + b"..."
+
+
+def text_of(value: object) -> str:
+    """A string attribute or dataset's value as ``str``, however the program that wrote it did."""
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.reshape(-1)[0]
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    return str(value)

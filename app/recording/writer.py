@@ -1,0 +1,333 @@
+"""A recording as it is written during a run: counts, appended so that a kill loses nothing flushed.
+
+Tried with kills at random moments and with every write boundary replayed: what survives all of
+them is the library version of ``layout.LIBVER``, the whole layout made first, then SWMR mode, and
+one flush of the whole file (of single datasets, channels could differ by an interval).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+import tomllib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+
+import h5py
+import numpy as np
+
+from app.errors import DearigError, InputError, InstrumentFault
+from app.recording.files import check_output
+from app.recording.finish import finish
+from app.recording.layout import (
+    EVENT_LEVELS,
+    EVENT_TYPE,
+    LIBVER,
+    MESSAGE_BYTES,
+    UNITS,
+    ZERO_ORDER,
+    counts_name,
+    lay_out,
+)
+from app.recording.physical import TEMPERATURE_UNITS, write_channel
+from app.recording.provenance import gather, write_provenance
+from app.recording.sample import write_sample
+from app.recording.text import clip_text, fixed, put_text
+from drivers.channels import CHANNEL_NAMES, Channel
+from drivers.rig import Block, Event, RigIdentity
+from model.material import Film, Load
+
+__all__ = ["FLUSH_INTERVAL", "RecordingWriter"]
+
+#: s between flushes, at least: at most this much of a run is lost in a kill.
+FLUSH_INTERVAL = 0.25
+
+
+class RecordingWriter:
+    """One run, being recorded to ``path``; a context manager.
+
+    ``identity`` names the channels, in the order in which blocks hold them; ``rate_Hz`` is the
+    sample clock's, ``samples_expected`` sizes nothing and is kept so that a reader sees what is
+    missing. ``configuration`` is the text of the rig file in force. ``now`` gives Unix time in s.
+
+    Raises ``InputError`` before anything is touched: the file exists (unless ``overwrite``), its
+    folder does not, or the sequence is not TOML. ``ValueError`` is a programming error.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        identity: RigIdentity,
+        rate_Hz: float,
+        samples_expected: int,
+        sequence_toml: str,
+        film: Film,
+        load: Load,
+        configuration: str,
+        *,
+        operator: str = "",
+        film_id: str = "",
+        notes: str = "",
+        seed: int | None = None,
+        overwrite: bool = False,
+        now: Callable[[], float] = time.time,
+    ) -> None:
+        if not (math.isfinite(rate_Hz) and rate_Hz > 0.0):
+            raise ValueError(f"rate_Hz = {rate_Hz!r} must be a finite number above 0")
+        _check_channels(identity.channels)
+        title = _title(sequence_toml)
+        self._path = check_output(path, overwrite)
+        self._channels = identity.channels
+        self._rate = float(rate_Hz)
+        self._now = now
+        self._written = self._flushed = self._recorded_events = 0
+        self._dirty = False
+
+        started = now()
+        provenance = gather(
+            started, configuration, operator, identity.seed if seed is None else seed
+        )
+        provenance["rig"] = identity.address
+        provenance["simulated"] = identity.simulated
+        with _disk_errors(self._path):
+            # "x" refuses a file that another process made since it was looked for
+            mode = "w" if overwrite else "x"
+            self._file = h5py.File(self._path, mode, libver=LIBVER)
+        try:
+            with _disk_errors(self._path):
+                entry = lay_out(self._file, "actuator", title, started)
+                put_text(entry, "sequence", sequence_toml)
+                write_sample(entry, film, load, film_id, notes)
+                write_provenance(entry, provenance)
+                self._lay_out_run(entry, identity, samples_expected)
+                self._file.flush()
+                self._file.swmr_mode = True
+                self._file.flush()
+        except BaseException:
+            self._file.close()
+            self._path.unlink(missing_ok=True)
+            raise
+        self._last_flush = now()
+
+    def _lay_out_run(self, entry: h5py.Group, identity: RigIdentity, samples_expected: int) -> None:
+        data = entry["data"]
+        data.attrs["rate_Hz"] = self._rate
+        data.attrs["samples_expected"] = int(samples_expected)
+        # about a second: a chunk is written again by every flush that finds it changed
+        chunk = int(min(max(self._rate, 1024), 65536))
+        self._counts = []
+        for channel in self._channels:
+            counts = data.create_dataset(
+                counts_name(channel.name),
+                shape=(0,),
+                maxshape=(None,),
+                chunks=(chunk,),
+                dtype="<i2",
+            )
+            write_channel(counts, channel)
+            if channel.name == "voltage_command":
+                counts.attrs["hold"] = fixed(ZERO_ORDER)
+            self._counts.append(counts)
+        self._events = entry.create_dataset(
+            "events", shape=(0,), maxshape=(None,), chunks=(32,), dtype=EVENT_TYPE
+        )
+
+        instruments = entry.create_group("instrument")
+        instruments.attrs["NX_class"] = fixed("NXcollection")
+        links = instruments.create_group("channels")
+        links.attrs["NX_class"] = fixed("NXcollection")
+        for channel in self._channels:
+            links[channel.name] = h5py.SoftLink(f"/entry/data/{counts_name(channel.name)}")
+        for instrument in identity.instruments:
+            group = instruments.create_group(_group_name(instrument.role, instruments))
+            group.attrs["NX_class"] = fixed("NXinstrument")
+            group.attrs["role"] = fixed(instrument.role)
+            group.attrs["model"] = fixed(instrument.model)
+            group.attrs["serial"] = fixed(instrument.serial)
+            pairs = fixed([text for pair in instrument.settings for text in pair])
+            group.create_dataset("settings", data=pairs.reshape(-1, 2))
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._path
+
+    @property
+    def samples(self) -> int:
+        """Samples appended so far."""
+        return self._written
+
+    @property
+    def samples_flushed(self) -> int:
+        """Samples that a kill can no longer take."""
+        return self._flushed
+
+    @property
+    def closed(self) -> bool:
+        """True after ``close``."""
+        return not self._file
+
+    def append(self, block: Block) -> None:
+        """Write the next block, its events with it.
+
+        Raises ``InstrumentFault`` if samples are missing before it, ``DearigError`` if the disk
+        takes no more.
+        """
+        counts = block.counts
+        if counts.ndim != 2 or counts.shape[0] != len(self._channels) or counts.dtype != np.int16:
+            raise ValueError(
+                f"a block holds int16 counts ({len(self._channels)}, n), "
+                f"not {counts.dtype} {counts.shape}"
+            )
+        if block.start != self._written:
+            raise InstrumentFault(
+                f"{self._path}: a block starts at sample {block.start} where sample "
+                f"{self._written} was due; the rig has lost samples, record again at a lower rate"
+            )
+        end = self._written + counts.shape[1]
+        with _disk_errors(self._path):
+            for dataset, row in zip(self._counts, counts, strict=True):
+                dataset.resize((end,))
+                dataset[self._written : end] = row
+            self._written = end
+            self._dirty = True
+            self._append_events(block.events)
+            self._flush_when_due()
+
+    def event(self, sample: int, level: str, message: str) -> None:
+        """Note ``message`` at ``sample``; ``level`` is info, warning or fault."""
+        with _disk_errors(self._path):
+            self._append_events((Event(sample, level, message),))
+            self._flush_when_due()
+
+    def _append_events(self, events: tuple[Event, ...]) -> None:
+        if not events:
+            return
+        rows = np.zeros(len(events), dtype=EVENT_TYPE)
+        for i, event in enumerate(events):
+            if event.level not in EVENT_LEVELS:
+                raise ValueError(
+                    f"event level {event.level!r} is not one of {', '.join(EVENT_LEVELS)}"
+                )
+            rows[i] = (
+                event.sample,
+                event.sample / self._rate,
+                event.level.encode(),
+                clip_text(event.message, MESSAGE_BYTES),
+            )
+        first = self._recorded_events
+        self._events.resize((first + len(events),))
+        self._events[first:] = rows
+        self._recorded_events += len(events)
+        self._dirty = True
+
+    def _flush_when_due(self) -> None:
+        # outside the interval on either side: a clock set back must not end the flushing
+        if self._dirty and not 0.0 <= self._now() - self._last_flush < FLUSH_INTERVAL:
+            self._file.flush()
+            self._flushed = self._written
+            self._last_flush = self._now()
+            self._dirty = False
+
+    def close(
+        self,
+        outcome: str = "finished",
+        *,
+        displacement_model: np.ndarray | None = None,
+        model_toml: str = "",
+    ) -> None:
+        """Finish the recording: physical values, end time, sample count; calling it again is fine.
+
+        ``outcome`` says in words how the run ended. ``displacement_model`` (samples,) m is the live
+        overlay, ``model_toml`` its parameters. Raises ``DearigError`` if the physical values cannot
+        be written; the counts are safe then.
+        """
+        if self.closed:
+            return
+        if displacement_model is not None and displacement_model.shape != (self._written,):
+            raise ValueError(
+                f"the overlay has shape {displacement_model.shape}, "
+                f"the recording {self._written} samples"
+            )
+        with _disk_errors(self._path):
+            self._file.close()
+        self._flushed = self._written
+        try:
+            finish(
+                self._path,
+                complete=True,
+                outcome=outcome,
+                ended=self._now(),
+                displacement_model=displacement_model,
+                model_toml=model_toml,
+            )
+        except InputError as error:
+            raise DearigError(
+                f"{error}; the run itself is safe there, in counts: make room and recover it"
+            ) from error
+
+    def __enter__(self) -> RecordingWriter:
+        """Itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close; a run that failed before its first sample leaves no file."""
+        if error is None:
+            self.close()
+        elif not self.closed and self._written == 0:
+            self._file.close()
+            self._path.unlink(missing_ok=True)
+        else:
+            self.close(f"ended early: {error or type(error).__name__}")
+
+
+@contextmanager
+def _disk_errors(path: Path) -> Iterator[None]:
+    """Say in a sentence what HDF5 reports as an ``OSError`` or ``RuntimeError``."""
+    try:
+        yield
+    except FileExistsError as error:
+        raise InputError(f"{path} exists already; choose another name") from error
+    except (OSError, RuntimeError) as error:
+        raise DearigError(
+            f"{path} cannot be written: {error}; see that the disk has room and that no other "
+            f"program holds the file"
+        ) from error
+
+
+def _check_channels(channels: tuple[Channel, ...]) -> None:
+    names = [c.name for c in channels]
+    for needed in ("displacement", "voltage_command"):
+        if needed not in names:
+            raise ValueError(f"a run is recorded with a channel {needed}; there are {names}")
+    if len(set(names)) != len(names):
+        raise ValueError(f"two channels have one name: {names}")
+    for channel in channels:
+        if channel.name not in CHANNEL_NAMES:
+            raise ValueError(f"channel {channel.name!r} is not one of {', '.join(CHANNEL_NAMES)}")
+        units = TEMPERATURE_UNITS if channel.name == "temperature" else (UNITS[channel.name],)
+        if channel.unit not in units:
+            raise ValueError(f"channel {channel.name} is in {channel.unit!r}, not in {units[0]}")
+
+
+def _title(sequence_toml: str) -> str:
+    try:
+        sequence = tomllib.loads(sequence_toml)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"the sequence is not TOML: {error}") from error
+    return str(sequence.get("name", "run"))
+
+
+def _group_name(role: str, taken: h5py.Group) -> str:
+    name = re.sub(r"\W+", "_", role).strip("_") or "instrument"
+    while name in taken:
+        name += "_"
+    return name

@@ -1,0 +1,61 @@
+"""Long curves made short without losing a peak."""
+
+from __future__ import annotations
+
+import numpy as np
+
+__all__ = ["decimate", "decimate_path"]
+
+
+def decimate(x: np.ndarray, y: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
+    """What a drawing of ``y`` (N,) against increasing ``x`` (N,) shows in ``columns`` pixels.
+
+    Of every column the lowest and the highest sample are kept, where they are, and of all the first
+    and the last: at most 2 columns + 2 points. Where a column has no finite sample, one NaN is
+    kept, so that the line breaks there. Curves that are short enough come back as they are.
+    """
+    x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    if x.shape != y.shape or x.ndim != 1:
+        raise ValueError(f"x {x.shape} and y {y.shape} must be rows of one length")
+    if columns < 1:
+        raise ValueError(f"columns = {columns} must be 1 or more")
+    y = np.where(np.isfinite(y), y, np.nan)
+    if x.size <= 2 * columns + 2:
+        return x, y
+    span = x[-1] - x[0]
+    if not span > 0.0:
+        raise ValueError("x must increase")
+    column = np.minimum(((x - x[0]) / span * columns).astype(np.int64), columns - 1)
+    starts = np.flatnonzero(np.diff(column, prepend=-1))
+    return _pick(x, y, _extremes(y, starts))
+
+
+def decimate_path(x: np.ndarray, y: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
+    """A curve (``x``, ``y``) (N,) that turns back, such as a loop, in at most 4 parts + 2 points.
+
+    It is cut into ``parts`` of as many samples each, and of every part the extremes of both are
+    kept.
+    """
+    x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    if x.shape != y.shape or x.ndim != 1:
+        raise ValueError(f"x {x.shape} and y {y.shape} must be rows of one length")
+    if x.size <= 4 * parts + 2:
+        return x, y
+    starts = np.unique(np.linspace(0, x.size, parts, endpoint=False).astype(np.int64))
+    return _pick(x, y, np.concatenate((_extremes(x, starts), _extremes(y, starts))))
+
+
+def _pick(x: np.ndarray, y: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    kept = np.unique(np.concatenate((rows, [0, x.size - 1])))
+    return x[kept], y[kept]
+
+
+def _extremes(y: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Rows of the lowest and highest of ``y`` (N,) in each run that begins at ``starts`` (K,)."""
+    lengths = np.diff(starts, append=y.size)
+    rows = [starts[np.isnan(np.fmin.reduceat(y, starts))]]
+    for ends in (np.fmin.reduceat(y, starts), np.fmax.reduceat(y, starts)):
+        there = np.flatnonzero(y == np.repeat(ends, lengths))
+        run = np.searchsorted(starts, there, side="right")
+        rows.append(there[np.unique(run, return_index=True)[1]])
+    return np.concatenate(rows)

@@ -1,0 +1,107 @@
+"""Numbers as a reader should see them: with the digits that the data support, and no more."""
+
+from __future__ import annotations
+
+import math
+import re
+
+__all__ = ["NOTHING", "interval", "power_of_ten", "quoted", "seconds", "significant", "symbol"]
+
+#: Stands where there is no number.
+NOTHING = "\N{EN DASH}"
+
+_TIMES = "\N{MULTIPLICATION SIGN}"
+_SUPERSCRIPT = str.maketrans(
+    "-0123456789",
+    "\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT ZERO}\N{SUPERSCRIPT ONE}\N{SUPERSCRIPT TWO}"
+    "\N{SUPERSCRIPT THREE}\N{SUPERSCRIPT FOUR}\N{SUPERSCRIPT FIVE}\N{SUPERSCRIPT SIX}"
+    "\N{SUPERSCRIPT SEVEN}\N{SUPERSCRIPT EIGHT}\N{SUPERSCRIPT NINE}",
+)
+_SUBSCRIPT = str.maketrans("0123456789", "".join(chr(0x2080 + i) for i in range(10)))
+_NAMED = re.compile(r"(mu|J|T)_(\d+)")
+_DIGITS_MAX = 6  # more would be believed by nobody
+_WIDE = 5.0  # beyond this ratio of its ends an interval is an order of magnitude, not a tolerance
+
+
+def power_of_ten(exponent: int) -> str:
+    """10 with ``exponent`` raised, without any markup."""
+    return "10" + str(exponent).translate(_SUPERSCRIPT)
+
+
+def _fixed(value: float, decimals: int) -> str:
+    """``value`` rounded at ``decimals`` behind the point; negative: tens, hundreds, ..."""
+    text = f"{round(value, decimals):.{max(decimals, 0)}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """``value`` with ``digits`` significant digits; very large and very small ones as powers."""
+    if math.isnan(value):
+        return NOTHING
+    if math.isinf(value):
+        return "\N{INFINITY}" if value > 0.0 else "-\N{INFINITY}"
+    if value == 0.0:
+        return "0"
+    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+    exponent = int(power)
+    if -4 < exponent < 6:
+        return _fixed(float(f"{mantissa}e{power}"), digits - 1 - exponent)
+    return f"{mantissa} {_TIMES} {power_of_ten(exponent)}"
+
+
+def _decimals(value: float, width: float) -> int:
+    """Decimals that show two digits of a ``width`` of uncertainty about ``value``."""
+    decimals = 1 - math.floor(math.log10(width))
+    if value != 0.0:
+        decimals = min(decimals, _DIGITS_MAX - 1 - math.floor(math.log10(abs(value))))
+    return decimals
+
+
+def _tolerance(low: float, high: float) -> float | None:
+    """Half the width of an interval that is one; None for an open or a wide one, or a point."""
+    if not (math.isfinite(low) and math.isfinite(high)) or high <= low:
+        return None
+    if low <= 0.0 <= high or (low > 0.0 and high / low > _WIDE):
+        return None
+    return 0.5 * (high - low)
+
+
+def quoted(value: float, low: float, high: float) -> str:
+    """``value`` with as many digits as its 95 % interval ``low`` .. ``high`` gives a meaning to."""
+    width = _tolerance(low, high)
+    if width is None or not math.isfinite(value) or not 1e-4 < abs(value) < 1e6:
+        return significant(value, 5 if low == high else 2)
+    return _fixed(value, _decimals(value, width))
+
+
+def interval(low: float, high: float) -> str:
+    """An interval in words; an end that is 0 or infinite is open."""
+    if low == 0.0 and math.isinf(high):
+        return "open"
+    if math.isinf(high):
+        return f"above {significant(low, 2)}"
+    if low == 0.0:
+        return f"below {significant(high, 2)}"
+    width = _tolerance(low, high)
+    if width is None or not 1e-4 < max(abs(low), abs(high)) < 1e6:
+        return f"{significant(low, 2)} to {significant(high, 2)}"
+    decimals = _decimals(max(abs(low), abs(high)), width)
+    return f"{_fixed(low, decimals)} to {_fixed(high, decimals)}"
+
+
+def seconds(duration: float) -> str:
+    """A duration in s, and in min or h once it is long."""
+    if duration < 120.0:
+        return f"{significant(duration)} s"
+    if duration < 7200.0:
+        return f"{significant(duration / 60.0)} min"
+    return f"{significant(duration / 3600.0)} h"
+
+
+def symbol(name: str) -> str:
+    """The field's own symbol for a parameter: mu_0 is a Greek letter with a subscript."""
+    match = _NAMED.fullmatch(name)
+    if match is None:
+        return name
+    letter = "\N{GREEK SMALL LETTER MU}" if match[1] == "mu" else match[1]
+    return letter + match[2].translate(_SUBSCRIPT)

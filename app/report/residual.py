@@ -1,0 +1,44 @@
+"""What a model leaves unexplained, as the curves by which one tells it from noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+__all__ = ["autocorrelation", "even", "spectrum"]
+
+_SAMPLES_MAX = 2**20  # beyond this a transform only gets slow
+
+
+def even(time: np.ndarray, residual: np.ndarray) -> tuple[float, np.ndarray]:
+    """``(step, residual)`` on an even grid: as it is, or interpolated where sampling is uneven."""
+    span = float(time[-1] - time[0])
+    step = span / (time.size - 1)
+    if time.size <= _SAMPLES_MAX and np.allclose(np.diff(time), step, rtol=1e-2, atol=0.0):
+        return step, residual
+    count = min(time.size, _SAMPLES_MAX)
+    grid = np.linspace(time[0], time[-1], count)
+    return span / (count - 1), np.interp(grid, time, residual)
+
+
+def autocorrelation(step: float, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """``(lag, correlation)`` (K,) for lags of one sample to a quarter of the record, in s.
+
+    The mean is kept: a residual that sits beside zero is correlated with itself.
+    """
+    n = residual.size
+    transform = np.fft.rfft(residual, 2 * n)
+    product = np.fft.irfft(np.abs(transform) ** 2, 2 * n)[: max(n // 4, 1) + 1]
+    product /= product[0] if product[0] > 0.0 else 1.0
+    return step * np.arange(1, product.size), product[1:]
+
+
+def spectrum(step: float, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """``(frequency, density)`` (K,): one-sided amplitude density per root Hz, by Welch's method.
+
+    White noise of standard deviation s shows as s sqrt(2 step) at every frequency.
+    """
+    from scipy.signal import welch
+
+    segment = min(residual.size, max(256, residual.size // 4))
+    frequency, power = welch(residual, fs=1.0 / step, nperseg=segment, detrend=False)
+    return frequency[1:], np.sqrt(power[1:])

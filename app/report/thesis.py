@@ -1,0 +1,29 @@
+"""The thesis's own figures, to stand beside ours."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from model.actuator import Actuator
+    from model.material import Network
+
+__all__ = ["table_3"]
+
+
+def table_3(model: Actuator | Network) -> dict[str, float]:
+    """The thesis's Table 3 by parameter name (SI), if ``model`` is an actuator of that make.
+
+    Table 3's branches are put in order of relaxation time, as fitted ones are: its order is a
+    convention, and like has to stand beside like.
+    """
+    from model.actuator import Actuator
+    from model.material import TABLE_3
+
+    if not isinstance(model, Actuator) or len(model.network.branches) != len(TABLE_3.branches):
+        return {}
+    branches = sorted(TABLE_3.branches, key=lambda b: b.relaxation_time)
+    springs = (TABLE_3.equilibrium, *(b.spring for b in branches))
+    values = {f"mu_{i}": s.modulus for i, s in enumerate(springs)}
+    values |= {f"J_{i}": s.limit for i, s in enumerate(springs)}
+    return values | {f"T_{i}": b.relaxation_time for i, b in enumerate(branches, 1)}

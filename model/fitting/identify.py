@@ -1,0 +1,281 @@
+"""Identification of a model from records, by one of two methods, with honest intervals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from model.actuator import Actuator
+from model.errors import ModelError
+from model.fitting.intervals import CHI2_95, correlation_time, covariance, profile
+from model.fitting.levenberg import LocalFit, descend
+from model.fitting.parameters import Estimate, Layout, require_free
+from model.fitting.problem import Problem
+from model.fitting.search import Progress, algorithm_1, film_starts, voltage_starts
+from model.kinematics import KINEMATICS
+from model.material import Network
+from model.records import ActuatorRecord, Record
+
+__all__ = ["METHODS", "Identification", "identify"]
+
+METHODS = ("hybrid", "de")
+
+_COARSE_RATE = 125.0  # Hz: plenty for relaxation times of tens of milliseconds, and cheap
+_COARSE_SAMPLES = 1500  # of a film record
+_SCOUT_ITERATIONS = 10  # of each start, before the hopeless ones are dropped
+_DETERMINED_RATIO = 5.0  # an interval wider than this factor determines nothing worth quoting
+_J_WORDS = "no spring stiffens measurably at these stretches: only a lower bound"
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What a fit found.
+
+    ``model`` is the fitted actuator or network, ``estimates`` its numbers with 95 % intervals,
+    ``covariance`` (f, f) that of ``covariance_names``, in SI units. ``cost`` is the mean square
+    of the residuals over the noise (1 when nothing is left but noise); ``correlation`` the
+    correlation time of the residuals in samples, by which the intervals are widened. ``warnings``
+    are sentences for the operator.
+    """
+
+    method: str
+    model: Actuator | Network
+    estimates: tuple[Estimate, ...]
+    covariance_names: tuple[str, ...]
+    covariance: np.ndarray
+    cost: float
+    correlation: float
+    simulations: int
+    converged: bool
+    warnings: tuple[str, ...]
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Names of the numbers that these data do not determine."""
+        return tuple(e.name for e in self.estimates if not e.determined)
+
+
+def _quiet(stage: str, fraction: float) -> None:
+    """Progress that nobody watches."""
+
+
+def identify(
+    records: Sequence[Record],
+    base: Actuator | Network,
+    method: str = "hybrid",
+    kinematics: str = "uniaxial",
+    seed: int = 0,
+    intervals: bool = True,
+    nested: Network | None = None,
+    workers: int = 2,
+    progress: Progress = _quiet,
+) -> Identification:
+    """Fit ``base`` to ``records``: all its moduli, locking limits and relaxation times are free.
+
+    ``base`` is an ``Actuator`` for records driven by voltage (its film, load and effects are kept),
+    a ``Network`` for films driven by stretch, held as ``kinematics`` says. Its parameter values are
+    not used as a start, only its number of branches and kinds of spring. ``seed`` matters to "de"
+    only. ``nested`` is a fit with fewer branches, from which one more descent starts, so that more
+    branches never fit worse. ``progress(stage, fraction)`` is called often. Raises ``ModelError`` for records and
+    models that do not fit together.
+    """
+    if method not in METHODS:
+        raise ModelError(f"method {method!r} is not one of {', '.join(METHODS)}")
+    held = 0 if isinstance(base, Actuator) else KINEMATICS.index(kinematics)
+    layout = Layout(base, held)
+    problem = Problem(records, layout, workers)
+    require_free(layout, problem.samples)
+    if method == "de":
+        values = algorithm_1(problem, seed, progress)
+        fit = descend(problem, layout.coordinates(values), iterations=0)
+        values = layout.by_relaxation_time(values)
+        estimates = [
+            Estimate(
+                q.name, q.unit, float(v), 0.0, math.inf, False, "Algorithm 1 gives no interval"
+            )
+            for q, v in zip(layout.quantities, values, strict=True)
+        ]
+        return _result("de", problem, values, estimates, fit, (), np.empty((0, 0)))
+    fit, held_limits = _hybrid(problem, nested, progress)
+    values = layout.by_relaxation_time(layout.values(fit.x))
+    if not intervals:
+        estimates = [
+            Estimate(q.name, q.unit, float(v), 0.0, math.inf, False, "no interval was asked for")
+            for q, v in zip(layout.quantities, values, strict=True)
+        ]
+        return _result("hybrid", problem, values, estimates, fit, (), np.empty((0, 0)))
+    estimates, names, cov = _intervals(problem, values, held_limits, progress)
+    return _result("hybrid", problem, values, estimates, fit, names, cov)
+
+
+def _result(
+    method: str,
+    problem: Problem,
+    values: np.ndarray,
+    estimates: list[Estimate],
+    fit: LocalFit,
+    names: tuple[str, ...],
+    cov: np.ndarray,
+) -> Identification:
+    layout = problem.layout
+    model = layout.model(values)
+    base = layout.base
+    if isinstance(base, Actuator) and base.load.rest_length is not None:
+        modulus = layout.build(values).equilibrium.modulus
+        estimates.insert(
+            0,
+            Estimate(
+                "mu_0", "Pa", modulus, modulus, modulus, True,
+                "follows from the measured rest length and the weight", free=False,
+            ),
+        )  # fmt: skip
+    correlation = correlation_time(fit.residuals)
+    warnings = []
+    if fit.cost > 1.5 and method == "hybrid":
+        warnings.append(
+            f"the residual is {math.sqrt(fit.cost):.3g} times the noise: the model lacks something, "
+            f"and the intervals (widened by the residual's size and correlation) are a rough guide"
+        )
+    if method == "hybrid" and not fit.converged:
+        warnings.append("the descent was still gaining when it was ended")
+    return Identification(
+        method=method,
+        model=model,
+        estimates=tuple(estimates),
+        covariance_names=names,
+        covariance=cov,
+        cost=fit.cost,
+        correlation=correlation,
+        simulations=problem.simulations,
+        converged=fit.converged,
+        warnings=tuple(warnings),
+    )
+
+
+def _coarse(problem: Problem) -> Problem:
+    """The same problem on means of neighbouring samples, where the record is denser than needed."""
+    records = [
+        r.coarse(_COARSE_RATE) if isinstance(r, ActuatorRecord) else r.coarse(_COARSE_SAMPLES)
+        for r in problem.records
+    ]
+    return Problem(records, problem.layout, problem.workers)
+
+
+def _coarse_about(problem: Problem, values: np.ndarray) -> Problem:
+    """The coarse problem with its optimum where the full one has it.
+
+    Averaging bends a curve a little, and the intervals can be narrower than that: so the coarse
+    measurement is the coarse model at the optimum plus the averaged residual of the full problem.
+    """
+    coarse = _coarse(problem)
+    full, _ = problem.predict(values)
+    thin, _ = coarse.predict(values)
+    edges_full = np.cumsum([0, *(r.measured.size for r in problem.records)])
+    edges_thin = np.cumsum([0, *(r.measured.size for r in coarse.records)])
+    for i, record in enumerate(problem.records):
+        model = full[0, edges_full[i] : edges_full[i + 1]]
+        part = slice(edges_thin[i], edges_thin[i + 1])
+        if isinstance(record, ActuatorRecord):
+            left = replace(record, displacement=record.displacement - model).coarse(_COARSE_RATE)
+        else:
+            left = replace(record, stress=record.stress - model).coarse(_COARSE_SAMPLES)
+        coarse.measured[part] = thin[0, part] + left.measured
+    return coarse
+
+
+def _hybrid(
+    problem: Problem, nested: Network | None, progress: Progress
+) -> tuple[LocalFit, np.ndarray]:
+    """Global search, descents from several starts, then the limits; returns the fit and what is held.
+
+    The locking limits of an actuator are first held where springs do not stiffen: at a few per cent
+    of strain they would otherwise wander, and drag the relaxation times along. They are freed at
+    the end, and stay free only if that explains significantly more.
+    """
+    layout = problem.layout
+    limits = np.zeros(layout.size, dtype=bool)
+    limits[layout.column("J")] = True
+    driven_by_voltage = isinstance(layout.base, Actuator)
+    first = limits if driven_by_voltage else np.zeros_like(limits)
+    coarse = _coarse(problem)
+    starts = (
+        voltage_starts(coarse, progress) if driven_by_voltage else film_starts(coarse, progress)
+    )
+    if nested is not None:
+        starts = np.vstack([starts, layout.padded(nested)])
+    steps = len(starts) + 4
+    fits = []
+    for n, start in enumerate(starts):
+        fits.append(descend(coarse, start, first, iterations=_SCOUT_ITERATIONS))
+        progress("descents", (n + 1) / steps)
+    # two, because the one that leads after a few steps is not always the one that gets down
+    leaders = sorted(fits, key=lambda f: f.cost)[:2]
+    best = min((descend(coarse, f.x, first) for f in leaders), key=lambda f: f.cost)
+    progress("descents", (len(starts) + 2) / steps)
+    if driven_by_voltage and limits.any():
+        freed = descend(coarse, best.x, iterations=20)
+        inflation = max(1.0, freed.cost) * max(1.0, correlation_time(freed.residuals))
+        gain = (best.cost - freed.cost) * coarse.samples / inflation
+        if gain > CHI2_95 * limits.sum():
+            best, first = freed, np.zeros_like(limits)
+    progress("descents", (len(starts) + 3) / steps)
+    fit = descend(problem, best.x, first, damping=1e-4)
+    progress("descents", 1.0)
+    problem.simulations += coarse.simulations
+    return fit, first
+
+
+def _intervals(
+    problem: Problem, values: np.ndarray, held: np.ndarray, progress: Progress
+) -> tuple[list[Estimate], tuple[str, ...], np.ndarray]:
+    """Estimates with profile-likelihood intervals; ``held`` (d,) are limits the data do not see."""
+    layout = problem.layout
+    coarse = _coarse_about(problem, values)
+    centre = descend(coarse, layout.coordinates(values), held, iterations=10)
+    free = ~held
+    residuals = centre.residuals
+    inflation = max(1.0, centre.cost) * max(1.0, correlation_time(residuals))
+    jac = coarse.jacobian(centre.x, free)
+    cov = covariance(jac.T @ jac, inflation)
+    spread = np.eye(layout.size)
+    spread[np.ix_(free, free)] = cov
+    # a held limit is freed alone for its own profile: the others are neo-Hookean in all but name
+    estimates = []
+    done = 0
+
+    def tick() -> None:
+        nonlocal done
+        done += 1
+        progress("intervals", 1.0 - 0.5 ** (done / (3.0 * layout.size)))
+
+    chi2 = centre.cost * coarse.samples
+    for j, q in enumerate(layout.quantities):
+        sides = (-1.0,) if held[j] else (-1.0, 1.0)  # a held limit is already as high as counts
+        low, high = profile(coarse, centre.x, chi2, j, spread, inflation, held, tick, sides)
+        value = float(values[j])
+        if q.kind != "mu":
+            low, high = math.exp(low), math.exp(high)
+        low, high = float(max(min(low, value), 0.0)), float(max(high, value))
+        determined = bool(low > 0.0 and high < math.inf and high / low <= _DETERMINED_RATIO)
+        note = "" if determined else _open_words(low, high)
+        if held[j]:
+            note = _J_WORDS if low > 0.0 else "these data say nothing about it"
+        estimates.append(Estimate(q.name, q.unit, value, low, high, determined, note))
+    progress("intervals", 1.0)
+    problem.simulations += coarse.simulations
+    names = tuple(n for n, f in zip(layout.names, free, strict=True) if f)
+    natural = np.where([q.kind == "mu" for q in layout.quantities], 1.0, values)[free]
+    return estimates, names, cov * np.outer(natural, natural)
+
+
+def _open_words(low: float, high: float) -> str:
+    if low == 0.0 and math.isinf(high):
+        return "these data say nothing about it"
+    if math.isinf(high):
+        return "only a lower bound"
+    if low == 0.0:
+        return "only an upper bound"
+    return f"known only within a factor of {high / low:.3g}"

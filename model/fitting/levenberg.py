@@ -1,0 +1,144 @@
+"""Levenberg-Marquardt in scaled coordinates: a local fit from one start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+
+from model.fitting.problem import Problem
+
+__all__ = ["LocalFit", "descend"]
+
+_DAMPINGS = np.array([1e-4, 1e-2, 1.0, 30.0])  # tried at once, times the present damping
+_DAMPING_MIN, _DAMPING_MAX = 1e-12, 1e8
+_GAIN_MIN = 0.1  # of chi-square: a third of a standard deviation of any number
+_PROBE = 0.1  # of a step, to see how the residuals curve along it
+_BEND_MAX = 0.4  # of a step: a larger correction is no correction
+_PATIENCE = 5  # iterations that together must gain something
+_FLAT = 1e-9  # of the scaled curvature: flatter directions are not seen by the data
+
+
+@dataclass(frozen=True)
+class LocalFit:
+    """Where a descent ended: coordinates ``x`` (d,), mean-square cost, residuals (N,).
+
+    ``normal`` is J^T J (f, f) over the free coordinates.
+    """
+
+    x: np.ndarray
+    cost: float
+    residuals: np.ndarray
+    normal: np.ndarray
+    iterations: int
+    converged: bool
+
+
+def descend(
+    problem: Problem,
+    start: np.ndarray,
+    fixed: np.ndarray | None = None,
+    iterations: int = 60,
+    gain: float = _GAIN_MIN,
+    damping: float = 1e-2,
+) -> LocalFit:
+    """Least squares from ``start`` (d,), coordinates of the layout, inside its bounds.
+
+    ``fixed`` (d,) bool holds some numbers where they are. Marquardt's scaling (each coordinate by
+    the length of its own Jacobian column) keeps numbers that the data hardly see, such as J at
+    small stretch, from stopping or misleading the others. Each iteration tries several dampings at
+    once, as one population on all cores, each with its geodesic acceleration: the valleys of
+    relaxation spectra are long, narrow and curved. Ends when the quadratic model promises a
+    gain in chi-square of less than ``gain``, or five iterations have gained no more. ``damping`` is the first one, relative to the scaled
+    curvature; near an optimum it may be small.
+    """
+    layout = problem.layout
+    free = np.ones(layout.size, dtype=bool) if fixed is None else ~fixed
+    x = np.clip(start, layout.lower, layout.upper)
+    r = problem.residuals(x)
+    chi2 = float(r @ r)
+    scale = np.zeros(int(free.sum()))
+    normal = np.zeros((scale.size, scale.size))
+    history = [chi2]
+    converged = not free.any()
+    done = 0
+    while done < iterations and not converged:
+        done += 1
+        jac = problem.jacobian(x, free)
+        normal, gradient = jac.T @ jac, jac.T @ r
+        scale = np.maximum(np.sqrt(np.diag(normal)), 1e-3 * scale)
+        safe = np.where(scale > 0.0, scale, 1.0)
+        # numbers at a bound that the gradient pushes outwards stay there
+        part, reach = x[free], layout.reach(x)[free]
+        stuck = ((part <= layout.lower[free]) & (gradient > 0.0)) | (
+            (part >= layout.upper[free]) & (gradient < 0.0)
+        )
+        move = ~stuck & (scale > 0.0)
+        if not move.any():
+            converged = True
+            break
+        w, q = eigh((normal / np.outer(safe, safe))[np.ix_(move, move)])
+        target = q.T @ (gradient / safe)[move]
+        # what the quadratic model still promises, flat directions apart
+        if float(np.sum(target**2 / np.maximum(w, _FLAT))) < gain:
+            converged = True
+            break
+        improved = False
+        while not improved and damping <= _DAMPING_MAX:
+            dampings = damping * _DAMPINGS
+            # rows: one first-order step for each damping, by the eigenvectors of the scaled J^T J
+            inverse = 1.0 / (np.maximum(w, 0.0) + dampings[:, None])
+            steps = np.zeros((dampings.size, part.size))
+            steps[:, move] = -((inverse * target) @ q.T) / safe[move]
+            steps /= np.maximum(1.0, np.max(np.abs(steps) / reach, axis=1))[:, None]
+            steps += _bend(problem, x, free, r, jac, steps, move, safe, q, inverse)
+            trials = np.tile(x, (dampings.size, 1))
+            trials[:, free] = np.clip(part + steps, layout.lower[free], layout.upper[free])
+            costs = problem.costs(trials) * problem.samples
+            best = int(np.argmin(costs))
+            if costs[best] < chi2:
+                improved = True
+                x, chi2 = trials[best], float(costs[best])
+                damping = max(dampings[best], _DAMPING_MIN)
+            else:
+                damping *= 1e3
+        if not improved:
+            converged = True
+            break
+        r = problem.residuals(x)
+        history.append(chi2)
+        converged = len(history) > _PATIENCE and history[-1 - _PATIENCE] - chi2 < gain
+    return LocalFit(x, chi2 / problem.samples, r, normal, done, converged)
+
+
+def _bend(
+    problem: Problem,
+    x: np.ndarray,
+    free: np.ndarray,
+    r: np.ndarray,
+    jac: np.ndarray,
+    steps: np.ndarray,
+    move: np.ndarray,
+    safe: np.ndarray,
+    q: np.ndarray,
+    inverse: np.ndarray,
+) -> np.ndarray:
+    """Second-order part (D, f) of ``steps`` (D, f): geodesic acceleration.
+
+    Transtrum and Sethna (2012): half the step by which the residuals' second derivative along the
+    first-order step would be undone. Left out where it is not small against that step.
+    """
+    layout = problem.layout
+    probes = np.tile(x, (steps.shape[0], 1))
+    probes[:, free] += _PROBE * steps
+    inside = np.all((probes >= layout.lower) & (probes <= layout.upper), axis=1)
+    probes = np.clip(probes, layout.lower, layout.upper)
+    predicted, _ = problem.predict(layout.values(probes))
+    shifted = (predicted - problem.measured) / problem.sigma
+    second = 2.0 / _PROBE * ((shifted - r) / _PROBE - steps @ jac.T)
+    push = (second @ jac)[:, move] / safe[move]
+    bend = np.zeros_like(steps)
+    bend[:, move] = -0.5 * (((push @ q) * inverse) @ q.T) / safe[move]
+    small = np.linalg.norm(bend * safe, axis=1) <= _BEND_MAX * np.linalg.norm(steps * safe, axis=1)
+    return np.where((small & inside)[:, None], bend, 0.0)

@@ -1,0 +1,246 @@
+"""Which numbers of a model are free, what they are called, and where the kernel reads them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from model.actuator import Actuator
+from model.errors import ModelError
+from model.material import Branch, Network, Spring
+from model.network import (
+    FORCE,
+    HEAD,
+    HELD,
+    KIND,
+    LIMIT,
+    LOCKING,
+    MODULUS,
+    RATE,
+    WIDTH,
+    nominal_pull,
+)
+from model.springs import SPRINGS, locking_strain
+
+__all__ = ["THESIS_RANGES", "Estimate", "Layout", "Quantity"]
+
+#: Search ranges of the thesis's Algorithm 1: moduli Pa, limits J, relaxation times s.
+THESIS_RANGES = {"mu": (0.0, 8e6), "J": (0.0, 9e8), "T": (0.0, 3e6)}
+
+# Where a logarithm can follow those ranges; below, a spring or a branch does nothing measurable.
+_FLOOR = {"mu": 1e-2, "J": 1e-3, "T": 1e-6}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One free number: ``kind`` mu, J or T of spring ``index`` (0 is the equilibrium spring)."""
+
+    kind: str
+    index: int
+
+    @property
+    def name(self) -> str:
+        """mu_0, J_0, T_1, ..."""
+        return f"{self.kind}_{self.index}"
+
+    @property
+    def unit(self) -> str:
+        """SI unit, empty for a pure number."""
+        return {"mu": "Pa", "J": "", "T": "s"}[self.kind]
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Range in which it is sought."""
+        return _FLOOR[self.kind], THESIS_RANGES[self.kind][1]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a fit says of one number: ``value`` and its 95 % interval ``low`` .. ``high``.
+
+    An end of the interval that the data leave open is 0 or infinite. ``determined`` is False when
+    the interval is so wide that the value should not be quoted; ``note`` then says so in words.
+    ``free`` is False for a number that follows from others (mu_0 of a measured rest length).
+    """
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    determined: bool
+    note: str = ""
+    free: bool = True
+
+
+class Layout:
+    """The free numbers of a network, moduli first, then limits, then times, as in the thesis.
+
+    ``base`` carries everything that is not free. A fit moves in *coordinates*: moduli as they are,
+    limits and times as logarithms. The data fix sums of moduli long before their parts, and such
+    valleys are straight only while the moduli stay linear; times and limits spread over decades.
+    """
+
+    def __init__(self, base: Actuator | Network, held: int = 0) -> None:
+        self.base = base
+        self.network = base.network if isinstance(base, Actuator) else base
+        self.held = base.film.held if isinstance(base, Actuator) else held
+        self._c = base.coefficients() if isinstance(base, Actuator) else base.coefficients(held)
+        self._rest = None
+        if isinstance(base, Actuator) and base.load.rest_length is not None:
+            self._rest = base.load.rest_length / base.film.length
+        springs = self.network.springs
+        self.quantities: tuple[Quantity, ...] = (
+            *(Quantity("mu", i) for i in range(len(springs)) if i or self._rest is None),
+            *(Quantity("J", i) for i, s in enumerate(springs) if s.kind != "neo-hookean"),
+            *(Quantity("T", i) for i in range(1, len(springs))),
+        )
+        self._columns = np.array(
+            [
+                HEAD + WIDTH * q.index + {"mu": MODULUS, "J": LIMIT, "T": RATE}[q.kind]
+                for q in self.quantities
+            ]
+        )
+        self._log = np.array([q.kind != "mu" for q in self.quantities])
+        bounds = np.array([q.bounds for q in self.quantities])
+        self.lower, self.upper = self.coordinates(bounds[:, 0]), self.coordinates(bounds[:, 1])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the free numbers in order."""
+        return tuple(q.name for q in self.quantities)
+
+    @property
+    def size(self) -> int:
+        """How many numbers are free."""
+        return len(self.quantities)
+
+    def column(self, kind: str) -> np.ndarray:
+        """Indices of the free numbers of one kind."""
+        return np.array([i for i, q in enumerate(self.quantities) if q.kind == kind], dtype=int)
+
+    def coordinates(self, values: np.ndarray) -> np.ndarray:
+        """Coordinates (..., d) of natural ``values`` (..., d)."""
+        return np.where(self._log, np.log(np.maximum(values, 1e-300)), values)
+
+    def values(self, x: np.ndarray) -> np.ndarray:
+        """Natural values (..., d) at coordinates ``x`` (..., d)."""
+        return np.where(self._log, np.exp(np.where(self._log, x, 0.0)), x)
+
+    def reach(self, x: np.ndarray) -> np.ndarray:
+        """How far (d,) one step from ``x`` may go in each coordinate before linearity is no guide.
+
+        A factor of 20 for a time or a limit; for a modulus the sum of all moduli.
+        """
+        moduli = x[~self._log]
+        return np.where(self._log, 3.0, max(float(moduli.sum()), 1.0) if moduli.size else 1.0)
+
+    def differences(self, x: np.ndarray) -> np.ndarray:
+        """Steps (d,) for difference quotients at coordinates ``x``."""
+        return np.where(self._log, 1e-4, 1e-4 * np.maximum(x, 1e-3 * self.reach(x)))
+
+    def initial(self) -> np.ndarray:
+        """Natural values (d,) of the base itself, inside the bounds."""
+        springs, times = self.network.springs, self.network.times
+        values = [
+            springs[q.index].modulus
+            if q.kind == "mu"
+            else springs[q.index].limit
+            if q.kind == "J"
+            else times[q.index - 1]
+            for q in self.quantities
+        ]
+        return self.values(np.clip(self.coordinates(np.array(values)), self.lower, self.upper))
+
+    def padded(self, network: Network) -> np.ndarray:
+        """Coordinates (d,) of ``network`` with weak branches added until it has as many as this one.
+
+        The added branches relax at the geometric mean of the others: there, a weak branch changes
+        little and can grow in either direction.
+        """
+        springs, times = list(network.springs), list(network.times)
+        middle = math.exp(sum(map(math.log, times)) / len(times)) if times else 1.0
+        while len(springs) < len(self.network.springs):
+            springs.append(replace(springs[-1], modulus=1e-3 * springs[-1].modulus))
+            times.append(middle)
+        branches = tuple(Branch(s, t) for s, t in zip(springs[1:], times, strict=True))
+        other = Network(springs[0], branches)
+        base = replace(self.base, network=other) if isinstance(self.base, Actuator) else other
+        values = [
+            {"mu": other.springs[q.index].modulus, "J": other.springs[q.index].limit}.get(
+                q.kind, other.times[q.index - 1] if q.index else 0.0
+            )
+            for q in Layout(base, self.held).quantities
+        ]
+        return np.clip(self.coordinates(np.array(values)), self.lower, self.upper)
+
+    def coefficients(self, values: np.ndarray) -> np.ndarray:
+        """Kernel coefficients (P, C) of a population ``values`` (P, d), natural (not logarithms)."""
+        values = np.atleast_2d(values)
+        c = np.tile(self._c, (values.shape[0], 1))
+        c[:, self._columns] = values
+        rates = self._columns[self.column("T")]
+        c[:, rates] = 1.0 / np.maximum(c[:, rates], 1e-9)
+        for j in self.column("J"):
+            k = HEAD + WIDTH * self.quantities[j].index
+            kind = int(self._c[k + KIND])
+            c[:, k + LOCKING] = [locking_strain(kind, v) for v in c[:, k + LIMIT]]
+        if self._rest is not None:
+            for row in c:
+                pull = nominal_pull(
+                    int(row[HELD]), int(row[HEAD + KIND]), row[HEAD + LIMIT],
+                    row[HEAD + LOCKING], self._rest,
+                )  # fmt: skip
+                row[HEAD + MODULUS] = row[FORCE] / pull
+        return c
+
+    def build(self, values: np.ndarray) -> Network:
+        """The network with the free numbers set to ``values`` (d,), natural."""
+        c = self.coefficients(values)[0]
+        springs = [
+            Spring(
+                modulus=float(c[k + MODULUS]),
+                limit=float(c[k + LIMIT]),
+                kind=SPRINGS[int(c[k + KIND])],
+            )
+            for k in range(HEAD, c.size, WIDTH)
+        ]
+        times = [float(1.0 / c[k + RATE]) for k in range(HEAD + WIDTH, c.size, WIDTH)]
+        branches = tuple(Branch(s, t) for s, t in zip(springs[1:], times, strict=True))
+        return Network(springs[0], branches)
+
+    def model(self, values: np.ndarray) -> Actuator | Network:
+        """The base with the free numbers set to ``values`` (d,)."""
+        network = self.build(values)
+        return replace(self.base, network=network) if isinstance(self.base, Actuator) else network
+
+    def by_relaxation_time(self, values: np.ndarray) -> np.ndarray:
+        """``values`` (d,) with the branches in order of relaxation time.
+
+        Branches of one kind of spring can be exchanged without changing the model, so their order
+        is a convention; without one, two fits of the same data could not be compared.
+        """
+        kinds = {s.kind for s in self.network.springs[1:]}
+        if len(kinds) > 1:
+            return values
+        times = self.column("T")
+        order = np.argsort(values[times], kind="stable")
+        sorted_values = values.copy()
+        for kind in ("mu", "J", "T"):
+            columns = [j for j in self.column(kind) if self.quantities[j].index > 0]
+            if len(columns) == len(order):
+                sorted_values[columns] = values[np.array(columns)[order]]
+        return sorted_values
+
+
+def require_free(layout: Layout, samples: int) -> None:
+    """Refuse a fit that has more unknowns than readings."""
+    if samples <= layout.size:
+        raise ModelError(
+            f"{samples} samples cannot determine {layout.size} parameters; record longer or fit "
+            f"fewer branches"
+        )
+    if not math.isfinite(float(layout.lower.sum())):
+        raise ModelError("the parameter bounds are not finite")

@@ -1,0 +1,112 @@
+"""The residuals of a set of records, for one parameter vector or a population of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from model import kernel
+from model.actuator import Actuator, displacements
+from model.errors import ModelError
+from model.film import stress_of
+from model.fitting.parameters import Layout
+from model.records import ActuatorRecord, FilmRecord, Record, at_sensor
+
+__all__ = ["Problem"]
+
+
+class Problem:
+    """Least squares of model minus measurement, in units of the noise.
+
+    ``records`` are all of actuators or all of films, and ``layout`` says what is free. Members of a
+    population whose simulation ends early keep the last value they reached: a large but finite
+    residual, which a search walks away from. ``simulations`` counts records simulated.
+    """
+
+    def __init__(self, records: Sequence[Record], layout: Layout, workers: int = 2) -> None:
+        if not records:
+            raise ModelError("a fit needs at least one record")
+        driven = {type(r) for r in records}
+        if len(driven) > 1:
+            raise ModelError("records driven by voltage and by stretch cannot be fitted together")
+        if isinstance(layout.base, Actuator) != isinstance(records[0], ActuatorRecord):
+            raise ModelError("the model and the records are not of one kind (voltage or stretch)")
+        self.records = tuple(records)
+        self.layout = layout
+        self.workers = workers
+        self.simulations = 0
+        self.measured = np.concatenate([r.measured for r in records])
+        self.sigma = np.concatenate([np.full(r.measured.size, r.noise) for r in records])
+        self._edges = np.cumsum([0, *(r.measured.size for r in records)])
+
+    @property
+    def samples(self) -> int:
+        """How many readings are fitted."""
+        return int(self.measured.size)
+
+    def predict(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Model readings (P, N) and statuses (P,) of a population ``values`` (P, d), natural."""
+        c = self.layout.coefficients(values)
+        out = np.zeros((c.shape[0], self.samples))
+        status = np.zeros(c.shape[0], dtype=np.int64)
+        for i, record in enumerate(self.records):
+            part = out[:, self._edges[i] : self._edges[i + 1]]
+            if isinstance(record, ActuatorRecord):
+                base = self.layout.base
+                length = base.film.length if isinstance(base, Actuator) else 1.0
+                x, u, s = displacements(c, length, record.drive, self.workers)
+                if record.lag == 0.0:
+                    part[:] = x
+                else:
+                    for p in range(c.shape[0]):
+                        at_sensor(record.time, x[p], u[p], record.lag, part[p])
+            else:
+                s = self._stresses(c, record, part)
+            status = np.where(status == kernel.OK, s, status)
+            self.simulations += c.shape[0]
+        return out, status
+
+    def _stresses(self, c: np.ndarray, record: FilmRecord, out: np.ndarray) -> np.ndarray:
+        status = np.zeros(c.shape[0], dtype=np.int64)
+
+        def run(member: int) -> None:
+            out[member], status[member], _ = stress_of(c[member], record.time, record.stretch)
+
+        if self.workers <= 1 or c.shape[0] == 1:
+            for member in range(c.shape[0]):
+                run(member)
+        else:
+            with ThreadPoolExecutor(self.workers) as pool:
+                list(pool.map(run, range(c.shape[0])))
+        return status
+
+    def residuals(self, x: np.ndarray) -> np.ndarray:
+        """(model - measured)/noise, (N,), at coordinates ``x`` (d,)."""
+        predicted, _ = self.predict(self.layout.values(x))
+        return (predicted[0] - self.measured) / self.sigma
+
+    def costs(self, x: np.ndarray) -> np.ndarray:
+        """Mean square of the residuals (P,) of a population of coordinates (P, d).
+
+        Members that the model cannot follow cost more than doing nothing at all.
+        """
+        predicted, status = self.predict(self.layout.values(x))
+        still = np.mean((self.measured / self.sigma) ** 2)
+        costs = np.mean(((predicted - self.measured) / self.sigma) ** 2, axis=1)
+        return np.where(status == kernel.OK, costs, 10.0 * still + costs)
+
+    def jacobian(self, x: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """d(residuals)/dx (N, f) over the ``free`` (d,) coordinates, as one population.
+
+        Central differences: two branches of nearly one relaxation time have nearly parallel columns
+        (to 1e-5), and a one-sided difference would blur just the direction that is hard to see.
+        """
+        steps = np.diag(self.layout.differences(x))[free]
+        up = np.minimum(x + steps, self.layout.upper)
+        down = np.maximum(x - steps, self.layout.lower)
+        predicted, _ = self.predict(self.layout.values(np.concatenate([up, down])))
+        width = (up - down).sum(axis=1)
+        half = width.size
+        return ((predicted[:half] - predicted[half:]) / self.sigma).T / width

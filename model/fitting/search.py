@@ -1,0 +1,274 @@
+"""Global searches: the thesis's Algorithm 1 as printed, and the starts of the hybrid method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
+from math import comb
+
+import numpy as np
+from scipy.optimize import OptimizeResult, differential_evolution, nnls
+
+from model import kernel
+from model.actuator import Actuator
+from model.errors import ModelError
+from model.film import unit_stresses
+from model.fitting.parameters import THESIS_RANGES, Layout
+from model.fitting.problem import Problem
+from model.kinematics import electric
+from model.material import Branch, Network, Spring
+from model.network import ELECTRIC, HEAD, MODULUS
+from model.records import ActuatorRecord, FilmRecord
+
+__all__ = ["ALGORITHM_1", "Algorithm1", "algorithm_1", "film_starts", "voltage_starts"]
+
+Progress = Callable[[str, float], None]
+
+_WIDE_LIMIT = 1e4  # of J: a spring that does not stiffen within any stretch of an actuator
+_REST_TURNS = 6
+_SETS_MAX = 6000  # of branches, each tried by least squares: a third of a second
+
+
+@dataclass(frozen=True)
+class Algorithm1:
+    """Settings of Algorithm 1 as printed; the thesis does not print the size of the population.
+
+    ``members`` is ten for each of the thesis's eleven parameters, the factor that Storn and Price
+    recommend. ``stop`` is the thesis's delta on e_rms (a fraction, eq. 50 without its 100 %).
+    """
+
+    generations: int = 150
+    mutation: float = 0.6
+    crossover: float = 0.9
+    members: int = 110
+    stop: float = 1e-3
+
+
+ALGORITHM_1 = Algorithm1()
+
+
+def algorithm_1(
+    problem: Problem, seed: int, progress: Progress, settings: Algorithm1 = ALGORITHM_1
+) -> np.ndarray:
+    """Natural parameter values (d,) found by differential evolution, as the thesis prints it.
+
+    DE/rand/1/bin, uniform initial members over the printed ranges, linear (not logarithmic)
+    coordinates. Eq. 50's e_rms is in the displacement's own unit, taken as mm.
+    """
+    layout = problem.layout
+    bounds = np.array([THESIS_RANGES[q.kind] for q in layout.quantities])
+    rng = np.random.default_rng(seed)
+    members = rng.uniform(bounds[:, 0], bounds[:, 1], (settings.members, layout.size))
+    # the open ends of the ranges: a modulus or a limit of exactly 0 is no spring
+    lowest = np.array([1e-300 if q.kind == "T" else 1e-9 for q in layout.quantities])
+
+    def cost(population: np.ndarray) -> np.ndarray:
+        values = np.maximum(np.atleast_2d(population.T), lowest)
+        predicted, status = problem.predict(values)
+        rms = np.sqrt(np.mean((predicted - problem.measured) ** 2, axis=1))
+        still = np.sqrt(np.mean(problem.measured**2))
+        return np.where(status == 0, rms, 10.0 * still + rms)
+
+    generation = 0
+
+    def watch(intermediate_result: OptimizeResult) -> bool:
+        nonlocal generation
+        generation += 1
+        progress("differential evolution", generation / settings.generations)
+        return bool(intermediate_result.fun * 1e3 < settings.stop)
+
+    result = differential_evolution(
+        cost,
+        bounds,
+        strategy="rand1bin",
+        maxiter=settings.generations,
+        mutation=settings.mutation,
+        recombination=settings.crossover,
+        init=members,
+        tol=0.0,
+        atol=0.0,
+        polish=False,
+        vectorized=True,
+        updating="deferred",
+        rng=rng,
+        callback=watch,
+    )
+    return np.maximum(result.x, lowest)
+
+
+def voltage_starts(problem: Problem, progress: Progress, starts: int = 6) -> np.ndarray:
+    """Coordinates (K, d) worth a descent for records driven by voltage, best first.
+
+    The stretch is measured but for its rest value, so the branches can be driven with it: every
+    term of the motion equation is then known, and linear in the moduli (film inertia is left out
+    here). The rest stretch depends on mu_0 alone and hardly changes the terms, so a few turns of
+    fit and rest state settle it. What remains is an exhaustive search over sets of relaxation
+    times, with non-negative least squares for the moduli: it needs no luck and no seed.
+    """
+    layout = problem.layout
+    base = layout.base
+    if not isinstance(base, Actuator):
+        raise ModelError("records driven by voltage need an actuator to fit")
+    values = layout.initial()
+    values[layout.column("J")] = _WIDE_LIMIT
+    c = layout.coefficients(values)[0]
+    candidates = np.array([(t, _WIDE_LIMIT) for t in _time_grid(problem)])
+    measured = base.load.rest_length
+    rest = 1.1 if measured is None else measured / base.film.length
+    for turn in range(_REST_TURNS):
+        parts, target = _balance(problem, base, c, candidates, rest)
+        moduli, _ = nnls(parts.T, target)
+        progress("global search", (turn + 1) / (_REST_TURNS + 1))
+        if measured is not None or moduli[0] <= 0.0:
+            break
+        c[HEAD + MODULUS] = moduli[0]
+        status, solved = kernel.rest_stretch(c, 0.0)
+        if status != kernel.OK or abs(solved - rest) < 1e-6:
+            break
+        rest = solved
+    found = _subsets(layout, _WIDE_LIMIT, candidates, parts, target)
+    progress("global search", 1.0)
+    return _ranked(layout, found, starts)
+
+
+def _balance(
+    problem: Problem, base: Actuator, c: np.ndarray, candidates: np.ndarray, rest: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Stress per unit modulus (1 + G, N), less that at rest, and the Maxwell stress (N,) they hold."""
+    parts, targets = [], []
+    for record in problem.records:
+        if isinstance(record, ActuatorRecord):
+            stretch = rest + record.displacement / base.film.length
+            # from the rest state, so that the measured stretch starts where the branches do
+            stretch[0] = rest
+            part, _ = _unit_stresses(
+                base.network, base.film.held, _WIDE_LIMIT, candidates, record.time, stretch
+            )
+            part -= part[:, :1]
+            parts.append(part)
+            thrust = np.array([electric(base.film.held, lam) for lam in stretch])
+            targets.append(c[ELECTRIC] * record.drive.voltage**2 * thrust)
+    return np.concatenate(parts, axis=1), np.concatenate(targets)
+
+
+def film_starts(problem: Problem, progress: Progress, starts: int = 8) -> np.ndarray:
+    """Coordinates (K, d) worth a descent for records driven by stretch, best first.
+
+    With the stretch imposed the stress is linear in the moduli: an exhaustive search over sets of
+    branches (each a relaxation time and a locking limit) and over the limit of the equilibrium
+    spring, with non-negative least squares for the moduli.
+    """
+    layout = problem.layout
+    records = [r for r in problem.records if isinstance(r, FilmRecord)]
+    greatest = max(float(np.max(r.stretch)) for r in records)
+    firsts = greatest**2 * np.array([1.2, 3.0, 10.0, 100.0])
+    # a branch that locks early flows at a nearly constant stress, whatever the rate
+    limits = (_WIDE_LIMIT, 1.0, 0.03)
+    if layout.network.springs[-1].kind != "gent":
+        limits = limits[:1]
+    if layout.network.equilibrium.kind == "neo-hookean":
+        firsts = firsts[-1:]
+    weight = 1.0 / problem.sigma
+    found: list[tuple[float, np.ndarray]] = []
+    for n, first in enumerate(firsts):
+        groups = []
+        for limit in limits:
+            group = np.array([(t, limit) for t in _time_grid(problem)])
+            responses = [
+                _unit_stresses(layout.network, layout.held, first, group, r.time, r.stretch)
+                for r in records
+            ]
+            if all(followed for _, followed in responses):
+                groups.append((group, np.concatenate([part for part, _ in responses], axis=1)))
+        if groups:
+            candidates = np.concatenate([group for group, _ in groups])
+            parts = np.concatenate([groups[0][1][:1], *(part[1:] for _, part in groups)])
+            found += _subsets(layout, first, candidates, parts * weight, problem.measured * weight)
+        progress("global search", (n + 1) / firsts.size)
+    return _ranked(layout, found, starts)
+
+
+def _time_grid(problem: Problem, points: int = 16) -> np.ndarray:
+    """Relaxation times that the records can show, from two samples to three durations."""
+    shortest = min(float(np.median(np.diff(r.time))) for r in problem.records)
+    longest = max(float(r.time[-1] - r.time[0]) for r in problem.records)
+    return np.geomspace(2.0 * shortest, 3.0 * longest, points)
+
+
+def _unit_stresses(
+    network: Network,
+    held: int,
+    first: float,
+    candidates: np.ndarray,
+    time: np.ndarray,
+    stretch: np.ndarray,
+) -> tuple[np.ndarray, bool]:
+    """Stress per unit modulus (1 + G, N) of the equilibrium spring, limit ``first``, and of branches.
+
+    ``candidates`` (G, 2) are relaxation times and limits of the branches.
+    """
+    springs = network.springs
+    kind = springs[-1].kind
+    equilibrium = Spring(1.0, first, springs[0].kind)
+    many = Network(equilibrium, tuple(Branch(Spring(1.0, j, kind), t) for t, j in candidates))
+    parts, status, _ = unit_stresses(many.coefficients(held), time, stretch)
+    return parts, status == kernel.OK
+
+
+def _subsets(
+    layout: Layout,
+    first: float,
+    candidates: np.ndarray,
+    parts: np.ndarray,
+    target: np.ndarray,
+) -> list[tuple[float, np.ndarray]]:
+    """(misfit, coordinates) of every set of branches among ``candidates``; spring 0 always belongs.
+
+    Where there would be too many sets, only candidates that least squares over all of them at once
+    makes use of, and their neighbours, take part.
+    """
+    branches = layout.column("T").size
+    triangle = np.linalg.qr(np.vstack([parts, target]).T, mode="r")
+    pool = list(range(len(candidates)))
+    if comb(len(pool), branches) > _SETS_MAX:
+        used, _ = nnls(triangle[:, :-1], triangle[:, -1])
+        weights = used[1:] + 0.5 * (np.roll(used[1:], 1) + np.roll(used[1:], -1))
+        order = [int(i) for i in np.argsort(-weights, kind="stable")]
+        keep = branches
+        while comb(keep + 1, branches) <= _SETS_MAX:
+            keep += 1
+        pool = sorted(order[:keep])
+    mu, limits, times = (layout.column(k) for k in ("mu", "J", "T"))
+    found = []
+    for chosen in combinations(pool, branches):
+        columns = [0, *(1 + i for i in chosen)]
+        moduli, misfit = nnls(triangle[:, columns], triangle[:, -1])
+        # a branch that least squares leaves out still has to be seen by the descent
+        moduli = np.maximum(moduli, 1e-3 * max(float(moduli.max()), 1.0))
+        spring_limits = np.array([first, *candidates[list(chosen), 1]])
+        values = layout.initial()
+        values[mu] = moduli[[layout.quantities[j].index for j in mu]]
+        values[limits] = spring_limits[[layout.quantities[j].index for j in limits]]
+        values[times] = candidates[list(chosen), 0]
+        found.append((misfit, layout.coordinates(values)))
+    return found
+
+
+def _ranked(layout: Layout, found: list[tuple[float, np.ndarray]], starts: int) -> np.ndarray:
+    """The best starts (K, d), no two of them alike in all relaxation times and limits."""
+    if not found:
+        raise ModelError(
+            "no set of springs can follow these records: check that stretch, displacement and "
+            "voltage are in the right units"
+        )
+    kept: list[np.ndarray] = []
+    told_apart = np.concatenate([layout.column("T"), layout.column("J")])
+    for _, x in sorted(found, key=lambda f: f[0]):
+        start = np.clip(x, layout.lower, layout.upper)
+        # times and limits make the difference: the moduli follow from them
+        if not kept or all(np.max(np.abs((start - k)[told_apart]), initial=0) > 0.7 for k in kept):
+            kept.append(start)
+        if len(kept) == starts:
+            break
+    return np.array(kept)

@@ -1,0 +1,54 @@
+"""How far a model is from a measurement: the thesis's two measures as printed, and three sound ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["Errors", "errors"]
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of one record, in the unit of the measured quantity (m or Pa), or in per cent.
+
+    ``rms`` root mean square, ``nrmse_pct`` the same over the measured range, ``max`` the largest
+    magnitude, ``peak_pct`` the RMS over the largest measured magnitude. ``e_rms_thesis_pct`` and
+    ``e_m_thesis_pct`` are the thesis's eq. 50 as printed: the RMS in the displacement's own unit
+    (taken as mm) times 100, and the largest error over the *model's* range.
+    """
+
+    rms: float
+    nrmse_pct: float
+    max: float
+    peak_pct: float
+    e_rms_thesis_pct: float
+    e_m_thesis_pct: float
+    samples: int
+
+
+def errors(measured: np.ndarray, model: np.ndarray) -> Errors:
+    """Errors of ``model`` (N,) against ``measured`` (N,), both in m (or both in Pa).
+
+    A range of zero gives infinite percentages, not an exception. Eq. 50's unit reading (mm) has a
+    meaning for displacements only.
+    """
+    difference = np.asarray(measured, dtype=np.float64) - np.asarray(model, dtype=np.float64)
+    rms = float(np.sqrt(np.mean(difference**2)))
+    largest = float(np.max(np.abs(difference)))
+
+    def per_cent(value: float, of: float) -> float:
+        if of > 0.0:
+            return 100.0 * value / of
+        return 0.0 if value == 0.0 else float("inf")
+
+    return Errors(
+        rms=rms,
+        nrmse_pct=per_cent(rms, float(np.ptp(measured))),
+        max=largest,
+        peak_pct=per_cent(rms, float(np.max(np.abs(measured)))),
+        e_rms_thesis_pct=rms * 1e3 * 100.0,
+        e_m_thesis_pct=per_cent(largest, float(np.ptp(model))),
+        samples=difference.size,
+    )

@@ -1,0 +1,161 @@
+"""Measured records, as a fit sees them: arrays and what is known about their noise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from model.actuator import Drive
+from model.errors import ModelError
+from model.jit import jit
+
+__all__ = ["ActuatorRecord", "FilmRecord", "Record", "at_sensor", "noise_of"]
+
+
+@dataclass(frozen=True)
+class ActuatorRecord:
+    """Displacement (N,) in m from the loaded rest state, under ``drive``.
+
+    ``noise`` is the standard deviation of one reading in m. ``lag`` is the known time in s by which
+    a reading is older than its time stamp (an averaging sensor), less the converter's skew: the
+    model is evaluated at ``time - lag``.
+    """
+
+    name: str
+    drive: Drive
+    displacement: np.ndarray
+    noise: float
+    lag: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self.name, self.measured, self.drive.time, self.noise)
+
+    @property
+    def time(self) -> np.ndarray:
+        """(N,) s."""
+        return self.drive.time
+
+    @property
+    def measured(self) -> np.ndarray:
+        """(N,) m."""
+        return self.displacement
+
+    def coarse(self, rate: float) -> ActuatorRecord:
+        """The record at no more than about ``rate`` Hz, for a first search; noise averages down.
+
+        A held voltage is, on average, half a sample late: the coarse drive keeps that.
+        """
+        steps = np.diff(self.time)
+        every = int(1.0 / (rate * float(np.median(steps))))
+        if every < 2:
+            return self
+        every -= 1 - every % 2  # odd, so that a mean lies on a sample
+        count = (self.time.size - every) // every + 1
+        rows = np.arange(count * every).reshape(count, every)
+        t = self.time[rows].mean(axis=1)
+        late = 0.5 * float(np.median(steps)) if self.drive.hold else 0.0
+        drive = Drive(t, np.interp(t - late, self.time, self.drive.voltage), hold=False)
+        x = self.displacement[rows].mean(axis=1)
+        return replace(self, drive=drive, displacement=x, noise=self.noise / math.sqrt(every))
+
+
+@dataclass(frozen=True)
+class FilmRecord:
+    """Nominal stress (N,) in Pa under an imposed ``stretch`` (N,) at ``time`` (N,) s."""
+
+    name: str
+    time: np.ndarray
+    stretch: np.ndarray
+    stress: np.ndarray
+    noise: float
+
+    def __post_init__(self) -> None:
+        for name in ("time", "stretch", "stress"):
+            object.__setattr__(
+                self, name, np.ascontiguousarray(getattr(self, name), dtype=np.float64)
+            )
+        _check(self.name, self.stress, self.time, self.noise)
+        _check(self.name, self.stretch, self.time, self.noise)
+
+    @property
+    def measured(self) -> np.ndarray:
+        """(N,) Pa."""
+        return self.stress
+
+    def coarse(self, samples: int) -> FilmRecord:
+        """The record in no more than about ``samples`` means of neighbours; the ends are kept."""
+        every = self.time.size // samples
+        if every < 2:
+            return self
+        count = (self.time.size - 1) // every
+        rows = 1 + np.arange(count * every).reshape(count, every)
+
+        def thin(values: np.ndarray) -> np.ndarray:
+            return np.concatenate([values[:1], values[rows].mean(axis=1)])
+
+        return replace(
+            self,
+            time=thin(self.time),
+            stretch=thin(self.stretch),
+            stress=thin(self.stress),
+            noise=self.noise / math.sqrt(every),
+        )
+
+
+Record = ActuatorRecord | FilmRecord
+
+
+def _check(name: str, values: np.ndarray, time: np.ndarray, noise: float) -> None:
+    if values.shape != time.shape:
+        raise ModelError(f"{name}: {values.size} readings at {time.size} times")
+    bad = np.flatnonzero(~(np.isfinite(values) & np.isfinite(time)))
+    if bad.size:
+        raise ModelError(f"{name}: sample {bad[0]} is not a finite number")
+    back = np.flatnonzero(np.diff(time) <= 0.0)
+    if back.size:
+        raise ModelError(
+            f"{name}: time does not increase from sample {back[0]} ({time[back[0]]:.6g} s) to the "
+            f"next ({time[back[0] + 1]:.6g} s)"
+        )
+    if not (math.isfinite(noise) and noise > 0.0):
+        raise ModelError(f"{name}: noise = {noise!r} must be a finite number above 0")
+
+
+def noise_of(values: np.ndarray) -> float:
+    """Standard deviation of the noise on a slowly changing quantity ``values`` (N,), N >= 4.
+
+    From second differences, which no drift or slope disturbs: their variance is six times that of
+    white noise.
+    """
+    if values.size < 4:
+        raise ModelError(f"{values.size} samples are too few to read a noise from; 4 are needed")
+    return float(np.sqrt(np.mean(np.diff(values, 2) ** 2) / 6.0))
+
+
+@jit
+def at_sensor(
+    time: np.ndarray, value: np.ndarray, rate: np.ndarray, lag: float, out: np.ndarray
+) -> None:
+    """``value`` (N,) as a sensor shows it that is ``lag`` s late, into ``out``: cubic Hermite."""
+    last = time.shape[0] - 1
+    j = 0
+    for k in range(last + 1):
+        t = time[k] - lag
+        if t <= time[0]:
+            out[k] = value[0]  # before the record the film was at rest
+            continue
+        if t >= time[last]:
+            out[k] = value[last] + rate[last] * (t - time[last])
+            continue
+        while time[j + 1] < t:
+            j += 1
+        h = time[j + 1] - time[j]
+        s = (t - time[j]) / h
+        r = 1.0 - s
+        out[k] = (
+            value[j] * (1.0 + 2.0 * s) * r * r
+            + value[j + 1] * (3.0 - 2.0 * s) * s * s
+            + h * (rate[j] * s * r * r - rate[j + 1] * s * s * r)
+        )

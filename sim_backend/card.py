@@ -1,0 +1,95 @@
+"""The multifunction card: 16-bit converters with their calibration, timebase and finite buffer."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivers.channels import COUNT_MAX, Channel, Scaling
+from drivers.errors import RigError
+from drivers.settings import RigSettings
+from sim_backend.streams import Streams
+
+__all__ = ["INPUT_OVERWRITTEN", "Card"]
+
+INPUT_OVERWRITTEN = -200279  #: DAQmx: samples were overwritten before they were read
+RATE_TOO_HIGH = -200077  #: DAQmx: a requested value is not supported
+
+
+class Card:
+    """The card of a rig with ``settings``; its calibration is drawn once from ``streams``."""
+
+    def __init__(self, settings: RigSettings, streams: Streams) -> None:
+        self._settings = settings
+        generator = streams.of_instrument("card")
+        spread = settings.card.calibration_ppm * 1e-6
+        coefficients: dict[str, tuple[float, ...]] = {}
+        for name, limit in settings.ranges().items():
+            step = limit / (COUNT_MAX + 1)
+            if name == "voltage_command":
+                # the output is corrected by the card itself
+                coefficients[name] = (0.0, step)
+                continue
+            # what the inputs' calibration says of them: an offset, a gain, a slight bend
+            offset, gain, square, cube = generator.uniform(-spread, spread, 4)
+            coefficients[name] = (
+                offset * limit,
+                step * (1.0 + gain),
+                0.1 * square * step / COUNT_MAX,
+                0.1 * cube * step / COUNT_MAX**2,
+            )
+        self._channels = {c.name: c for c in settings.channels(coefficients)}
+        # volts only: what is behind the terminals is the business of other instruments
+        self._converters = {n: Scaling(c, 1.0) for n, c in coefficients.items()}
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Channels in the order of blocks."""
+        return tuple(self._channels.values())
+
+    def actual_rate(self, rate: float) -> float:
+        """The rate in Hz nearest to ``rate`` that the timebase can be divided down to.
+
+        Raises ``RigError`` where the card cannot run at ``rate`` or scan its inputs within it.
+        """
+        card = self._settings.card
+        inputs = len(self._channels) - 1
+        fastest = 1e3 * min(card.ao_rate_max_kHz, card.ai_rate_max_kHz / inputs)
+        if not 0.0 < rate <= fastest:
+            raise RigError(
+                f"card {card.device}: a sample rate of {rate:g} Hz on {inputs} inputs is not "
+                f"possible; up to {fastest:g} Hz are",
+                RATE_TOO_HIGH,
+            )
+        scan = self._settings.skew(inputs - 1) * 1e6 + card.convert_interval_us
+        if scan * rate > 1e6 * (1.0 + 1e-9):
+            raise RigError(
+                f"card {card.device}: scanning {inputs} inputs takes {scan:g} us, a sample at "
+                f"{rate:g} Hz {1e6 / rate:g} us; lower the rate, card.first_convert_us or "
+                f"card.convert_interval_us",
+                RATE_TOO_HIGH,
+            )
+        timebase = card.timebase_MHz * 1e6
+        return timebase / max(1, round(timebase / rate))
+
+    def command_counts(self, voltage: np.ndarray) -> np.ndarray:
+        """Output counts (N,) int16 for ``voltage`` (N,) V at the film."""
+        return self._channels["voltage_command"].scaling.counts(voltage)
+
+    def put_out(self, counts: np.ndarray) -> np.ndarray:
+        """Volts (N,) at the output terminal for ``counts``."""
+        return self._converters["voltage_command"].physical(counts)
+
+    def convert(self, channel: str, volts: np.ndarray) -> np.ndarray:
+        """Counts (N,) int16 for ``volts`` (N,) at the input of ``channel``, saturating."""
+        return self._converters[channel].counts(volts)
+
+    def check_buffer(self, waiting: int) -> None:
+        """Raise ``RigError`` when more samples wait than the input buffer holds."""
+        size = self._settings.card.ai_buffer_samples
+        if waiting > size:
+            raise RigError(
+                f"card {self._settings.card.device}: {waiting} samples waited for their reader and "
+                f"the buffer holds {size}: the oldest were overwritten; read more often or enlarge "
+                f"card.ai_buffer_samples",
+                INPUT_OVERWRITTEN,
+            )

@@ -1,0 +1,58 @@
+"""Clocks that a simulated rig runs on: the only place that reads the time or waits for it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Protocol
+
+__all__ = ["Clock", "ManualClock", "PacedClock"]
+
+
+class Clock(Protocol):
+    """Time in s from an arbitrary start."""
+
+    def now(self) -> float:
+        """Present time in s."""
+        ...
+
+    def wait(self, until: float, wake: threading.Event) -> None:
+        """Return at time ``until``, or as soon as ``wake`` is set."""
+        ...
+
+
+class ManualClock:
+    """A clock that stands still until somebody waits for it, and then is there at once.
+
+    A rig on it runs as fast as it can, and a test moves it by hand with ``advance``.
+    """
+
+    def __init__(self) -> None:
+        self._now = 0.0
+
+    def now(self) -> float:
+        """Present time in s."""
+        return self._now
+
+    def advance(self, seconds: float) -> None:
+        """Let ``seconds`` pass."""
+        if not seconds >= 0.0:
+            raise ValueError(f"time goes forward, not by {seconds!r} s")
+        self._now += seconds
+
+    def wait(self, until: float, wake: threading.Event) -> None:
+        """Jump to ``until``, unless ``wake`` is set already."""
+        if not wake.is_set():
+            self._now = max(self._now, until)
+
+
+class PacedClock:
+    """Real time."""
+
+    def now(self) -> float:
+        """Present time in s."""
+        return time.monotonic()
+
+    def wait(self, until: float, wake: threading.Event) -> None:
+        """Wait until ``until``, or until ``wake`` is set."""
+        wake.wait(max(0.0, until - self.now()))

@@ -1,0 +1,71 @@
+"""From an address to a simulated rig: ``sim`` obeys the model, ``sim:SEED`` hides something."""
+
+from __future__ import annotations
+
+import re
+
+from drivers.errors import AddressError
+from drivers.settings import RigSettings
+from model.actuator import Actuator
+from model.material import TABLE_3, Film, Load
+from sim_backend.clock import Clock, ManualClock, PacedClock
+from sim_backend.model_plant import ModelPlant
+from sim_backend.plant import Plant
+from sim_backend.rig import SimulatedRig
+from sim_backend.truth import cases
+
+__all__ = ["is_simulated", "open_simulated_rig"]
+
+
+def is_simulated(address: str) -> bool:
+    """True for addresses of simulated rigs, well-formed or not: ``sim`` and ``sim:...``."""
+    return address == "sim" or address.startswith("sim:")
+
+
+def open_simulated_rig(
+    address: str,
+    settings: RigSettings,
+    film: Film,
+    load: Load,
+    *,
+    seed: int = 0,
+    paced: bool = False,
+    actuator: Actuator | None = None,
+    clock: Clock | None = None,
+    block_samples: int | None = None,
+) -> SimulatedRig:
+    """Open the rig at ``address``.
+
+    ``sim`` is a film of ``actuator``, by default ``film`` under ``load`` with the network of the
+    thesis's Table 3. ``sim:SEED`` is a film of the same network with something hidden that SEED
+    decides. The instruments' noise follows SEED and ``seed`` together, so that another ``seed``
+    records the same rig again. ``paced`` runs in real time, else as fast as it is read; ``clock``
+    replaces either.
+
+    Raises ``AddressError`` for an address that is neither, ``ModelError`` or ``ValueError`` for a
+    film that cannot hang at rest.
+    """
+    found = re.fullmatch(r"sim(?::(\d{1,18}))?", address)
+    if not found:
+        raise AddressError(
+            f"rig {address!r} is not a simulated rig: write sim, or sim:SEED with a whole number "
+            f"such as sim:7"
+        )
+    plant: Plant
+    if found[1] is None:
+        hidden = None
+        plant = ModelPlant.at_rest(actuator or Actuator(film, load, TABLE_3))
+    else:
+        if actuator is not None:
+            raise AddressError(f"rig {address!r} brings its own film; only sim takes an actuator")
+        hidden = int(found[1])
+        plant = cases.draw(hidden, film, load).plant()
+    return SimulatedRig(
+        settings,
+        plant,
+        clock or (PacedClock() if paced else ManualClock()),
+        address=address,
+        noise_seed=(seed,) if hidden is None else (seed, hidden),
+        identity_seed=hidden,
+        block_samples=block_samples,
+    )

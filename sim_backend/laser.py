@@ -1,0 +1,231 @@
+"""The laser displacement sensor: a moving average on its own clock, put out as a voltage.
+
+The position between the nodes of the film's motion is the cubic through positions and velocities at
+both ends. A moving average over thousands of internal samples then costs no more than one over a
+few, because the sum of a cubic over evenly spaced instants has a closed form.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.settings import LaserSettings
+from model.jit import jit
+from sim_backend.streams import Streams
+
+__all__ = ["Laser", "LaserRows", "LaserState"]
+
+
+@jit
+def _instants_before(time: float, phase: float, period: float) -> int:
+    """Number of the first instant ``phase + j period`` at or after ``time``."""
+    return math.ceil((time - phase) / period)
+
+
+@jit
+def _partial_sum(
+    position: np.ndarray,
+    velocity: np.ndarray,
+    node: int,
+    spacing: float,
+    first: float,
+    step: float,
+    count: int,
+) -> float:
+    """Sum of ``count`` positions in one interval, at ``first``, ``first + step``, .. s into it."""
+    p0, v0 = position[node], velocity[node] * spacing
+    rise, v1 = position[node + 1] - p0, velocity[node + 1] * spacing
+    c2 = 3.0 * rise - 2.0 * v0 - v1
+    c3 = v0 + v1 - 2.0 * rise
+    # the cubic in the number i of the sample: theta = a + b i
+    a, b = first / spacing, step / spacing
+    k0 = p0 + a * (v0 + a * (c2 + a * c3))
+    k1 = b * (v0 + a * (2.0 * c2 + 3.0 * a * c3))
+    k2 = b * b * (c2 + 3.0 * a * c3)
+    k3 = b * b * b * c3
+    n = float(count)
+    s1 = 0.5 * n * (n - 1.0)
+    s2 = s1 * (2.0 * n - 1.0) / 3.0
+    return k0 * n + k1 * s1 + k2 * s2 + k3 * s1 * s1
+
+
+@jit
+def _sum_up_to(
+    instant: int,
+    position: np.ndarray,
+    velocity: np.ndarray,
+    first_node: int,
+    spacing: float,
+    phase: float,
+    period: float,
+    numbers: np.ndarray,
+    sums: np.ndarray,
+) -> float:
+    """Sum of all positions from the first node up to and including ``instant``.
+
+    Before the first node the film stood still where it is there: the sum then counts backwards.
+    """
+    if instant < numbers[0]:
+        return -position[0] * (numbers[0] - 1 - instant)
+    node = int((phase + instant * period) / spacing) - first_node
+    node = min(max(node, 0), numbers.shape[0] - 2)
+    while numbers[node] > instant:
+        node -= 1
+    while numbers[node + 1] <= instant:
+        node += 1
+    number = numbers[node]
+    into = phase + number * period - (first_node + node) * spacing
+    count = instant - number + 1
+    return sums[node] + _partial_sum(position, velocity, node, spacing, into, period, count)
+
+
+@jit
+def _averages(
+    position: np.ndarray,
+    velocity: np.ndarray,
+    first_node: int,
+    spacing: float,
+    phase: float,
+    period: float,
+    averaging: int,
+    times: np.ndarray,
+    out: np.ndarray,
+) -> None:
+    """Moving averages that stand on the output at ``times`` (N,) s, all within the nodes' span."""
+    nodes = position.shape[0]
+    numbers = np.empty(nodes, dtype=np.int64)
+    sums = np.zeros(nodes)
+    for i in range(nodes):
+        numbers[i] = _instants_before((first_node + i) * spacing, phase, period)
+    for i in range(nodes - 1):
+        count = numbers[i + 1] - numbers[i]
+        into = phase + numbers[i] * period - (first_node + i) * spacing
+        inside = _partial_sum(position, velocity, i, spacing, into, period, count)
+        sums[i + 1] = sums[i] + inside
+    for k in range(times.shape[0]):
+        last = math.floor((times[k] - phase) / period)
+        last = min(last, numbers[nodes - 1] - 1)
+        upper = _sum_up_to(
+            last, position, velocity, first_node, spacing, phase, period, numbers, sums
+        )
+        lower = _sum_up_to(
+            last - averaging, position, velocity, first_node, spacing, phase, period, numbers, sums
+        )
+        out[k] = (upper - lower) / averaging
+
+
+@dataclass(frozen=True)
+class LaserState:
+    """What the average still needs of the past.
+
+    ``position`` and ``velocity`` (K,) are the nodes since ``first_node``, ``draws`` (Q, 2) the
+    noise of the last sample intervals, ``alarm`` whether the film is out of range.
+    """
+
+    first_node: int
+    position: np.ndarray
+    velocity: np.ndarray
+    draws: np.ndarray
+    alarm: bool = False
+
+
+@dataclass(frozen=True)
+class LaserRows:
+    """Analog output ``volts`` (N,) and whether the sensor reported ``alarm`` (N,), out of range."""
+
+    volts: np.ndarray
+    alarm: np.ndarray
+
+
+class Laser:
+    """The sensor during one run, read once every ``interval`` s; holds no state of its own."""
+
+    def __init__(
+        self, settings: LaserSettings, streams: Streams, run: int, interval: float, spacing: float
+    ) -> None:
+        self._settings = settings
+        self._streams = streams
+        self._run = run
+        self._interval = interval
+        self._spacing = spacing  # of the nodes of the film's motion, s
+        self._period = settings.sampling_us * 1e-6 * (1.0 + settings.clock_error_ppm * 1e-6)
+        generator = streams.before_run("laser", run)
+        self._phase = generator.uniform(0.0, self._period)
+        self._whole, self._part = divmod(settings.averaging * self._period, interval)
+        self._before = generator.standard_normal((int(self._whole) + 1, 2))
+
+    def start(self) -> LaserState:
+        """State with the film at rest."""
+        return LaserState(0, np.zeros(1), np.zeros(1), self._before)
+
+    def read(
+        self,
+        position: np.ndarray,
+        velocity: np.ndarray,
+        times: np.ndarray,
+        chunk: int,
+        chunk_samples: int,
+        state: LaserState,
+    ) -> tuple[LaserRows, LaserState]:
+        """Read at ``times`` (N,) s the film's ``position`` m and ``velocity`` m/s at nodes (K,).
+
+        The first node is the last one of the read before (the state's); times lie within the nodes.
+        """
+        settings = self._settings
+        position = np.concatenate((state.position, position[1:]))
+        velocity = np.concatenate((state.velocity, velocity[1:]))
+        mean = np.empty(times.size)
+        _averages(
+            position,
+            velocity,
+            state.first_node,
+            self._spacing,
+            self._phase,
+            self._period,
+            settings.averaging,
+            times,
+            mean,
+        )
+        noise, draws = self._noise(times.size, chunk, chunk_samples, state.draws)
+        reading = settings.rest_position_mm * 1e-3 + mean + settings.noise_um * 1e-6 * noise
+        if settings.resolution_um > 0.0:
+            step = settings.resolution_um * 1e-6
+            reading = np.rint(reading / step) * step
+        limit = settings.range_mm * 1e-3
+        alarm = np.abs(reading) > limit
+        reading = np.clip(reading, -limit, limit)
+        volts = settings.direction * reading * 1e3 / settings.mm_per_V
+        # the window's oldest instant is asked for by the next read's first time
+        keep = math.ceil((settings.averaging + 1) * self._period / self._spacing) + 1
+        cut = max(0, position.size - 1 - keep)
+        after = LaserState(
+            state.first_node + cut, position[cut:], velocity[cut:], draws, bool(alarm[-1])
+        )
+        return LaserRows(volts, alarm), after
+
+    def _noise(
+        self, samples: int, chunk: int, chunk_samples: int, before: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(N,) noise of unit variance, correlated where averaging windows of readings overlap.
+
+        White noise averaged over a window is the increment of a random walk over it. The window is
+        ``whole`` sample intervals and a ``part``, so each interval's increment is drawn in two
+        pieces, before and after the window's far edge, and readings that share pieces correlate as
+        they should.
+        """
+        generator = self._streams.of_chunk("laser", self._run, chunk)
+        fresh = generator.standard_normal((chunk_samples, 2))[:samples]
+        draws = np.concatenate((before, fresh))
+        window = self._whole * self._interval + self._part
+        late = math.sqrt(self._part / window) * draws[:, 1]
+        whole = int(self._whole)
+        # rows before + k - whole .. before + k - 1 are whole intervals, the one before them a part
+        noise = late[:samples].copy()
+        if whole:
+            early = math.sqrt((self._interval - self._part) / window) * draws[:, 0]
+            walk = np.concatenate(([0.0], np.cumsum(early + late)))
+            noise += walk[1 + whole : 1 + whole + samples] - walk[1 : 1 + samples]
+        return noise, draws[-(whole + 1) :]

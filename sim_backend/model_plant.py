@@ -1,0 +1,75 @@
+"""A film that obeys the model exactly: what identification should find again, and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from model import kernel
+from model.actuator import STATUS_WORDS, Actuator, initial_state
+from model.kinematics import thinning
+from model.material import VACUUM_PERMITTIVITY
+from sim_backend.plant import Motion
+
+__all__ = ["ModelPlant"]
+
+
+@dataclass(frozen=True)
+class ModelPlant:
+    """``actuator`` with its kernel coefficients, rest stretch and present kernel state."""
+
+    actuator: Actuator
+    coefficients: np.ndarray
+    rest: float
+    state: np.ndarray
+    failed: bool = False
+
+    @classmethod
+    def at_rest(cls, actuator: Actuator) -> ModelPlant:
+        """The film relaxed under its load. Raises ``ModelError`` where it has no rest state."""
+        rest = actuator.rest()
+        coefficients = actuator.coefficients()
+        return cls(actuator, coefficients, rest, initial_state(coefficients, rest))
+
+    @property
+    def capacitance(self) -> float:
+        """Present capacitance in F."""
+        return float(self._capacitance(self.state[:1])[0])
+
+    def advance(
+        self, time: np.ndarray, voltage: np.ndarray, hold: bool
+    ) -> tuple[Motion, ModelPlant]:
+        """See ``Plant.advance``. A film that has failed stays where it was."""
+        stretch, rate = np.full(time.size, self.state[0]), np.zeros(time.size)
+        fault, fault_at = None, 0
+        after = self
+        if not self.failed:
+            state = self.state.copy()
+            status, reached = kernel.drive_by_voltage(
+                self.coefficients, time, voltage, hold, state, stretch, rate
+            )
+            if status != kernel.OK:
+                fault, fault_at = STATUS_WORDS[status], int(reached)
+                state = np.concatenate((stretch[-1:], [0.0], state[2:]))
+            after = replace(self, state=state, failed=fault is not None)
+        length = self.actuator.film.length
+        nothing = np.zeros(time.size)
+        motion = Motion(
+            displacement=(stretch - self.rest) * length,
+            velocity=rate * length,
+            capacitance=self._capacitance(stretch),
+            leakage=nothing,
+            heating=nothing,
+            fault=fault,
+            fault_at=fault_at,
+        )
+        return motion, after
+
+    def _capacitance(self, stretch: np.ndarray) -> np.ndarray:
+        film = self.actuator.film
+        at_rest = (
+            VACUUM_PERMITTIVITY * film.permittivity * film.length * film.width / film.thickness
+        )
+        # the volume stays: what the thickness loses the area gains
+        return at_rest * thinning(film.held, stretch) ** 2

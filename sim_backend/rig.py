@@ -1,0 +1,343 @@
+"""The simulated rig: the instruments put together, behind the interface that every rig has."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+
+from drivers.errors import RigError, RigStateError
+from drivers.gate import GatedWaveform, ramp_down
+from drivers.rig import Block, Event, Instrument, RigIdentity, RigState
+from drivers.settings import RigSettings
+from sim_backend.card import Card
+from sim_backend.clock import Clock
+from sim_backend.plant import Plant
+from sim_backend.signal_path import CHUNK, PathState, SignalPath
+from sim_backend.streams import Streams
+
+__all__ = ["SimulatedRig"]
+
+# a tick that the clock has reached but for rounding has been reached
+_TICK_TOLERANCE = 1e-6
+
+
+class _Run:
+    """One waveform on its way: what has been played, computed, and handed over."""
+
+    def __init__(
+        self, waveform: GatedWaveform, counts: np.ndarray, path: SignalPath, state: PathState
+    ) -> None:
+        self.waveform = waveform
+        self.command = counts
+        self.started = 0.0  # s on the rig's clock
+        self.delivered = 0  # samples handed to the reader
+        self.stopped = False
+        self.events: list[Event] = []
+        self._path = path
+        self._state = state  # after the newest chunk
+        self._before = state  # before it
+        self._chunks = 0  # computed so far
+        self._ready = np.empty((0, 0), dtype=np.int16)  # computed, not delivered
+
+    @property
+    def total(self) -> int:
+        return self.command.size
+
+    def take(self, end: int) -> np.ndarray:
+        """Counts (channels, n) of the samples after the delivered ones, up to ``end``."""
+        while self._chunks * CHUNK < end:
+            self._compute()
+        samples = end - self.delivered
+        counts, self._ready = self._ready[:, :samples], self._ready[:, samples:]
+        self.delivered = end
+        return counts
+
+    def replace_from(self, sample: int, counts: np.ndarray) -> None:
+        """Play ``counts`` in place of everything from ``sample`` on.
+
+        ``sample`` is later than all that was delivered, so only the newest chunk can hold samples
+        that were computed ahead and are not true any more: it is computed again from its start.
+        """
+        self.command = np.concatenate((self.command[:sample], counts))
+        if self._chunks * CHUNK > sample:
+            self._chunks -= 1
+            self._state = self._before
+            self._ready = self._ready[:, :0]
+            # what had not been delivered of it comes again with the new computation
+            self.events = [e for e in self.events if e.sample < self._chunks * CHUNK]
+
+    def _compute(self) -> None:
+        first = self._chunks * CHUNK
+        self._before = self._state
+        counts, events, self._state = self._path.advance(
+            self._chunks, self.command[first : first + CHUNK], self._before
+        )
+        counts = counts[:, max(0, self.delivered - first) :]
+        self._ready = np.concatenate((self._ready, counts), axis=1) if self._ready.size else counts
+        self.events.extend(e for e in events if e.sample >= self.delivered)
+        self._chunks += 1
+
+
+class SimulatedRig:
+    """A rig on a ``clock``, whose film is ``plant``; see ``drivers.rig.Rig`` for the calls.
+
+    ``plant`` is the film at rest: every run starts from it, as if the operator had waited for it to
+    relax. Blocks hold ``block_samples`` samples, or a tenth of a second when that is None; their
+    length changes nothing in the data. All calls may come from any thread.
+    """
+
+    def __init__(
+        self,
+        settings: RigSettings,
+        plant: Plant,
+        clock: Clock,
+        *,
+        address: str = "sim",
+        noise_seed: tuple[int, ...] = (0,),
+        identity_seed: int | None = None,
+        block_samples: int | None = None,
+    ) -> None:
+        if block_samples is not None and block_samples < 1:
+            raise ValueError(f"block_samples = {block_samples} must be 1 or more, or None")
+        self._settings = settings
+        self._plant = plant
+        self._clock = clock
+        self._address = address
+        self._identity_seed = identity_seed
+        self._block_samples = block_samples
+        self._streams = Streams(noise_seed)
+        self._card = Card(settings, self._streams)
+        self._lock = threading.RLock()
+        self._wake = threading.Event()
+        self._state = RigState.SAFE
+        self._run: _Run | None = None
+        self._runs = 0
+        self._rate = 0.0
+
+    @property
+    def state(self) -> RigState:
+        """Where the rig stands."""
+        return self._state
+
+    @property
+    def output(self) -> float:
+        """Voltage in V that is commanded at the film now."""
+        with self._lock:
+            run = self._run
+            if self._state is not RigState.RUNNING or run is None:
+                return 0.0
+            at = min(self._ticks(run), run.total - 1)
+            return float(self._card.channels[0].scaling.physical(run.command[at : at + 1])[0])
+
+    def identify(self) -> RigIdentity:
+        """Say what is there; moves nothing."""
+        with self._lock:
+            self._expect("identify", *(s for s in RigState if s is not RigState.CLOSED))
+        return RigIdentity(
+            address=self._address,
+            simulated=True,
+            instruments=_instruments(self._settings),
+            channels=self._card.channels,
+            seed=self._identity_seed,
+        )
+
+    def load(self, waveform: GatedWaveform) -> float:
+        """Take a waveform that has passed the gate; returns the actual sample rate in Hz.
+
+        Raises ``RigError`` for a waveform that passed under wider limits than this rig's, or at a
+        rate the card cannot do.
+        """
+        if not isinstance(waveform, GatedWaveform):
+            raise TypeError(
+                f"a rig plays a GatedWaveform, which drivers.gate.admit makes, "
+                f"not {type(waveform).__name__}"
+            )
+        with self._lock:
+            self._expect("load", RigState.SAFE, RigState.DONE)
+            _check_limits(waveform, self._settings)
+            rate = self._card.actual_rate(waveform.rate)
+            path = SignalPath(self._settings, self._card, self._streams, self._runs, rate)
+            counts = self._card.command_counts(waveform.voltage)
+            self._run = _Run(waveform, counts, path, path.start(self._plant))
+            self._runs += 1
+            self._rate = rate
+            self._state = RigState.LOADED
+            return rate
+
+    def arm(self) -> None:
+        """Make ready to start at once; the output is still at 0 V."""
+        with self._lock:
+            self._expect("arm", RigState.LOADED)
+            self._state = RigState.ARMED
+
+    def start(self) -> None:
+        """Start the sample clock."""
+        with self._lock:
+            self._expect("start", RigState.ARMED)
+            self._running().started = self._clock.now()
+            self._state = RigState.RUNNING
+
+    def read(self) -> Block | None:
+        """Next block, waiting for it if need be; None when the waveform has been played.
+
+        Raises ``RigError`` with DAQmx's code -200279 when the reader came so late that samples were
+        overwritten; the output is at 0 V then. Raises ``RigStateError`` when the rig was made safe.
+        """
+        while True:
+            with self._lock:
+                if self._state is RigState.DONE:
+                    return None
+                self._expect("read", RigState.RUNNING)
+                run = self._running()
+                if run.delivered == run.total:
+                    self._state = RigState.DONE
+                    return None
+                size = self._block_samples or max(1, round(0.1 * self._rate))
+                end = min(run.delivered + size, run.total)
+                acquired = min(self._ticks(run), run.total)
+                try:
+                    self._card.check_buffer(acquired - run.delivered)
+                except RigError:
+                    self.make_safe()
+                    raise
+                if acquired >= end:
+                    return self._deliver(run, end)
+                due = run.started + end / self._rate
+                self._wake.clear()
+            self._clock.wait(due, self._wake)
+
+    def stop(self) -> None:
+        """End the run early: ramp down to 0 V in the set time; what was acquired stays readable."""
+        with self._lock:
+            if self._state is RigState.DONE:
+                return  # it ended by itself in the same moment
+            self._expect("stop", RigState.RUNNING)
+            run = self._running()
+            played = self._ticks(run) + 1  # with the sample that stands on the output now
+            if run.stopped or played >= run.total:
+                return
+            seconds = self._settings.limits.ramp_down_s
+            ramp = ramp_down(run.waveform, played - 1, seconds)
+            run.replace_from(played, self._card.command_counts(ramp))
+            run.stopped = True
+            run.events.append(
+                Event(
+                    played,
+                    "info",
+                    f"stopped: ramping from {run.waveform.voltage[played - 1] * 1e-3:.4g} kV to 0 "
+                    f"in {ramp.size / self._rate:.3g} s",
+                )
+            )
+            self._wake.set()
+
+    def make_safe(self) -> None:
+        """Take the output to 0 V, now, and forget the waveform."""
+        with self._lock:
+            if self._state is RigState.CLOSED:
+                return
+            self._run = None
+            self._state = RigState.SAFE
+            self._wake.set()
+
+    def close(self) -> None:
+        """Make safe and release the instruments."""
+        with self._lock:
+            self.make_safe()
+            self._state = RigState.CLOSED
+
+    def _deliver(self, run: _Run, end: int) -> Block:
+        start = run.delivered
+        counts = run.take(end)
+        if not run.events:
+            return Block(start, counts)
+        due = sorted((e for e in run.events if e.sample < end), key=lambda event: event.sample)
+        run.events = [e for e in run.events if e.sample >= end]
+        if end == run.total:  # an event of a ramp of no length lies beyond the last sample
+            due, run.events = due + run.events, []
+        return Block(start, counts, tuple(due))
+
+    def _ticks(self, run: _Run) -> int:
+        """Whole sample intervals that have passed since the start."""
+        return int((self._clock.now() - run.started) * self._rate + _TICK_TOLERANCE)
+
+    def _running(self) -> _Run:
+        if self._run is None:
+            raise RigStateError("no waveform is loaded")
+        return self._run
+
+    def _expect(self, call: str, *states: RigState) -> None:
+        if self._state not in states:
+            wanted = " or ".join(state.value for state in states)
+            raise RigStateError(f"{call}: the rig is {self._state.value}, it must be {wanted}")
+
+
+def _check_limits(waveform: GatedWaveform, settings: RigSettings) -> None:
+    """Refuse a waveform that was admitted under wider limits than the rig's own."""
+    passed, own = waveform.limits, settings.limits.gate_limits()
+    if not (
+        passed.voltage_max <= own.voltage_max
+        and passed.voltage_min >= own.voltage_min
+        and passed.slew <= own.slew
+        and passed.field <= own.field
+    ):
+        raise RigError(
+            f"the waveform passed the gate under wider limits ({passed}) than this rig's ({own}); "
+            f"admit it under the rig's own"
+        )
+
+
+def _instruments(settings: RigSettings) -> tuple[Instrument, ...]:
+    """The instruments as they would identify themselves."""
+    amplifier, laser, card = settings.amplifier, settings.laser, settings.card
+    instruments = [
+        Instrument(
+            "card",
+            card.model,
+            "simulated",
+            (
+                ("device", card.device),
+                *((f"terminal of {n}", t) for n, t in settings.terminals().items()),
+                *((f"range of {n}", f"+-{r:g} V") for n, r in settings.ranges().items()),
+                ("first conversion", f"{card.first_convert_us:g} us after the tick"),
+                ("conversion interval", f"{card.convert_interval_us:g} us"),
+            ),
+        ),
+        Instrument(
+            "amplifier",
+            amplifier.model,
+            amplifier.serial or "simulated",
+            (
+                ("gain", f"{amplifier.gain_V_per_V:g} V/V"),
+                ("range", f"+-{amplifier.range_kV:g} kV"),
+                ("current limit", f"{amplifier.current_limit_mA:g} mA"),
+                ("slew rate", f"{amplifier.slew_V_per_us:g} V/us"),
+                ("bandwidth", f"{amplifier.bandwidth_kHz:g} kHz"),
+                ("voltage monitor", f"{amplifier.monitor_V_per_kV:g} V/kV"),
+                ("current monitor", f"{amplifier.current_monitor_V_per_mA:g} V/mA"),
+            ),
+        ),
+        Instrument(
+            "laser",
+            laser.model,
+            laser.serial or "simulated",
+            (
+                ("reference distance", f"{laser.reference_distance_mm:g} mm"),
+                ("range", f"+-{laser.range_mm:g} mm"),
+                ("analog scaling", f"{laser.mm_per_V:g} mm/V"),
+                ("sampling", f"{laser.sampling_us:g} us"),
+                ("averaging", f"{laser.averaging} samples"),
+            ),
+        ),
+    ]
+    if settings.thermometer is not None:
+        thermometer = settings.thermometer
+        instruments.append(
+            Instrument(
+                "thermometer",
+                thermometer.model,
+                thermometer.serial or "simulated",
+                (("scaling", f"{thermometer.celsius_per_V:g} C/V"),),
+            )
+        )
+    return tuple(instruments)

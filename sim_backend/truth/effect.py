@@ -1,0 +1,38 @@
+"""What one hidden effect is: a name for the score, and the place of the signal path it acts on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim_backend.truth.film import FilmNumbers
+
+__all__ = ["Stage", "TruthEffect"]
+
+#: One step of a signal path, carried from call to call: ``stage(time, rows, carry)`` returns the
+#: changed rows and what to hand it the next time. ``carry`` is None in the first call of a run, and
+#: is never changed in place: a run may be taken up again from it. Rows are copies. Node 0 of a call
+#: is the last node of the one before.
+Stage = Callable[[np.ndarray, np.ndarray, object], tuple[np.ndarray, object]]
+
+
+@dataclass(frozen=True)
+class TruthEffect:
+    """One effect that the rig has and nobody declared.
+
+    ``family`` is one of the diagnosis's families, or ``unknown`` for what is in none of them;
+    ``description`` says form and size. It acts through one or more of
+
+    * ``on_film``: changes the numbers of the equation of motion;
+    * ``on_voltage``: a stage on the voltage (N,) V that reaches the film, held from node to node;
+    * ``on_motion``: a stage on what the sensor sees, rows (2, N): displacement m, velocity m/s.
+    """
+
+    family: str
+    acts_on: str
+    description: str
+    on_film: Callable[[FilmNumbers], FilmNumbers] | None = None
+    on_voltage: Stage | None = None
+    on_motion: Stage | None = None

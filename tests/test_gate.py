@@ -1,0 +1,170 @@
+"""The one gate: nothing beyond a limit passes, and nothing gets out another way."""
+
+import copy
+import math
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from drivers.errors import RefusedWaveform
+from drivers.gate import GatedWaveform, Limits, admit, ramp_down
+
+LIMITS = Limits(voltage_min=-1000.0, voltage_max=8000.0, slew=4.0e5, field=1.0e7)
+RATE = 1000.0
+FIELD = 1.0e3
+
+any_float = st.floats(allow_nan=True, allow_infinity=True)
+near_limits = st.floats(min_value=-2000.0, max_value=9000.0)
+
+
+def gate(voltage, rate=RATE, limits=LIMITS, field=FIELD):
+    voltage = np.asarray(voltage, dtype=float)
+    return admit(voltage, rate, limits, np.full(voltage.shape, field))
+
+
+def within(voltage, field_per_volt, limits=LIMITS, rate=RATE):
+    """The same limits, said another way."""
+    voltage, field_per_volt = voltage.tolist(), field_per_volt.tolist()
+    if not all(math.isfinite(v) for v in voltage) or voltage[0] != 0.0 or voltage[-1] != 0.0:
+        return False
+    if not all(math.isfinite(f) and f > 0.0 for f in field_per_volt):
+        return False
+    for i, v in enumerate(voltage):
+        if v > limits.voltage_max or v < limits.voltage_min:
+            return False
+        if abs(v) * field_per_volt[i] > limits.field:
+            return False
+        if i and abs(v - voltage[i - 1]) * rate > limits.slew:
+            return False
+    return True
+
+
+@settings(deadline=None, max_examples=150)
+@given(
+    st.lists(st.one_of(any_float, near_limits), max_size=12),
+    st.one_of(any_float, st.floats(min_value=500.0, max_value=2000.0)),
+)
+def test_what_passes_is_within_every_limit_and_what_is_refused_is_not(inside, field):
+    voltage = np.array([0.0, *inside, 0.0])
+    factors = np.full(voltage.size, field)
+    if within(voltage, factors):
+        np.testing.assert_array_equal(admit(voltage, RATE, LIMITS, factors).voltage, voltage)
+    else:
+        with pytest.raises(RefusedWaveform):
+            admit(voltage, RATE, LIMITS, factors)
+
+
+@settings(deadline=None, max_examples=50)
+@given(arrays(np.float64, st.integers(2, 20), elements=any_float))
+def test_any_numbers_at_all_pass_only_within_the_limits(voltage):
+    try:
+        passed = gate(voltage)
+    except RefusedWaveform:
+        return
+    assert within(passed.voltage, np.full(voltage.size, FIELD))
+
+
+@pytest.mark.parametrize(
+    ("voltage", "message"),
+    [
+        ([0, 8000.1, 0], "voltage reaches 8.0001 kV at 0.001 s, 8 kV is allowed"),
+        ([0, -1000.5, 0], "negative voltage reaches 1.0005 kV at 0.001 s, 1 kV is allowed"),
+        ([0, 1e308, -1e308, 0], "slew reaches inf kV/s"),
+        ([0, 500.0, 0], "slew reaches 500 kV/s at 0 s, 400 kV/s is allowed"),
+        ([0, math.nan, 0], r"sample 1 \(at 0.001 s\) is not a finite number"),
+        ([0, 100, math.inf], "sample 2 .* is not a finite number"),
+        ([1, 0, 0], "the waveform starts at 0.001 kV, not at 0"),
+        ([0, 0, 1], "the waveform ends at 0.001 kV, not at 0"),
+        ([0.0], "at least 2 samples"),
+        ([], "at least 2 samples"),
+        ([[0.0, 0.0]], "one row"),
+    ],
+)
+def test_refusals_say_what_when_and_how_much(voltage, message):
+    with pytest.raises(RefusedWaveform, match=message):
+        gate(voltage)
+
+
+def test_a_refusal_names_every_limit_that_is_broken():
+    with pytest.raises(RefusedWaveform) as caught:
+        gate([0.0, 9000.0, 500.0], field=2.0e3)
+    assert len(caught.value.reasons) == 4  # voltage, slew, field, end
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, math.nan, math.inf])
+def test_rates_that_are_none(rate):
+    with pytest.raises(RefusedWaveform, match="sample rate"):
+        gate([0.0, 0.0], rate=rate)
+
+
+@pytest.mark.parametrize("field", [0.0, -1.0])
+def test_field_factors_that_are_none(field):
+    with pytest.raises(RefusedWaveform, match="field factor"):
+        gate([0.0, 0.0], field=field)
+
+
+def test_field_factors_must_be_as_many_as_samples():
+    with pytest.raises(RefusedWaveform, match="as many field factors"):
+        admit(np.zeros(3), RATE, LIMITS, np.ones(2))
+
+
+@pytest.mark.parametrize("name", ["voltage_min", "voltage_max", "slew", "field"])
+def test_a_limit_that_is_no_number_lets_nothing_pass(name):
+    limits = Limits(**{**vars(LIMITS), name: math.nan})
+    with pytest.raises(RefusedWaveform, match="nan"):
+        gate([0.0, 0.0], limits=limits)
+
+
+def test_margins_say_how_near_it_comes():
+    margins = {m.quantity: m for m in gate([0.0, 200.0, 0.0]).margins}
+    assert margins["voltage"].reached == pytest.approx(0.2)
+    assert margins["slew"].reached == pytest.approx(200.0)
+    assert margins["true field"].reached == pytest.approx(0.2)
+    assert margins["true field"].unit == "MV/m"
+
+
+def test_no_other_way_in():
+    with pytest.raises(TypeError, match=r"drivers\.gate\.admit and from nowhere else"):
+        GatedWaveform(np.zeros(2), RATE, LIMITS, (), object())
+    with pytest.raises(TypeError, match="cannot be derived"):
+        type("Forged", (GatedWaveform,), {})
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_no_copies(copied):
+    with pytest.raises(TypeError, match="admit the waveform again"):
+        copied(gate([0.0, 0.0]))
+
+
+def test_unchangeable_afterwards():
+    source = np.array([0.0, 100.0, 0.0])
+    passed = gate(source)
+    source[1] = 1e9
+    assert passed.voltage[1] == 100.0
+    with pytest.raises(ValueError, match="read-only"):
+        passed.voltage[1] = 1e9
+    with pytest.raises(ValueError, match="cannot set WRITEABLE"):
+        passed.voltage.setflags(write=True)
+    for name in ("voltage", "rate", "_voltage", "_limits"):
+        with pytest.raises(AttributeError, match="not changed after the gate"):
+            setattr(passed, name, None)
+
+
+@pytest.mark.parametrize(
+    ("peak", "duration", "steps"),
+    [(400.0, 0.01, 10), (-400.0, 0.01, 10), (400.0, 0.0, 1), (0.0, 1.0, 0), (1200.0, 0.0, 3)],
+)
+def test_ramp_down_goes_straight_to_zero_within_the_slew(peak, duration, steps):
+    rise = np.linspace(0.0, peak, 10)
+    limits = Limits(-2000.0, 2000.0, LIMITS.slew, LIMITS.field)
+    passed = gate([*rise, *rise[::-1]], limits=limits)
+    ramp = ramp_down(passed, 9, duration)
+    assert ramp.size == steps
+    whole = np.array([peak, *ramp])
+    assert whole[-1] == 0.0
+    np.testing.assert_allclose(np.diff(whole, 2), 0.0, atol=1e-9)
+    assert np.all(np.abs(np.diff(whole)) * RATE <= limits.slew * (1.0 + 1e-12))
