@@ -17,13 +17,13 @@ class InputError(DearigError):
     exit_code = 2
 
 
-class SafetyStop(DearigError):
+class SafetyStop(DearigError):  # noqa: N818  (the name of what happened)
     """A safety limit stopped the run; the rig was made safe."""
 
     exit_code = 3
 
 
-class InstrumentFault(DearigError):
+class InstrumentFault(DearigError):  # noqa: N818
     """An instrument failed or is not there."""
 
     exit_code = 4

@@ -48,7 +48,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class BranchTrial:
-    """What one number of branches did: errors (rms Pa or m, and per cent of peak) pooled over files.
+    """What one number of branches did: errors (Pa or m, and per cent of peak) pooled over files.
 
     ``bic`` is the information criterion on the training data, by which the number is chosen;
     validation plays no part in that choice.

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-import difflib
 import json
-import re
-import tomllib
-import types
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Literal, get_args
 
 from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from app.errors import InputError
+from app.toml_input import allowed, meant, parse_toml, read_text, shown
 from drivers.gate import Limits
 from drivers.settings import RigSettings, Section
 from model.material import Film, Load
 
 __all__ = ["FilmSection", "LoadSection", "RigFile", "load_rig_file", "write_default"]
-
-# what a key can end in: used to tell a wrong unit from a wrong name
-_UNITS = frozenset(
-    {"nm", "um", "mm", "cm", "m", "m3", "us", "ms", "s", "mv", "v", "kv", "ua", "ma", "a"}
-    | {"hz", "khz", "mhz", "g", "kg", "n", "k", "mk", "celsius", "ppm", "percent", "pct", "per"}
-)
 
 
 class FilmSection(Section):
@@ -106,19 +97,7 @@ def load_rig_file(path: Path | str | None) -> RigFile:
     if path is None:
         return RigFile()
     path = Path(path)
-    try:
-        text = path.read_bytes().decode("utf-8")
-    except OSError as error:
-        raise InputError(f"rig file {path} cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        raise InputError(
-            f"rig file {path}, line {line}: not UTF-8 text; save the file in UTF-8"
-        ) from error
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"rig file {path}{_toml_fault(str(error), text)}") from error
+    data = parse_toml(read_text(path, "rig file"), f"rig file {path}")
     try:
         return RigFile.model_validate(data)
     except ValidationError as error:
@@ -156,7 +135,7 @@ def _section_lines(name: str, info: FieldInfo) -> Iterator[str]:
     yield f"# {doc}" if not off else f"# {doc} {(info.description or '').capitalize()}."
     yield f"{off}[{name}]"
     for key, field in section.model_fields.items():
-        about = f"# {field.description} ({_allowed(field)})"
+        about = f"# {field.description} ({allowed(field)})"
         value = field.get_default(call_default_factory=True)
         if value is None:
             yield about
@@ -173,47 +152,6 @@ def _section_class(info: FieldInfo) -> type[BaseModel]:
         if isinstance(part, type) and issubclass(part, BaseModel):
             return part
     raise TypeError(f"{info!r} is not a section")
-
-
-def _allowed(info: FieldInfo) -> str:
-    """What a key may hold, in words: ``a number from 0.1 to 10``."""
-    kind = info.annotation
-    if get_origin(kind) in (Union, types.UnionType):
-        kind = next(part for part in get_args(kind) if part is not type(None))
-    if get_origin(kind) is Literal:
-        return " or ".join(json.dumps(value) for value in get_args(kind))
-    words = {float: "a number", int: "a whole number", str: "a text"}
-    text = words.get(kind, "a table") if isinstance(kind, type) else "a table"
-    bounds: dict[str, Any] = {}
-    for constraint in info.metadata:
-        for name in ("gt", "ge", "lt", "le", "pattern", "min_length"):
-            value = getattr(constraint, name, None)
-            if value is not None:
-                bounds[name] = value
-    if "ge" in bounds:
-        text += f" from {bounds['ge']:g}"
-    if "gt" in bounds:
-        text += f" above {bounds['gt']:g}"
-    if "le" in bounds:
-        text += f" to {bounds['le']:g}" if "ge" in bounds else f", at most {bounds['le']:g}"
-    if "pattern" in bounds:
-        text += f" such as {'ao0' if 'ao' in bounds['pattern'] else 'ai0'}"
-    if "min_length" in bounds:
-        text += " that is not empty"
-    return text
-
-
-def _toml_fault(message: str, text: str) -> str:
-    """`, line N: what` from tomllib's message, which says where only in its text."""
-    found = re.fullmatch(r"(.*?)\s*\(at (?:line (\d+), column (\d+)|end of document)\)", message)
-    if not found:
-        return f": not TOML: {message}"
-    what, line, column = found.groups()
-    lines = text.splitlines()
-    if line is None:
-        return f", line {max(len(lines), 1)}: {what} at the end of the file"
-    shown = lines[int(line) - 1].strip() if int(line) <= len(lines) else ""
-    return f", line {line}, column {column}: {what}" + (f" in `{shown}`" if shown else "")
 
 
 def _sentence(error: ValidationError) -> str:
@@ -235,20 +173,15 @@ def _fault(fault: ErrorDetails) -> str:
     key = ".".join(place)
     info = RigFile.model_fields[place[0]]
     if fault["type"] in ("model_type", "model_attributes_type"):
-        return f"{key} = {_shown(value)} is not a table: write [{key}] and its keys below"
+        return f"{key} = {shown(value)} is not a table: write [{key}] and its keys below"
     if len(place) == 1:
         # the section's own check
         return str(fault["ctx"]["error"])
     info = _section_class(info).model_fields[place[1]]
-    allowed = _allowed(info)
+    may = allowed(info)
     if fault["type"] == "value_error":
-        return f"{key} = {_shown(value)} is not allowed: {fault['ctx']['error']}"
-    return f"{key} = {_shown(value)} is not allowed, but {allowed} ({info.description})"
-
-
-def _shown(value: object) -> str:
-    text = json.dumps(value, default=str, ensure_ascii=False)
-    return text if len(text) <= 40 else f"{text[:37]}..."
+        return f"{key} = {shown(value)} is not allowed: {fault['ctx']['error']}"
+    return f"{key} = {shown(value)} is not allowed, but {may} ({info.description})"
 
 
 def _unknown(place: list[str]) -> str:
@@ -257,27 +190,14 @@ def _unknown(place: list[str]) -> str:
     sections = RigFile.model_fields
     known = _section_class(sections[parents[0]]).model_fields if parents else sections
     dotted = ".".join(place)
-    for name in known:
-        if _stem(key) and _stem(name) == _stem(key):
-            unit = name.removeprefix(_stem(name)).strip("_")
-            if unit:
-                unit = unit.replace("_", " ")
-                meant = ".".join([*parents, name])
-                return f"{dotted} is not a key: this value is given in {unit}, as {meant}"
+    what = "key" if parents else "table"
+    hint = meant(key, known, "".join(f"{p}." for p in parents))
+    if hint and not hint.startswith("did"):
+        return f"{dotted} is not a {what}: {hint}"
     for section, info in sections.items():
         if section not in parents and key in _section_class(info).model_fields:
             return f"{dotted} is not a key here: it belongs in [{section}]"
-    what = "key" if parents else "table"
-    near = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
-    if near:
-        return f"{dotted} is not a {what}; did you mean {'.'.join([*parents, near[0]])}?"
+    if hint:
+        return f"{dotted} is not a {what}; {hint}"
     where = f"[{parents[0]}]" if parents else "a rig file"
     return f"{dotted} is not a {what}; {where} takes {', '.join(known)}"
-
-
-def _stem(key: str) -> str:
-    """A key without the unit at its end: ``slew_max`` of ``slew_max_kV_per_s``."""
-    parts = key.split("_")
-    while parts and parts[-1].lower() in _UNITS:
-        parts.pop()
-    return "_".join(parts)

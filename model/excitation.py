@@ -64,7 +64,7 @@ class Segment(Protocol):
         ...
 
     def after(self, end: float) -> Segment:
-        """This segment following a voltage of ``end`` V: fills in a start that was left open."""
+        """The segment following a voltage of ``end`` V: fills in a start that was left open."""
         ...
 
 
@@ -118,7 +118,7 @@ class HalfSine(_Fixed):
 
 @dataclass(frozen=True)
 class Lobes(_Fixed):
-    """Eq. 49: ``periods`` repetitions of half-sine lobes of ``amplitudes`` V, ``frequencies`` Hz."""
+    """Eq. 49: ``periods`` times the half-sine lobes of ``amplitudes`` V and ``frequencies`` Hz."""
 
     amplitudes: tuple[float, ...] = THESIS_AMPLITUDES
     frequencies: tuple[float, ...] = THESIS_FREQUENCIES
@@ -383,7 +383,7 @@ class Chirp:
 
 @dataclass(frozen=True)
 class Multisine:
-    """Sines of ``frequencies`` Hz about ``offset``, with Schroeder's phases, scaled to ``amplitude``.
+    """Sines of ``frequencies`` Hz about ``offset``, Schroeder's phases, scaled to ``amplitude``.
 
     ``amplitude`` is the largest excursion from the offset, so that a limit is easy to keep.
     """

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any, TypeVar, cast
 
 import numba
 import platformdirs
@@ -17,6 +20,8 @@ import platformdirs
 __all__ = ["cache_folder", "inlined", "is_compiled", "jit"]
 
 _KERNEL_ROOT = Path(__file__).parent
+# numba fills this module from the environment when it is imported: a type checker finds it empty
+_settings: dict[str, Any] = vars(numba.config)
 
 
 def _sources_digest() -> str:
@@ -33,22 +38,34 @@ def cache_folder() -> Path:
 
 def is_compiled() -> bool:
     """True when a command will start at once, False when it must first compile the kernels."""
-    return any(Path(numba.config.CACHE_DIR).rglob("*.nbi"))
+    return any(Path(_settings["CACHE_DIR"]).rglob("*.nbi"))
 
 
 if "NUMBA_CACHE_DIR" not in os.environ:
-    numba.config.CACHE_DIR = str(cache_folder())
+    _settings["CACHE_DIR"] = str(cache_folder())
 
 # nogil: populations run on threads, which (unlike numba's own parallel layer) may be entered from
 # several Python threads at once, as a window with a live overlay does.
-# error_model="numpy": a division by zero gives inf, which the status checks catch, not an exception.
+# error_model="numpy": a division by zero gives inf, which the status checks catch, no exception.
 # reassoc lets loops over branches use vector units; NaN and inf keep their meaning.
-_OPTIONS = {
-    "cache": True,
-    "nogil": True,
-    "error_model": "numpy",
-    "fastmath": {"contract", "arcp", "nsz", "reassoc"},
-}
-jit = numba.njit(**_OPTIONS)
-#: For pieces that are compiled into their caller, so that literal arguments become constants there.
-inlined = numba.njit(inline="always", **_OPTIONS)
+_compiled = partial(
+    numba.njit,
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+    fastmath={"contract", "arcp", "nsz", "reassoc"},
+)
+
+# To the type checker a compiled function is the function it was compiled from: it is called with
+# the same arguments and returns the same values.
+_Function = TypeVar("_Function", bound=Callable[..., object])
+
+
+def jit(function: _Function) -> _Function:
+    """Compile ``function`` at its first call, and keep the machine code on disk."""
+    return cast(_Function, _compiled(function))
+
+
+def inlined(function: _Function) -> _Function:
+    """As ``jit``, compiled into its caller, so that literal arguments become constants there."""
+    return cast(_Function, _compiled(function, inline="always"))

@@ -38,7 +38,7 @@ def _positive(owner: str, **values: float) -> None:
 
 @dataclass(frozen=True)
 class Film:
-    """A film before it is loaded: ``length`` L1 (along the motion), ``width`` L2, ``thickness`` Z, m.
+    """A film before it is loaded: ``length`` L1 along the motion, ``width`` L2, ``thickness`` Z, m.
 
     ``density`` in kg/m^3 (the thesis prints none; 1000 is that of PDMS within a few per cent) and
     the relative ``permittivity``.
@@ -172,7 +172,7 @@ class Network:
         return replace(self, equilibrium=replace(self.equilibrium, modulus=modulus))
 
     def coefficients(self, held: int) -> np.ndarray:
-        """Coefficient vector of the kernels (see ``model.network``), head filled with ``held`` only."""
+        """Coefficients as ``model.network`` lays them out; of the head only ``held`` is filled."""
         springs = self.springs
         c = np.zeros(network.HEAD + network.WIDTH * len(springs))
         c[network.HELD] = held

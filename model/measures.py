@@ -1,4 +1,4 @@
-"""How far a model is from a measurement: the thesis's two measures as printed, and three sound ones."""
+"""How far a model is from a measurement: the thesis's measures as printed, and sound ones."""
 
 from __future__ import annotations
 

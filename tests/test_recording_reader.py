@@ -144,6 +144,17 @@ def test_a_file_that_another_program_writes(tmp_path: Path) -> None:
         open_recording(copy)
 
 
+def test_a_damaged_first_block_never_reaches_the_library(tmp_path: Path, run: Path) -> None:
+    whole = run.read_bytes()
+    path = tmp_path / "bad.h5"
+    for at in range(48):
+        raw = bytearray(whole)
+        raw[at] ^= 0x10
+        path.write_bytes(raw)
+        with pytest.raises(InputError, match=r"bad\.h5 (is damaged|is not an HDF5|cannot be read)"):
+            open_recording(path)
+
+
 def test_bytes_turned_anywhere_are_a_sentence_or_harmless(tmp_path: Path, film: Path) -> None:
     whole = film.read_bytes()
     rng = np.random.default_rng(5)

@@ -24,7 +24,7 @@ def check_output(path: str | Path, overwrite: bool, source: Path | None = None) 
         if source is not None and source.exists() and path.samefile(source):
             raise InputError(f"{path} is the file that is read; choose another name for the output")
         if not overwrite:
-            raise InputError(f"{path} exists already; choose another name, or ask to overwrite it")
+            raise InputError(f"{path} exists already; choose another name, or replace it with --force")
     if not path.parent.is_dir():
         raise InputError(f"{path} cannot be written: there is no folder {path.parent}")
     return path

@@ -66,6 +66,8 @@ def opened(path: Path) -> Iterator[h5py.File]:
         flags = consistency_flags(path)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error}") from error
+    except ValueError as error:
+        raise InputError(f"{path} is damaged: {error}") from error
     if flags is None:
         raise InputError(
             f"{path} is not an HDF5 file; recordings made elsewhere are brought in with import"

@@ -21,13 +21,19 @@ MASK = 0xFFFFFFFF
 def consistency_flags(path: Path) -> int | None:
     """Flags of a file that was not closed (0: it was); None if it is not an HDF5 file.
 
-    Files with an older superblock have none, and count as closed.
+    Files with an older superblock have none, and count as closed. Raises ``ValueError`` if the
+    superblock is damaged: opened in SWMR mode such a file is read again and again, and pauses grow
+    without end.
     """
     with path.open("rb") as stream:
         head = stream.read(SIZE)
     if head[: len(SIGNATURE)] != SIGNATURE or len(head) < SIZE:
         return None
-    return head[FLAGS_AT] if head[VERSION_AT] == VERSION else 0
+    if head[VERSION_AT] != VERSION:
+        return 0
+    if struct.unpack_from("<I", head, CHECKSUM_AT)[0] != lookup3(head[:CHECKSUM_AT]):
+        raise ValueError("the checksum of its first 48 bytes is wrong")
+    return head[FLAGS_AT]
 
 
 def mend_superblock(path: Path) -> None:

@@ -368,7 +368,7 @@ def _noise_band(ax: Axes, comparison: Comparison, shown: Shown) -> None:
         for i, edge in enumerate((-floor, floor)):
             # on top as well: where the error is nothing but noise, it covers the band
             ax.axhline(
-                edge, color=MARK, linewidth=1.0, linestyle=(0, (3, 2)), zorder=4,
+                edge, color=MARK, linewidth=0.8, linestyle=(0, (3, 2)), zorder=4,
                 label=None if i else
                 f"\N{PLUS-MINUS SIGN} noise floor, {significant(floor)} {shown.error_unit}",
             )  # fmt: skip
@@ -380,7 +380,8 @@ def _histogram(ax: Axes, comparison: Comparison) -> None:
     shown = SHOWN[comparison.kind]
     residual = _residual(comparison) * shown.error_factor
     # a few stray samples must not squeeze everything else into one bar
-    centre, reach = float(np.median(residual)), 4.5 * float(np.std(residual))
+    centre = float(np.median(residual))
+    reach = min(4.5 * float(np.std(residual)), 1.1 * float(np.max(np.abs(residual - centre))))
     noise = None if comparison.noise is None else comparison.noise * shown.error_factor
     reach = max(reach, 4.0 * noise if noise else 0.0) or 1.0
     bins = int(np.clip(math.sqrt(residual.size), 12, 60))

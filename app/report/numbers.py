@@ -5,19 +5,41 @@ from __future__ import annotations
 import math
 import re
 
-__all__ = ["NOTHING", "interval", "power_of_ten", "quoted", "seconds", "significant", "symbol"]
+__all__ = [
+    "NOTHING",
+    "interval",
+    "plain",
+    "power_of_ten",
+    "quoted",
+    "seconds",
+    "significant",
+    "symbol",
+]
 
 #: Stands where there is no number.
 NOTHING = "\N{EN DASH}"
 
 _TIMES = "\N{MULTIPLICATION SIGN}"
-_SUPERSCRIPT = str.maketrans(
-    "-0123456789",
+_RAISED = (
     "\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT ZERO}\N{SUPERSCRIPT ONE}\N{SUPERSCRIPT TWO}"
     "\N{SUPERSCRIPT THREE}\N{SUPERSCRIPT FOUR}\N{SUPERSCRIPT FIVE}\N{SUPERSCRIPT SIX}"
-    "\N{SUPERSCRIPT SEVEN}\N{SUPERSCRIPT EIGHT}\N{SUPERSCRIPT NINE}",
+    "\N{SUPERSCRIPT SEVEN}\N{SUPERSCRIPT EIGHT}\N{SUPERSCRIPT NINE}"
 )
-_SUBSCRIPT = str.maketrans("0123456789", "".join(chr(0x2080 + i) for i in range(10)))
+_LOWERED = "".join(chr(ord("\N{SUBSCRIPT ZERO}") + i) for i in range(10))
+_SUPERSCRIPT = str.maketrans("-0123456789", _RAISED)
+_SUBSCRIPT = str.maketrans("0123456789", _LOWERED)
+_PLAIN = str.maketrans(
+    {
+        "\N{MICRO SIGN}": "u",
+        "\N{GREEK SMALL LETTER MU}": "mu",
+        _TIMES: "x",
+        NOTHING: "-",
+        "\N{INFINITY}": "inf",
+        "\N{HORIZONTAL ELLIPSIS}": "...",
+        "\N{NO-BREAK SPACE}": " ",
+        "\N{PLUS-MINUS SIGN}": "+-",
+    }
+)
 _NAMED = re.compile(r"(mu|J|T)_(\d+)")
 _DIGITS_MAX = 6  # more would be believed by nobody
 _WIDE = 5.0  # beyond this ratio of its ends an interval is an order of magnitude, not a tolerance
@@ -105,3 +127,11 @@ def symbol(name: str) -> str:
         return name
     letter = "\N{GREEK SMALL LETTER MU}" if match[1] == "mu" else match[1]
     return letter + match[2].translate(_SUBSCRIPT)
+
+
+def plain(text: str) -> str:
+    """``text`` in ASCII: ``um`` and ``mu_0`` for what has a name there, escapes for the rest."""
+    for shape, sign in ((_RAISED, "^"), (_LOWERED, "_")):
+        back = str.maketrans(shape, "-0123456789"[-len(shape) :])
+        text = re.sub(f"[{shape}]+", lambda m, s=sign, b=back: s + m[0].translate(b), text)  # type: ignore[misc]
+    return text.translate(_PLAIN).encode("ascii", "backslashreplace").decode("ascii")

@@ -28,7 +28,7 @@ ACTS_ON = (
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of an effect: SI ``unit``, the ``neutral`` value at which it vanishes, ``bounds``."""
+    """One number of an effect: SI ``unit``, ``neutral`` value at which it vanishes, ``bounds``."""
 
     name: str
     unit: str

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["EFFECT"]
 
 
-def _contribute(c: np.ndarray, values: Mapping[str, float], film: Film, load: Load) -> None:
+def _contribute(c: np.ndarray, values: Mapping[str, float], film: Film, _load: Load) -> None:
     c[INERTIA] += values["moving_mass"] * film.length / (film.width * film.thickness)
 
 

@@ -79,8 +79,8 @@ def identify(
     a ``Network`` for films driven by stretch, held as ``kinematics`` says. Its parameter values are
     not used as a start, only its number of branches and kinds of spring. ``seed`` matters to "de"
     only. ``nested`` is a fit with fewer branches, from which one more descent starts, so that more
-    branches never fit worse. ``progress(stage, fraction)`` is called often. Raises ``ModelError`` for records and
-    models that do not fit together.
+    branches never fit worse. ``progress(stage, fraction)`` is called often. Raises ``ModelError``
+    for records and models that do not fit together.
     """
     if method not in METHODS:
         raise ModelError(f"method {method!r} is not one of {', '.join(METHODS)}")
@@ -136,8 +136,9 @@ def _result(
     warnings = []
     if fit.cost > 1.5 and method == "hybrid":
         warnings.append(
-            f"the residual is {math.sqrt(fit.cost):.3g} times the noise: the model lacks something, "
-            f"and the intervals (widened by the residual's size and correlation) are a rough guide"
+            f"the residual is {math.sqrt(fit.cost):.3g} times the noise: the model lacks "
+            f"something, and the intervals (widened by the residual's size and correlation) "
+            f"are a rough guide"
         )
     if method == "hybrid" and not fit.converged:
         warnings.append("the descent was still gaining when it was ended")
@@ -179,17 +180,19 @@ def _coarse_about(problem: Problem, values: np.ndarray) -> Problem:
         model = full[0, edges_full[i] : edges_full[i + 1]]
         part = slice(edges_thin[i], edges_thin[i + 1])
         if isinstance(record, ActuatorRecord):
-            left = replace(record, displacement=record.displacement - model).coarse(_COARSE_RATE)
+            moved = replace(record, displacement=record.displacement - model)
+            left = moved.coarse(_COARSE_RATE).measured
         else:
-            left = replace(record, stress=record.stress - model).coarse(_COARSE_SAMPLES)
-        coarse.measured[part] = thin[0, part] + left.measured
+            pulled = replace(record, stress=record.stress - model)
+            left = pulled.coarse(_COARSE_SAMPLES).measured
+        coarse.measured[part] = thin[0, part] + left
     return coarse
 
 
 def _hybrid(
     problem: Problem, nested: Network | None, progress: Progress
 ) -> tuple[LocalFit, np.ndarray]:
-    """Global search, descents from several starts, then the limits; returns the fit and what is held.
+    """Global search, descents from several starts, then the limits: the fit, and what is held.
 
     The locking limits of an actuator are first held where springs do not stiffen: at a few per cent
     of strain they would otherwise wander, and drag the relaxation times along. They are freed at

@@ -62,10 +62,10 @@ def profile(
     """95 % interval of coordinate ``index``: where refitting all others no longer keeps up.
 
     ``best`` (d,) with chi-square ``chi2`` is the optimum, ``cov`` (d, d) the covariance, which
-    says how far to step and where the others will go, ``inflation`` the factor by which chi-square counts less
-    than its white-noise value, ``held`` (d,) bool the numbers that are not refitted. An end that
-    the data leave open, or that is not among the ``sides`` sought, is -inf or inf. ``tick`` is
-    called at each point.
+    says how far to step and where the others will go, ``inflation`` the factor by which chi-square
+    counts less than its white-noise value, ``held`` (d,) bool the numbers that are not refitted.
+    An end that the data leave open, or that is not among the ``sides`` sought, is -inf or inf.
+    ``tick`` is called at each point.
     """
     layout = problem.layout
     fixed = held.copy()

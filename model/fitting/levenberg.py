@@ -49,9 +49,9 @@ def descend(
     the length of its own Jacobian column) keeps numbers that the data hardly see, such as J at
     small stretch, from stopping or misleading the others. Each iteration tries several dampings at
     once, as one population on all cores, each with its geodesic acceleration: the valleys of
-    relaxation spectra are long, narrow and curved. Ends when the quadratic model promises a
-    gain in chi-square of less than ``gain``, or five iterations have gained no more. ``damping`` is the first one, relative to the scaled
-    curvature; near an optimum it may be small.
+    relaxation spectra are long, narrow and curved. Ends when the quadratic model promises a gain in
+    chi-square of less than ``gain``, or five iterations have gained no more. ``damping`` is the
+    first one, relative to the scaled curvature; near an optimum it may be small.
     """
     layout = problem.layout
     free = np.ones(layout.size, dtype=bool) if fixed is None else ~fixed

@@ -155,7 +155,7 @@ class Layout:
         return self.values(np.clip(self.coordinates(np.array(values)), self.lower, self.upper))
 
     def padded(self, network: Network) -> np.ndarray:
-        """Coordinates (d,) of ``network`` with weak branches added until it has as many as this one.
+        """Coordinates (d,) of ``network``, with weak branches added until it has as many as this.
 
         The added branches relax at the geometric mean of the others: there, a weak branch changes
         little and can grow in either direction.
@@ -177,7 +177,7 @@ class Layout:
         return np.clip(self.coordinates(np.array(values)), self.lower, self.upper)
 
     def coefficients(self, values: np.ndarray) -> np.ndarray:
-        """Kernel coefficients (P, C) of a population ``values`` (P, d), natural (not logarithms)."""
+        """Kernel coefficients (P, C) of a population ``values`` (P, d), natural, no logarithms."""
         values = np.atleast_2d(values)
         c = np.tile(self._c, (values.shape[0], 1))
         c[:, self._columns] = values

@@ -135,7 +135,7 @@ def voltage_starts(problem: Problem, progress: Progress, starts: int = 6) -> np.
 def _balance(
     problem: Problem, base: Actuator, c: np.ndarray, candidates: np.ndarray, rest: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Stress per unit modulus (1 + G, N), less that at rest, and the Maxwell stress (N,) they hold."""
+    """Stress per unit modulus (1 + G, N) less that at rest, and the Maxwell stress (N,)."""
     parts, targets = [], []
     for record in problem.records:
         if isinstance(record, ActuatorRecord):
@@ -164,7 +164,7 @@ def film_starts(problem: Problem, progress: Progress, starts: int = 8) -> np.nda
     greatest = max(float(np.max(r.stretch)) for r in records)
     firsts = greatest**2 * np.array([1.2, 3.0, 10.0, 100.0])
     # a branch that locks early flows at a nearly constant stress, whatever the rate
-    limits = (_WIDE_LIMIT, 1.0, 0.03)
+    limits: tuple[float, ...] = (_WIDE_LIMIT, 1.0, 0.03)
     if layout.network.springs[-1].kind != "gent":
         limits = limits[:1]
     if layout.network.equilibrium.kind == "neo-hookean":
@@ -204,9 +204,10 @@ def _unit_stresses(
     time: np.ndarray,
     stretch: np.ndarray,
 ) -> tuple[np.ndarray, bool]:
-    """Stress per unit modulus (1 + G, N) of the equilibrium spring, limit ``first``, and of branches.
+    """Stress per unit modulus (1 + G, N) of the equilibrium spring and of candidate branches.
 
-    ``candidates`` (G, 2) are relaxation times and limits of the branches.
+    ``first`` is the limit of the equilibrium spring, ``candidates`` (G, 2) are relaxation times and
+    limits of the branches.
     """
     springs = network.springs
     kind = springs[-1].kind
@@ -229,7 +230,7 @@ def _subsets(
     makes use of, and their neighbours, take part.
     """
     branches = layout.column("T").size
-    triangle = np.linalg.qr(np.vstack([parts, target]).T, mode="r")
+    triangle = np.asarray(np.linalg.qr(np.vstack([parts, target]).T, mode="r"))
     pool = list(range(len(candidates)))
     if comb(len(pool), branches) > _SETS_MAX:
         used, _ = nnls(triangle[:, :-1], triangle[:, -1])

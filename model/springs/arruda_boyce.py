@@ -19,7 +19,7 @@ NAME = "arruda-boyce"
 
 @jit
 def langevin(beta: float) -> tuple[float, float]:
-    """Langevin function coth(beta) - 1/beta, with its slope; series near 0, tails without overflow."""
+    """Langevin function coth(beta) - 1/beta and its slope: series near 0, no overflow far out."""
     if beta < 0.05:
         b2 = beta * beta
         return (

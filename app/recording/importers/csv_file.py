@@ -17,14 +17,14 @@ import numpy as np
 from app.errors import InputError
 from app.recording.importers.source import no_such_column
 
-__all__ = ["CsvSource"]
+__all__ = ["CsvFile"]
 
 DELIMITERS = (";", "\t", ",")
 #: A cell is quoted in messages up to this length.
 SHOWN = 30
 
 
-class CsvSource:
+class CsvFile:
     """The CSV file at ``path``. Raises ``InputError`` if it has no line of names or no data."""
 
     def __init__(self, path: Path) -> None:

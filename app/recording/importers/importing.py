@@ -12,11 +12,11 @@ import numpy as np
 from app.errors import InputError
 from app.recording.files import check_output, file_sha256
 from app.recording.importers.chosen import Chosen
-from app.recording.importers.csv_file import CsvSource
-from app.recording.importers.mat_file import MatSource
+from app.recording.importers.csv_file import CsvFile
+from app.recording.importers.mat_file import MatFile
 from app.recording.importers.plausible import doubts
 from app.recording.importers.source import Source
-from app.recording.importers.tdms_file import TdmsSource
+from app.recording.importers.tdms_file import TdmsChannels
 from app.recording.quiet import lead_in, mean_beyond_noise
 from app.recording.save import save_recording
 from drivers.rig import Event
@@ -110,11 +110,11 @@ def _open(path: Path) -> Source:
     if path.stat().st_size == 0:
         raise InputError(f"{path} is empty")
     if suffix in (".csv", ".txt", ".tsv"):
-        return CsvSource(path)
+        return CsvFile(path)
     if suffix == ".mat":
-        return MatSource(path)
+        return MatFile(path)
     if suffix == ".tdms":
-        return TdmsSource(path)
+        return TdmsChannels(path)
     raise InputError(f"{path}: files named .csv, .mat and .tdms can be imported, not {suffix!r}")
 
 

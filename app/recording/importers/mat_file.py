@@ -19,7 +19,7 @@ import numpy as np
 from app.errors import InputError
 from app.recording.importers.source import PARSER_FAILURES, no_such_column
 
-__all__ = ["MatSource"]
+__all__ = ["MatFile"]
 
 #: MAT-File Format (The MathWorks): a header, then elements of kind, size and body.
 HEADER = 128
@@ -29,7 +29,7 @@ MATRIX, COMPRESSED = 14, 15
 DEEPEST = 8
 
 
-class MatSource:
+class MatFile:
     """The MAT file at ``path``. Raises ``InputError`` if it cannot be read or holds no numbers."""
 
     def __init__(self, path: Path) -> None:

@@ -11,10 +11,10 @@ import numpy as np
 from app.errors import InputError
 from app.recording.importers.source import PARSER_FAILURES, no_such_column
 
-__all__ = ["TdmsSource"]
+__all__ = ["TdmsChannels"]
 
 
-class TdmsSource:
+class TdmsChannels:
     """The TDMS file at ``path``. Raises ``InputError`` if it cannot be read or holds no numbers.
 
     Where no channel is called ``time_s``, one is made from the waveform timing of the channels, if

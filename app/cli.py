@@ -1,0 +1,538 @@
+"""The command ``dearig``: what it is asked goes to one function each, what it answers to a person.
+
+Nothing heavy is imported here: ``dearig --help`` must answer at once, so each command imports what
+it needs when it runs.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from typer.exceptions import TyperException
+
+from app.errors import DearigError, InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from app.progress import Progress
+
+__all__ = ["app", "main"]
+
+log = logging.getLogger(__name__)
+
+app = typer.Typer(
+    name="dearig",
+    help="Run a dielectric-elastomer actuator rig, record it, and find out what its physical "
+    "model is missing.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Json = Annotated[
+    str | None,
+    typer.Option(
+        "--json", metavar="PATH", help="Write the result as JSON there; - for standard output."
+    ),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace the output if it exists.")]
+RigFileOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--rig-file",
+        metavar="FILE.toml",
+        help="Film, load, instruments and limits. [default: the thesis's rig]",
+    ),
+]
+
+
+class Method(StrEnum):
+    """Ways to identify a model."""
+
+    hybrid = "hybrid"
+    de = "de"
+
+
+class SpringKind(StrEnum):
+    """Strain energies."""
+
+    gent = "gent"
+    neo_hookean = "neo-hookean"
+    arruda_boyce = "arruda-boyce"
+
+
+class DriveChannel(StrEnum):
+    """What a model is driven by."""
+
+    command = "command"
+    monitor = "monitor"
+
+
+class ExportFormat(StrEnum):
+    """What recordings are exported to."""
+
+    csv = "csv"
+    mat = "mat"
+    parquet = "parquet"
+
+
+class Kinematics(StrEnum):
+    """How a film is held."""
+
+    uniaxial = "uniaxial"
+    constrained_width = "constrained-width"
+    equibiaxial = "equibiaxial"
+
+
+@app.callback()
+def _options(
+    verbose: Annotated[int, typer.Option("--verbose", "-v", count=True, help="Say more.")] = 0,
+) -> None:
+    level = (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
+    logging.basicConfig(level=level, format="%(levelname)s: %(message)s", stream=sys.stderr)
+    # other packages' own news is not the operator's
+    logging.getLogger("numba").setLevel(logging.WARNING)
+    logging.getLogger("matplotlib").setLevel(logging.WARNING)
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where results go.")] = Path(
+        "demo"
+    ),
+    seed: Annotated[int, typer.Option(min=0, help="Of the simulated noise.")] = 0,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Run the thesis's experiment on the simulated rig: record, identify, validate, report."""
+    from app.demo import run_demo
+    from app.terminal import identify_table, outcome_json, validate_tables, write_json
+
+    with _working(json) as (console, progress):
+        result = run_demo(out, seed=seed, overwrite=force, clock=time.monotonic, progress=progress)
+    console.print(identify_table(result.identified))
+    for table in validate_tables(result.validated):
+        console.print(table)
+    console.print(f"Recordings, model and report lie in {out}", soft_wrap=True, highlight=False)
+    console.print(f"Report: {result.report}", soft_wrap=True, highlight=False)
+    if json is not None:
+        write_json(
+            {
+                "format": "dearig-demo/1",
+                "report": str(result.report),
+                "identification": outcome_json(result.identified),
+                "validation": outcome_json(result.validated),
+                "seconds": result.seconds,
+            },
+            json,
+        )
+
+
+@app.command()
+def record(
+    sequence: Annotated[str, typer.Argument(metavar="SEQUENCE", help="A TOML file or a preset.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.h5", help="The recording.")],
+    rig: Annotated[
+        str, typer.Option(help="sim, or sim:SEED for a rig that hides an effect.")
+    ] = "sim",
+    rig_file: RigFileOption = None,
+    paced: Annotated[bool, typer.Option("--paced", help="Simulate in real time.")] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Of the simulated noise.")] = 0,
+    operator: Annotated[str, typer.Option(help="Who runs it; kept in the recording.")] = "",
+    film: Annotated[str, typer.Option(help="Which film; kept in the recording.")] = "",
+    notes: Annotated[str, typer.Option(help="Anything else; kept in the recording.")] = "",
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Play a sequence on a rig and record it; ctrl-C ramps down to 0 V and keeps the recording."""
+    from app.rigfile import load_rig_file
+    from app.run import record as run
+    from app.sequencefile import load_sequence
+    from app.terminal import write_json
+
+    settings = load_rig_file(rig_file)
+    text = "" if rig_file is None else rig_file.read_text(encoding="utf-8")
+    with _working(json) as (console, progress):
+        result = run(
+            load_sequence(sequence), rig, settings, text, out, seed=seed, paced=paced,
+            operator=operator, film_id=film, notes=notes, overwrite=force, progress=progress,
+        )  # fmt: skip
+    seconds = result.samples / result.rate_Hz
+    console.print(
+        f"{result.path}: {result.samples} samples, {seconds:.1f} s at {result.rate_Hz:g} Hz, "
+        f"{result.outcome}",
+        soft_wrap=True,
+        highlight=False,
+    )
+    for event in result.events:
+        console.print(f"  {event}", soft_wrap=True, highlight=False)
+    if json is not None:
+        write_json(
+            {
+                "format": "dearig-run/1",
+                "recording": str(result.path),
+                "samples": result.samples,
+                "rate_Hz": result.rate_Hz,
+                "outcome": result.outcome,
+                "events": list(result.events),
+            },
+            json,
+        )
+
+
+@app.command("import")
+def import_(
+    source: Annotated[Path, typer.Argument(metavar="IN.csv|IN.mat|IN.tdms", help="Measured data.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.h5", help="The recording.")],
+    column: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=SOURCE", help="What the file calls a column; may be repeated."),
+    ] = None,
+    gauge_length_mm: Annotated[
+        float | None, typer.Option(help="Of a film whose displacement was measured.")
+    ] = None,
+    area_mm2: Annotated[
+        float | None, typer.Option(help="Cross-section of a film whose force was measured.")
+    ] = None,
+    kinematics: Annotated[
+        Kinematics | None, typer.Option(help="How the film was held. [default: uniaxial]")
+    ] = None,
+    rig_file: RigFileOption = None,
+    film: Annotated[str, typer.Option(help="Which film; kept in the recording.")] = "",
+    notes: Annotated[str, typer.Option(help="Anything else; kept in the recording.")] = "",
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Bring in measured data that was made elsewhere (CSV, MAT, TDMS) as a recording."""
+    from app.recording.importers import import_file
+    from app.recording.reader import open_recording
+    from app.recording.summary import describe
+    from app.rigfile import load_rig_file
+    from app.terminal import write_json
+
+    columns = {}
+    for pair in column or []:
+        name, _, where = pair.partition("=")
+        if not (name and where):
+            raise InputError(f"--column {pair} is not of the form NAME=SOURCE")
+        columns[name] = where
+    settings = None if rig_file is None else load_rig_file(rig_file)
+    with _working(json) as (console, _):
+        doubts = import_file(
+            source,
+            out,
+            columns,
+            gauge_length_mm=gauge_length_mm,
+            area_mm2=area_mm2,
+            kinematics=None if kinematics is None else kinematics.value,
+            film=None if settings is None else settings.as_film(),
+            load=None if settings is None else settings.as_load(),
+            configuration="" if rig_file is None else rig_file.read_text(encoding="utf-8"),
+            film_id=film,
+            notes=notes,
+            overwrite=force,
+        )
+    recording = open_recording(out)
+    console.print(
+        f"{out}: {recording.samples} samples, {recording.duration:.1f} s of {recording.kind} data",
+        soft_wrap=True,
+        highlight=False,
+    )
+    for doubt in doubts:
+        console.print(f"[yellow]Look again:[/] {doubt}", soft_wrap=True, highlight=False)
+    if json is not None:
+        write_json({**describe(recording), "doubts": doubts}, json)
+
+
+@app.command()
+def info(
+    path: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A recording.")],
+    json: Json = None,
+) -> None:
+    """Say what a recording holds."""
+    from rich.table import Table
+
+    from app.recording.reader import open_recording
+    from app.recording.summary import describe, describe_rows
+    from app.terminal import write_json
+
+    recording = open_recording(path)
+    table = Table(show_header=False, box=None, pad_edge=False)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in describe_rows(recording):
+        table.add_row(name, value)
+    if json != "-":
+        _console().print(table, highlight=False)
+    if json is not None:
+        write_json(describe(recording), json)
+
+
+@app.command()
+def export(
+    path: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A recording.")],
+    to: Annotated[ExportFormat, typer.Option(help="Format.")],
+    out: Annotated[Path | None, typer.Option(help="[default: beside the recording]")] = None,
+    force: Force = False,
+) -> None:
+    """Hand a recording on as CSV, MAT or Parquet."""
+    from app.recording.exporters import export_recording
+
+    _console().print(str(export_recording(path, to.value, out, force)), soft_wrap=True)
+
+
+@app.command()
+def recover(
+    path: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A recording of a killed run.")],
+) -> None:
+    """Mend the recording of a run that was killed, so that any program can read it."""
+    from app.recording.reader import open_recording
+    from app.recording.recover import recover as mend
+
+    mended = mend(path)
+    recording = open_recording(path)
+    what = "recovered" if mended else "nothing to recover"
+    _console().print(
+        f"{path}: {what}; {recording.samples} samples, {recording.duration:.1f} s",
+        soft_wrap=True,
+        highlight=False,
+    )
+
+
+@app.command()
+def identify(
+    train: Annotated[list[Path], typer.Argument(metavar="TRAIN.h5...", help="Recordings to fit.")],
+    out: Annotated[Path, typer.Option("--out", metavar="MODEL.toml", help="The model.")],
+    method: Annotated[
+        Method, typer.Option(help="hybrid, or the thesis's Algorithm 1 as printed (de).")
+    ] = Method.hybrid,
+    validate_: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--validate",
+            metavar="FILE.h5",
+            help="Untouched recordings, read once at the end; may be repeated.",
+        ),
+    ] = None,
+    branches: Annotated[
+        str, typer.Option(metavar="N|N-M", help="Maxwell branches; a range tries each.")
+    ] = "3",
+    spring: Annotated[SpringKind, typer.Option(help="Strain energy.")] = SpringKind.gent,
+    drive: Annotated[
+        DriveChannel, typer.Option(help="Voltage that drives.")
+    ] = DriveChannel.command,
+    rest_length_mm: Annotated[
+        float | None,
+        typer.Option(help="Measured length under the load (82); left out, mu_0 gives it."),
+    ] = None,
+    rig_file: RigFileOption = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of Algorithm 1.")] = 0,
+    intervals: Annotated[bool, typer.Option(help="95 % intervals.")] = True,
+    report: Annotated[
+        Path | None, typer.Option(metavar="OUT.html", help="A report with figures.")
+    ] = None,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Fit the model to recordings, with intervals and a word on what the data do not determine."""
+    from app.identify import identify_recordings
+    from app.recording.files import check_output
+    from app.rigfile import load_rig_file
+    from app.terminal import branch_table, identify_table, outcome_json, write_json
+
+    if report is not None:
+        check_output(report, force)
+    with _working(json) as (console, progress):
+        outcome = identify_recordings(
+            train,
+            out,
+            validation=validate_ or [],
+            method=method.value,
+            branches=_branches(branches),
+            spring=spring.value,
+            drive=drive.value,
+            rest_length_mm=rest_length_mm,
+            rig_file=None if rig_file is None else load_rig_file(rig_file),
+            seed=seed,
+            intervals=intervals,
+            overwrite=force,
+            clock=time.monotonic,
+            progress=progress,
+        )
+        if report is not None:
+            from app.report.html import write_identify_report
+
+            write_identify_report(outcome, report)
+    if outcome.trials:
+        console.print(branch_table(outcome))
+    console.print(identify_table(outcome))
+    for label, path in (("Model", out), ("Report", report)):
+        if path is not None:
+            console.print(f"{label}: {path}", soft_wrap=True, highlight=False)
+    if json is not None:
+        write_json(outcome_json(outcome), json)
+
+
+@app.command()
+def validate(
+    model: Annotated[Path, typer.Argument(metavar="MODEL.toml", help="A model file.")],
+    paths: Annotated[list[Path], typer.Argument(metavar="FILE.h5...", help="Recordings.")],
+    drive: Annotated[
+        DriveChannel, typer.Option(help="Voltage that drives.")
+    ] = DriveChannel.command,
+    report: Annotated[
+        Path | None, typer.Option(metavar="OUT.html", help="A report with figures.")
+    ] = None,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Compare a model with recordings: error tables like the thesis's Tables 4 and 5."""
+    from app.recording.files import check_output
+    from app.terminal import outcome_json, validate_tables, write_json
+    from app.validate import validate_model
+
+    if report is not None:
+        check_output(report, force)
+    with _working(json) as (console, progress):
+        outcome = validate_model(model, paths, drive=drive.value, progress=progress)
+        if report is not None:
+            from app.report.html import write_validate_report
+
+            write_validate_report(outcome, report)
+    for table in validate_tables(outcome):
+        console.print(table)
+    if report is not None:
+        console.print(f"Report: {report}", soft_wrap=True, highlight=False)
+    if json is not None:
+        write_json(outcome_json(outcome), json)
+
+
+@app.command()
+def simulate(
+    model: Annotated[Path, typer.Argument(metavar="MODEL.toml", help="A model file.")],
+    drive: Annotated[
+        str, typer.Option(metavar="FILE.h5|SEQUENCE.toml", help="Recording, sequence or preset.")
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="OUT.h5|OUT.csv", help="The prediction.")],
+    voltage: Annotated[DriveChannel, typer.Option(help="Of a recording.")] = DriveChannel.command,
+    rig_file: RigFileOption = None,
+    force: Force = False,
+) -> None:
+    """Write what a model predicts under a recorded or planned drive."""
+    from app.rigfile import load_rig_file
+    from app.simulate import simulate_model
+
+    with _working(None) as (console, _):
+        path = simulate_model(
+            model,
+            drive,
+            out,
+            rig_file=load_rig_file(rig_file),
+            voltage=voltage.value,
+            overwrite=force,
+        )
+    console.print(str(path), soft_wrap=True)
+
+
+@app.command("rig-file")
+def rig_file_command(
+    out: Annotated[Path, typer.Argument(metavar="FILE.toml", help="Where to write it.")],
+) -> None:
+    """Write a rig file with every key, its default and what it means, to be edited."""
+    from app.rigfile import write_default
+
+    write_default(out)
+    _console().print(f"{out}: edit it, and give it to commands as --rig-file {out}", soft_wrap=True)
+
+
+@app.command()
+def presets() -> None:
+    """List the sequences that are known by name."""
+    from app.presets import PRESETS
+    from app.sequencefile import load_sequence
+
+    for name in PRESETS:
+        sequence = load_sequence(name).sequence
+        _console().print(f"{name:18s} {sequence.duration:6.1f} s  {sequence.name}", highlight=False)
+
+
+def _branches(text: str) -> list[int]:
+    """``3`` or ``1-4`` as numbers."""
+    first, dash, last = text.partition("-")
+    if not (first.isdigit() and (last.isdigit() if dash else not last)):
+        raise InputError(f"--branches {text} is neither a number nor a range such as 1-4")
+    low, high = int(first), int(last or first)
+    if low > high:
+        raise InputError(f"--branches {text} goes from more to fewer; write {high}-{low}")
+    return list(range(low, high + 1))
+
+
+def _console() -> Console:
+    from rich.console import Console
+
+    return Console()
+
+
+@contextmanager
+def _working(json: str | None) -> Iterator[tuple[Console, Progress]]:
+    """A console for results and a progress bar on standard error while the body works.
+
+    With JSON on standard output, words go to standard error, so that a pipe gets JSON and no more.
+    """
+    from rich.console import Console
+
+    from app.terminal import progress
+
+    console = Console(stderr=json == "-")
+    with progress("dearig") as report:
+        yield console, _told_of_compiling(report)
+
+
+def _told_of_compiling(report: Progress) -> Progress:
+    from model.jit import is_compiled
+
+    if not is_compiled():
+        sys.stderr.write("Compiling the numerical kernels, once: this takes about a minute.\n")
+    return report
+
+
+def main() -> None:
+    """Run the command line; errors become one sentence and an exit code."""
+    try:
+        status: object = app(standalone_mode=False)
+    except DearigError as error:
+        _say(str(error))
+        status = error.exit_code
+    except TyperException as error:
+        # usage: typer's own words, and its exit code 2
+        error.show()
+        status = error.exit_code
+    except typer.Exit as error:
+        status = error.exit_code
+    except (KeyboardInterrupt, typer.Abort):
+        _say("interrupted")
+        status = 130
+    except BrokenPipeError:
+        # the reader of a pipe has gone (head, less): nothing more can be said, and that is no error
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = 0
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _say(message: str) -> None:
+    sys.stderr.write(f"dearig: {message}\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,247 @@
+"""Identification of a model from recordings, into a model file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.errors import InputError
+from app.modelfile import save_model
+from app.outcomes import BranchTrial, Comparison, IdentifyOutcome
+from app.progress import Progress, quiet
+from app.recording.files import check_output
+from app.recording.recording import Recording
+from app.records import PUBLISHED_FIT, as_record, compare, open_all
+from app.rigfile import RigFile
+from model.actuator import Actuator
+from model.errors import ModelError
+from model.fitting import Identification, identify
+from model.material import Branch, Load, Network, Spring
+from model.records import Record
+
+__all__ = ["identify_recordings"]
+
+
+def identify_recordings(
+    train: Sequence[str | Path],
+    out: str | Path,
+    *,
+    validation: Sequence[str | Path] = (),
+    method: str = "hybrid",
+    branches: Sequence[int] = (3,),
+    spring: str = "gent",
+    drive: str = "command",
+    rest_length_mm: float | None = None,
+    rig_file: RigFile | None = None,
+    seed: int = 0,
+    intervals: bool = True,
+    overwrite: bool = False,
+    clock: Callable[[], float],
+    progress: Progress = quiet,
+) -> IdentifyOutcome:
+    """Fit the recordings ``train`` and write the model to ``out``.
+
+    With several numbers of ``branches`` each is fitted, and the one with the least information
+    criterion on the training data is kept; the ``validation`` recordings are read once, at the end,
+    and play no part in the choice. Film and load come from the recordings, else from ``rig_file``.
+    ``clock`` gives seconds. Raises ``InputError`` for everything that cannot be fitted, before
+    anything is written.
+    """
+    check_output(out, overwrite)
+    for path in validation:
+        if any(Path(path).resolve() == Path(t).resolve() for t in train):
+            raise InputError(
+                f"{path} is given both to fit and to validate: an error on fitted data proves "
+                f"nothing; leave it out of one of them"
+            )
+    started = clock()
+    recordings = open_all(train)
+    others = open_all([*train, *validation])[len(recordings) :]
+    records = [as_record(r, drive) for r in recordings]
+    kind = recordings[0].kind
+    kinematics = recordings[0].kinematics
+    fits: list[tuple[int, Identification]] = []
+    trials = []
+    smaller: Network | None = None
+    for i, count in enumerate(sorted(set(branches))):
+        base = _base(recordings, count, spring, rest_length_mm, rig_file)
+
+        def report(stage: str, fraction: float, done: int = i) -> None:
+            label = stage if len(branches) == 1 else f"{sorted(set(branches))[done]} branches"
+            progress(label, fraction if len(branches) == 1 else (done + fraction) / len(branches))
+
+        last = len(set(branches)) == 1
+        try:
+            fit = identify(
+                records, base, method, kinematics, seed, intervals and last, smaller,
+                progress=report,
+            )  # fmt: skip
+        except ModelError as error:
+            raise InputError(f"these recordings cannot be fitted: {error}") from error
+        smaller = fit.model.network if isinstance(fit.model, Actuator) else fit.model
+        fits.append((count, fit))
+    scores = [_bic(fit, records) for _, fit in fits]
+    best = int(np.argmin(scores))
+    count, fit = fits[best]
+    if len(fits) > 1:
+        for i, (n, candidate) in enumerate(fits):
+            trials.append(
+                _trial(n, candidate, recordings, others, kinematics, drive, scores[i], i == best)
+            )
+        if intervals and method == "hybrid":
+            network = fit.model.network if isinstance(fit.model, Actuator) else fit.model
+            fit = identify(
+                records, fit.model, method, kinematics, seed, True, network, progress=progress
+            )
+    compared = [compare(r, fit.model, kinematics, "train", drive) for r in recordings]
+    validated = [compare(r, fit.model, kinematics, "validation", drive) for r in others]
+    seconds = clock() - started
+    title = recordings[0].title or recordings[0].name
+    name = f"{title}, {count} branches" if count != 1 else f"{title}, 1 branch"
+    history = _history(fit, recordings, compared, validated, spring, drive, seconds)
+    path = save_model(out, name, fit.model, kinematics, history, overwrite)
+    is_thesis_run = kind == "actuator" and any(c.row == "identification" for c in compared)
+    return IdentifyOutcome(
+        title=name,
+        kind=kind,
+        method=method,
+        fit=fit,
+        train=tuple(compared),
+        validation=tuple(validated),
+        trials=tuple(trials),
+        model_path=str(path),
+        seconds=seconds,
+        published_fit=PUBLISHED_FIT if is_thesis_run else None,
+    )
+
+
+def _base(
+    recordings: Sequence[Recording],
+    branches: int,
+    spring: str,
+    rest_length_mm: float | None,
+    rig_file: RigFile | None,
+) -> Actuator | Network:
+    """What to fit: its structure matters, its numbers do not."""
+    limit = {"neo-hookean": math.inf, "gent": 1e4, "arruda-boyce": 1e4}.get(spring)
+    if limit is None:
+        raise InputError(f"spring {spring!r} is not one of neo-hookean, gent, arruda-boyce")
+    if not 0 <= branches <= 8:
+        raise InputError(f"{branches} branches cannot be fitted; give a number from 0 to 8")
+    one = Spring(1e5, limit, spring)
+    network = Network(one, tuple(Branch(one, 1.0) for _ in range(branches)))
+    if recordings[0].kind == "film":
+        held = {r.kinematics for r in recordings}
+        if len(held) > 1:
+            raise InputError(
+                f"films held in different ways ({', '.join(sorted(held))}) are fitted one by one"
+            )
+        return network
+    films = {r.film for r in recordings if r.film is not None}
+    loads = {r.load for r in recordings if r.load is not None}
+    if len(films) > 1 or len(loads) > 1:
+        raise InputError("these recordings are of different films or loads; fit them one by one")
+    default = rig_file or RigFile()
+    film = films.pop() if films and rig_file is None else default.as_film()
+    load = loads.pop() if loads and rig_file is None else default.as_load()
+    if rest_length_mm is not None:
+        try:
+            load = Load(load.mass, rest_length_mm / 1e3)
+        except ModelError as error:
+            raise InputError(str(error)) from error
+        if not load.rest_length or load.rest_length <= film.length:
+            raise InputError(
+                f"a rest length of {rest_length_mm:g} mm is not above the film's own "
+                f"{film.length * 1e3:g} mm: under its load the film is longer than before"
+            )
+    return Actuator(film, load, network)
+
+
+def _bic(fit: Identification, records: Sequence[Record]) -> float:
+    """Bayesian information criterion that counts correlated residuals as what they are worth."""
+    samples = sum(r.measured.size for r in records) / max(1.0, fit.correlation)
+    free = sum(e.free for e in fit.estimates)
+    return float(samples * math.log(fit.cost) + free * math.log(max(samples, 2.0)))
+
+
+def _trial(
+    count: int,
+    fit: Identification,
+    train: Sequence[Recording],
+    validation: Sequence[Recording],
+    kinematics: str,
+    drive: str,
+    bic: float,
+    chosen: bool,
+) -> BranchTrial:
+    fitted = [compare(r, fit.model, kinematics, "train", drive) for r in train]
+    checked = [compare(r, fit.model, kinematics, "validation", drive) for r in validation]
+    return BranchTrial(
+        branches=count,
+        train_rms=_pooled(fitted),
+        train_peak_pct=_mean_peak(fitted),
+        validation_rms=_pooled(checked) if checked else None,
+        validation_peak_pct=_mean_peak(checked) if checked else None,
+        bic=bic,
+        chosen=chosen,
+    )
+
+
+def _pooled(comparisons: Sequence[Comparison]) -> float:
+    """RMS over all files, each file counting the same."""
+    return math.sqrt(float(np.mean([c.errors.rms**2 for c in comparisons])))
+
+
+def _mean_peak(comparisons: Sequence[Comparison]) -> float:
+    return float(np.mean([c.errors.peak_pct for c in comparisons]))
+
+
+def _history(
+    fit: Identification,
+    recordings: Sequence[Recording],
+    train: Sequence[Comparison],
+    validation: Sequence[Comparison],
+    spring: str,
+    drive: str,
+    seconds: float,
+) -> dict[str, Any]:
+    """Where the model comes from, for its file."""
+    unit, scale = ("um", 1e6) if train[0].kind == "actuator" else ("kPa", 1e-3)
+
+    def figures(comparison: Comparison) -> dict[str, Any]:
+        return {
+            "name": comparison.name,
+            f"rms_{unit}": comparison.errors.rms * scale,
+            "nrmse_pct": comparison.errors.nrmse_pct,
+        }
+
+    return {
+        "method": fit.method,
+        "spring": spring,
+        "drive": drive,
+        "seconds": seconds,
+        "simulations": fit.simulations,
+        "mean_square_over_noise": fit.cost,
+        "residual_correlation_samples": fit.correlation,
+        "warnings": list(fit.warnings),
+        "train": [
+            {**figures(c), "sha256": r.sha256} for c, r in zip(train, recordings, strict=True)
+        ],
+        "validation": [figures(c) for c in validation],
+        "estimate": [
+            {
+                "name": e.name,
+                "unit": e.unit,
+                "value": e.value,
+                "low95": e.low if e.low > 0.0 else None,
+                "high95": e.high if math.isfinite(e.high) else None,
+                "determined": e.determined,
+                "note": e.note,
+            }
+            for e in fit.estimates
+        ],
+    }

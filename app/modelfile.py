@@ -1,0 +1,233 @@
+"""Model files: a fitted model as TOML, complete enough to be simulated anywhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tomli_w
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from app.errors import InputError
+from app.recording.files import check_output, replaced_when_done
+from app.toml_input import allowed, meant, parse_toml, read_text, shown
+from model.actuator import Actuator
+from model.errors import ModelError
+from model.material import Branch, Film, Load, Network, Spring
+
+__all__ = ["FORMAT", "ModelFile", "load_model", "model_toml", "save_model"]
+
+FORMAT = "dearig-model/1"
+
+_Positive = Annotated[float, Field(gt=0.0)]
+_Kind = Literal["neo-hookean", "gent", "arruda-boyce"]
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """A model by ``name``: an actuator, or the network of a film held as ``kinematics`` says.
+
+    ``history`` is what the file says about where the model comes from: data with their checksums,
+    method, intervals.
+    """
+
+    name: str
+    model: Actuator | Network
+    kinematics: str
+    history: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def kind(self) -> str:
+        """``actuator`` or ``film``, as recordings have it."""
+        return "actuator" if isinstance(self.model, Actuator) else "film"
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class _Film(_Table):
+    length_m: _Positive
+    width_m: _Positive
+    thickness_m: _Positive
+    relative_permittivity: _Positive = 4.7
+    density_kg_m3: _Positive = 1000.0
+
+
+class _Load(_Table):
+    mass_kg: Annotated[float, Field(ge=0.0)]
+    rest_length_m: _Positive | None = None
+
+
+class _Spring(_Table):
+    spring: _Kind = "gent"
+    modulus_Pa: Annotated[float, Field(ge=0.0)]
+    limit: _Positive | None = None
+
+    def build(self) -> Spring:
+        return Spring(self.modulus_Pa, math.inf if self.limit is None else self.limit, self.spring)
+
+
+class _Branch(_Spring):
+    relaxation_time_s: Annotated[float, Field(ge=0.0)]
+
+
+class _Effect(_Table):
+    name: str
+    values: dict[str, float]
+
+
+class _File(_Table):
+    format: str
+    name: str = Field(min_length=1)
+    kinematics: Literal["constrained-width", "uniaxial", "equibiaxial"]
+    film: _Film | None = None
+    load: _Load | None = None
+    equilibrium: _Spring
+    branch: list[_Branch] = Field(default=[])
+    effect: list[_Effect] = Field(default=[])
+    history: dict[str, Any] = Field(default={})
+
+
+def load_model(path: str | Path) -> ModelFile:
+    """Read the model file at ``path``.
+
+    Raises ``InputError`` with one sentence: file, key, value, and what is allowed; also for a file
+    of a newer version, which may mean something that this one does not know.
+    """
+    path = Path(path)
+    name = f"model file {path}"
+    data = parse_toml(read_text(path, "model file"), name)
+    found = data.get("format")
+    if found != FORMAT:
+        if isinstance(found, str) and found.startswith("dearig-model/"):
+            raise InputError(f"{name} has the format {found}; this version reads {FORMAT}")
+        raise InputError(f'{name} has no line format = "{FORMAT}": it is not a model file')
+    try:
+        file = _File.model_validate(data)
+    except ValidationError as error:
+        raise InputError(f"{name}: {_sentence(error)}") from error
+    try:
+        return ModelFile(file.name, _build(file), file.kinematics, file.history)
+    except ModelError as error:
+        raise InputError(f"{name}: {error}") from error
+
+
+def _build(file: _File) -> Actuator | Network:
+    branches = tuple(Branch(b.build(), b.relaxation_time_s) for b in file.branch)
+    network = Network(file.equilibrium.build(), branches)
+    if file.film is None and file.load is None:
+        if file.effect:
+            raise ModelError("effects need a [film] and a [load]: this model is of a bare film")
+        return network
+    if file.film is None or file.load is None:
+        raise ModelError("[film] and [load] go together: an actuator has both, a bare film neither")
+    film = Film(
+        length=file.film.length_m,
+        width=file.film.width_m,
+        thickness=file.film.thickness_m,
+        permittivity=file.film.relative_permittivity,
+        density=file.film.density_kg_m3,
+        kinematics=file.kinematics,
+    )
+    effects = tuple((e.name, tuple(e.values.items())) for e in file.effect)
+    load = Load(file.load.mass_kg, file.load.rest_length_m)
+    return Actuator(film, load, network, effects)
+
+
+def model_toml(
+    name: str, model: Actuator | Network, kinematics: str, history: Mapping[str, Any]
+) -> str:
+    """The model as the text of a model file."""
+    data: dict[str, Any] = {"format": FORMAT, "name": name, "kinematics": kinematics}
+    network = model
+    if isinstance(model, Actuator):
+        network = model.network
+        data["kinematics"] = model.film.kinematics
+        data["film"] = {
+            "length_m": model.film.length,
+            "width_m": model.film.width,
+            "thickness_m": model.film.thickness,
+            "relative_permittivity": model.film.permittivity,
+            "density_kg_m3": model.film.density,
+        }
+        data["load"] = {"mass_kg": model.load.mass}
+        if model.load.rest_length is not None:
+            data["load"]["rest_length_m"] = model.load.rest_length
+        if model.effects:
+            data["effect"] = [{"name": n, "values": dict(v)} for n, v in model.effects]
+    if not isinstance(network, Network):
+        raise TypeError(f"{type(model).__name__} is not a model")
+    data["equilibrium"] = _spring_table(network.equilibrium)
+    data["branch"] = [
+        {**_spring_table(b.spring), "relaxation_time_s": b.relaxation_time}
+        for b in network.branches
+    ]
+    if history:
+        data["history"] = _plain(history)
+    return tomli_w.dumps(data)
+
+
+def save_model(
+    path: str | Path,
+    name: str,
+    model: Actuator | Network,
+    kinematics: str,
+    history: Mapping[str, Any],
+    overwrite: bool = False,
+) -> Path:
+    """Write a model file, whole or not at all; ``InputError`` where it may not be written."""
+    out = check_output(path, overwrite)
+    with replaced_when_done(out) as partial:
+        partial.write_text(model_toml(name, model, kinematics, history), encoding="utf-8")
+    return out
+
+
+def _spring_table(spring: Spring) -> dict[str, Any]:
+    table: dict[str, Any] = {"spring": spring.kind, "modulus_Pa": spring.modulus}
+    if math.isfinite(spring.limit):
+        table["limit"] = spring.limit
+    return table
+
+
+def _plain(value: Any) -> Any:
+    """``value`` with only what TOML has: no None, no numpy, infinities as text-free omissions."""
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items() if v is not None}
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        return [_plain(v) for v in value if v is not None]
+    if hasattr(value, "item"):
+        return value.item()
+    return value
+
+
+def _sentence(error: ValidationError) -> str:
+    faults = error.errors(include_url=False)
+    fault = min(faults, key=lambda f: f["type"] != "extra_forbidden")
+    place = [p for p in fault["loc"] if p != "[key]"]
+    table: type[BaseModel] = _File
+    dotted = ""
+    for part in place[:-1]:
+        if isinstance(part, int):
+            dotted += f"[{part + 1}]"
+            continue
+        dotted += f".{part}" if dotted else str(part)
+        table = {
+            "film": _Film, "load": _Load, "equilibrium": _Spring, "branch": _Branch,
+            "effect": _Effect,
+        }.get(str(part), table)  # fmt: skip
+    last = place[-1] if place else "file"
+    key = f"{dotted}.{last}" if dotted and isinstance(last, str) else f"{dotted}{last}"
+    if fault["type"] == "extra_forbidden":
+        hint = meant(str(last), table.model_fields)
+        return f"{key} is not a key: {hint or 'it takes ' + ', '.join(table.model_fields)}"
+    if fault["type"] == "missing":
+        return f"{key} is missing"
+    info = table.model_fields.get(str(last))
+    words = allowed(info) if info is not None else str(fault["msg"])
+    if "a table" in words:
+        words = fault["msg"][0].lower() + fault["msg"][1:]
+    return f"{key} = {shown(fault['input'])} is not allowed: {words}"

@@ -1,0 +1,14 @@
+"""How long work tells how far it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+__all__ = ["Progress", "quiet"]
+
+#: Called with the name of a stage and the part of it that is done, 0 to 1.
+Progress = Callable[[str, float], None]
+
+
+def quiet(stage: str, fraction: float) -> None:
+    """Progress that nobody watches."""

@@ -1,0 +1,220 @@
+"""From recordings to the records that a fit takes, and back to comparisons with a model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from app.errors import InputError
+from app.outcomes import Comparison, Published
+from app.presets import PRESETS, VALIDATION_A, VALIDATION_B
+from app.recording.reader import open_recording
+from app.recording.recording import Recording
+from app.sequencefile import parse_sequence
+from model.actuator import Actuator, Drive
+from model.errors import ModelError
+from model.excitation import Lobes
+from model.film import nominal_stress
+from model.material import Network
+from model.measures import errors
+from model.records import ActuatorRecord, FilmRecord, Record, at_sensor, noise_of
+
+__all__ = ["PUBLISHED_FIT", "as_record", "compare", "open_all"]
+
+#: What the thesis prints for its identification run.
+PUBLISHED_FIT = Published(2.13, 4.07)
+
+# Tables 4 and 5 of the thesis, by preset: e_rms and e_m in per cent, as printed
+_TABLE_4 = dict(
+    zip(
+        VALIDATION_A,
+        ((5.8484, 6.9696), (8.8924, 2.4462), (5.8952, 3.8678), (8.7797, 5.8924), (5.9604, 3.8877)),
+        strict=True,
+    )
+)
+_TABLE_5 = dict(
+    zip(
+        VALIDATION_B,
+        ((2.4729, 7.4374), (2.9408, 6.7550), (3.5766, 7.0148), (7.7592, 5.6113), (8.6652, 4.6098)),
+        strict=True,
+    )
+)
+
+
+def open_all(paths: Sequence[str | Path]) -> list[Recording]:
+    """Recordings at ``paths``, all of one kind.
+
+    Raises ``InputError`` for one that cannot be read, for a mixture of kinds, and for a file named
+    twice (its samples would count double).
+    """
+    seen: dict[Path, str] = {}
+    for path in paths:
+        where = Path(path).resolve()
+        if where in seen:
+            raise InputError(f"{path} is named twice; each recording counts once")
+        seen[where] = str(path)
+    recordings = [open_recording(p) for p in paths]
+    kinds = {r.kind for r in recordings}
+    if len(kinds) > 1:
+        words = ", ".join(f"{r.path} is of {_KIND_WORDS[r.kind]}" for r in recordings)
+        raise InputError(f"these recordings cannot be used together: {words}")
+    return recordings
+
+
+_KIND_WORDS = {"actuator": "an actuator (voltage)", "film": "a film (stretch)"}
+
+
+def as_record(recording: Recording, drive: str = "command") -> Record:
+    """What a fit sees of a recording; ``drive`` is command or monitor, for actuators.
+
+    The noise comes from the quiet lead-in, or from second differences where there is none.
+    """
+    try:
+        if recording.kind == "film":
+            stretch, stress = _present(recording.stretch), _present(recording.nominal_stress)
+            return FilmRecord(recording.name, recording.time, stretch, stress, _noise(stress))
+        displacement = _present(recording.displacement)
+        noise = recording.noise_floor or _noise(displacement)
+        return ActuatorRecord(
+            recording.name,
+            recording_drive(recording, drive),
+            displacement,
+            noise,
+            recording.displacement_delay - recording.displacement_skew,
+        )
+    except ModelError as error:
+        raise InputError(f"{recording.path}: {error}") from error
+
+
+def recording_drive(recording: Recording, drive: str) -> Drive:
+    """The voltage of a recording: what was commanded, or what the monitor read."""
+    voltage = recording.voltage_command
+    if drive == "monitor":
+        voltage = recording.voltage_monitor
+        if voltage is None:
+            raise InputError(f"{recording.path} has no voltage monitor; use the command")
+    return Drive(recording.time, _present(voltage), recording.hold)
+
+
+def _present(values: np.ndarray | None) -> np.ndarray:
+    if values is None:
+        raise ModelError("a channel that its kind needs is missing")
+    return values
+
+
+def _noise(values: np.ndarray) -> float:
+    noise = noise_of(values)
+    if noise > 0.0:
+        return noise
+    raise ModelError("the signal is constant or without any noise: a fit cannot weigh it")
+
+
+def compare(
+    recording: Recording,
+    model: Actuator | Network,
+    kinematics: str,
+    role: str,
+    drive: str = "command",
+) -> Comparison:
+    """The recording beside what ``model`` says, with its errors.
+
+    Raises ``InputError`` where model and recording are not of one kind, or where the model cannot
+    follow the drive.
+    """
+    warnings: list[str] = []
+    if recording.kind == "film":
+        if isinstance(model, Actuator):
+            model = model.network
+        if recording.kinematics != kinematics:
+            warnings.append(f"the film was held {recording.kinematics}, the model's {kinematics}")
+        record = as_record(recording)
+        stretch = _present(recording.stretch)
+        answer = nominal_stress(model, recording.kinematics, recording.time, stretch)
+        if not answer.ok:
+            raise InputError(f"{recording.path}: the model cannot follow it: {answer.in_words}")
+        predicted, driven, noise = answer.stress, stretch, record.noise
+        table, row, published = "", "", None
+    else:
+        if not isinstance(model, Actuator):
+            raise InputError(
+                f"{recording.path} is driven by voltage, and the model is of a bare film: it knows "
+                f"no load and no electrodes"
+            )
+        warnings += _other_rig(recording, model)
+        drive_of = recording_drive(recording, drive)
+        response = model.simulate(drive_of)
+        if not response.ok:
+            raise InputError(f"{recording.path}: the model cannot follow it: {response.in_words}")
+        predicted = np.empty_like(response.displacement)
+        at_sensor(
+            drive_of.time,
+            response.displacement,
+            response.rate * model.film.length,
+            recording.displacement_delay - recording.displacement_skew,
+            predicted,
+        )
+        driven, noise = drive_of.voltage, recording.noise_floor
+        table, row, published = _place(recording)
+    if not recording.complete:
+        warnings.append("the recording is incomplete: the run was interrupted or killed")
+    return Comparison(
+        name=recording.name,
+        kind=recording.kind,
+        role=role,
+        time=recording.time,
+        drive=driven,
+        measured=recording.signal,
+        model=predicted,
+        errors=errors(recording.signal, predicted),
+        noise=noise,
+        table=table,
+        row=row,
+        published=published,
+        warnings=tuple(warnings),
+    )
+
+
+def _other_rig(recording: Recording, model: Actuator) -> list[str]:
+    """Sentences about a film or load in the recording that is not the model's."""
+    sentences = []
+    if recording.film is not None and recording.film != model.film:
+        sentences.append("the recording was made with another film than the model's")
+    if recording.load is not None and recording.load.mass != model.load.mass:
+        sentences.append(
+            f"the recording was made under {recording.load.mass * 1e3:g} g, the model is of "
+            f"{model.load.mass * 1e3:g} g"
+        )
+    return sentences
+
+
+def _place(recording: Recording) -> tuple[str, str, Published | None]:
+    """Table, row and printed figures of a run that the thesis made too."""
+    for preset, frequency in VALIDATION_A.items():
+        if _plays(recording, preset):
+            return "A", f"f = {frequency:g} Hz", Published(*_TABLE_4[preset])
+    for preset, amplitude in VALIDATION_B.items():
+        if _plays(recording, preset):
+            return "B", f"a = {amplitude:g} kV", Published(*_TABLE_5[preset])
+    if _plays(recording, "thesis"):
+        return "", "identification", PUBLISHED_FIT
+    return "", recording.name, None
+
+
+def _plays(recording: Recording, preset: str) -> bool:
+    """True when the recording's sequence is the lobes of ``preset``, however often repeated."""
+    if not recording.sequence_toml:
+        return False
+    try:
+        played = parse_sequence(recording.sequence_toml, recording.name, Path()).sequence.segments
+    except InputError:
+        return False  # a sequence with a CSV that is not here: not one of the thesis's
+    wanted = parse_sequence(PRESETS[preset], preset, Path()).sequence.segments
+    return len(played) == 1 and _one_period(played[0]) == _one_period(wanted[0])
+
+
+def _one_period(segment: object) -> object:
+    """A thesis segment with one period, so that runs of any length compare equal."""
+    return replace(segment, periods=1) if isinstance(segment, Lobes) else segment

@@ -1,0 +1,267 @@
+"""The report: one HTML page that needs nothing but itself, for a screen, a phone or paper."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.report import figures
+from app.report.numbers import seconds, significant
+from app.report.tables import (
+    Table,
+    branch_trials,
+    by_thesis_table,
+    error_table,
+    parameter_table,
+    thesis_error_table,
+)
+from app.report.units import SHOWN
+from app.report.words import (
+    describe_model,
+    identify_summary,
+    validate_summary,
+    warnings_of,
+)
+
+if TYPE_CHECKING:  # jinja2 and matplotlib are loaded by the command that writes a report
+    from markupsafe import Markup
+    from matplotlib.figure import Figure
+
+    from app.outcomes import Comparison, IdentifyOutcome, Published, ValidateOutcome
+
+__all__ = ["write_demo_report", "write_identify_report", "write_validate_report"]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure in the page: its drawing, and in words what it shows."""
+
+    svg: Markup
+    caption: str
+
+
+@dataclass(frozen=True)
+class Side:
+    """Tables that stand side by side where there is room."""
+
+    title: str
+    tables: tuple[Table, ...]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One outcome as the template takes it; empty tuples leave their sections out."""
+
+    title: str
+    lead: str
+    summary: tuple[str, ...]
+    warnings: tuple[str, ...]
+    errors: tuple[Side, ...]
+    parameters: tuple[Table, ...]
+    parameter_pictures: tuple[Picture, ...]
+    branches: tuple[Table, ...]
+    branch_pictures: tuple[Picture, ...]
+    pictures: tuple[tuple[str, tuple[Picture, ...]], ...]
+    residuals: tuple[tuple[str, tuple[Picture, ...]], ...]
+    provenance: tuple[tuple[str, tuple[str, ...]], ...]
+    film: bool
+    rest_length_known: bool
+
+
+def write_identify_report(outcome: IdentifyOutcome, path: str | Path) -> Path:
+    """Write what an identification found to ``path``. Raises ``InputError``."""
+    return _write((_identify_part(outcome, _prefixes()),), outcome.title, path)
+
+
+def write_validate_report(outcome: ValidateOutcome, path: str | Path) -> Path:
+    """Write how a model did on recordings to ``path``. Raises ``InputError``."""
+    return _write((_validate_part(outcome, _prefixes()),), outcome.title, path)
+
+
+def write_demo_report(
+    identify: IdentifyOutcome, validate: ValidateOutcome, path: str | Path
+) -> Path:
+    """Write an identification and a validation of its model as one page. Raises ``InputError``."""
+    prefixes = _prefixes()
+    parts = (_identify_part(identify, prefixes), _validate_part(validate, prefixes))
+    return _write(parts, identify.title, path)
+
+
+def _write(parts: tuple[Part, ...], title: str, path: str | Path) -> Path:
+    from app.recording.files import check_output, replaced_when_done
+
+    path = check_output(path, overwrite=True)
+    page = _render(parts, title)
+    with replaced_when_done(path) as partial:
+        # a file's name may hold bytes that are no text: shown as ?, rather than no report at all
+        partial.write_text(page, encoding="utf-8", errors="replace", newline="\n")
+    return path
+
+
+def _render(parts: tuple[Part, ...], title: str) -> str:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("app.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("report.html.j2").render(
+        parts=parts,
+        title=title,
+        film=all(p.film for p in parts),
+        rest_length_known=any(p.rest_length_known for p in parts),
+    )
+
+
+def _prefixes() -> Iterator[str]:
+    """What keeps the figures of one page apart."""
+    return (f"f{n}" for n in count(1))
+
+
+def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
+    fit = outcome.fit
+    # the thesis's figures are of one run: several recordings have no share in them
+    published = outcome.published_fit if len(outcome.train) == 1 else None
+    errors = [_side("Training: the recordings that were fitted", outcome.train, published)]
+    errors += _validation_sides(
+        outcome.validation, "Validation: recordings that the fit did not see"
+    )
+    pictures = [("Training", _comparison_pictures(outcome.train, prefixes))]
+    if outcome.validation:
+        pictures.append(("Validation", _comparison_pictures(outcome.validation, prefixes)))
+    branch_tables: tuple[Table, ...] = ()
+    branch_pictures: tuple[Picture, ...] = ()
+    if outcome.trials:
+        branch_tables = (branch_trials(outcome.trials, outcome.kind),)
+        branch_pictures = (
+            _picture(
+                figures.branches_figure(outcome.trials, outcome.kind),
+                prefixes,
+                "Error on training and validation data, and the information criterion (BIC) of "
+                "the training data, against number of branches.",
+            ),
+        )
+    every = (*outcome.train, *outcome.validation)
+    return Part(
+        title=outcome.title,
+        lead="Identification",
+        summary=identify_summary(outcome),
+        warnings=warnings_of(outcome),
+        errors=tuple(errors),
+        parameters=(parameter_table(fit),),
+        parameter_pictures=(
+            _picture(
+                figures.parameters_figure(fit),
+                prefixes,
+                "Parameters with their 95 % intervals. An arrow is an end that the data leave "
+                "open; grey is what they do not determine.",
+            ),
+        ),
+        branches=branch_tables,
+        branch_pictures=branch_pictures,
+        pictures=tuple(pictures),
+        residuals=tuple((c.name, _residual_pictures(c, prefixes)) for c in outcome.train),
+        provenance=(
+            ("Fitted to", tuple(c.name for c in outcome.train)),
+            ("Validated on", tuple(c.name for c in outcome.validation) or ("nothing",)),
+            ("Samples", (f"{sum(c.errors.samples for c in every):,}",)),
+            ("Model", (describe_model(fit.model),)),
+            ("Model file", (outcome.model_path or "not written",)),
+            ("Method", (outcome.method,)),
+            ("Converged", ("yes" if fit.converged else "no",)),
+            ("Simulations", (f"{fit.simulations:,}",)),
+            ("Residual over noise", (significant(fit.cost**0.5),)),
+            ("Residual correlation", (f"{significant(fit.correlation)} samples",)),
+            ("Time taken", (seconds(outcome.seconds),)),
+        ),
+        film=outcome.kind == "film",
+        rest_length_known=any(not e.free for e in fit.estimates),
+    )
+
+
+def _validate_part(outcome: ValidateOutcome, prefixes: Iterator[str]) -> Part:
+    worst = max(outcome.comparisons, key=_over_noise)
+    return Part(
+        title=outcome.title,
+        lead="Validation",
+        summary=validate_summary(outcome),
+        warnings=warnings_of(outcome),
+        errors=tuple(_validation_sides(outcome.comparisons, "By recording")),
+        parameters=(),
+        parameter_pictures=(),
+        branches=(),
+        branch_pictures=(),
+        pictures=(("Recordings", _comparison_pictures(outcome.comparisons, prefixes)),),
+        residuals=((f"{worst.name}, where it is largest", _residual_pictures(worst, prefixes)),),
+        provenance=(
+            ("Recordings", tuple(c.name for c in outcome.comparisons)),
+            ("Samples", (f"{sum(c.errors.samples for c in outcome.comparisons):,}",)),
+            ("Model", (outcome.model_name,)),
+            ("Model file", (outcome.model_path or "not written",)),
+        ),
+        film=outcome.kind == "film",
+        rest_length_known=False,
+    )
+
+
+def _over_noise(comparison: Comparison) -> float:
+    """RMS in noise floors, or as it is where no floor is known."""
+    return comparison.errors.rms / (comparison.noise or 1.0)
+
+
+def _side(title: str, comparisons: Sequence[Comparison], published: Published | None) -> Side:
+    ours = error_table("Measured less model", comparisons)
+    theirs = thesis_error_table("By the thesis's formulas, in %", comparisons, published)
+    return Side(title, (ours,) if theirs is None else (ours, theirs))
+
+
+def _validation_sides(comparisons: Sequence[Comparison], alone: str) -> list[Side]:
+    groups = by_thesis_table(comparisons, alone)
+    return [_side(title, members, None) for title, members in groups]
+
+
+def _picture(figure: Figure, prefixes: Iterator[str], caption: str) -> Picture:
+    from markupsafe import Markup
+
+    # matplotlib has escaped all text in the drawing, and the label is an escaped attribute
+    return Picture(Markup(figures.svg(figure, next(prefixes), caption)), caption)  # noqa: S704
+
+
+def _comparison_pictures(
+    comparisons: Sequence[Comparison], prefixes: Iterator[str]
+) -> tuple[Picture, ...]:
+    pictures = []
+    for c in comparisons:
+        shown = SHOWN[c.kind]
+        name = f"{c.name} ({c.row})" if c.row else c.name
+        error = f"{significant(c.errors.rms * shown.error_factor)} {shown.error_unit} RMS"
+        pictures.append(
+            _picture(
+                figures.comparison_figure(c),
+                prefixes,
+                f"{name}: {shown.drive.lower()}, {shown.quantity.lower()} measured and by the "
+                f"model, and measured less model ({error}).",
+            )
+        )
+        if c.kind == "film":
+            caption = f"{name}: nominal stress against stretch."
+            pictures.append(_picture(figures.loop_figure(c), prefixes, caption))
+    return tuple(pictures)
+
+
+def _residual_pictures(comparison: Comparison, prefixes: Iterator[str]) -> tuple[Picture, ...]:
+    captions = (
+        "How large the error is, and how large noise alone would be.",
+        "How like itself the error is after a time; noise is not.",
+        "How the error spreads over frequency; white noise would be flat.",
+    )
+    return tuple(
+        _picture(figure, prefixes, caption)
+        for figure, caption in zip(figures.residual_panels(comparison), captions, strict=True)
+    )

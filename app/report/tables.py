@@ -1,0 +1,207 @@
+"""Tables of results as rows of words, for the terminal and for the page alike."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from app.report.numbers import NOTHING, interval, quoted, significant, symbol
+from app.report.thesis import table_3
+from app.report.units import SHOWN, parameter_unit
+
+if TYPE_CHECKING:
+    from app.outcomes import BranchTrial, Comparison, Published
+    from model.fitting import Identification
+
+__all__ = [
+    "Row",
+    "Table",
+    "branch_trials",
+    "by_thesis_table",
+    "error_table",
+    "parameter_table",
+    "thesis_error_table",
+]
+
+
+@dataclass(frozen=True)
+class Row:
+    """Cells of one line; ``detail`` is a sentence on it, ``muted`` and ``mark`` set it back or off."""
+
+    cells: tuple[str, ...]
+    detail: str = ""
+    muted: bool = False
+    mark: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; ``head`` gives name and unit of every column, the first is what the rows are of."""
+
+    title: str
+    head: tuple[tuple[str, str], ...]
+    rows: tuple[Row, ...]
+    note: str = ""
+
+    def beside(self, other: Table) -> Table:
+        """Both tables as one, where they are of the same rows."""
+        if [r.cells[0] for r in self.rows] != [r.cells[0] for r in other.rows]:
+            raise ValueError(f"{self.title!r} and {other.title!r} are not of the same rows")
+        rows = tuple(
+            Row(a.cells + b.cells[1:], a.detail, a.muted, a.mark)
+            for a, b in zip(self.rows, other.rows, strict=True)
+        )
+        notes = " ".join(n for n in (self.note, other.note) if n)
+        return Table(self.title, self.head + other.head[1:], rows, notes)
+
+
+_TITLES = {
+    "A": "Table A: amplitudes 6 to 8 kV at one frequency (the thesis's Table 4)",
+    "B": "Table B: frequencies 0.2 to 1 Hz at one amplitude (the thesis's Table 5)",
+    "": "Other recordings",
+}
+
+
+def by_thesis_table(
+    comparisons: Sequence[Comparison], alone: str
+) -> list[tuple[str, tuple[Comparison, ...]]]:
+    """``(title, comparisons)`` for each of the thesis's validation tables that occurs.
+
+    ``alone`` is the title of recordings of which none belongs to such a table.
+    """
+    found = []
+    for table, title in _TITLES.items():
+        members = tuple(c for c in comparisons if c.table == table)
+        if members:
+            outside = table == "" and len(members) == len(comparisons)
+            found.append((alone if outside else title, members))
+    return found
+
+
+def _label(comparison: Comparison) -> str:
+    # the label of a table's row is short: it stays in one piece
+    return comparison.row.replace(" ", "\N{NO-BREAK SPACE}") or comparison.name
+
+
+def error_table(title: str, comparisons: Sequence[Comparison]) -> Table:
+    """Our own measures: RMS, the same in per cent, the largest error, and RMS over noise floor."""
+    shown = SHOWN[comparisons[0].kind]
+    film = comparisons[0].kind == "film"
+    rows = []
+    for c in comparisons:
+        e = c.errors
+        noise = NOTHING if not c.noise else significant(e.rms / c.noise)
+        rows.append(
+            Row(
+                (
+                    _label(c),
+                    significant(e.rms * shown.error_factor),
+                    significant(e.peak_pct if film else e.nrmse_pct),
+                    significant(e.max * shown.error_factor),
+                    noise,
+                )
+            )
+        )
+    head = (
+        ("", ""),
+        ("RMS", shown.error_unit),
+        ("RMS", "% of peak") if film else ("NRMSE", "% of range"),
+        ("Max", shown.error_unit),
+        ("RMS", "/ noise"),
+    )
+    return Table(title, head, tuple(rows))
+
+
+def thesis_error_table(
+    title: str, comparisons: Sequence[Comparison], published: Published | None = None
+) -> Table | None:
+    """The thesis's two measures as printed, beside its own figures; None for film data.
+
+    ``published`` stands for comparisons that bring no figures of their own.
+    """
+    if comparisons[0].kind == "film":
+        return None
+    rows = []
+    for c in comparisons:
+        theirs = c.published or published
+        rows.append(
+            Row(
+                (
+                    _label(c),
+                    significant(c.errors.e_rms_thesis_pct),
+                    NOTHING if theirs is None else significant(theirs.e_rms_pct),
+                    significant(c.errors.e_m_thesis_pct),
+                    NOTHING if theirs is None else significant(theirs.e_m_pct),
+                )
+            )
+        )
+    head = (
+        ("", ""),
+        ("e_rms", "here"),
+        ("e_rms", "thesis"),
+        ("e_m", "here"),
+        ("e_m", "thesis"),
+    )
+    return Table(title, head, tuple(rows))
+
+
+def parameter_table(fit: Identification) -> Table:
+    """Every parameter with its 95 % interval, beside the thesis's Table 3 where that applies."""
+    published = table_3(fit.model)
+    known = fit.covariance.size > 0
+    rows = []
+    for e in fit.estimates:
+        factor, unit = parameter_unit(e.unit)
+        if known:
+            value = quoted(e.value * factor, e.low * factor, e.high * factor)
+            within = interval(e.low * factor, e.high * factor) if e.free else "follows"
+        else:
+            value, within = significant(e.value * factor, 4), NOTHING
+        cells = [symbol(e.name), value if e.determined or not known else f"({value})", unit, within]
+        if published:
+            theirs = published.get(e.name, math.nan)
+            cells.append(significant(theirs * factor, 4))
+        # without intervals every row would say the same; the page says it once
+        rows.append(Row(tuple(cells), e.note if known else "", known and not e.determined))
+    head = [("", ""), ("Value", ""), ("Unit", ""), ("95 % interval", "")]
+    if published:
+        head.append(("Thesis", "Table 3"))
+    notes = []
+    if known and fit.undetermined:
+        notes.append("Values in brackets are not determined by these data.")
+    if published:
+        notes.append("Table 3's branches are listed by relaxation time, as ours are.")
+    return Table("Parameters", tuple(head), tuple(rows), " ".join(notes))
+
+
+def branch_trials(trials: Sequence[BranchTrial], kind: str) -> Table:
+    """What each number of branches did on training and on validation data."""
+    shown = SHOWN[kind]
+    best = min((t.bic for t in trials), default=0.0)
+    rows = []
+    for t in trials:
+        validation = (t.validation_rms, t.validation_peak_pct)
+        cells = (
+            f"{t.branches}{' *' if t.chosen else ''}",
+            significant(t.train_rms * shown.error_factor),
+            significant(t.train_peak_pct),
+            NOTHING if validation[0] is None else significant(validation[0] * shown.error_factor),
+            NOTHING if validation[1] is None else significant(validation[1]),
+            significant(t.bic - best),
+        )
+        rows.append(Row(cells, mark=t.chosen))
+    head = (
+        ("Branches", ""),
+        ("Training", shown.error_unit),
+        ("Training", "% of peak"),
+        ("Validation", shown.error_unit),
+        ("Validation", "% of peak"),
+        ("BIC", "above best"),
+    )
+    note = (
+        "* was chosen, by the BIC (an information criterion) of the training data; validation "
+        "plays no part in the choice."
+    )
+    return Table("Number of branches", head, tuple(rows), note)

@@ -1,0 +1,215 @@
+"""What an outcome says, in sentences for someone who has not read the thesis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from app.report.numbers import seconds, significant, symbol
+from app.report.units import SHOWN
+
+if TYPE_CHECKING:
+    from app.outcomes import Comparison, IdentifyOutcome, ValidateOutcome
+    from model.actuator import Actuator
+    from model.fitting import Identification
+    from model.material import Network
+
+__all__ = [
+    "describe_model",
+    "doubts",
+    "identify_summary",
+    "listed",
+    "pooled_noise",
+    "pooled_rms",
+    "validate_summary",
+    "warnings_of",
+]
+
+_METHODS = {
+    "hybrid": "a global search followed by least squares",
+    "de": "the thesis's Algorithm 1 (differential evolution) as printed",
+}
+_NAMES_MAX = 6  # more names than this are a number
+# RMS over noise floor: hardly anything left; little left; more, and the model lacks something
+_AT_NOISE, _NEAR_NOISE = 1.1, 1.5
+
+
+def listed(names: Iterable[str]) -> str:
+    """a, b and c."""
+    names = list(names)
+    if len(names) < 2:
+        return "".join(names)
+    return f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _counted(count: int, one: str) -> str:
+    return f"{count:,} {one}{'' if count == 1 else 's'}"
+
+
+def _recordings(comparisons: Sequence[Comparison]) -> str:
+    names = [c.name for c in comparisons]
+    head = _counted(len(names), "recording")
+    return f"{head} ({listed(names)})" if len(names) <= _NAMES_MAX else head
+
+
+def pooled_rms(comparisons: Sequence[Comparison]) -> float:
+    """RMS over all samples of all recordings, in m or Pa."""
+    samples = sum(c.errors.samples for c in comparisons)
+    return math.sqrt(sum(c.errors.rms**2 * c.errors.samples for c in comparisons) / samples)
+
+
+def pooled_noise(comparisons: Sequence[Comparison]) -> float | None:
+    """RMS of the noise floors that are known, in m or Pa; None where none is."""
+    floors = [c.noise for c in comparisons if c.noise is not None]
+    return math.sqrt(sum(n * n for n in floors) / len(floors)) if floors else None
+
+
+def describe_model(model: Actuator | Network) -> str:
+    """Springs, branches and effects of a model, in a few words."""
+    from model.actuator import Actuator
+
+    network = model.network if isinstance(model, Actuator) else model
+    kinds = sorted({s.kind for s in network.springs})
+    names = {"gent": "Gent", "neo-hookean": "neo-Hookean", "arruda-boyce": "Arruda-Boyce"}
+    springs = listed(names.get(k, k) for k in kinds)
+    words = f"{springs} springs with {_counted(len(network.branches), 'relaxation branch')}"
+    words = words.replace("branchs", "branches")
+    effects = (
+        [name.replace("_", " ") for name, _ in model.effects] if isinstance(model, Actuator) else []
+    )
+    return f"{words}, and {listed(effects)}" if effects else words
+
+
+def identify_summary(outcome: IdentifyOutcome) -> tuple[str, ...]:
+    """What was fitted on what, how well it follows, and how well where it was not fitted."""
+    train = outcome.train
+    samples = sum(c.errors.samples for c in train)
+    free = sum(e.free for e in outcome.fit.estimates)
+    said = [
+        f"A model of the {'film' if outcome.kind == 'film' else 'actuator'} "
+        f"({describe_model(outcome.fit.model)}; {_counted(free, 'free parameter')}) was fitted to "
+        f"{_recordings(train)}, {_counted(samples, 'sample')} in all, by "
+        f"{_METHODS.get(outcome.method, outcome.method)}. It took {seconds(outcome.seconds)}."
+    ]
+    said.append(f"On {_these(train)} it {_misses(train)}")
+    if outcome.validation:
+        count = _counted(len(outcome.validation), "other recording")
+        said.append(f"On {count}, which the fit never saw, it {_misses(outcome.validation)}")
+    if outcome.published_fit is not None:
+        said.append(
+            f"The thesis reports e_rms = {outcome.published_fit.e_rms_pct:g} % and e_m = "
+            f"{outcome.published_fit.e_m_pct:g} % for its own fit; by the same formulas this one "
+            f"has {_worst(train, 'e_rms_thesis_pct')} and {_worst(train, 'e_m_thesis_pct')}."
+        )
+    chosen = [t for t in outcome.trials if t.chosen]
+    if chosen:
+        tried = listed(str(t.branches) for t in outcome.trials)
+        said.append(
+            f"Of {tried} branches, {chosen[0].branches} were chosen, by the information criterion "
+            f"of the training data alone."
+        )
+    said.append(doubts(outcome.fit))
+    return tuple(said)
+
+
+def validate_summary(outcome: ValidateOutcome) -> tuple[str, ...]:
+    """How well a model follows recordings, and where it does worst."""
+    all_of = outcome.comparisons
+    fresh = tuple(c for c in all_of if c.role != "train")
+    said = [
+        f"The model ({outcome.model_name}) was set beside {_recordings(all_of)}. "
+        f"On {_these(all_of)} it {_misses(all_of)}"
+    ]
+    if len(fresh) < len(all_of):
+        seen = [c.name for c in all_of if c.role == "train"]
+        said.append(
+            f"{listed(seen)} {'was' if len(seen) == 1 else 'were'} used to fit this model: "
+            f"{'its error is' if len(seen) == 1 else 'their errors are'} no validation."
+        )
+    if len(all_of) > 1:
+        shown = SHOWN[outcome.kind]
+        worst = max(all_of, key=lambda c: c.errors.rms)
+        said.append(
+            f"It does worst on {worst.name}: "
+            f"{significant(worst.errors.rms * shown.error_factor)} {shown.error_unit} RMS."
+        )
+    return tuple(said)
+
+
+def doubts(fit: Identification) -> str:
+    """One sentence on what the data leave open."""
+    if fit.covariance.size == 0:
+        return (
+            "No intervals were computed, so nothing is known about how well the data determine "
+            "these parameters."
+        )
+    if not fit.undetermined:
+        return "The data determine every parameter."
+    named = listed(symbol(n) for n in fit.undetermined)
+    return (
+        f"The data do not determine {named}: other values would fit as well, and no digit of "
+        f"theirs should be quoted."
+    )
+
+
+def warnings_of(outcome: IdentifyOutcome | ValidateOutcome) -> tuple[str, ...]:
+    """All warnings, those of a recording with its name, none twice."""
+    fit = getattr(outcome, "fit", None)
+    said = [w[:1].upper() + w[1:] for w in fit.warnings] if fit is not None else []
+    if fit is not None:
+        comparisons = (*getattr(outcome, "train", ()), *getattr(outcome, "validation", ()))
+    else:
+        comparisons = getattr(outcome, "comparisons", ())
+    said += [f"{c.name}: {w}" for c in comparisons for w in c.warnings]
+    return tuple(dict.fromkeys(_sentence(w) for w in said))
+
+
+def _sentence(text: str) -> str:
+    return text if text.endswith((".", "!", "?")) else f"{text}."
+
+
+def _these(comparisons: Sequence[Comparison]) -> str:
+    return "this recording" if len(comparisons) == 1 else "these recordings"
+
+
+def _span(values: Sequence[float]) -> str:
+    low, high = significant(min(values)), significant(max(values))
+    return low if low == high else f"{low} to {high}"
+
+
+def _worst(comparisons: Sequence[Comparison], measure: str) -> str:
+    return f"{_span([getattr(c.errors, measure) for c in comparisons])} %"
+
+
+def _misses(comparisons: Sequence[Comparison]) -> str:
+    """... misses the measured displacement by 1.2 um RMS ... (a verb phrase and its sequel)."""
+    kind = comparisons[0].kind
+    shown = SHOWN[kind]
+    rms = pooled_rms(comparisons)
+    if kind == "film":
+        share = f"{_span([c.errors.peak_pct for c in comparisons])} % of the peak"
+    else:
+        share = f"{_span([c.errors.nrmse_pct for c in comparisons])} % of the measured range"
+    largest = max(c.errors.max for c in comparisons)
+    words = (
+        f"misses the measured {shown.quantity.lower()} by "
+        f"{significant(rms * shown.error_factor)} {shown.error_unit} RMS ({share}), and by "
+        f"{significant(largest * shown.error_factor)} {shown.error_unit} at most."
+    )
+    noise = pooled_noise(comparisons)
+    if not noise:
+        return f"{words} The noise floor is not known, so there is nothing to measure that against."
+    floor = f"{significant(noise * shown.error_factor)} {shown.error_unit}"
+    ratio = rms / noise
+    if ratio <= _AT_NOISE:
+        return f"{words} The noise floor is {floor}: hardly anything but noise is left."
+    if ratio <= _NEAR_NOISE:
+        return (
+            f"{words} The noise floor is {floor}: the error is {significant(ratio)} times that, so "
+            f"most of what is left is noise."
+        )
+    return (
+        f"{words} The noise floor is {floor}: the error is {significant(ratio)} times that, so "
+        f"there is something that the model does not describe."
+    )

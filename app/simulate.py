@@ -1,0 +1,120 @@
+"""What a model predicts under a recorded or planned drive, as a recording or as CSV."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from app.errors import InputError
+from app.modelfile import load_model, model_toml
+from app.recording.files import check_output, replaced_when_done
+from app.recording.reader import open_recording
+from app.recording.save import save_recording
+from app.records import recording_drive
+from app.rigfile import RigFile
+from app.sequencefile import load_sequence
+from model.actuator import Actuator, Drive
+from model.errors import ModelError
+from model.film import nominal_stress
+from model.material import Network
+
+__all__ = ["simulate_model"]
+
+
+def simulate_model(
+    model_path: str | Path,
+    drive: str | Path,
+    out: str | Path,
+    *,
+    rig_file: RigFile,
+    voltage: str = "command",
+    overwrite: bool = False,
+) -> Path:
+    """Drive the model with a recording (``.h5``) or a sequence, and write ``.h5`` or ``.csv``.
+
+    A recorded voltage is followed as the recording says (held by the converter, or linear between
+    samples); a planned one as the sequence itself, sampled at the rig file's rate. ``voltage`` is
+    command or monitor. Raises ``InputError``.
+    """
+    loaded = load_model(model_path)
+    target = check_output(out, overwrite)
+    if target.suffix not in (".h5", ".csv"):
+        raise InputError(f"{out}: the output is a recording (.h5) or a table (.csv)")
+    sequence_toml, hold, kinematics = "", False, loaded.kinematics
+    if Path(drive).suffix in (".h5", ".hdf5", ".nxs"):
+        recording = open_recording(drive)
+        title = f"{loaded.name} under {recording.title or recording.name}"
+        sequence_toml = recording.sequence_toml
+        if recording.kind == "film":
+            values = _film(loaded.model, recording.kinematics, recording.time, recording.stretch)
+            kinematics = recording.kinematics
+        else:
+            given = recording_drive(recording, voltage)
+            values, hold = _actuator(loaded.model, given), given.hold
+    else:
+        plan = load_sequence(drive)
+        title = f"{loaded.name} under {plan.sequence.name}"
+        sequence_toml = plan.toml
+        try:
+            time, volts = plan.sequence.sample(float(rig_file.card.sample_rate_Hz))
+        except ModelError as error:
+            raise InputError(f"sequence {drive}: {error}") from error
+        values = _actuator(loaded.model, Drive(time, volts))
+    if target.suffix == ".csv":
+        with replaced_when_done(target) as partial:
+            _write_csv(partial, values)
+        return target
+    actuator = loaded.model if isinstance(loaded.model, Actuator) else None
+    return save_recording(
+        target,
+        "film" if "stretch" in values else "actuator",
+        values,
+        title=title,
+        hold=hold,
+        kinematics=kinematics,
+        film=actuator.film if actuator and "stretch" not in values else None,
+        load=actuator.load if actuator and "stretch" not in values else None,
+        sequence_toml=sequence_toml,
+        model_toml=model_toml(loaded.name, loaded.model, loaded.kinematics, {}),
+        notes="a prediction of a model, not a measurement",
+        overwrite=overwrite,
+    )
+
+
+def _actuator(model: Actuator | Network, drive: Drive) -> dict[str, np.ndarray]:
+    if not isinstance(model, Actuator):
+        raise InputError("the model is of a bare film; it can only follow a recorded stretch")
+    response = model.simulate(drive)
+    if not response.ok:
+        raise InputError(f"the model cannot follow this voltage: {response.in_words}")
+    return {
+        "time": drive.time,
+        "voltage_command": drive.voltage,
+        "displacement": response.displacement,
+    }
+
+
+def _film(
+    model: Actuator | Network, kinematics: str, time: np.ndarray, stretch: np.ndarray | None
+) -> dict[str, np.ndarray]:
+    if stretch is None:
+        raise InputError("the recording holds no stretch")
+    network = model.network if isinstance(model, Actuator) else model
+    answer = nominal_stress(network, kinematics, time, stretch)
+    if not answer.ok:
+        raise InputError(f"the model cannot follow this stretch: {answer.in_words}")
+    return {"time": time, "stretch": stretch, "nominal_stress": answer.stress}
+
+
+def _write_csv(path: Path, values: dict[str, np.ndarray]) -> None:
+    columns = {
+        "time": ("time_s", 1.0),
+        "voltage_command": ("voltage_V", 1.0),
+        "displacement": ("displacement_mm", 1e3),
+        "stretch": ("stretch", 1.0),
+        "nominal_stress": ("nominal_stress_kPa", 1e-3),
+    }
+    table = np.column_stack([values[name] * columns[name][1] for name in values])
+    header = ",".join(columns[name][0] for name in values)
+    np.savetxt(path, table, fmt="%.12g", delimiter=",", header=header, comments="")

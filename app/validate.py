@@ -1,0 +1,41 @@
+"""Validation of a model on recordings: error tables like the thesis's Tables 4 and 5."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from app.modelfile import load_model
+from app.outcomes import ValidateOutcome
+from app.progress import Progress, quiet
+from app.records import compare, open_all
+
+__all__ = ["validate_model"]
+
+
+def validate_model(
+    model_path: str | Path,
+    paths: Sequence[str | Path],
+    *,
+    drive: str = "command",
+    progress: Progress = quiet,
+) -> ValidateOutcome:
+    """Compare the model in ``model_path`` with each recording. Raises ``InputError``.
+
+    A recording that the model was fitted to is marked as training data, by its checksum.
+    """
+    model = load_model(model_path)
+    recordings = open_all(paths)
+    fitted = {str(d.get("sha256")) for d in model.history.get("train", [])}
+    comparisons = []
+    for i, recording in enumerate(recordings):
+        role = "train" if recording.sha256 in fitted else "validation"
+        comparisons.append(compare(recording, model.model, model.kinematics, role, drive))
+        progress("validation", (i + 1) / len(recordings))
+    return ValidateOutcome(
+        title=f"{model.name} on {len(recordings)} recording{'s' if len(recordings) > 1 else ''}",
+        kind=recordings[0].kind,
+        model_name=model.name,
+        model_path=str(model_path),
+        comparisons=tuple(comparisons),
+    )

@@ -1,0 +1,144 @@
+"""How much faster the model's kernel follows the thesis's record than general-purpose solvers do.
+
+Run as ``python -m tests.benchmarks.bench_kernel``. One thesis record is two periods of eq. 49
+(22.8 s) with Table 3's film. The same right-hand side, compiled, goes to every solver; the general
+ones are set as loosely as their error against a 1e-10 reference stays near the kernel's. Medians of
+repeats in one run: compare the ratios, the milliseconds belong to this machine and its load.
+"""
+
+import math
+import statistics
+import time
+from collections.abc import Callable
+
+import numba
+import numpy as np
+from scipy.integrate import odeint, solve_ivp
+from sksundae.cvode import CVODE
+
+from model import kernel
+from model.actuator import Actuator, Drive, initial_state
+from model.excitation import Sequence
+from model.material import (
+    STANDARD_GRAVITY,
+    TABLE_3,
+    THESIS_FILM,
+    THESIS_LOAD,
+    VACUUM_PERMITTIVITY,
+)
+
+RATE = 400.0  # samples a second: with them the kernel stays below 0.1 um
+ENOUGH = 0.1e-6  # m
+TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+
+AMPLITUDES = np.array([6.0e3, 6.5e3, 7.0e3, 7.5e3, 8.0e3])
+FREQUENCIES = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
+EDGES = np.concatenate([[0.0], np.cumsum(1.0 / FREQUENCIES)])
+MODULI = np.array([s.modulus for s in TABLE_3.springs])
+LIMITS = np.array([s.limit for s in TABLE_3.springs])
+TIMES = np.array(TABLE_3.times)
+LOAD = THESIS_LOAD.mass * STANDARD_GRAVITY / (THESIS_FILM.width * THESIS_FILM.thickness)
+ELECTRIC = VACUUM_PERMITTIVITY * THESIS_FILM.permittivity / THESIS_FILM.thickness**2
+INERTIA = THESIS_FILM.density * THESIS_FILM.length**2 / 3.0
+
+
+@numba.njit(error_model="numpy", fastmath=True)
+def rates(t: float, y: np.ndarray, dy: np.ndarray) -> None:
+    """Eq. 48, the lobes of eq. 49 as a function of exact time."""
+    within = t % EDGES[-1]
+    lobe = 0
+    while lobe < 4 and within >= EDGES[lobe + 1]:
+        lobe += 1
+    v = AMPLITUDES[lobe] * math.sin(math.pi * FREQUENCIES[lobe] * (within - EDGES[lobe]))
+    lam = y[0]
+    s = lam * lam
+    inverse = 1.0 / s
+    stress = MODULI[0] * (s - inverse) / (1.0 - (s + inverse - 2.0) / LIMITS[0])
+    for i in range(1, 4):
+        inner = y[1 + i] * y[1 + i]
+        up, down = s / inner, inner * inverse
+        pull = (up - down) / (1.0 - (up + down - 2.0) / LIMITS[i])
+        stress += MODULI[i] * pull
+        dy[1 + i] = y[1 + i] * 0.0 + pull / TIMES[i - 1]
+    dy[0] = y[1]
+    dy[1] = (LOAD + ELECTRIC * v * v * lam - stress / lam) / INERTIA
+
+
+@numba.njit
+def returned(t: float, y: np.ndarray) -> np.ndarray:
+    dy = np.empty(5)
+    rates(t, y, dy)
+    return dy
+
+
+def timed(run: Callable[[], np.ndarray], repeats: int) -> tuple[float, np.ndarray]:
+    """Median seconds of ``repeats`` runs after one that compiles, and the result."""
+    result = run()
+    spent = []
+    for _ in range(repeats):
+        before = time.perf_counter()
+        run()
+        spent.append(time.perf_counter() - before)
+    return statistics.median(spent), result
+
+
+def main() -> None:
+    actuator = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
+    sequence = Sequence.thesis()
+    duration = sequence.segments[0].duration
+    t = np.arange(math.ceil(duration * RATE)) / RATE
+    drive = Drive(t, sequence.segments[0].voltage(t))
+    c = actuator.coefficients()
+    rest = actuator.rest()
+    start = initial_state(c, rest)
+    atol_weights = np.array([1.0, 100.0, 1.0, 1.0, 1.0])  # the rate may err more than the stretch
+
+    def ours() -> np.ndarray:
+        y = start.copy()
+        stretch, rate = np.empty(t.size), np.empty(t.size)
+        kernel.drive_by_voltage(c, drive.time, drive.voltage, False, y, stretch, rate)
+        return stretch
+
+    def lsoda(tolerance: float) -> np.ndarray:
+        return odeint(
+            returned, start, t, tfirst=True, rtol=tolerance, atol=tolerance * atol_weights,
+            mxstep=100_000,
+        )[:, 0]  # fmt: skip
+
+    def cvode(tolerance: float) -> np.ndarray:
+        solver = CVODE(
+            rates, method="Adams", rtol=tolerance, atol=tolerance * atol_weights,
+            max_num_steps=100_000,
+        )  # fmt: skip
+        return solver.solve(t, start).y[:, 0]
+
+    reference = solve_ivp(
+        returned, (0.0, t[-1]), start, method="DOP853", t_eval=t, rtol=1e-10,
+        atol=1e-13 * atol_weights, max_step=2e-3,
+    ).y[0]  # fmt: skip
+
+    def error(stretch: np.ndarray) -> float:
+        return float(np.max(np.abs(stretch - reference))) * THESIS_FILM.length
+
+    base, stretch = timed(ours, 51)
+    print(f"thesis record, two periods, {duration:.1f} s, {t.size} samples at {RATE:g} Hz")
+    print(f"{'solver':<34}{'ms':>10}{'error um':>11}{'ratio':>9}{'target':>9}")
+    name = "this kernel (RK4, fixed steps)"
+    print(f"{name:<34}{base * 1e3:>10.3f}{error(stretch) * 1e6:>11.4f}{1:>9}")
+    for name, run, target in (
+        ("SciPy LSODA (odeint)", lsoda, 150),
+        ("SUNDIALS CVODE Adams", cvode, 40),
+    ):
+        for tolerance in TOLERANCES:
+            if error(run(tolerance)) <= ENOUGH:
+                break
+        spent, stretch = timed(lambda run=run, tol=tolerance: run(tol), 7)  # type: ignore[misc]
+        label = f"{name}, rtol = atol = {tolerance:.0e}"
+        print(
+            f"{label:<34}{spent * 1e3:>10.3f}{error(stretch) * 1e6:>11.4f}"
+            f"{spent / base:>9.0f}{target:>8}x"
+        )
+
+
+if __name__ == "__main__":
+    main()
