@@ -122,8 +122,7 @@ def demo(
     with _working(json) as (console, progress):
         result = run_demo(out, seed=seed, overwrite=force, clock=time.monotonic, progress=progress)
     console.print(identify_table(result.identified))
-    for table in validate_tables(result.validated):
-        console.print(table)
+    console.print(validate_tables(result.validated))
     console.print(f"Recordings, model and report lie in {out}", soft_wrap=True, highlight=False)
     console.print(f"Report: {result.report}", soft_wrap=True, highlight=False)
     if json is not None:
@@ -410,8 +409,7 @@ def validate(
             from app.report.html import write_validate_report
 
             write_validate_report(outcome, report)
-    for table in validate_tables(outcome):
-        console.print(table)
+    console.print(validate_tables(outcome))
     if report is not None:
         console.print(f"Report: {report}", soft_wrap=True, highlight=False)
     if json is not None:

@@ -11,6 +11,7 @@ from app.identify import identify_recordings
 from app.outcomes import IdentifyOutcome, ValidateOutcome
 from app.presets import VALIDATION_A, VALIDATION_B
 from app.progress import Progress, quiet
+from app.report.figures import overview_figure, save_png
 from app.report.html import write_demo_report
 from app.rigfile import RigFile
 from app.run import record
@@ -40,8 +41,8 @@ def run_demo(
 ) -> DemoResult:
     """Record the identification run and the ten validation runs, identify, validate, report.
 
-    Everything goes into the folder ``out``: recordings, ``model.toml`` and ``report.html``. Raises
-    ``InputError`` where the folder holds something already, unless ``overwrite``.
+    Everything goes into the folder ``out``: recordings, ``model.toml``, ``report.html``,
+    ``overview.png``. Raises ``InputError`` where the folder holds something, unless ``overwrite``.
     """
     started = clock()
     if out.exists() and not out.is_dir():
@@ -75,5 +76,8 @@ def run_demo(
     report = out / "report.html"
     progress("report", 0.0)
     write_demo_report(identified, validated, report)
+    progress("report", 0.8)
+    overview = overview_figure(identified.train[0], validated.comparisons)
+    save_png(overview, out / "overview.png", dpi=110)
     progress("report", 1.0)
     return DemoResult(identified, validated, report, clock() - started)

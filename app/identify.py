@@ -84,7 +84,9 @@ def identify_recordings(
             raise InputError(f"these recordings cannot be fitted: {error}") from error
         smaller = fit.model.network if isinstance(fit.model, Actuator) else fit.model
         fits.append((count, fit))
-    scores = [_bic(fit, records) for _, fit in fits]
+    # one count of independent samples for all, from the fit that left the least structure behind
+    correlation = max(1.0, min(fit.correlation for _, fit in fits))
+    scores = [_bic(fit, records, correlation) for _, fit in fits]
     best = int(np.argmin(scores))
     count, fit = fits[best]
     if len(fits) > 1:
@@ -161,9 +163,9 @@ def _base(
     return Actuator(film, load, network)
 
 
-def _bic(fit: Identification, records: Sequence[Record]) -> float:
+def _bic(fit: Identification, records: Sequence[Record], correlation: float) -> float:
     """Bayesian information criterion that counts correlated residuals as what they are worth."""
-    samples = sum(r.measured.size for r in records) / max(1.0, fit.correlation)
+    samples = sum(r.measured.size for r in records) / correlation
     free = sum(e.free for e in fit.estimates)
     return float(samples * math.log(fit.cost) + free * math.log(max(samples, 2.0)))
 

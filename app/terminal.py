@@ -127,6 +127,8 @@ class _Fitted:
                 yield from _laid_out(piece[0], show, width)
                 yield Text()
                 yield from _laid_out(piece[1], show, width)
+        if self._warnings:
+            yield Text()
         for warning in self._warnings:
             yield Text(show(f"Warning: {warning}"), style="yellow")
 

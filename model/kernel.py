@@ -64,7 +64,7 @@ _STRETCH_MAX = 100.0  # beyond any elastomer: a runaway, whatever the springs sa
 _RK4_STEP_MAX = 2.5e-3  # s; a thesis record is then good to 0.03 um
 _RK4_PHASE_MAX = 1.20  # (angular frequency or flow rate) times step
 _RK4_KICK = 5e-8  # in stretch: the error allowed in following one kick of the drive
-_RK4_RINGING = 1e-9  # in stretch a radian of ringing, which lasts for some hundred radians
+_RK4_RINGING = 5e-9  # in stretch a radian of ringing, which lasts for some hundred radians
 _RK4_REFINE_MAX = 20.0
 _RK4_SUBSTEPS_MAX = 2  # beyond that, one RODAS step is cheaper
 _RODAS_TOLERANCE = 5e-9  # in stretch, a step: 0.4 nm on 75 mm
@@ -75,7 +75,6 @@ _NEO_HOOKEAN, _GENT = SPRINGS.index(neo_hookean.NAME), SPRINGS.index(gent.NAME)
 
 _SHORTEST = WIDTH
 _LONGEST = WIDTH + 1
-_STIFFENING = WIDTH + 2
 
 
 @jit
@@ -97,9 +96,7 @@ def _rates(
 ) -> None:
     """Right-hand side of eq. 48 at voltage squared ``field2``, written into ``dy``.
 
-    ``uniform`` is the code of the strain energy when all springs share it, else -1. Called with
-    ``held`` and ``uniform`` as literals it compiles to straight arithmetic, about twice as fast
-    as the general form.
+    ``uniform`` is the code of the strain energy when all springs share it, else -1.
     """
     lam = y[0]
     s = lam * lam
@@ -216,20 +213,19 @@ def _locking_stretch(held: int, locking: float, sign: float) -> float:
 
 @jit
 def _spring_table(c: np.ndarray) -> np.ndarray:
-    """Springs as (WIDTH + 3, n + 1): one row a property, so that loops over springs read in order.
+    """Springs as (WIDTH + 2, n + 1): one row a property, so that loops over springs read in order.
 
-    The rows added are the least and the greatest stretch short of locking, and 1/J.
+    The two rows added are the least and the greatest stretch short of locking.
     """
     held = int(c[HELD])
     count = branch_count(c) + 1
-    table = np.empty((WIDTH + 3, count))
+    table = np.empty((WIDTH + 2, count))
     for i in range(count):
         k = HEAD + WIDTH * i
         for m in range(WIDTH):
             table[m, i] = c[k + m]
         table[_SHORTEST, i] = _locking_stretch(held, c[k + LOCKING], -1.0)
         table[_LONGEST, i] = _locking_stretch(held, c[k + LOCKING], 1.0)
-        table[_STIFFENING, i] = 0.0 if c[k + KIND] == _NEO_HOOKEAN else 1.0 / c[k + LIMIT]
     return table
 
 
@@ -255,13 +251,14 @@ def _rk4_steps(
     v1: float,
     h: float,
     steps: int,
+    stride: int,
     work: np.ndarray,
     trace: np.ndarray,
 ) -> None:
     """``steps`` Runge-Kutta steps of length ``h`` from ``y`` in place, voltage v0 to v1 linearly.
 
-    ``trace`` carries the acceleration at the starts of the two steps before; its last number
-    becomes the largest second difference of accelerations met on the way.
+    ``trace`` carries the acceleration at the last two of every ``stride`` steps; its last number
+    becomes the largest second difference of these accelerations met on the way.
     """
     n = y.shape[0]
     k1, k2, k3, k4, z = work[0], work[1], work[2], work[3], work[4]
@@ -271,9 +268,10 @@ def _rk4_steps(
         vm = v0 + (v1 - v0) * ((m + 0.5) / steps)
         vb = v0 + (v1 - v0) * ((m + 1.0) / steps)
         _rates(held, uniform, c, springs, y, va * va, k1)
-        trace[2] = max(trace[2], abs(k1[1] - 2.0 * trace[0] + trace[1]))
-        trace[1] = trace[0]
-        trace[0] = k1[1]
+        if m % stride == 0:
+            trace[2] = max(trace[2], abs(k1[1] - 2.0 * trace[0] + trace[1]))
+            trace[1] = trace[0]
+            trace[0] = k1[1]
         for j in range(n):
             z[j] = y[j] + 0.5 * h * k1[j]
         _rates(held, uniform, c, springs, z, vm * vm, k2)
@@ -299,37 +297,45 @@ def _lean_pull(p: float, q: float, stiffening: float) -> float:
 
 
 @jit
+def _lean_table(c: np.ndarray, springs: np.ndarray) -> np.ndarray:
+    """What ``_lean_steps`` reads: load and field over the inertia, then three numbers a spring.
+
+    Those are modulus over inertia, 1/J and 1/T; springs that are missing are there as zeros.
+    """
+    table = np.zeros(14)
+    table[0], table[1] = c[FORCE] / c[INERTIA], c[ELECTRIC] / c[INERTIA]
+    for i in range(springs.shape[1]):
+        table[2 + 3 * i] = springs[MODULUS, i] / c[INERTIA]
+        neo_hookean = springs[KIND, i] == _NEO_HOOKEAN
+        table[3 + 3 * i] = 0.0 if neo_hookean else 1.0 / springs[LIMIT, i]
+        table[4 + 3 * i] = springs[RATE, i]
+    return table
+
+
+@jit
 def _lean_steps(
-    c: np.ndarray,
-    springs: np.ndarray,
+    table: np.ndarray,
     y: np.ndarray,
     v0: float,
     v1: float,
     h: float,
     steps: int,
+    stride: int,
     trace: np.ndarray,
 ) -> None:
     """As ``_rk4_steps`` for the thesis's case: width held, springs of Gent's kind, n <= 3.
 
-    Twice as fast, because nothing but the voltage leaves the registers: branches that are missing
-    are there with modulus and rate 0.
+    Twice as fast, because nothing leaves the registers on the way. ``table`` is ``_lean_table``'s.
     """
-    n = springs.shape[1] - 1
-    per_mass = 1.0 / c[INERTIA]
-    load, electric_gain = c[FORCE] * per_mass, c[ELECTRIC] * per_mass
-    m0, g0 = springs[MODULUS, 0] * per_mass, springs[_STIFFENING, 0]
-    m1, g1, r1, x1 = 0.0, 0.0, 0.0, 1.0
-    m2, g2, r2, x2 = 0.0, 0.0, 0.0, 1.0
-    m3, g3, r3, x3 = 0.0, 0.0, 0.0, 1.0
-    if n > 0:
-        m1, g1 = springs[MODULUS, 1] * per_mass, springs[_STIFFENING, 1]
-        r1, x1 = springs[RATE, 1], y[2]
-    if n > 1:
-        m2, g2 = springs[MODULUS, 2] * per_mass, springs[_STIFFENING, 2]
-        r2, x2 = springs[RATE, 2], y[3]
-    if n > 2:
-        m3, g3 = springs[MODULUS, 3] * per_mass, springs[_STIFFENING, 3]
-        r3, x3 = springs[RATE, 3], y[4]
+    n = y.shape[0] - 2
+    load, electric_gain = table[0], table[1]
+    m0, g0 = table[2], table[3]
+    m1, g1, r1 = table[5], table[6], table[7]
+    m2, g2, r2 = table[8], table[9], table[10]
+    m3, g3, r3 = table[11], table[12], table[13]
+    x1 = y[2] if n > 0 else 1.0
+    x2 = y[3] if n > 1 else 1.0
+    x3 = y[4] if n > 2 else 1.0
     lam, speed = y[0], y[1]
     half, sixth = 0.5 * h, h / 6.0
     dv = (v1 - v0) / steps
@@ -345,8 +351,9 @@ def _lean_steps(
         t3 = _lean_pull(p, x3 * x3, g3)
         stress = m0 * _lean_pull(p, 1.0, g0) + m1 * t1 + m2 * t2 + m3 * t3
         a = load + e0 * lam - stress / lam
-        bend = max(bend, abs(a - 2.0 * last + last_but_one))
-        last_but_one, last = last, a
+        if m % stride == 0:
+            bend = max(bend, abs(a - 2.0 * last + last_but_one))
+            last_but_one, last = last, a
         f1, f2, f3 = r1 * t1, r2 * t2, r3 * t3
         sum_v, sum_a = speed, a
         sum_1, sum_2, sum_3 = f1, f2, f3
@@ -539,15 +546,16 @@ def drive_by_voltage(
     held, uniform = int(c[HELD]), int(c[UNIFORM])
     springs = _spring_table(c)
     lean = held == 0 and springs.shape[1] <= 4 and np.max(springs[KIND]) <= _GENT
+    table = _lean_table(c, springs) if lean else np.zeros(0)
     work = np.zeros((15, y.shape[0]))
     before = np.empty(y.shape[0])
     trace = np.zeros(3)
     status = OK
     reached = samples
     h = _RODAS_STEP_MAX
-    swing, steps, step_before = 0.0, 1, 0.0
+    swing, bound, steps, step_before, gentle = 0.0, 0.0, 1, 0.0, True
     kick_gain, ring_gain, fading, per_phase2 = 0.0, 0.0, 1.0, 1.0
-    ring = 0.0
+    ring, kick = 0.0, 0.0
     fresh = True
     last = voltage[0]
     for k in range(samples):
@@ -573,35 +581,44 @@ def drive_by_voltage(
                 bound = max(max(swing, fastest) / _RK4_PHASE_MAX, 1.0 / _RK4_STEP_MAX)
             steps = math.ceil(dt * bound - 1e-6)
             step_before = dt
+            gentle = steps <= max(_RK4_SUBSTEPS_MAX, _RK4_SUBSTEPS_MAX * dt / _RK4_STEP_MAX)
             phase2 = (swing * dt / steps) ** 2
             kick_gain = phase2 * (swing * dt / steps) * (dt / steps) ** 2 / 120.0 / _RK4_KICK
             ring_gain = phase2 * (dt / steps) ** 2 / 120.0 / _RK4_RINGING
             fading = 1.0 / (1.0 + 0.25 * swing * dt)
             per_phase2 = steps * steps / (swing * dt) ** 2
-        explicit = steps <= max(_RK4_SUBSTEPS_MAX, _RK4_SUBSTEPS_MAX * dt / _RK4_STEP_MAX)
+        explicit = gentle
         if explicit:
             # a step of phase p gets an oscillation wrong by p^5/120 of its amplitude: once, where
             # the drive kicks the film, and again at each step while the film rings on
-            kick = v0 * v0 - last * last if hold else v1 * v1 - 2.0 * v0 * v0 + last * last
-            kicked = kick_gain * abs(c[ELECTRIC] * kick) * y[0] / c[INERTIA]
-            ringing = ring_gain * ring
-            fine = steps
+            field2 = v0 * v0 - last * last if hold else v1 * v1 - 2.0 * v0 * v0 + last * last
+            kick_before = abs(kick)
+            kick = c[ELECTRIC] * field2 * electric(held, y[0]) / c[INERTIA]
+            kicked, ringing = kick_gain * abs(kick), ring_gain * ring
+            refine = 1
             if kicked > 1.0 or ringing > 1.0:
                 more = max(kicked**0.2, math.sqrt(math.sqrt(ringing)))
-                fine = math.ceil(steps * min(more, _RK4_REFINE_MAX))
+                refine = math.ceil(min(more, _RK4_REFINE_MAX))
+            fine = steps * refine
+            # a slow staircase rings within each of its long treads, but it does not ring on
+            forced = 0.0
+            if hold and steps > 1:
+                trace[0] += kick
+                trace[1] += kick
+                forced = 3.0 * min(abs(kick), kick_before)
             for j in range(y.shape[0]):
                 before[j] = y[j]
             if lean:
-                _lean_steps(c, springs, y, v0, v1, dt / fine, fine, trace)
+                _lean_steps(table, y, v0, v1, dt / fine, fine, refine, trace)
             else:
-                _rk4_steps(held, uniform, c, springs, y, v0, v1, dt / fine, fine, work, trace)
-            ratio = fine / steps
-            ring = max(ring * fading, trace[2] * per_phase2 * ratio * ratio)
+                h_fine = dt / fine
+                _rk4_steps(held, uniform, c, springs, y, v0, v1, h_fine, fine, refine, work, trace)
+            ring = max(ring * fading, trace[2] * per_phase2 - forced)
             if not _admissible(springs, y):  # locking came nearer than the stiffness had foretold
                 explicit = False
                 for j in range(y.shape[0]):
                     y[j] = before[j]
-        last = v1
+        last = v0
         if not explicit:
             fresh = True
             status, h = _rodas(c, springs, y, v0, v1, dt, h, work)

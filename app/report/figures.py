@@ -140,9 +140,12 @@ def svg(figure: Figure, prefix: str, label: str) -> str:
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r"\s*<style [^>]*>.*?</style>", "", text, flags=re.DOTALL)
     text = re.sub(r"\s*<!--.*?-->", "", text, flags=re.DOTALL)
-    text = re.sub(r'\bid="', f'id="{prefix}-', text)
-    text = re.sub(r'\b(?:xlink:)?href="#', f'href="#{prefix}-', text)
-    text = re.sub(r"url\(#", f"url(#{prefix}-", text)
+    # matplotlib's identifiers differ from run to run; only those that something refers to are kept
+    text = re.sub(r"\bxlink:href=", "href=", text)
+    used = dict.fromkeys(re.findall(r'(?:href="|url\()#([^")]+)', text))
+    short = {name: f"{prefix}-{i}" for i, name in enumerate(used)}
+    text = re.sub(r' id="([^"]*)"', lambda d: f' id="{short[d[1]]}"' if d[1] in short else "", text)
+    text = re.sub(r'(href="|url\()#([^")]+)', lambda d: f"{d[1]}#{short[d[2]]}", text)
     text = re.sub(r' d="[^"]*"', lambda d: _rounded(d[0]), text)
     text = text.replace("'DejaVu Sans', sans-serif", "inherit").replace("'DejaVu Sans'", "inherit")
     box = re.search(r'viewBox="[^"]*"', text)

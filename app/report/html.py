@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -73,28 +73,32 @@ class Part:
 
 def write_identify_report(outcome: IdentifyOutcome, path: str | Path) -> Path:
     """Write what an identification found to ``path``. Raises ``InputError``."""
-    return _write((_identify_part(outcome, _prefixes()),), outcome.title, path)
+    return _write(path, outcome.title, lambda p: (_identify_part(outcome, p),))
 
 
 def write_validate_report(outcome: ValidateOutcome, path: str | Path) -> Path:
     """Write how a model did on recordings to ``path``. Raises ``InputError``."""
-    return _write((_validate_part(outcome, _prefixes()),), outcome.title, path)
+    return _write(path, outcome.title, lambda p: (_validate_part(outcome, p),))
 
 
 def write_demo_report(
     identify: IdentifyOutcome, validate: ValidateOutcome, path: str | Path
 ) -> Path:
     """Write an identification and a validation of its model as one page. Raises ``InputError``."""
-    prefixes = _prefixes()
-    parts = (_identify_part(identify, prefixes), _validate_part(validate, prefixes))
-    return _write(parts, identify.title, path)
+    return _write(
+        path,
+        identify.title,
+        lambda p: (_identify_part(identify, p), _validate_part(validate, p)),
+    )
 
 
-def _write(parts: tuple[Part, ...], title: str, path: str | Path) -> Path:
+def _write(
+    path: str | Path, title: str, parts: Callable[[Iterator[str]], tuple[Part, ...]]
+) -> Path:
     from app.recording.files import check_output, replaced_when_done
 
-    path = check_output(path, overwrite=True)
-    page = _render(parts, title)
+    path = check_output(path, overwrite=True)  # before seconds go into the figures
+    page = _render(parts(_prefixes()), title)
     with replaced_when_done(path) as partial:
         # a file's name may hold bytes that are no text: shown as ?, rather than no report at all
         partial.write_text(page, encoding="utf-8", errors="replace", newline="\n")
@@ -160,7 +164,9 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
                 figures.parameters_figure(fit),
                 prefixes,
                 "Parameters with their 95 % intervals. An arrow is an end that the data leave "
-                "open; grey is what they do not determine.",
+                "open; grey is what they do not determine."
+                if fit.covariance.size > 0
+                else "Parameters; no intervals were computed.",
             ),
         ),
         branches=branch_tables,

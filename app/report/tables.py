@@ -28,7 +28,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Row:
-    """Cells of one line; ``detail`` is a sentence on it, ``muted`` and ``mark`` set it back or off."""
+    """Cells of a line; ``detail`` is a sentence on it, ``muted`` or ``mark`` set it back or off."""
 
     cells: tuple[str, ...]
     detail: str = ""

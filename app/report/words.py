@@ -94,8 +94,9 @@ def identify_summary(outcome: IdentifyOutcome) -> tuple[str, ...]:
     ]
     said.append(f"On {_these(train)} it {_misses(train)}")
     if outcome.validation:
-        count = _counted(len(outcome.validation), "other recording")
-        said.append(f"On {count}, which the fit never saw, it {_misses(outcome.validation)}")
+        n = len(outcome.validation)
+        others = "another recording" if n == 1 else f"{n} other recordings"
+        said.append(f"On {others}, which the fit never saw, it {_misses(outcome.validation)}")
     if outcome.published_fit is not None:
         said.append(
             f"The thesis reports e_rms = {outcome.published_fit.e_rms_pct:g} % and e_m = "
