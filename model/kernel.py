@@ -572,21 +572,24 @@ def drive_by_voltage(
         if fresh:
             _rates(held, uniform, c, springs, y, v0 * v0, work[0])
             trace[0] = trace[1] = work[0, 1]
-            ring = max(ring, abs(work[0, 1]))
+            ring = abs(work[0, 1])
             fresh = False
         # the film's stiffness follows the stretch slowly, and time is mostly even
         if k % 64 == 0 or abs(dt - step_before) > 1e-6 * dt:
             if k % 64 == 0:
                 swing, fastest = _speed_limit(c, y)
                 bound = max(max(swing, fastest) / _RK4_PHASE_MAX, 1.0 / _RK4_STEP_MAX)
-            steps = math.ceil(dt * bound - 1e-6)
             step_before = dt
-            gentle = steps <= max(_RK4_SUBSTEPS_MAX, _RK4_SUBSTEPS_MAX * dt / _RK4_STEP_MAX)
-            phase2 = (swing * dt / steps) ** 2
-            kick_gain = phase2 * (swing * dt / steps) * (dt / steps) ** 2 / 120.0 / _RK4_KICK
-            ring_gain = phase2 * (dt / steps) ** 2 / 120.0 / _RK4_RINGING
+            wanted = dt * bound - 1e-6
+            # a bound that is not finite is not gentle either, and cannot be counted in steps
+            gentle = wanted <= max(_RK4_SUBSTEPS_MAX, _RK4_SUBSTEPS_MAX * dt / _RK4_STEP_MAX)
+            steps = max(math.ceil(wanted), 1) if gentle else 1
+            step = dt / steps
+            phase = max(swing * step, 1e-6)
+            kick_gain = phase**3 * step**2 / 120.0 / _RK4_KICK
+            ring_gain = phase**2 * step**2 / 120.0 / _RK4_RINGING
             fading = 1.0 / (1.0 + 0.25 * swing * dt)
-            per_phase2 = steps * steps / (swing * dt) ** 2
+            per_phase2 = 1.0 / phase**2
         explicit = gentle
         if explicit:
             # a step of phase p gets an oscillation wrong by p^5/120 of its amplitude: once, where
@@ -613,8 +616,9 @@ def drive_by_voltage(
             else:
                 h_fine = dt / fine
                 _rk4_steps(held, uniform, c, springs, y, v0, v1, h_fine, fine, refine, work, trace)
-            ring = max(ring * fading, trace[2] * per_phase2 - forced)
-            if not _admissible(springs, y):  # locking came nearer than the stiffness had foretold
+            if _admissible(springs, y):
+                ring = max(ring * fading, trace[2] * per_phase2 - forced)
+            else:  # locking came nearer than the stiffness had foretold
                 explicit = False
                 for j in range(y.shape[0]):
                     y[j] = before[j]

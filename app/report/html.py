@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -85,6 +86,8 @@ def write_demo_report(
     identify: IdentifyOutcome, validate: ValidateOutcome, path: str | Path
 ) -> Path:
     """Write an identification and a validation of its model as one page. Raises ``InputError``."""
+    if {c.name for c in identify.validation} <= {c.name for c in validate.comparisons}:
+        identify = replace(identify, validation=())  # they stand in the other half
     return _write(
         path,
         identify.title,
@@ -115,11 +118,19 @@ def _render(parts: tuple[Part, ...], title: str) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["glued"] = _glued
     return environment.get_template("report.html.j2").render(
         parts=parts,
         title=title,
         film=all(p.film for p in parts),
         rest_length_known=any(p.rest_length_known for p in parts),
+    )
+
+
+def _glued(sentence: str) -> str:
+    """``sentence`` in which no line ends between a number and its unit."""
+    return re.sub(
+        r"(?<=\d) (?=%|\N{MICRO SIGN}m\b|kPa\b|s\b|min\b|h\b)", "\N{NO-BREAK SPACE}", sentence
     )
 
 

@@ -195,9 +195,9 @@ def branch_trials(trials: Sequence[BranchTrial], kind: str) -> Table:
     head = (
         ("Branches", ""),
         ("Training", shown.error_unit),
-        ("Training", "% of peak"),
+        ("", "% of peak"),
         ("Validation", shown.error_unit),
-        ("Validation", "% of peak"),
+        ("", "% of peak"),
         ("BIC", "above best"),
     )
     note = (

@@ -23,8 +23,8 @@ def langevin(beta: float) -> tuple[float, float]:
     if beta < 0.05:
         b2 = beta * beta
         return (
-            beta * (1.0 / 3.0 - b2 / 45.0 + 2.0 * b2 * b2 / 945.0),
-            1.0 / 3.0 - b2 / 15.0 + 2.0 * b2 * b2 / 189.0,
+            beta * (1.0 / 3.0 - b2 * (1.0 / 45.0 - b2 * (2.0 / 945.0 - b2 / 4725.0))),
+            1.0 / 3.0 - b2 * (1.0 / 15.0 - b2 * (2.0 / 189.0 - b2 / 675.0)),
         )
     if beta > 20.0:
         return 1.0 - 1.0 / beta, 1.0 / (beta * beta)
@@ -36,8 +36,9 @@ def langevin(beta: float) -> tuple[float, float]:
 def inverse_langevin(x: float) -> float:
     """Beta with coth(beta) - 1/beta = x, for 0 <= x < 1, to rounding.
 
-    Starts from Kroeger's rational approximation (2015, error below 0.28 %); two Newton steps on the
-    Langevin function leave nothing that double precision can show.
+    Starts from Kroeger's rational approximation (2015, error below 0.28 %); two Newton steps leave
+    nothing that double precision can show. They are taken in 1/beta, in which the Langevin function
+    of a stretched chain is a straight line.
     """
     if x < 1e-4:
         return 3.0 * x + 1.8 * x * x * x
@@ -45,7 +46,7 @@ def inverse_langevin(x: float) -> float:
     beta = (3.0 * x - x * x2 / 5.0 * (6.0 + x2 - 2.0 * x2 * x2)) / (1.0 - x2)
     for _ in range(2):
         value, rate = langevin(beta)
-        beta += (x - value) / rate
+        beta /= 1.0 - (x - value) / (rate * beta)
     return beta
 
 
