@@ -6,11 +6,13 @@ it needs when it runs.
 
 from __future__ import annotations
 
+import io
 import logging
 import os
+import re
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
@@ -46,6 +48,7 @@ Json = Annotated[
         "--json", metavar="PATH", help="Write the result as JSON there; - for standard output."
     ),
 ]
+Seed = Annotated[int, typer.Option(min=0, max=10**15, help="Of the simulated noise.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace the output if it exists.")]
 RigFileOption = Annotated[
     Path | None,
@@ -111,7 +114,7 @@ def demo(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where results go.")] = Path(
         "demo"
     ),
-    seed: Annotated[int, typer.Option(min=0, help="Of the simulated noise.")] = 0,
+    seed: Seed = 0,
     json: Json = None,
     force: Force = False,
 ) -> None:
@@ -119,12 +122,13 @@ def demo(
     from app.demo import run_demo
     from app.terminal import identify_table, outcome_json, validate_tables, write_json
 
+    _check_files(force, (), json=json)
     with _working(json) as (console, progress):
         result = run_demo(out, seed=seed, overwrite=force, clock=time.monotonic, progress=progress)
     console.print(identify_table(result.identified))
     console.print(validate_tables(result.validated))
-    console.print(f"Recordings, model and report lie in {out}", soft_wrap=True, highlight=False)
-    console.print(f"Report: {result.report}", soft_wrap=True, highlight=False)
+    _print(console, f"Recordings, model and report lie in {out}")
+    _print(console, f"Report: {result.report}")
     if json is not None:
         write_json(
             {
@@ -147,7 +151,7 @@ def record(
     ] = "sim",
     rig_file: RigFileOption = None,
     paced: Annotated[bool, typer.Option("--paced", help="Simulate in real time.")] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Of the simulated noise.")] = 0,
+    seed: Seed = 0,
     operator: Annotated[str, typer.Option(help="Who runs it; kept in the recording.")] = "",
     film: Annotated[str, typer.Option(help="Which film; kept in the recording.")] = "",
     notes: Annotated[str, typer.Option(help="Anything else; kept in the recording.")] = "",
@@ -159,23 +163,24 @@ def record(
     from app.run import record as run
     from app.sequencefile import load_sequence
     from app.terminal import write_json
+    from app.toml_input import read_text
 
+    _check_files(force, (sequence, rig_file), out, json=json, recording=out)
     settings = load_rig_file(rig_file)
-    text = "" if rig_file is None else rig_file.read_text(encoding="utf-8")
+    text = "" if rig_file is None else read_text(rig_file, "rig file")
     with _working(json) as (console, progress):
         result = run(
             load_sequence(sequence), rig, settings, text, out, seed=seed, paced=paced,
             operator=operator, film_id=film, notes=notes, overwrite=force, progress=progress,
         )  # fmt: skip
     seconds = result.samples / result.rate_Hz
-    console.print(
+    _print(
+        console,
         f"{result.path}: {result.samples} samples, {seconds:.1f} s at {result.rate_Hz:g} Hz, "
         f"{result.outcome}",
-        soft_wrap=True,
-        highlight=False,
     )
     for event in result.events:
-        console.print(f"  {event}", soft_wrap=True, highlight=False)
+        _print(console, f"  {event}")
     if json is not None:
         write_json(
             {
@@ -219,15 +224,21 @@ def import_(
     from app.recording.summary import describe
     from app.rigfile import load_rig_file
     from app.terminal import write_json
+    from app.toml_input import read_text
 
-    columns = {}
+    columns: dict[str, str] = {}
     for pair in column or []:
         name, _, where = pair.partition("=")
         if not (name and where):
-            raise InputError(f"--column {pair} is not of the form NAME=SOURCE")
+            raise InputError(
+                f"--column {pair} is not of the form NAME=SOURCE, such as voltage_kV=Voltage"
+            )
+        if name in columns:
+            raise InputError(f"--column {name} is given twice, as {columns[name]} and as {where}")
         columns[name] = where
+    _check_files(force, (source, rig_file), out, json=json, recording=out)
     settings = None if rig_file is None else load_rig_file(rig_file)
-    with _working(json) as (console, _):
+    with _working(json, computes=False) as (console, _):
         doubts = import_file(
             source,
             out,
@@ -237,19 +248,18 @@ def import_(
             kinematics=None if kinematics is None else kinematics.value,
             film=None if settings is None else settings.as_film(),
             load=None if settings is None else settings.as_load(),
-            configuration="" if rig_file is None else rig_file.read_text(encoding="utf-8"),
+            configuration="" if rig_file is None else read_text(rig_file, "rig file"),
             film_id=film,
             notes=notes,
             overwrite=force,
         )
     recording = open_recording(out)
-    console.print(
+    _print(
+        console,
         f"{out}: {recording.samples} samples, {recording.duration:.1f} s of {recording.kind} data",
-        soft_wrap=True,
-        highlight=False,
     )
     for doubt in doubts:
-        console.print(f"[yellow]Look again:[/] {doubt}", soft_wrap=True, highlight=False)
+        _print(console, f"Look again: {doubt}", style="yellow")
     if json is not None:
         write_json({**describe(recording), "doubts": doubts}, json)
 
@@ -258,20 +268,23 @@ def import_(
 def info(
     path: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A recording.")],
     json: Json = None,
+    force: Force = False,
 ) -> None:
     """Say what a recording holds."""
     from rich.table import Table
+    from rich.text import Text
 
     from app.recording.reader import open_recording
     from app.recording.summary import describe, describe_rows
     from app.terminal import write_json
 
+    _check_files(force, (path,), json=json)
     recording = open_recording(path)
     table = Table(show_header=False, box=None, pad_edge=False)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for name, value in describe_rows(recording):
-        table.add_row(name, value)
+        table.add_row(name, Text(value))
     if json != "-":
         _console().print(table, highlight=False)
     if json is not None:
@@ -282,31 +295,52 @@ def info(
 def export(
     path: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A recording.")],
     to: Annotated[ExportFormat, typer.Option(help="Format.")],
-    out: Annotated[Path | None, typer.Option(help="[default: beside the recording]")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="[default: beside the recording]")
+    ] = None,
+    json: Json = None,
     force: Force = False,
 ) -> None:
     """Hand a recording on as CSV, MAT or Parquet."""
     from app.recording.exporters import export_recording
+    from app.terminal import write_json
 
-    _console().print(str(export_recording(path, to.value, out, force)), soft_wrap=True)
+    _check_files(force, (path,), *([] if out is None else [out]), json=json)
+    written = export_recording(path, to.value, out, force)
+    _print(_console(json), str(written))
+    if json is not None:
+        write_json(
+            {
+                "format": "dearig-export/1",
+                "recording": str(path),
+                "to": to.value,
+                "out": str(written),
+            },
+            json,
+        )
 
 
 @app.command()
 def recover(
     path: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A recording of a killed run.")],
+    json: Json = None,
+    force: Force = False,
 ) -> None:
     """Mend the recording of a run that was killed, so that any program can read it."""
     from app.recording.reader import open_recording
     from app.recording.recover import recover as mend
+    from app.recording.summary import describe
+    from app.terminal import write_json
 
+    _check_files(force, (path,), json=json)
     mended = mend(path)
     recording = open_recording(path)
     what = "recovered" if mended else "nothing to recover"
-    _console().print(
-        f"{path}: {what}; {recording.samples} samples, {recording.duration:.1f} s",
-        soft_wrap=True,
-        highlight=False,
+    _print(
+        _console(json), f"{path}: {what}; {recording.samples} samples, {recording.duration:.1f} s"
     )
+    if json is not None:
+        write_json({**describe(recording), "recovered": mended}, json)
 
 
 @app.command()
@@ -336,7 +370,7 @@ def identify(
         typer.Option(help="Measured length under the load (82); left out, mu_0 gives it."),
     ] = None,
     rig_file: RigFileOption = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of Algorithm 1.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=10**15, help="Of Algorithm 1.")] = 0,
     intervals: Annotated[bool, typer.Option(help="95 % intervals.")] = True,
     report: Annotated[
         Path | None, typer.Option(metavar="OUT.html", help="A report with figures.")
@@ -346,19 +380,18 @@ def identify(
 ) -> None:
     """Fit the model to recordings, with intervals and a word on what the data do not determine."""
     from app.identify import identify_recordings
-    from app.recording.files import check_output
     from app.rigfile import load_rig_file
     from app.terminal import branch_table, identify_table, outcome_json, write_json
 
-    if report is not None:
-        check_output(report, force)
+    numbers = _branches(branches)
+    _check_files(force, (*train, *(validate_ or []), rig_file), out, *_given(report), json=json)
     with _working(json) as (console, progress):
         outcome = identify_recordings(
             train,
             out,
             validation=validate_ or [],
             method=method.value,
-            branches=_branches(branches),
+            branches=numbers,
             spring=spring.value,
             drive=drive.value,
             rest_length_mm=rest_length_mm,
@@ -378,7 +411,7 @@ def identify(
     console.print(identify_table(outcome))
     for label, path in (("Model", out), ("Report", report)):
         if path is not None:
-            console.print(f"{label}: {path}", soft_wrap=True, highlight=False)
+            _print(console, f"{label}: {path}")
     if json is not None:
         write_json(outcome_json(outcome), json)
 
@@ -397,12 +430,10 @@ def validate(
     force: Force = False,
 ) -> None:
     """Compare a model with recordings: error tables like the thesis's Tables 4 and 5."""
-    from app.recording.files import check_output
     from app.terminal import outcome_json, validate_tables, write_json
     from app.validate import validate_model
 
-    if report is not None:
-        check_output(report, force)
+    _check_files(force, (model, *paths), *_given(report), json=json)
     with _working(json) as (console, progress):
         outcome = validate_model(model, paths, drive=drive.value, progress=progress)
         if report is not None:
@@ -411,7 +442,7 @@ def validate(
             write_validate_report(outcome, report)
     console.print(validate_tables(outcome))
     if report is not None:
-        console.print(f"Report: {report}", soft_wrap=True, highlight=False)
+        _print(console, f"Report: {report}")
     if json is not None:
         write_json(outcome_json(outcome), json)
 
@@ -425,13 +456,16 @@ def simulate(
     out: Annotated[Path, typer.Option("--out", metavar="OUT.h5|OUT.csv", help="The prediction.")],
     voltage: Annotated[DriveChannel, typer.Option(help="Of a recording.")] = DriveChannel.command,
     rig_file: RigFileOption = None,
+    json: Json = None,
     force: Force = False,
 ) -> None:
     """Write what a model predicts under a recorded or planned drive."""
     from app.rigfile import load_rig_file
     from app.simulate import simulate_model
+    from app.terminal import write_json
 
-    with _working(None) as (console, _):
+    _check_files(force, (model, drive, rig_file), out, json=json)
+    with _working(json) as (console, _):
         path = simulate_model(
             model,
             drive,
@@ -440,7 +474,17 @@ def simulate(
             voltage=voltage.value,
             overwrite=force,
         )
-    console.print(str(path), soft_wrap=True)
+    _print(console, str(path))
+    if json is not None:
+        write_json(
+            {
+                "format": "dearig-simulation/1",
+                "model": str(model),
+                "drive": drive,
+                "out": str(path),
+            },
+            json,
+        )
 
 
 @app.command("rig-file")
@@ -451,81 +495,158 @@ def rig_file_command(
     from app.rigfile import write_default
 
     write_default(out)
-    _console().print(f"{out}: edit it, and give it to commands as --rig-file {out}", soft_wrap=True)
+    _print(_console(), f"{out}: edit it, and give it to commands as --rig-file {out}")
 
 
 @app.command()
-def presets() -> None:
+def presets(json: Json = None, force: Force = False) -> None:
     """List the sequences that are known by name."""
     from app.presets import PRESETS
     from app.sequencefile import load_sequence
 
-    for name in PRESETS:
-        sequence = load_sequence(name).sequence
-        _console().print(f"{name:18s} {sequence.duration:6.1f} s  {sequence.name}", highlight=False)
+    _check_files(force, (), json=json)
+    console = _console(json)
+    found = {name: load_sequence(name).sequence for name in PRESETS}
+    for name, sequence in found.items():
+        _print(console, f"{name:18s} {sequence.duration:6.1f} s  {sequence.name}")
+    if json is not None:
+        from app.terminal import write_json
+
+        listed = [
+            {"name": name, "title": s.name, "duration_s": s.duration, "sequence": PRESETS[name]}
+            for name, s in found.items()
+        ]
+        write_json({"format": "dearig-presets/1", "presets": listed}, json)
 
 
 def _branches(text: str) -> list[int]:
     """``3`` or ``1-4`` as numbers."""
-    first, dash, last = text.partition("-")
-    if not (first.isdigit() and (last.isdigit() if dash else not last)):
-        raise InputError(f"--branches {text} is neither a number nor a range such as 1-4")
-    low, high = int(first), int(last or first)
+    from app.identify import BRANCHES_MAX
+
+    found = re.fullmatch(r"\s*([0-9]{1,9})\s*(?:-\s*([0-9]{1,9}))?\s*", text)
+    if not found:
+        raise InputError(f"--branches {text!r} is neither a number nor a range such as 1-4")
+    low, high = int(found[1]), int(found[2] or found[1])
     if low > high:
         raise InputError(f"--branches {text} goes from more to fewer; write {high}-{low}")
+    if not (low >= 1 and high <= BRANCHES_MAX):
+        raise InputError(
+            f"--branches {text}: a model has from 1 to {BRANCHES_MAX} branches; write such a "
+            f"number, or a range such as 1-4"
+        )
     return list(range(low, high + 1))
 
 
-def _console() -> Console:
+def _given(path: Path | None) -> list[Path]:
+    return [] if path is None else [path]
+
+
+def _check_files(
+    force: bool,
+    sources: Iterable[str | Path | None],
+    *outputs: Path,
+    json: str | None,
+    recording: Path | None = None,
+) -> None:
+    """Refuse, before any work, outputs that may not be written: that of an hour would be lost.
+
+    ``sources`` are read, and never overwritten even by force (a preset's name is none of them).
+    ``recording`` is the output that will be a recording.
+    """
+    from app.recording.files import check_output
+
+    read = [source for source in sources if source is not None]
+    written = [*outputs, *([] if json in (None, "-") else [Path(str(json))])]
+    for i, path in enumerate(written):
+        check_output(path, force, *read)
+        if any(path.resolve() == other.resolve() for other in written[:i]):
+            raise InputError(f"{path} is named for two outputs; give each a name of its own")
+    if recording is not None and recording.suffix.lower() not in (".h5", ".hdf5", ".nxs"):
+        raise InputError(
+            f"{recording} would be a recording, which is an HDF5 file: let its name end in .h5 "
+            f"(dearig export makes CSV, MAT and Parquet of it)"
+        )
+
+
+def _console(json: str | None = None) -> Console:
+    """Where words go: with JSON on standard output, to standard error; a pipe gets JSON alone."""
     from rich.console import Console
 
-    return Console()
+    return Console(stderr=json == "-")
+
+
+def _print(console: Console, text: str, style: str | None = None) -> None:
+    """A line as it stands: names of files and columns may hold [brackets], and are not wrapped."""
+    console.print(text, style=style, markup=False, highlight=False, emoji=False, soft_wrap=True)
 
 
 @contextmanager
-def _working(json: str | None) -> Iterator[tuple[Console, Progress]]:
+def _working(json: str | None, computes: bool = True) -> Iterator[tuple[Console, Progress]]:
     """A console for results and a progress bar on standard error while the body works.
 
-    With JSON on standard output, words go to standard error, so that a pipe gets JSON and no more.
+    ``computes``: the body uses the compiled kernels.
     """
-    from rich.console import Console
-
     from app.terminal import progress
 
-    console = Console(stderr=json == "-")
+    if computes:
+        _tell_of_compiling()
     with progress("dearig") as report:
-        yield console, _told_of_compiling(report)
+        yield _console(json), report
 
 
-def _told_of_compiling(report: Progress) -> Progress:
+def _tell_of_compiling() -> None:
     from model.jit import is_compiled
 
     if not is_compiled():
         sys.stderr.write("Compiling the numerical kernels, once: this takes about a minute.\n")
-    return report
 
 
 def main() -> None:
     """Run the command line; errors become one sentence and an exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # a name that the terminal's encoding lacks is shown by its code, and ends nothing
+            stream.reconfigure(errors="backslashreplace")
     try:
-        status: object = app(standalone_mode=False)
+        status: object = app(prog_name="dearig", standalone_mode=False)
+        if status == _INTERRUPTED:  # as which typer returns a KeyboardInterrupt
+            _say("interrupted")
+        sys.stdout.flush()
     except DearigError as error:
-        _say(str(error))
-        status = error.exit_code
+        if isinstance(error.__cause__, BrokenPipeError):
+            status = _pipe_gone()
+        else:
+            _say(str(error))
+            status = error.exit_code
     except TyperException as error:
-        # usage: typer's own words, and its exit code 2
-        error.show()
-        status = error.exit_code
-    except typer.Exit as error:
-        status = error.exit_code
-    except (KeyboardInterrupt, typer.Abort):
+        _say(_usage(error))
+        status = InputError.exit_code
+    except KeyboardInterrupt:
         _say("interrupted")
-        status = 130
-    except BrokenPipeError:
-        # the reader of a pipe has gone (head, less): nothing more can be said, and that is no error
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        status = 0
+        status = _INTERRUPTED
+    except (BrokenPipeError, SystemExit):
+        # both rich and typer make a SystemExit of a broken pipe; nothing else here raises one
+        status = _pipe_gone()
     sys.exit(status if isinstance(status, int) else 0)
+
+
+_INTERRUPTED = 130
+
+
+def _pipe_gone() -> int:
+    """The reader of a pipe has left (head, less): no more can be said, and that is no error."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 0
+
+
+def _usage(error: TyperException) -> str:
+    """Typer's complaint about the command line as a sentence."""
+    context = getattr(error, "ctx", None)
+    command = "dearig" if context is None else context.command_path
+    # words of the library that checks the values
+    words = error.format_message().replace("Value error, ", "").strip().rstrip(".")
+    words = re.sub(r"(.*): Input should be ", r"\1: it must be ", words)
+    return f"{words}; {command} --help says what it takes" if words else f"try {command} --help"
 
 
 def _say(message: str) -> None:

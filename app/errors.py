@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-__all__ = ["DearigError", "InputError", "InstrumentFault", "SafetyStop"]
+__all__ = [
+    "DearigError",
+    "DiskFault",
+    "InputError",
+    "InstrumentFault",
+    "Interrupted",
+    "SafetyStop",
+]
 
 
 class DearigError(Exception):
@@ -27,3 +34,18 @@ class InstrumentFault(DearigError):  # noqa: N818
     """An instrument failed or is not there."""
 
     exit_code = 4
+
+
+class DiskFault(DearigError):  # noqa: N818
+    """The disk took no more during a run; the rig was made safe.
+
+    It counts with the instruments: the input was good, and something that records failed.
+    """
+
+    exit_code = 4
+
+
+class Interrupted(DearigError):  # noqa: N818
+    """The operator ended a run; the rig was made safe."""
+
+    exit_code = 130

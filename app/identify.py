@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +21,13 @@ from app.rigfile import RigFile
 from model.actuator import Actuator
 from model.errors import ModelError
 from model.fitting import Identification, identify
-from model.material import Branch, Load, Network, Spring
+from model.material import Branch, Film, Load, Network, Spring
 from model.records import Record
 
-__all__ = ["identify_recordings"]
+__all__ = ["BRANCHES_MAX", "identify_recordings"]
+
+#: Maxwell branches of a model, at most: no data of this kind determine more.
+BRANCHES_MAX = 8
 
 
 def identify_recordings(
@@ -51,7 +55,7 @@ def identify_recordings(
     ``clock`` gives seconds. Raises ``InputError`` for everything that cannot be fitted, before
     anything is written.
     """
-    check_output(out, overwrite)
+    check_output(out, overwrite, *train, *validation)
     for path in validation:
         if any(Path(path).resolve() == Path(t).resolve() for t in train):
             raise InputError(
@@ -60,10 +64,16 @@ def identify_recordings(
             )
     started = clock()
     recordings = open_all(train)
-    others = open_all([*train, *validation])[len(recordings) :]
+    others = open_all(validation)
+    _check_apart(recordings, others)
     records = [as_record(r, drive) for r in recordings]
     kind = recordings[0].kind
     kinematics = recordings[0].kinematics
+    for count in branches:
+        if not 1 <= count <= BRANCHES_MAX:
+            raise InputError(
+                f"{count} branches cannot be fitted; give a number from 1 to {BRANCHES_MAX}"
+            )
     fits: list[tuple[int, Identification]] = []
     trials = []
     smaller: Network | None = None
@@ -132,8 +142,6 @@ def _base(
     limit = {"neo-hookean": math.inf, "gent": 1e4, "arruda-boyce": 1e4}.get(spring)
     if limit is None:
         raise InputError(f"spring {spring!r} is not one of neo-hookean, gent, arruda-boyce")
-    if not 0 <= branches <= 8:
-        raise InputError(f"{branches} branches cannot be fitted; give a number from 0 to 8")
     one = Spring(1e5, limit, spring)
     network = Network(one, tuple(Branch(one, 1.0) for _ in range(branches)))
     if recordings[0].kind == "film":
@@ -142,25 +150,68 @@ def _base(
             raise InputError(
                 f"films held in different ways ({', '.join(sorted(held))}) are fitted one by one"
             )
+        if rest_length_mm is not None:
+            raise InputError("a rest length is of an actuator; these recordings are of films")
         return network
     films = {r.film for r in recordings if r.film is not None}
     loads = {r.load for r in recordings if r.load is not None}
     if len(films) > 1 or len(loads) > 1:
-        raise InputError("these recordings are of different films or loads; fit them one by one")
+        raise InputError(_differing(recordings))
     default = rig_file or RigFile()
     film = films.pop() if films and rig_file is None else default.as_film()
     load = loads.pop() if loads and rig_file is None else default.as_load()
     if rest_length_mm is not None:
+        # not (>), so that NaN is refused too
+        if not film.length * 1e3 < rest_length_mm < 1e4:
+            raise InputError(
+                f"a rest length of {rest_length_mm:g} mm is not above the film's own "
+                f"{film.length * 1e3:g} mm, or beyond 10 m: under its load the film is longer than "
+                f"before"
+            )
         try:
             load = Load(load.mass, rest_length_mm / 1e3)
         except ModelError as error:
-            raise InputError(str(error)) from error
-        if not load.rest_length or load.rest_length <= film.length:
-            raise InputError(
-                f"a rest length of {rest_length_mm:g} mm is not above the film's own "
-                f"{film.length * 1e3:g} mm: under its load the film is longer than before"
-            )
+            raise InputError(f"a rest length of {rest_length_mm:g} mm: {error}") from error
     return Actuator(film, load, network)
+
+
+def _check_apart(train: Sequence[Recording], validation: Sequence[Recording]) -> None:
+    """Refuse data that would be both fitted and validated, and kinds that do not go together."""
+    fitted = {r.sha256: r.path for r in train}
+    for recording in validation:
+        if recording.sha256 in fitted:
+            raise InputError(
+                f"{recording.path}, to validate, is a copy of {fitted[recording.sha256]}, to fit: "
+                f"an error on fitted data proves nothing; leave it out of one of them"
+            )
+        if recording.kind != train[0].kind:
+            raise InputError(
+                f"{recording.path}, to validate, is of kind {recording.kind}, and "
+                f"{train[0].path}, to fit, of kind {train[0].kind}: give data of one kind"
+            )
+
+
+def _differing(recordings: Sequence[Recording]) -> str:
+    """Which two recordings are not of one film and load."""
+    first = next(r for r in recordings if r.film is not None or r.load is not None)
+    for other in recordings:
+        for what, one, two in (
+            ("films", first.film, other.film),
+            ("loads", first.load, other.load),
+        ):
+            if one is not None and two is not None and one != two:
+                return (
+                    f"{first.path} and {other.path} are of different {what} "
+                    f"({_apart(one, two)}, in SI units); fit them one by "
+                    f"one, or say with --rig-file what holds for all"
+                )
+    return "these recordings are of different films or loads; fit them one by one"
+
+
+def _apart(one: Film | Load, two: Film | Load) -> str:
+    """The numbers in which two films or two loads differ."""
+    pairs = ((f.name, getattr(one, f.name), getattr(two, f.name)) for f in fields(one))
+    return ", ".join(f"{name.replace('_', ' ')} {a} and {b}" for name, a, b in pairs if a != b)
 
 
 def _bic(fit: Identification, records: Sequence[Record], correlation: float) -> float:

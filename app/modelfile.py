@@ -44,6 +44,13 @@ class ModelFile:
         """``actuator`` or ``film``, as recordings have it."""
         return "actuator" if isinstance(self.model, Actuator) else "film"
 
+    @property
+    def fitted(self) -> frozenset[str]:
+        """SHA-256 of the recordings it was fitted to, as far as its history names them."""
+        train = self.history.get("train")
+        tables = train if isinstance(train, list) else []
+        return frozenset(str(t["sha256"]) for t in tables if isinstance(t, dict) and "sha256" in t)
+
 
 class _Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -104,14 +111,23 @@ def load_model(path: str | Path) -> ModelFile:
     found = data.get("format")
     if found != FORMAT:
         if isinstance(found, str) and found.startswith("dearig-model/"):
-            raise InputError(f"{name} has the format {found}; this version reads {FORMAT}")
-        raise InputError(f'{name} has no line format = "{FORMAT}": it is not a model file')
+            raise InputError(
+                f"{name} has the format {found}; this version reads {FORMAT}: use a newer dearig, "
+                f"or identify the model again with this one"
+            )
+        raise InputError(
+            f'{name} has no line format = "{FORMAT}": it is not a model file, as dearig identify '
+            f"writes them"
+        )
     try:
         file = _File.model_validate(data)
     except ValidationError as error:
         raise InputError(f"{name}: {_sentence(error)}") from error
     try:
-        return ModelFile(file.name, _build(file), file.kinematics, file.history)
+        model = _build(file)
+        if isinstance(model, Actuator):
+            model.rest()  # a load that the springs cannot carry is a fault of this file
+        return ModelFile(file.name, model, file.kinematics, file.history)
     except ModelError as error:
         raise InputError(f"{name}: {error}") from error
 
@@ -142,7 +158,7 @@ def model_toml(
     name: str, model: Actuator | Network, kinematics: str, history: Mapping[str, Any]
 ) -> str:
     """The model as the text of a model file."""
-    data: dict[str, Any] = {"format": FORMAT, "name": name, "kinematics": kinematics}
+    data: dict[str, Any] = {"format": FORMAT, "name": _plain(name), "kinematics": kinematics}
     network = model
     if isinstance(model, Actuator):
         network = model.network
@@ -201,33 +217,47 @@ def _plain(value: Any) -> Any:
         return [_plain(v) for v in value if v is not None]
     if hasattr(value, "item"):
         return value.item()
+    if isinstance(value, str):
+        # a file whose name is no text in this system's encoding still has a place in a history
+        return value.encode("utf-8", "replace").decode("utf-8")
     return value
+
+
+#: Keys that hold one table for each of several things.
+_LISTS = ("branch", "effect")
+_TABLES: Mapping[str, type[_Table]] = {
+    "film": _Film,
+    "load": _Load,
+    "equilibrium": _Spring,
+    "branch": _Branch,
+    "effect": _Effect,
+}
 
 
 def _sentence(error: ValidationError) -> str:
     faults = error.errors(include_url=False)
     fault = min(faults, key=lambda f: f["type"] != "extra_forbidden")
     place = [p for p in fault["loc"] if p != "[key]"]
-    table: type[BaseModel] = _File
+    table: type[_Table] = _File
     dotted = ""
     for part in place[:-1]:
         if isinstance(part, int):
             dotted += f"[{part + 1}]"
             continue
         dotted += f".{part}" if dotted else str(part)
-        table = {
-            "film": _Film, "load": _Load, "equilibrium": _Spring, "branch": _Branch,
-            "effect": _Effect,
-        }.get(str(part), table)  # fmt: skip
+        table = _TABLES.get(str(part), table)
     last = place[-1] if place else "file"
     key = f"{dotted}.{last}" if dotted and isinstance(last, str) else f"{dotted}{last}"
     if fault["type"] == "extra_forbidden":
         hint = meant(str(last), table.model_fields)
         return f"{key} is not a key: {hint or 'it takes ' + ', '.join(table.model_fields)}"
     if fault["type"] == "missing":
-        return f"{key} is missing"
+        info = table.model_fields.get(str(last))
+        return f"{key} is missing" + (f": it takes {allowed(info)}" if info is not None else "")
     info = table.model_fields.get(str(last))
-    words = allowed(info) if info is not None else str(fault["msg"])
-    if "a table" in words:
-        words = fault["msg"][0].lower() + fault["msg"][1:]
-    return f"{key} = {shown(fault['input'])} is not allowed: {words}"
+    if str(last) in _LISTS:
+        return f"{key} = {shown(fault['input'])} is no list of tables: write [[{last}]] above each"
+    words = "a number" if info is None else allowed(info)
+    if words == "a table":
+        return f"{key} = {shown(fault['input'])} is not a table: write [{key}] above its keys"
+    return f"{key} = {shown(fault['input'])} is not allowed: it takes {words}"

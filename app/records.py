@@ -48,15 +48,23 @@ def open_all(paths: Sequence[str | Path]) -> list[Recording]:
     """Recordings at ``paths``, all of one kind.
 
     Raises ``InputError`` for one that cannot be read, for a mixture of kinds, and for a file named
-    twice (its samples would count double).
+    twice or beside a copy of it (its samples would count double).
     """
-    seen: dict[Path, str] = {}
+    named: set[Path] = set()
     for path in paths:
         where = Path(path).resolve()
-        if where in seen:
+        if where in named:
             raise InputError(f"{path} is named twice; each recording counts once")
-        seen[where] = str(path)
+        named.add(where)
     recordings = [open_recording(p) for p in paths]
+    seen: dict[str, Path] = {}
+    for recording in recordings:
+        if recording.sha256 in seen:
+            raise InputError(
+                f"{recording.path} is a copy of {seen[recording.sha256]}; each recording counts "
+                f"once: leave one of them out"
+            )
+        seen[recording.sha256] = recording.path
     kinds = {r.kind for r in recordings}
     if len(kinds) > 1:
         words = ", ".join(f"{r.path} is of {_KIND_WORDS[r.kind]}" for r in recordings)
@@ -95,8 +103,13 @@ def recording_drive(recording: Recording, drive: str) -> Drive:
     if drive == "monitor":
         voltage = recording.voltage_monitor
         if voltage is None:
-            raise InputError(f"{recording.path} has no voltage monitor; use the command")
-    return Drive(recording.time, _present(voltage), recording.hold)
+            raise InputError(
+                f"{recording.path} has no voltage monitor; leave --drive out to use the command"
+            )
+    try:
+        return Drive(recording.time, _present(voltage), recording.hold)
+    except ModelError as error:
+        raise InputError(f"{recording.path}: {error}") from error
 
 
 def _present(values: np.ndarray | None) -> np.ndarray:
@@ -109,7 +122,10 @@ def _noise(values: np.ndarray) -> float:
     noise = noise_of(values)
     if noise > 0.0:
         return noise
-    raise ModelError("the signal is constant or without any noise: a fit cannot weigh it")
+    raise ModelError(
+        "the signal never changes, or on a straight line only: nothing can be learned from it; see "
+        "that the sensor was connected and the right column was imported"
+    )
 
 
 def compare(
@@ -127,7 +143,10 @@ def compare(
     warnings: list[str] = []
     if recording.kind == "film":
         if isinstance(model, Actuator):
-            model = model.network
+            raise InputError(
+                f"{recording.path} is of a film (stretch), and the model is of an actuator "
+                f"(voltage): validate it on recordings of the actuator, or identify a film model"
+            )
         if recording.kinematics != kinematics:
             warnings.append(f"the film was held {recording.kinematics}, the model's {kinematics}")
         record = as_record(recording)
@@ -135,13 +154,15 @@ def compare(
         answer = nominal_stress(model, recording.kinematics, recording.time, stretch)
         if not answer.ok:
             raise InputError(f"{recording.path}: the model cannot follow it: {answer.in_words}")
-        predicted, driven, noise = answer.stress, stretch, record.noise
+        predicted, driven = answer.stress, stretch
+        noise: float | None = record.noise
         table, row, published = "", "", None
     else:
         if not isinstance(model, Actuator):
             raise InputError(
-                f"{recording.path} is driven by voltage, and the model is of a bare film: it knows "
-                f"no load and no electrodes"
+                f"{recording.path} is of an actuator (voltage), and the model is of a bare film "
+                f"(stretch), which knows no load and no electrodes: validate it on recordings of "
+                f"films, or identify an actuator model"
             )
         warnings += _other_rig(recording, model)
         drive_of = recording_drive(recording, drive)

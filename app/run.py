@@ -6,8 +6,12 @@ import logging
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.errors import InputError, InstrumentFault
+import numpy as np
+
+from app.errors import DearigError, InputError, InstrumentFault, Interrupted
+from app.interrupts import Interrupts
 from app.progress import Progress, quiet
+from app.recording.files import check_output
 from app.recording.writer import RecordingWriter
 from app.rigfile import RigFile
 from app.sequencefile import LoadedSequence
@@ -37,6 +41,10 @@ class RunResult:
     events: tuple[str, ...]
 
 
+class _NotSafe(InstrumentFault):
+    """The voltage may still be up."""
+
+
 def open_rig(address: str, rig_file: RigFile, *, seed: int, paced: bool) -> Rig:
     """The rig at ``address``. Raises ``InputError`` for an address that names none."""
     try:
@@ -44,8 +52,10 @@ def open_rig(address: str, rig_file: RigFile, *, seed: int, paced: bool) -> Rig:
             return open_simulated_rig(
                 address, rig_file, rig_file.as_film(), rig_file.as_load(), seed=seed, paced=paced
             )
-    except (AddressError, ModelError) as error:
+    except AddressError as error:
         raise InputError(str(error)) from error
+    except ValueError as error:  # a film that cannot hang at rest
+        raise InputError(f"rig {address!r} with this rig file: {error}") from error
     if address.startswith("daqmx:"):
         raise InputError(
             f"rig {address!r}: this version drives simulated rigs only; write sim or sim:SEED"
@@ -59,14 +69,20 @@ def gate_sequence(loaded: LoadedSequence, rig_file: RigFile) -> GatedWaveform:
     The true field is predicted with the model of the rig file's film (Table 3's network): a
     stretched film is thinner. Raises ``InputError`` with a sentence for every limit it breaks.
     """
-    rate = float(rig_file.card.sample_rate_Hz)
+    rate, limits = float(rig_file.card.sample_rate_Hz), rig_file.gate_limits()
     name = loaded.sequence.name
     try:
-        time, voltage = loaded.sequence.sample(rate)
+        time, voltage = loaded.sample(rate)
         actuator = Actuator(rig_file.as_film(), rig_file.as_load(), TABLE_3)
+        # the film at its thickest: what is refused here needs no prediction, and what a voltage far
+        # beyond every limit would do to the model is not the operator's question
+        thick = np.full(voltage.size, 1.0 / actuator.film.thickness)
+        admit(voltage, rate, limits, thick)
         response = actuator.simulate(Drive(time, voltage, hold=True))
+    except RefusedWaveform as error:
+        raise _refusal(name, error) from error
     except ModelError as error:
-        raise InputError(f"sequence {name!r}: {error}") from error
+        raise InputError(f"sequence {name!r} with this rig file: {error}") from error
     if response.status == PULL_IN:
         raise InputError(f"sequence {name!r} is refused: the model predicts {response.in_words}")
     if not response.ok:
@@ -76,11 +92,15 @@ def gate_sequence(loaded: LoadedSequence, rig_file: RigFile) -> GatedWaveform:
         )
     thin = thinning(actuator.film.held, response.stretch) / actuator.film.thickness
     try:
-        return admit(voltage, rate, rig_file.gate_limits(), thin)
+        return admit(voltage, rate, limits, thin)
     except RefusedWaveform as error:
-        raise InputError(
-            f"sequence {name!r} is refused: {'; '.join(error.reasons)} (limits of the rig file)"
-        ) from error
+        raise _refusal(name, error) from error
+
+
+def _refusal(name: str, error: RefusedWaveform) -> InputError:
+    return InputError(
+        f"sequence {name!r} is refused: {'; '.join(error.reasons)} (limits of the rig file)"
+    )
 
 
 def record(
@@ -101,80 +121,141 @@ def record(
     """Play ``loaded`` on the rig at ``address`` and record it to ``out``.
 
     ``configuration`` is the text of the rig file, kept with the recording. Raises ``InputError``
-    before anything is touched, ``InstrumentFault`` for what fails during the run, after the
-    rig was made safe and the recording was closed; a ``KeyboardInterrupt`` passes through in the
-    same way.
+    before anything is touched; after the rig was made safe and the recording was closed,
+    ``InstrumentFault`` or ``DiskFault`` for what failed during the run, and ``Interrupted`` where
+    the operator ended it: the first ctrl-C ramps down in the set time, the second is 0 V at once.
     """
+    out = check_output(out, overwrite)
     waveform = gate_sequence(loaded, rig_file)
     rig = open_rig(address, rig_file, seed=seed, paced=paced)
     try:
-        return _record_on(
-            rig, waveform, loaded, rig_file, configuration, out, seed, operator, film_id, notes,
-            overwrite, progress,
-        )  # fmt: skip
+        with Interrupts() as interrupts:
+            try:
+                rate = rig.load(waveform)
+                identity = rig.identify()
+            except RefusedWaveform as error:
+                raise InputError(f"the rig refuses the sequence: {error}") from error
+            except RigError as error:
+                raise InstrumentFault(str(error)) from error
+            writer = RecordingWriter(
+                out, identity, rate, waveform.voltage.size, loaded.toml, rig_file.as_film(),
+                rig_file.as_load(), configuration, operator=operator, film_id=film_id,
+                notes=notes, seed=seed, overwrite=overwrite,
+            )  # fmt: skip
+            events = _follow(rig, writer, waveform.voltage.size, interrupts, progress)
+        return RunResult(out, writer.samples, rate, "finished", events)
     finally:
-        rig.close()
+        _close(rig)
 
 
-def _record_on(
-    rig: Rig,
-    waveform: GatedWaveform,
-    loaded: LoadedSequence,
-    rig_file: RigFile,
-    configuration: str,
-    out: str | Path,
-    seed: int,
-    operator: str,
-    film_id: str,
-    notes: str,
-    overwrite: bool,
-    progress: Progress,
-) -> RunResult:
-    try:
-        rate = rig.load(waveform)
-    except RefusedWaveform as error:
-        raise InputError(f"the rig refuses the sequence: {error}") from error
-    except RigError as error:
-        raise InstrumentFault(str(error)) from error
-    samples = waveform.voltage.size
-    writer = RecordingWriter(
-        out, rig.identify(), rate, samples, loaded.toml, rig_file.as_film(), rig_file.as_load(),
-        configuration, operator=operator, film_id=film_id, notes=notes, seed=seed,
-        overwrite=overwrite,
-    )  # fmt: skip
+def _follow(
+    rig: Rig, writer: RecordingWriter, samples: int, interrupts: Interrupts, progress: Progress
+) -> tuple[str, ...]:
+    """Play what is loaded and record it; whatever happens, 0 V comes first, then the file's end."""
     events: list[str] = []
-    outcome = "interrupted; the rig was made safe"
     try:
-        rig.arm()
-        rig.start()
-        while (block := rig.read()) is not None:
-            writer.append(block)
-            for event in block.events:
-                events.append(f"{event.level}: {event.message}")
-                log.log(_LEVELS.get(event.level, logging.INFO), "%s", event.message)
-            progress("recording", writer.samples / samples)
-        outcome = "finished"
-    except KeyboardInterrupt:
-        _ramp_down(rig, writer)
-        raise
-    except RigError as error:
-        outcome = f"instrument fault: {error}"
-        raise InstrumentFault(
-            f"{error}; the rig was made safe, and what was recorded is in {out}"
+        try:
+            _play(rig, writer, samples, interrupts, events, progress)
+        finally:
+            # 0 V first: a disk that is slow or full must not keep the voltage up
+            interrupts.close()
+            _make_safe(rig)
+        if interrupts.asked():
+            kept = _end(writer, "interrupted by the operator; ramped down to 0 V")
+            raise Interrupted(f"interrupted: the voltage was ramped down to 0 V, and {kept}")
+        if writer.samples == 0:
+            raise InstrumentFault(f"the rig gave no samples; {_end(writer, 'no samples')}")
+        writer.close("finished")
+    except KeyboardInterrupt as error:
+        kept = _end(
+            writer, "interrupted by the operator", "interrupted by the operator: 0 V at once"
+        )
+        raise Interrupted(
+            f"interrupted: the output was taken to 0 V at once, and {kept}"
         ) from error
+    except RigError as error:
+        kept = _end(writer, f"instrument fault: {error}", f"instrument fault: {error}", "fault")
+        raise InstrumentFault(f"{error}; the rig was made safe, and {kept}") from error
+    except DearigError as error:
+        if writer.closed:
+            raise
+        kept = _end(writer, f"ended early: {error}", f"ended early: {error}", "fault")
+        safe = "" if isinstance(error, _NotSafe) else "the rig was made safe, and "
+        raise type(error)(f"{error}; {safe}{kept}") from error
     finally:
-        # 0 V first: a disk that is slow or full must not keep the voltage up
+        # only what nobody foresaw comes here with an open file
+        _end(writer, "ended early by a fault of the program")
+    return tuple(events)
+
+
+def _play(
+    rig: Rig,
+    writer: RecordingWriter,
+    samples: int,
+    interrupts: Interrupts,
+    events: list[str],
+    progress: Progress,
+) -> None:
+    rig.arm()
+    if interrupts.asked():
+        return
+    rig.start()
+    stopping = False
+    while (block := rig.read()) is not None:
+        writer.append(block)
+        for event in block.events:
+            events.append(f"{event.level}: {event.message}")
+            log.log(_LEVELS.get(event.level, logging.INFO), "%s", event.message)
+        progress("recording", writer.samples / samples)
+        if interrupts.asked() and not stopping:
+            stopping = True
+            writer.event(
+                writer.samples, "warning", "interrupted by the operator: ramping down to 0 V"
+            )
+            rig.stop()
+
+
+def _make_safe(rig: Rig) -> None:
+    try:
         rig.make_safe()
+    except RigError as error:
+        raise _NotSafe(
+            f"THE RIG COULD NOT BE MADE SAFE ({error}): switch the amplifier's high voltage off "
+            f"by hand"
+        ) from error
+
+
+def _close(rig: Rig) -> None:
+    try:
+        rig.close()
+    except RigError as error:
+        raise InstrumentFault(
+            f"THE RIG COULD NOT BE CLOSED ({error}): see that the amplifier is at 0 V"
+        ) from error
+
+
+def _end(writer: RecordingWriter, outcome: str, event: str = "", level: str = "warning") -> str:
+    """Close the recording of a run that ended early; where it is, in words.
+
+    A disk that fails here too is one more thing to say, and must not hide what ended the run.
+    """
+    if writer.closed:
+        return f"what was recorded is in {writer.path}"
+    if writer.samples == 0:
+        writer.discard()
+        return "nothing was recorded"
+    trouble = ""
+    try:
+        if event:
+            writer.event(writer.samples - 1, level, event)
+    except DearigError as error:
+        trouble = str(error)
+    try:
         writer.close(outcome)
-    return RunResult(Path(out), writer.samples, rate, outcome, tuple(events))
+    except DearigError as error:
+        trouble = str(error)
+    where = f"what was recorded is in {writer.path} ({writer.samples} samples)"
+    return f"{where}; {trouble}" if trouble else where
 
 
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "fault": logging.ERROR}
-
-
-def _ramp_down(rig: Rig, writer: RecordingWriter) -> None:
-    """Take the voltage down in the set time, recording it; a second ctrl-C ends that at once."""
-    writer.event(writer.samples, "warning", "interrupted by the operator: ramping down to 0 V")
-    rig.stop()
-    while (block := rig.read()) is not None:
-        writer.append(block)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,9 +19,14 @@ from model import excitation
 from model.errors import ModelError
 from model.excitation import THESIS_AMPLITUDES, THESIS_FREQUENCIES, Segment, Sequence
 
-__all__ = ["LoadedSequence", "load_sequence"]
+__all__ = ["LoadedSequence", "load_sequence", "parse_sequence"]
 
 _KV = 1e3
+#: Samples of a run, at most: 2.8 h at 1 kHz. Every step from the gate to the recording's physical
+#: values holds several rows of that many numbers, and they must fit into an ordinary memory.
+SAMPLES_MAX = 10_000_000
+#: Segments with their repeats, at most; the periods of thesis segments do not count.
+SEGMENTS_MAX = 10_000
 _Voltage = Annotated[float, Field(ge=-1e3, le=1e3)]
 _Positive = Annotated[float, Field(gt=0.0)]
 
@@ -32,13 +38,58 @@ class LoadedSequence:
     sequence: Sequence
     toml: str
 
+    def sample(self, rate: float) -> tuple[np.ndarray, np.ndarray]:
+        """Time in s and voltage in V, (N,) each, at ``rate`` Hz.
+
+        Raises ``InputError`` for a sequence that is too long to be played, or has a segment too
+        short to be: one that fell between two samples would be left out without a word.
+        """
+        sequence, count = self.sequence, self.sequence.duration * rate
+        name = f"sequence {sequence.name!r}"
+        if not count <= SAMPLES_MAX:
+            raise InputError(
+                f"{name} lasts {sequence.duration:.4g} s, which is {count:.3g} samples at "
+                f"{rate:g} Hz, and at most {SAMPLES_MAX:,} can be played: shorten it, or lower "
+                f"card.sample_rate_Hz in the rig file"
+            )
+        for i, segment in enumerate(sequence.segments):
+            label = f"{name}: segment {i + 1} ({sequence.labels[i]})"
+            if segment.duration * rate < 2.0:
+                raise InputError(
+                    f"{label} lasts {segment.duration:.3g} s, less than two samples at {rate:g} "
+                    f"Hz: make it longer, or raise card.sample_rate_Hz in the rig file"
+                )
+            fastest = _fastest(segment)
+            if fastest > 0.5 * rate:
+                raise InputError(
+                    f"{label} reaches {fastest:g} Hz, and {rate:g} samples a second play at most "
+                    f"{0.5 * rate:g} Hz: lower it, or raise card.sample_rate_Hz in the rig file"
+                )
+        try:
+            return sequence.sample(rate)
+        except ModelError as error:
+            raise InputError(f"{name}: {error}") from error
+
+
+def _fastest(segment: Segment) -> float:
+    """Highest frequency of a segment in Hz; 0 for others, whose duration says enough."""
+    if isinstance(segment, excitation.Sine):
+        return segment.frequency
+    if isinstance(segment, excitation.Chirp):
+        return max(segment.low, segment.high)
+    if isinstance(segment, excitation.Multisine):
+        return max(segment.frequencies)
+    if isinstance(segment, excitation.Lobes):
+        return max(segment.frequencies)  # a lobe of f Hz lasts 1/f, and takes two samples as well
+    return 0.0
+
 
 class _Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
 class _Segment(_Table):
-    repeats: int = Field(default=1, ge=1, le=1_000_000, description="how often it is played")
+    repeats: int = Field(default=1, ge=1, le=SEGMENTS_MAX, description="how often it is played")
 
     def build(self, folder: Path) -> Segment:
         raise NotImplementedError
@@ -189,19 +240,31 @@ class _Csv(_Segment):
 
     def build(self, folder: Path) -> Segment:
         from app.recording.importers.csv_file import CsvFile
+        from app.recording.importers.source import listing
 
         source = CsvFile(folder / self.file)
         scale = next((k for k in ("voltage_kV", "voltage_V") if k in source.names), None)
         if scale is None or "time_s" not in source.names:
             raise InputError(
-                f"{source.path} has the columns {', '.join(source.names)}; a waveform takes time_s "
+                f"{source.path} has the columns {listing(source.names)}; a waveform takes time_s "
                 f"and voltage_kV or voltage_V"
             )
         for column in ("time_s", scale):
             source.check(column)
         columns = source.read(["time_s", scale])
+        time = columns["time_s"]
+        if time.size < 2:
+            raise InputError(f"{source.path} has one line of data; a waveform takes at least 2")
+        back = np.flatnonzero(np.diff(time) <= 0.0)
+        if back.size:
+            at = int(back[0]) + 1
+            how = "stands still" if time[at] == time[at - 1] else "goes back"
+            raise InputError(
+                f"{source.path}, {source.row(at)}: time {how}, from {time[at - 1]:.9g} s to "
+                f"{time[at]:.9g} s; a step takes two lines with a little time between them"
+            )
         voltages = columns[scale] * (_KV if scale == "voltage_kV" else 1.0)
-        return excitation.Sampled(columns["time_s"], voltages)
+        return excitation.Sampled(time, voltages)
 
 
 _KINDS: dict[str, type[_Segment]] = {
@@ -239,10 +302,16 @@ def load_sequence(source: str | Path) -> LoadedSequence:
     if str(source) in PRESETS:
         return parse_sequence(PRESETS[str(source)], f"preset {source}", Path())
     path = Path(source)
-    if not path.exists() and path.suffix != ".toml":
+    try:
+        there = path.exists()
+    except OSError:  # a name too long to be one
+        there = False
+    if not there and path.suffix != ".toml":
+        near = difflib.get_close_matches(str(source), PRESETS, n=1)
         raise InputError(
-            f"sequence {source} is neither a file nor a preset; the presets are "
-            f"{', '.join(PRESETS)}"
+            f"sequence {source} is neither a file nor a preset"
+            + (f" (did you mean {near[0]}?)" if near else "")
+            + f"; the presets are {', '.join(PRESETS)}"
         )
     return parse_sequence(read_text(path, "sequence"), f"sequence {path}", path.parent)
 
@@ -261,8 +330,13 @@ def parse_sequence(text: str, name: str, folder: Path) -> LoadedSequence:
         kind = table.kind
         try:
             built = table.build(folder)
-        except ModelError as error:
+        except (InputError, ModelError) as error:
             raise InputError(f"{name}: segment {i + 1}: {error}") from error
+        if len(segments) + table.repeats > SEGMENTS_MAX:
+            raise InputError(
+                f"{name}: segment {i + 1} ({kind}): repeats = {table.repeats} makes more than "
+                f"{SEGMENTS_MAX:,} segments in all; play the sequence several times"
+            )
         segments += [built] * table.repeats
         labels += [kind] * table.repeats
         if isinstance(table, _Csv):
@@ -275,10 +349,20 @@ def parse_sequence(text: str, name: str, folder: Path) -> LoadedSequence:
     return LoadedSequence(sequence, text.rstrip("\n") + "\n" + attached)
 
 
+_NO_SEGMENTS = (
+    "there is no list of segments: write [[segment]], in double brackets, above the keys of each, "
+    "and at least one"
+)
+
+
 def _sentence(error: ValidationError, data: dict[str, Any]) -> str:
     """One sentence for the first fault; a wrong name before the wrong values it may have caused."""
     faults = error.errors(include_url=False)
     first = min(faults, key=lambda fault: fault["type"] != "extra_forbidden")
+    if first["type"] == "extra_forbidden":
+        # what is missing beside a wrong name is what was meant by it
+        beside = first["loc"][:-1]
+        faults = [f for f in faults if f["type"] != "missing" or f["loc"][:-1] != beside]
     more = len(faults) - 1
     tail = f" ({more} more fault{'s' if more > 1 else ''} after that)" if more else ""
     return _fault(first, data) + tail
@@ -310,6 +394,8 @@ def _fault(fault: ErrorDetails, data: dict[str, Any]) -> str:
         hint = meant(key, fields)
         takes = f"it takes {', '.join(fields)}"
         return f"{where}{key} is not a key: {hint or takes}"
+    if key == "segment":
+        return f"{where}{_NO_SEGMENTS}"
     if fault["type"] == "missing":
         info = fields[key]
         return f"{where}{key} is missing ({info.description}, {allowed(info)})"
@@ -317,8 +403,8 @@ def _fault(fault: ErrorDetails, data: dict[str, Any]) -> str:
     index = f"[{int(place[1]) + 1}]" if len(place) > 1 and isinstance(place[1], int) else ""
     if fault["type"] == "value_error":
         return f"{where}{key}{index} = {shown(value)} is not allowed: {fault['ctx']['error']}"
-    message = fault["msg"][0].lower() + fault["msg"][1:]
-    if fault["type"] in ("model_type", "model_attributes_type"):
-        message = f"write {key} as a table [[{key}]]"
-    words = allowed(info) if not index and "a table" not in allowed(info) else message
-    return f"{where}{key}{index} = {shown(value)} is not allowed: {words} ({info.description})"
+    takes = allowed(info, item=bool(index))
+    return (
+        f"{where}{key}{index} = {shown(value)} is not allowed: it takes {takes} "
+        f"({info.description})"
+    )

@@ -15,7 +15,6 @@ from app.records import recording_drive
 from app.rigfile import RigFile
 from app.sequencefile import load_sequence
 from model.actuator import Actuator, Drive
-from model.errors import ModelError
 from model.film import nominal_stress
 from model.material import Network
 
@@ -38,7 +37,7 @@ def simulate_model(
     command or monitor. Raises ``InputError``.
     """
     loaded = load_model(model_path)
-    target = check_output(out, overwrite)
+    target = check_output(out, overwrite, model_path, drive)
     if target.suffix not in (".h5", ".csv"):
         raise InputError(f"{out}: the output is a recording (.h5) or a table (.csv)")
     sequence_toml, hold, kinematics = "", False, loaded.kinematics
@@ -56,10 +55,7 @@ def simulate_model(
         plan = load_sequence(drive)
         title = f"{loaded.name} under {plan.sequence.name}"
         sequence_toml = plan.toml
-        try:
-            time, volts = plan.sequence.sample(float(rig_file.card.sample_rate_Hz))
-        except ModelError as error:
-            raise InputError(f"sequence {drive}: {error}") from error
+        time, volts = plan.sample(float(rig_file.card.sample_rate_Hz))
         values = _actuator(loaded.model, Drive(time, volts))
     if target.suffix == ".csv":
         with replaced_when_done(target) as partial:
@@ -84,7 +80,10 @@ def simulate_model(
 
 def _actuator(model: Actuator | Network, drive: Drive) -> dict[str, np.ndarray]:
     if not isinstance(model, Actuator):
-        raise InputError("the model is of a bare film; it can only follow a recorded stretch")
+        raise InputError(
+            "the model is of a bare film, which a voltage does not move: drive it with a recording "
+            "of a film"
+        )
     response = model.simulate(drive)
     if not response.ok:
         raise InputError(f"the model cannot follow this voltage: {response.in_words}")

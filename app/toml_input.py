@@ -9,7 +9,7 @@ import tomllib
 import types
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
@@ -17,6 +17,7 @@ from app.errors import InputError
 
 __all__ = ["allowed", "meant", "parse_toml", "read_text", "shown"]
 
+_HDF5 = b"\x89HDF\r\n\x1a\n"
 # what a key can end in: used to tell a wrong unit from a wrong name
 _UNITS = frozenset(
     {"nm", "um", "mm", "cm", "m", "m3", "us", "ms", "s", "mv", "v", "kv", "ua", "ma", "a"}
@@ -27,9 +28,13 @@ _UNITS = frozenset(
 def read_text(path: Path, what: str) -> str:
     """Text of the ``what`` (rig file, sequence) at ``path``; ``InputError`` where it is none."""
     try:
-        return path.read_bytes().decode("utf-8")
+        raw = path.read_bytes()
     except OSError as error:
         raise InputError(f"{what} {path} cannot be read: {error.strerror or error}") from error
+    if raw.startswith(_HDF5):
+        raise InputError(f"{path} is a recording (HDF5) where a {what} (TOML) should be")
+    try:
+        return raw.decode("utf-8")
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         raise InputError(
@@ -43,19 +48,47 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{name}{_toml_fault(str(error), text)}") from error
+    except (RecursionError, ValueError) as error:
+        # what the parser leaves to the interpreter: brackets without end, a number of 5000 digits
+        raise InputError(
+            f"{name}: it cannot be read as TOML: brackets are nested too deeply, or a number has "
+            f"thousands of digits"
+        ) from error
 
 
-def allowed(info: FieldInfo) -> str:
-    """What a key may hold, in words: ``a number from 0.1 to 10``."""
-    kind = info.annotation
-    if get_origin(kind) in (Union, types.UnionType):
-        kind = next(part for part in get_args(kind) if part is not type(None))
+def allowed(info: FieldInfo, item: bool = False) -> str:
+    """What a key may hold, in words: ``a number from 0.1 to 10``.
+
+    ``item``: what one value in its list may be.
+    """
+    kind, metadata = _bare(info.annotation, info.metadata)
     if get_origin(kind) is Literal:
         return " or ".join(json.dumps(value) for value in get_args(kind))
+    if get_origin(kind) is list:
+        kind, inner = _bare(get_args(kind)[0], [])
+        if item:
+            metadata = inner
+        elif kind is float:
+            return f"a list such as [6.0, 6.5], each {_bounded('a number', inner)}"
     words = {float: "a number", int: "a whole number", str: "a text"}
     text = words.get(kind, "a table") if isinstance(kind, type) else "a table"
+    return _bounded(text, metadata)
+
+
+def _bare(kind: Any, metadata: list[Any]) -> tuple[Any, list[Any]]:
+    """A type without ``| None`` and without its constraints, and these."""
+    if get_origin(kind) in (Union, types.UnionType):
+        kind = next(part for part in get_args(kind) if part is not type(None))
+    if get_origin(kind) is Annotated:
+        kind, *more = get_args(kind)
+        for constraint in more:
+            metadata = [*metadata, *(getattr(constraint, "metadata", None) or [constraint])]
+    return kind, metadata
+
+
+def _bounded(text: str, metadata: list[Any]) -> str:
     bounds: dict[str, Any] = {}
-    for constraint in info.metadata:
+    for constraint in metadata:
         for name in ("gt", "ge", "lt", "le", "pattern", "min_length"):
             value = getattr(constraint, name, None)
             if value is not None:
@@ -79,6 +112,8 @@ def _toml_fault(message: str, text: str) -> str:
     if not found:
         return f": not TOML: {message}"
     what, line, column = found.groups()
+    if what == r"Illegal character '\n'":
+        what = "a text is not closed by a quotation mark"
     lines = text.splitlines()
     if line is None:
         return f", line {max(len(lines), 1)}: {what} at the end of the file"

@@ -26,10 +26,9 @@ def validate_model(
     """
     model = load_model(model_path)
     recordings = open_all(paths)
-    fitted = {str(d.get("sha256")) for d in model.history.get("train", [])}
     comparisons = []
     for i, recording in enumerate(recordings):
-        role = "train" if recording.sha256 in fitted else "validation"
+        role = "train" if recording.sha256 in model.fitted else "validation"
         comparisons.append(compare(recording, model.model, model.kinematics, role, drive))
         progress("validation", (i + 1) / len(recordings))
     return ValidateOutcome(

@@ -168,7 +168,7 @@ def admit(
         field = np.abs(voltage) * field_per_volt
     margins = (
         check("voltage", voltage, limits.voltage_max, "kV", 1e-3),
-        check("negative voltage", -voltage, -limits.voltage_min, "kV", 1e-3),
+        check("negative voltage", -voltage, 0.0 - limits.voltage_min, "kV", 1e-3),
         check("slew", slew, limits.slew, "kV/s", 1e-3),
         check("true field", field, limits.field, "MV/m", 1e-6),
     )

@@ -5,8 +5,6 @@ check them against the manuals of the instruments at hand. Values marked "simula
 how an instrument misbehaves; a real one needs no telling.
 """
 
-# ruff: noqa: N815 -- keys of a rig file carry their units: range_kV, not range_kv
-
 from __future__ import annotations
 
 from collections.abc import Mapping

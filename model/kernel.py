@@ -4,7 +4,9 @@ State ``y`` = [lam, dlam/dt, xi_1 .. xi_n]. The kernel steps from sample to samp
 that its grid and the record's line up exactly; inside one sample interval it takes as many equal
 steps as accuracy asks for. Two methods:
 
-* classical Runge-Kutta of order 4, where the film is not stiff for the record's interval;
+* classical Runge-Kutta of order 4, where the film is not stiff for the record's interval, in finer
+  steps while the film rings after an edge of the drive (its bare ringing at 70 Hz lasts for
+  tens of cycles, and every step adds to the error of its phase);
 * RODAS (Hairer and Wanner, Solving ODEs II, IV.7), an L-stable Rosenbrock method of order 4 with
   an error estimate, where it is: moduli of MPa, relaxation times of microseconds, springs near
   locking. Its Jacobian is an arrow (each branch knows only lam and itself), so a step costs O(n).
@@ -66,7 +68,10 @@ _RK4_PHASE_MAX = 1.20  # (angular frequency or flow rate) times step
 _RK4_KICK = 5e-8  # in stretch: the error allowed in following one kick of the drive
 _RK4_RINGING = 5e-9  # in stretch a radian of ringing, which lasts for some hundred radians
 _RK4_REFINE_MAX = 20.0
+_MOVED = 5e-3  # of the stretch: then the stiffness is looked at again
+_STIFFER = 1.25  # growth of the number of steps that a sample may meet on its way
 _RK4_SUBSTEPS_MAX = 2  # beyond that, one RODAS step is cheaper
+_LEAN_SUBSTEPS_MAX = 4  # the same for the quicker form
 _RODAS_TOLERANCE = 5e-9  # in stretch, a step: 0.4 nm on 75 mm
 _RODAS_STEP_MAX = 2e-2  # s; the error estimate rules below that
 _RODAS_HALVINGS = 2.0**-17
@@ -156,7 +161,10 @@ def rest_stretch(c: np.ndarray, field2: float) -> tuple[int, float]:
 
 @jit
 def _speed_limit(c: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Angular frequency of the film at ``y`` (rad/s) and the fastest flow of a branch (1/s)."""
+    """Angular frequency of the film at ``y`` (rad/s), and Runge-Kutta steps that it takes a second.
+
+    The latter follow from that frequency, the fastest flow of a branch and the longest step.
+    """
     held = int(c[HELD])
     lam = y[0]
     stiffness = c[HEAD + MODULUS] * nominal_pull_slope(
@@ -169,7 +177,8 @@ def _speed_limit(c: np.ndarray, y: np.ndarray) -> tuple[float, float]:
         bend = nominal_pull_slope(held, int(c[k + KIND]), c[k + LIMIT], c[k + LOCKING], e)
         stiffness += c[k + MODULUS] * bend / (y[2 + i] * y[2 + i])
         fastest = max(fastest, c[k + RATE] * bend * e / y[2 + i])
-    return math.sqrt(max(stiffness, 0.0) / c[INERTIA]), fastest
+    swing = math.sqrt(max(stiffness, 0.0) / c[INERTIA])
+    return swing, max(max(swing, fastest) / _RK4_PHASE_MAX, 1.0 / _RK4_STEP_MAX)
 
 
 @jit
@@ -547,6 +556,7 @@ def drive_by_voltage(
     springs = _spring_table(c)
     lean = held == 0 and springs.shape[1] <= 4 and np.max(springs[KIND]) <= _GENT
     table = _lean_table(c, springs) if lean else np.zeros(0)
+    most = _LEAN_SUBSTEPS_MAX if lean else _RK4_SUBSTEPS_MAX
     work = np.zeros((15, y.shape[0]))
     before = np.empty(y.shape[0])
     trace = np.zeros(3)
@@ -555,7 +565,7 @@ def drive_by_voltage(
     h = _RODAS_STEP_MAX
     swing, bound, steps, step_before, gentle = 0.0, 0.0, 1, 0.0, True
     kick_gain, ring_gain, fading, per_phase2 = 0.0, 0.0, 1.0, 1.0
-    ring, kick = 0.0, 0.0
+    ring, kick, lam_seen = 0.0, 0.0, y[0]
     fresh = True
     last = voltage[0]
     for k in range(samples):
@@ -577,12 +587,12 @@ def drive_by_voltage(
         # the film's stiffness follows the stretch slowly, and time is mostly even
         if k % 64 == 0 or abs(dt - step_before) > 1e-6 * dt:
             if k % 64 == 0:
-                swing, fastest = _speed_limit(c, y)
-                bound = max(max(swing, fastest) / _RK4_PHASE_MAX, 1.0 / _RK4_STEP_MAX)
+                swing, bound = _speed_limit(c, y)
+                lam_seen = y[0]
             step_before = dt
             wanted = dt * bound - 1e-6
             # a bound that is not finite is not gentle either, and cannot be counted in steps
-            gentle = wanted <= max(_RK4_SUBSTEPS_MAX, _RK4_SUBSTEPS_MAX * dt / _RK4_STEP_MAX)
+            gentle = wanted <= max(most, most * dt / _RK4_STEP_MAX)
             steps = max(math.ceil(wanted), 1) if gentle else 1
             step = dt / steps
             phase = max(swing * step, 1e-6)
@@ -616,10 +626,16 @@ def drive_by_voltage(
             else:
                 h_fine = dt / fine
                 _rk4_steps(held, uniform, c, springs, y, v0, v1, h_fine, fine, refine, work, trace)
-            if _admissible(springs, y):
+            explicit = _admissible(springs, y)
+            if explicit and abs(y[0] - lam_seen) > _MOVED * lam_seen:
+                # far enough for springs to have stiffened: then this step was too long
+                bound_before = bound
+                swing, bound = _speed_limit(c, y)
+                lam_seen, step_before = y[0], 0.0
+                explicit = bound <= _STIFFER * bound_before
+            if explicit:
                 ring = max(ring * fading, trace[2] * per_phase2 - forced)
-            else:  # locking came nearer than the stiffness had foretold
-                explicit = False
+            else:
                 for j in range(y.shape[0]):
                     y[j] = before[j]
         last = v0

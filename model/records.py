@@ -48,7 +48,8 @@ class ActuatorRecord:
         A held voltage is, on average, half a sample late: the coarse drive keeps that.
         """
         steps = np.diff(self.time)
-        every = int(1.0 / (rate * float(np.median(steps))))
+        # the steps of a clock are even to rounding only: 4.9999999 samples are 5
+        every = int(1.0 / (rate * float(np.median(steps))) + 1e-6)
         if every < 2:
             return self
         every -= 1 - every % 2  # odd, so that a mean lies on a sample

@@ -1,13 +1,16 @@
 """The film under voltage or stretch, written from thesis eq. 48 for SciPy: the tests' oracle.
 
 Nothing here comes from the kernels: the springs' derivatives, the three kinematics and the motion
-equation are written out once more, in the plainest form.
+equation are written out once more, in the plainest form (compiled, because SciPy asks for them some
+hundred thousand times a test).
 """
 
 import math
 
+import numba
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy.integrate import odeint
+from scipy.optimize import brentq
 
 from model.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY
 
@@ -77,47 +80,99 @@ def balance(actuator, lam, voltage):
     )
 
 
-def equations(actuator, voltage):
-    """Right-hand side f(t, y) of eq. 48; ``voltage`` is a function of time."""
-    film, network = actuator.film, actuator.network
+@numba.njit(error_model="numpy")
+def _geometry(kinematics, e):
+    """(I1, half its derivative that one direction carries, Maxwell stress over eps (phi/Z)^2)."""
+    if kinematics == 0:
+        return e**2 + 1.0 + e**-2, e - e**-3, e
+    if kinematics == 1:
+        return e**2 + 2.0 / e, e - 1.0 / e**2, 0.5
+    return 2.0 * e**2 + e**-4, e - e**-5, e**3
+
+
+@numba.njit(error_model="numpy")
+def _stress(kinematics, kind, modulus, limit, e):
+    i1, half, _ = _geometry(kinematics, e)
+    if kind == 0:
+        return modulus * half
+    if kind == 1:
+        return modulus * half / (1.0 - (i1 - 3.0) / limit)
+    chain, root = math.sqrt(i1 / 3.0), math.sqrt(limit)
+    low, high = 0.0, 1e6
+    for _ in range(90):
+        middle = 0.5 * (low + high)
+        value = middle / 3.0 if middle < 1e-6 else 1.0 / math.tanh(middle) - 1.0 / middle
+        if value < chain / root:
+            low = middle
+        else:
+            high = middle
+    return modulus * root * low / (3.0 * chain) * half
+
+
+@numba.njit(error_model="numpy")
+def _rates(y, t, drive, head, springs):
+    """Eq. 48. ``drive`` = [t0, dt, v0, v1]; ``springs`` rows are kind, modulus, limit, T."""
+    kinematics, inertia, force, permittivity = int(head[0]), head[1], head[2], head[3]
+    v = drive[2] + (drive[3] - drive[2]) * (t - drive[0]) / drive[1]
+    lam = y[0]
+    stress = force + permittivity * v**2 * _geometry(kinematics, lam)[2]
+    dy = np.zeros(y.size)
+    for i in range(springs.shape[0]):
+        kind, modulus, limit = int(springs[i, 0]), springs[i, 1], springs[i, 2]
+        if i == 0:
+            stress -= _stress(kinematics, kind, modulus, limit, lam)
+        else:
+            xi = y[1 + i]
+            unit = _stress(kinematics, kind, 1.0, limit, lam / xi)
+            stress -= modulus * unit / xi
+            dy[1 + i] = unit * (lam / xi) / springs[i, 3]
+    dy[0] = y[1]
+    dy[1] = stress / inertia
+    return dy
+
+
+def solve(actuator, time, voltage, hold=False, tolerance=1e-11):
+    """Stretch (N,) at ``time`` under samples of ``voltage``, by LSODA from sample to sample.
+
+    Every sample is a corner of the drive, so the solver starts anew at each. Branches of relaxation
+    time 0 carry nothing and are left out.
+    """
+    film = actuator.film
     inertia = film.density * film.length**2 / 3.0
     for name, values in actuator.effects:
         if name == "load inertia":
             mass = dict(values)["moving_mass"]
             inertia += mass * film.length / (film.width * film.thickness)
-
-    def rates(t, y):
-        lam, speed = y[0], y[1]
-        stress = balance(actuator, lam, voltage(t))
-        flows = []
-        for branch, xi in zip(network.branches, y[2:], strict=True):
-            pull = spring_stress(branch.spring, film.kinematics, lam / xi)
-            stress -= pull / xi
-            true = pull * lam / xi
-            flows.append(true / branch.spring.modulus / branch.relaxation_time)
-        return [speed, stress / inertia, *flows]
-
-    return rates
-
-
-def solve(actuator, time, voltage, hold=False, rtol=1e-10, method="DOP853", rest=None):
-    """Stretch (N,) at ``time`` under samples of ``voltage``, from sample to sample.
-
-    The solver is stopped at every sample where the drive has a corner, so that it never steps over
-    one: at all of them for a held drive, else where the slope changes.
-    """
-    rest = actuator.rest() if rest is None else rest
-    y = np.array([rest, 0.0, *([rest] * len(actuator.network.branches))])
-    atol = np.full(y.size, 1e-12)
-    atol[1] = 1e-9
+    section = film.width * film.thickness
+    head = np.array(
+        [
+            ("constrained-width", "uniaxial", "equibiaxial").index(film.kinematics),
+            inertia,
+            actuator.load.mass * STANDARD_GRAVITY / section,
+            VACUUM_PERMITTIVITY * film.permittivity / film.thickness**2,
+        ]
+    )
+    names = ("neo-hookean", "gent", "arruda-boyce")
+    network = actuator.network
+    rows = [(network.equilibrium, math.nan)]
+    rows += [(b.spring, b.relaxation_time) for b in network.branches if b.relaxation_time > 0.0]
+    springs = np.array([(names.index(s.kind), s.modulus, s.limit, t) for s, t in rows])
+    rest = brentq(lambda lam: -balance(actuator, lam, 0.0), 1.0, rest_bracket(actuator), xtol=1e-15)
+    y = np.array([rest, 0.0, *([rest] * (len(rows) - 1))])
     out = [rest]
     for k in range(time.size - 1):
-        v0, v1 = voltage[k], voltage[k] if hold else voltage[k + 1]
-        t0, dt = time[k], time[k + 1] - time[k]
-        f = equations(actuator, lambda t, a=v0, b=v1, t0=t0, dt=dt: a + (b - a) * (t - t0) / dt)
-        done = solve_ivp(f, (t0, time[k + 1]), y, method=method, rtol=rtol, atol=atol)
-        if not done.success:
-            raise RuntimeError(done.message)
-        y = done.y[:, -1]
+        ends = (time[k], time[k + 1])
+        drive = np.array([ends[0], ends[1] - ends[0], voltage[k], voltage[k + (not hold)]])
+        y = odeint(
+            _rates, y, ends, args=(drive, head, springs), rtol=tolerance, atol=1e-13, mxstep=200_000
+        )[1]
         out.append(y[0])
     return np.array(out)
+
+
+def rest_bracket(actuator):
+    """A stretch at which the equilibrium spring pulls harder than the load, short of locking."""
+    lam = 1.0
+    while balance(actuator, lam, 0.0) >= 0.0:
+        lam *= 1.002
+    return lam

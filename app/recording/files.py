@@ -3,31 +3,54 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from app.errors import InputError
 
-__all__ = ["check_output", "file_sha256", "replaced_when_done"]
+__all__ = ["check_output", "file_sha256", "in_words", "replaced_when_done"]
 
 
-def check_output(path: str | Path, overwrite: bool, source: Path | None = None) -> Path:
+def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Path:
     """``path`` as one that may be written to; otherwise ``InputError`` with nothing touched.
 
-    ``source`` is the file that is read meanwhile, and never overwritten.
+    ``sources`` are the files that are read meanwhile, and never overwritten.
     """
     path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; give the name of a file in it")
-    if path.exists():
-        if source is not None and source.exists() and path.samefile(source):
-            raise InputError(f"{path} is the file that is read; choose another name for the output")
-        if not overwrite:
-            raise InputError(f"{path} exists already; choose another name, or replace it with --force")
-    if not path.parent.is_dir():
-        raise InputError(f"{path} cannot be written: there is no folder {path.parent}")
+    try:
+        if path.is_dir():
+            raise InputError(f"{path} is a folder; give the name of a file in it")
+        if path.exists():
+            if any(Path(s).exists() and path.samefile(s) for s in sources):
+                raise InputError(
+                    f"{path} is the file that is read; choose another name for the output"
+                )
+            if not path.is_file():
+                # replacing a device (/dev/null) would take it from the whole machine
+                raise InputError(f"{path} is no ordinary file; give the name of one")
+            if not overwrite:
+                raise InputError(
+                    f"{path} exists already; choose another name, or replace it with --force"
+                )
+        if not path.parent.is_dir():
+            raise InputError(f"{path} cannot be written: there is no folder {path.parent}")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be written: {in_words(error)}") from error
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(
+            f"{path} cannot be written: nothing may be written to the folder {path.parent}; "
+            f"choose another one"
+        )
     return path
+
+
+def in_words(error: Exception) -> str:
+    """What the operating system says of ``error``, without its number and without the path."""
+    if isinstance(error, OSError) and error.errno:
+        return os.strerror(error.errno)
+    return str(error)
 
 
 @contextmanager
@@ -42,7 +65,7 @@ def replaced_when_done(path: Path) -> Iterator[Path]:
         yield partial
         partial.replace(path)
     except (OSError, RuntimeError) as error:
-        raise InputError(f"{path} cannot be written: {error}") from error
+        raise InputError(f"{path} cannot be written: {in_words(error)}") from error
     finally:
         partial.unlink(missing_ok=True)
 

@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 
 from app.errors import InputError
+from app.recording.files import in_words
 from app.recording.layout import (
     FORMAT,
     FORMAT_NAME,
@@ -60,17 +61,18 @@ def open_recording(path: str | Path) -> Recording:
 @contextmanager
 def opened(path: Path) -> Iterator[h5py.File]:
     """The HDF5 file at ``path`` open for reading; ``InputError`` where it cannot be."""
-    if not path.is_file():
-        raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")
     try:
+        if not path.is_file():
+            raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")
         flags = consistency_flags(path)
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {error}") from error
+        raise InputError(f"{path} cannot be read: {in_words(error)}") from error
     except ValueError as error:
         raise InputError(f"{path} is damaged: {error}") from error
     if flags is None:
         raise InputError(
-            f"{path} is not an HDF5 file; recordings made elsewhere are brought in with import"
+            f"{path} is not an HDF5 file, as recordings are; bring data made elsewhere in with "
+            f"dearig import"
         )
     try:
         # a plain open is refused after a kill and during a run; SWMR sees what was flushed. Not

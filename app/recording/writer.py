@@ -19,8 +19,8 @@ from types import TracebackType
 import h5py
 import numpy as np
 
-from app.errors import DearigError, InputError, InstrumentFault
-from app.recording.files import check_output
+from app.errors import DearigError, DiskFault, InputError, InstrumentFault
+from app.recording.files import check_output, in_words
 from app.recording.finish import finish
 from app.recording.layout import (
     EVENT_LEVELS,
@@ -92,12 +92,12 @@ class RecordingWriter:
         )
         provenance["rig"] = identity.address
         provenance["simulated"] = identity.simulated
-        with _disk_errors(self._path):
+        with _disk_errors(self._path, InputError):
             # "x" refuses a file that another process made since it was looked for
             mode = "w" if overwrite else "x"
             self._file = h5py.File(self._path, mode, libver=LIBVER)
         try:
-            with _disk_errors(self._path):
+            with _disk_errors(self._path, InputError):
                 entry = lay_out(self._file, "actuator", title, started)
                 put_text(entry, "sequence", sequence_toml)
                 write_sample(entry, film, load, film_id, notes)
@@ -173,8 +173,8 @@ class RecordingWriter:
     def append(self, block: Block) -> None:
         """Write the next block, its events with it.
 
-        Raises ``InstrumentFault`` if samples are missing before it, ``DearigError`` if the disk
-        takes no more.
+        Raises ``InstrumentFault`` if samples are missing before it, ``DiskFault`` if the disk takes
+        no more.
         """
         counts = block.counts
         if counts.ndim != 2 or counts.shape[0] != len(self._channels) or counts.dtype != np.int16:
@@ -242,7 +242,7 @@ class RecordingWriter:
         """Finish the recording: physical values, end time, sample count; calling it again is fine.
 
         ``outcome`` says in words how the run ended. ``displacement_model`` (samples,) m is the live
-        overlay, ``model_toml`` its parameters. Raises ``DearigError`` if the physical values cannot
+        overlay, ``model_toml`` its parameters. Raises ``DiskFault`` if the physical values cannot
         be written; the counts are safe then.
         """
         if self.closed:
@@ -265,9 +265,15 @@ class RecordingWriter:
                 model_toml=model_toml,
             )
         except InputError as error:
-            raise DearigError(
+            raise DiskFault(
                 f"{error}; the run itself is safe there, in counts: make room and recover it"
             ) from error
+
+    def discard(self) -> None:
+        """Leave no file: for a run that ended before its first sample."""
+        if not self.closed:
+            self._file.close()
+            self._path.unlink(missing_ok=True)
 
     def __enter__(self) -> RecordingWriter:
         """Itself."""
@@ -283,23 +289,22 @@ class RecordingWriter:
         if error is None:
             self.close()
         elif not self.closed and self._written == 0:
-            self._file.close()
-            self._path.unlink(missing_ok=True)
+            self.discard()
         else:
             self.close(f"ended early: {error or type(error).__name__}")
 
 
 @contextmanager
-def _disk_errors(path: Path) -> Iterator[None]:
+def _disk_errors(path: Path, kind: type[DearigError] = DiskFault) -> Iterator[None]:
     """Say in a sentence what HDF5 reports as an ``OSError`` or ``RuntimeError``."""
     try:
         yield
     except FileExistsError as error:
         raise InputError(f"{path} exists already; choose another name") from error
     except (OSError, RuntimeError) as error:
-        raise DearigError(
-            f"{path} cannot be written: {error}; see that the disk has room and that no other "
-            f"program holds the file"
+        raise kind(
+            f"{path} cannot be written: {in_words(error)}; see that the disk has room and that no "
+            f"other program holds the file"
         ) from error
 
 

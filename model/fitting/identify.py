@@ -84,6 +84,8 @@ def identify(
     """
     if method not in METHODS:
         raise ModelError(f"method {method!r} is not one of {', '.join(METHODS)}")
+    if kinematics not in KINEMATICS:
+        raise ModelError(f"kinematics {kinematics!r} is not one of {', '.join(KINEMATICS)}")
     held = 0 if isinstance(base, Actuator) else KINEMATICS.index(kinematics)
     layout = Layout(base, held)
     problem = Problem(records, layout, workers)
@@ -243,8 +245,6 @@ def _intervals(
     inflation = max(1.0, centre.cost) * max(1.0, correlation_time(residuals))
     jac = coarse.jacobian(centre.x, free)
     cov = covariance(jac.T @ jac, inflation)
-    spread = np.eye(layout.size)
-    spread[np.ix_(free, free)] = cov
     # a held limit is freed alone for its own profile: the others are neo-Hookean in all but name
     estimates = []
     done = 0
@@ -257,7 +257,7 @@ def _intervals(
     chi2 = centre.cost * coarse.samples
     for j, q in enumerate(layout.quantities):
         sides = (-1.0,) if held[j] else (-1.0, 1.0)  # a held limit is already as high as counts
-        low, high = profile(coarse, centre.x, chi2, j, spread, inflation, held, tick, sides)
+        low, high = profile(coarse, centre.x, chi2, j, jac, inflation, held, tick, sides)
         value = float(values[j])
         if q.kind != "mu":
             low, high = math.exp(low), math.exp(high)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,8 +14,11 @@ from model.fitting.problem import Problem
 __all__ = ["CHI2_95", "correlation_time", "covariance", "profile"]
 
 CHI2_95 = 3.841458820694124  #: 95 % of chi-square with one degree of freedom
-_POINTS_MAX = 7  # on one side of a profile
+_POINTS_MAX = 8  # on one side of a profile
 _NEAR = 0.06  # of the threshold's root: close enough to call it crossed
+_NEAR_A_LIMIT = 0.3  # the same for a limit that is not determined: it is a bound by decades
+_SHORTER = np.array([1.0, 0.5, 0.25, 0.1, 0.03])  # of a step: tried at once
+_GUESS_MAX = 1e4  # thresholds above the optimum from which a refit takes a few iterations
 
 
 def correlation_time(residuals: np.ndarray) -> float:
@@ -42,10 +46,56 @@ def covariance(normal: np.ndarray, inflation: float) -> np.ndarray:
     """
     if normal.size == 0:
         return normal
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    seen = np.sqrt(np.diag(normal))
+    scale = np.maximum(seen, 1e-12 * (float(seen.max()) or 1.0))
     w, q = np.linalg.eigh(normal / np.outer(scale, scale))
     inverse = (q / np.maximum(w, 1e-14)) @ q.T
     return inflation * inverse / np.outer(scale, scale)
+
+
+@dataclass(frozen=True)
+class _Path:
+    """Where the other numbers go when one of them, ``index``, is moved away from ``start`` (d,).
+
+    ``first`` and ``second`` (d,) are the first two derivatives there by that number, ``sigma`` the
+    standard deviation that they foretell for it.
+    """
+
+    index: int
+    start: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    sigma: float
+
+    def ahead(self, points: np.ndarray) -> np.ndarray:
+        """Guesses (P, d) at ``points`` (P,) of the moved number."""
+        s = (points - self.start[self.index])[:, None]
+        return self.start + self.first * s + 0.5 * self.second * s * s
+
+
+def _path(
+    problem: Problem, best: np.ndarray, j: np.ndarray, others: np.ndarray, index: int
+) -> _Path:
+    """The way along which coordinate ``index`` is profiled; ``j`` (N, f) is that of ``others``."""
+    layout = problem.layout
+    inverse = covariance(j.T @ j, 1.0)
+    probe = layout.differences(best)[index]
+    first, second = np.zeros(layout.size), np.zeros(layout.size)
+    first[index] = 1.0
+    sides = np.clip(best + np.outer((-probe, probe), first), layout.lower, layout.upper)
+    predicted, _ = problem.predict(layout.values(sides))
+    slope = np.diff(predicted / problem.sigma, axis=0)[0] / max(np.ptp(sides[:, index]), 1e-300)
+    first[others] = -inverse @ (j.T @ slope)
+    left = slope + j @ first[others]
+    sigma = 1.0 / max(math.sqrt(float(left @ left)), 1e-150)
+    # far enough for the bend to show, near enough for it to be one
+    probe = min(0.1 * sigma, *(0.05 * layout.reach(best) / np.maximum(np.abs(first), 1e-300)))
+    three = best + np.outer((-probe, 0.0, probe), first)
+    if np.all((three >= layout.lower) & (three <= layout.upper)):
+        predicted, _ = problem.predict(layout.values(three))
+        bend = np.diff(predicted / problem.sigma, 2, axis=0)[0] / probe**2
+        second[others] = -inverse @ (j.T @ bend)
+    return _Path(index, best, first, second, sigma)
 
 
 def profile(
@@ -53,7 +103,7 @@ def profile(
     best: np.ndarray,
     chi2: float,
     index: int,
-    cov: np.ndarray,
+    jac: np.ndarray,
     inflation: float,
     held: np.ndarray,
     tick: Callable[[], None],
@@ -61,7 +111,7 @@ def profile(
 ) -> tuple[float, float]:
     """95 % interval of coordinate ``index``: where refitting all others no longer keeps up.
 
-    ``best`` (d,) with chi-square ``chi2`` is the optimum, ``cov`` (d, d) the covariance, which
+    ``best`` (d,) with chi-square ``chi2`` is the optimum, ``jac`` (N, f) the Jacobian there, which
     says how far to step and where the others will go, ``inflation`` the factor by which chi-square
     counts less than its white-noise value, ``held`` (d,) bool the numbers that are not refitted.
     An end that the data leave open, or that is not among the ``sides`` sought, is -inf or inf.
@@ -71,39 +121,49 @@ def profile(
     fixed = held.copy()
     fixed[index] = True
     threshold = CHI2_95 * inflation
-    sigma = math.sqrt(cov[index, index])
-    tangent = cov[:, index] / cov[index, index]
+    others = ~fixed
+    centre = _path(problem, best, jac[:, others[~held]], others, index)
+    reach = layout.reach(best)
     ends = {-1.0: -math.inf, 1.0: math.inf}
     for sign in sides:
         bound = layout.lower[index] if sign < 0 else layout.upper[index]
-        reach = layout.reach(best)
-        step = min(1.96 * sigma * math.sqrt(inflation), reach[index])
-        inside, z_inside, here = best[index], 0.0, best
-        ahead = tangent  # how the others move with this one
+        path = centre
+        step = min(1.96 * path.sigma * math.sqrt(inflation), reach[index])
+        inside, z_inside = best[index], 0.0
+        near = _NEAR_A_LIMIT if held[index] else _NEAR
         outside, z_outside = math.inf, math.inf
         end = sign * math.inf
         for _ in range(_POINTS_MAX):
             tick()
-            step_before = step
-            at_bound = sign * (inside + sign * step - bound) >= 0.0
-            point = bound if at_bound else inside + sign * step
-            # the others move no further at once than this one may: a tangent is no map
-            shift = np.clip(ahead * (point - inside), -reach, reach)
-            warm = np.where(held, here, here + shift)
-            warm[index] = point
+            # the others follow a parabola only so far: step no further than the guess is good
+            shorter = _SHORTER if math.isinf(outside) else _SHORTER[:1]
+            points = np.clip(
+                inside + sign * step * shorter, layout.lower[index], layout.upper[index]
+            )
+            guesses = path.start + np.clip(path.ahead(points) - path.start, -reach, reach)
+            guesses = np.where(held, best, np.clip(guesses, layout.lower, layout.upper))
+            guesses[:, index] = points
+            excess = problem.costs(guesses) * problem.samples - chi2
+            good = np.flatnonzero(excess < _GUESS_MAX * threshold)
+            chosen = int(good[0]) if good.size else points.size - 1
+            point = float(points[chosen])
+            at_bound = sign * (point - bound) >= 0.0
+            step_before = abs(point - inside)
             # the gain asked of the refit is a fraction of what decides
-            fit = descend(problem, warm, fixed, iterations=8, gain=0.03 * threshold, damping=1e-5)
+            gain = 0.03 * threshold
+            fit = descend(
+                problem, guesses[chosen], fixed, iterations=8, gain=gain, damping=1e-5, patience=2
+            )
             z = math.sqrt(max(fit.cost * problem.samples - chi2, 0.0) / threshold)
-            if abs(z - 1.0) < _NEAR:
+            if abs(z - 1.0) < near:
                 end = point
                 break
             if z < 1.0:
-                if at_bound:
+                if at_bound or step_before == 0.0:
                     break
-                slope = (z - z_inside) / max(abs(point - inside), 1e-300)
-                if point != inside:
-                    ahead = (fit.x - here) / (point - inside)
-                inside, z_inside, here = point, z, fit.x
+                slope = (z - z_inside) / step_before
+                inside, z_inside = point, z
+                path = _path(problem, fit.x, fit.jacobian, others, index)
                 step = (1.0 - z) / slope if slope > 0.0 else reach[index]
                 step = min(step, 4.0 * step_before, reach[index])
             else:

@@ -24,13 +24,14 @@ _FLAT = 1e-9  # of the scaled curvature: flatter directions are not seen by the 
 class LocalFit:
     """Where a descent ended: coordinates ``x`` (d,), mean-square cost, residuals (N,).
 
-    ``normal`` is J^T J (f, f) over the free coordinates.
+    ``jacobian`` (N, f) over the free coordinates is that of the last iteration: at ``x`` itself
+    where nothing was left to gain, else a step before.
     """
 
     x: np.ndarray
     cost: float
     residuals: np.ndarray
-    normal: np.ndarray
+    jacobian: np.ndarray
     iterations: int
     converged: bool
 
@@ -42,6 +43,7 @@ def descend(
     iterations: int = 60,
     gain: float = _GAIN_MIN,
     damping: float = 1e-2,
+    patience: int = _PATIENCE,
 ) -> LocalFit:
     """Least squares from ``start`` (d,), coordinates of the layout, inside its bounds.
 
@@ -50,8 +52,8 @@ def descend(
     small stretch, from stopping or misleading the others. Each iteration tries several dampings at
     once, as one population on all cores, each with its geodesic acceleration: the valleys of
     relaxation spectra are long, narrow and curved. Ends when the quadratic model promises a gain in
-    chi-square of less than ``gain``, or five iterations have gained no more. ``damping`` is the
-    first one, relative to the scaled curvature; near an optimum it may be small.
+    chi-square of less than ``gain``, or ``patience`` iterations have together gained no more.
+    ``damping`` is the first one, relative to the scaled curvature; near an optimum it may be small.
     """
     layout = problem.layout
     free = np.ones(layout.size, dtype=bool) if fixed is None else ~fixed
@@ -59,7 +61,7 @@ def descend(
     r = problem.residuals(x)
     chi2 = float(r @ r)
     scale = np.zeros(int(free.sum()))
-    normal = np.zeros((scale.size, scale.size))
+    jac = np.zeros((r.size, scale.size))
     history = [chi2]
     converged = not free.any()
     done = 0
@@ -108,8 +110,8 @@ def descend(
             break
         r = problem.residuals(x)
         history.append(chi2)
-        converged = len(history) > _PATIENCE and history[-1 - _PATIENCE] - chi2 < gain
-    return LocalFit(x, chi2 / problem.samples, r, normal, done, converged)
+        converged = len(history) > patience and history[-1 - patience] - chi2 < gain
+    return LocalFit(x, chi2 / problem.samples, r, jac, done, converged)
 
 
 def _bend(

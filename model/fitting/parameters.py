@@ -161,7 +161,8 @@ class Layout:
         little and can grow in either direction.
         """
         springs, times = list(network.springs), list(network.times)
-        middle = math.exp(sum(map(math.log, times)) / len(times)) if times else 1.0
+        logarithms = [math.log(max(t, _FLOOR["T"])) for t in times]
+        middle = math.exp(sum(logarithms) / len(logarithms)) if times else 1.0
         while len(springs) < len(self.network.springs):
             springs.append(replace(springs[-1], modulus=1e-3 * springs[-1].modulus))
             times.append(middle)

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from app.errors import InputError
+from app.recording.files import in_words
 from app.recording.importers.source import no_such_column
 
 __all__ = ["CsvFile"]
@@ -167,8 +168,8 @@ def _complaint(cell: str, decimal_comma: bool) -> str:
 def _decoded(path: Path) -> str:
     try:
         raw = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error}") from error
+    except (OSError, ValueError) as error:  # a name with a zero byte is a ValueError
+        raise InputError(f"{path} cannot be read: {in_words(error)}") from error
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
         try:
             return raw.decode("utf-16")

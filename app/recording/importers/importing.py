@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from app.errors import InputError
-from app.recording.files import check_output, file_sha256
+from app.recording.files import check_output, file_sha256, in_words
 from app.recording.importers.chosen import Chosen
 from app.recording.importers.csv_file import CsvFile
 from app.recording.importers.mat_file import MatFile
@@ -104,11 +104,14 @@ def import_file(
 
 
 def _open(path: Path) -> Source:
-    if not path.is_file():
-        raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")
+    try:
+        if not path.is_file():
+            raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")
+        if path.stat().st_size == 0:
+            raise InputError(f"{path} is empty")
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {in_words(error)}") from error
     suffix = path.suffix.lower()
-    if path.stat().st_size == 0:
-        raise InputError(f"{path} is empty")
     if suffix in (".csv", ".txt", ".tsv"):
         return CsvFile(path)
     if suffix == ".mat":

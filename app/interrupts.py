@@ -1,0 +1,67 @@
+"""Ctrl-C during a run: looked at between two blocks, so that no block is torn."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable
+from types import FrameType, TracebackType
+
+__all__ = ["Interrupts"]
+
+# a closed terminal or a stopped service must not leave a voltage up either
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+
+_Handler = Callable[[int, FrameType | None], object] | int | None
+
+
+class Interrupts:
+    """While it is entered, the first ctrl-C is ``asked`` for and the second raises.
+
+    Raised at once, it could strike between a block's being read and its being written, and the
+    samples around the ramp to 0 V would be lost; a rig that hangs answers to the second. Whatever
+    handlers a host program has set stay, and so does a signal that is ignored; outside the main
+    thread nothing is installed, because signals do not go there.
+    """
+
+    def __init__(self) -> None:
+        self._asked = False
+        self._raises = True
+        self._before: dict[int, _Handler] = {}
+
+    def asked(self) -> bool:
+        """True once the run is to end."""
+        return self._asked
+
+    def close(self) -> None:
+        """Raise no more: the rig is being made safe, and nothing is quicker than that."""
+        self._raises = False
+
+    def __enter__(self) -> Interrupts:
+        """Itself."""
+        if threading.current_thread() is threading.main_thread():
+            for name in _NAMES:
+                number = getattr(signal, name, None)
+                if number is None:
+                    continue
+                before = signal.getsignal(number)
+                if before in (signal.SIG_DFL, signal.default_int_handler):
+                    self._before[number] = before
+                    signal.signal(number, self._handle)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Put back what was there."""
+        for number, before in self._before.items():
+            signal.signal(number, before)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002
+        if self._asked and self._raises:
+            self._raises = False
+            raise KeyboardInterrupt
+        self._asked = True

@@ -1,0 +1,283 @@
+"""Identification: known models found again, with intervals that hold the truth."""
+
+import functools
+import importlib
+import math
+
+import numpy as np
+import pytest
+
+from model.actuator import Actuator, Drive
+from model.errors import ModelError
+from model.excitation import Sequence
+from model.film import nominal_stress
+from model.fitting import identify
+from model.fitting.intervals import correlation_time, covariance
+from model.fitting.levenberg import descend
+from model.fitting.parameters import Layout
+from model.fitting.problem import Problem
+from model.fitting.search import Algorithm1, algorithm_1
+from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Load, Network, Spring
+from model.records import ActuatorRecord, FilmRecord
+
+# the package exports the function of the same name
+identify_module = importlib.import_module("model.fitting.identify")
+
+NOISE = 1e-6
+SORTED = Network(
+    TABLE_3.equilibrium, tuple(sorted(TABLE_3.branches, key=lambda b: b.relaxation_time))
+)
+ONE = Network.gent((45e3, 60e3), (1e4, 1e4), (0.4,))
+
+
+def made(network, seed=0, load=THESIS_LOAD, rate=100.0, noise=NOISE):
+    """One period of the thesis's record, as a model makes it."""
+    time, voltage = Sequence.thesis(periods=1).sample(rate)
+    drive = Drive(time, voltage)
+    x = Actuator(THESIS_FILM, load, network).simulate(drive).displacement
+    x = x + noise * np.random.default_rng(seed).standard_normal(x.size)
+    return ActuatorRecord("made", drive, x, noise)
+
+
+def truths(network):
+    numbers = {f"mu_{i}": s.modulus for i, s in enumerate(network.springs)}
+    numbers |= {f"J_{i}": s.limit for i, s in enumerate(network.springs)}
+    return numbers | {f"T_{i}": t for i, t in enumerate(network.times, 1)}
+
+
+@functools.cache
+def thesis_fit():
+    return identify([made(TABLE_3)], Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3))
+
+
+def test_the_thesis_record_leaves_nothing_but_noise():
+    fit = thesis_fit()
+    assert fit.cost == pytest.approx(1.0, abs=0.12)
+    assert fit.correlation == pytest.approx(1.0, abs=0.5)
+    assert fit.warnings == ()
+    assert fit.method == "hybrid"
+    assert fit.model.network.times == tuple(sorted(fit.model.network.times))
+
+
+def test_the_truth_is_in_the_intervals():
+    truth = truths(SORTED)
+    outside = [e.name for e in thesis_fit().estimates if not e.low <= truth[e.name] <= e.high]
+    # eleven intervals of 95 %
+    assert len(outside) <= 1
+    for e in thesis_fit().estimates:
+        assert e.low <= e.value <= e.high
+
+
+def test_the_limits_are_not_determined():
+    undetermined = thesis_fit().undetermined
+    assert {"J_0", "J_1", "J_2", "J_3"} <= set(undetermined)
+    assert "mu_0" not in undetermined
+    for e in thesis_fit().estimates:
+        if e.name.startswith("J"):
+            assert "lower bound" in e.note or "nothing" in e.note
+            assert e.high == math.inf
+
+
+def test_covariance_belongs_to_its_names():
+    fit = thesis_fit()
+    count = len(fit.covariance_names)
+    assert fit.covariance.shape == (count, count)
+    assert np.linalg.eigvalsh(fit.covariance).min() > -1e-6 * np.abs(fit.covariance).max()
+    sigma = np.sqrt(fit.covariance[0, 0])
+    estimate = fit.estimates[0]
+    # the best determined number is nearly linear: its interval is its standard deviation
+    assert estimate.high - estimate.low == pytest.approx(2.0 * 1.96 * sigma, rel=0.4)
+
+
+def test_a_measured_rest_length_fixes_the_equilibrium_modulus():
+    load = Load(0.2, rest_length=0.082)
+    fit = identify([made(ONE, load=load)], Actuator(THESIS_FILM, load, ONE), intervals=False)
+    first = fit.estimates[0]
+    assert (first.name, first.free, first.determined) == ("mu_0", False, True)
+    assert first.value == pytest.approx(83.0e3, rel=1e-3)
+    assert "rest length" in first.note
+    assert fit.cost == pytest.approx(1.0, abs=0.12)
+    assert [e.name for e in fit.estimates].count("mu_0") == 1
+    assert fit.model.network.springs[1].modulus == pytest.approx(60e3, rel=0.01)
+
+
+def test_two_records_are_fitted_together():
+    records = [made(ONE, seed) for seed in (1, 2)]
+    fit = identify(records, Actuator(THESIS_FILM, THESIS_LOAD, ONE), intervals=False)
+    assert fit.cost == pytest.approx(1.0, abs=0.1)
+    assert fit.model.network.times[0] == pytest.approx(0.4, rel=0.01)
+
+
+def test_a_known_lag_is_not_fitted_away():
+    fine = made(ONE, rate=1000.0, noise=1e-9)
+    late = np.interp(fine.time - 5e-3, fine.time, fine.displacement)
+    record = ActuatorRecord("late", fine.drive, late, 1e-7, lag=5e-3)
+    fit = identify([record], Actuator(THESIS_FILM, THESIS_LOAD, ONE), intervals=False)
+    assert fit.cost < 1.0
+    assert fit.model.network.times[0] == pytest.approx(0.4, rel=1e-3)
+
+
+def test_more_branches_never_fit_worse():
+    record = made(TABLE_3, seed=3)
+    fits = [None]
+    for branches in (1, 2):
+        network = Network(TABLE_3.equilibrium, TABLE_3.branches[:branches])
+        base = Actuator(THESIS_FILM, THESIS_LOAD, network)
+        nested = fits[-1].model.network if fits[-1] else None
+        fits.append(identify([record], base, intervals=False, nested=nested))
+    assert fits[2].cost <= fits[1].cost * (1.0 + 1e-9)
+
+
+def film_record(seed=0, noise=20.0):
+    network = Network(
+        Spring(60e3, 30.0), (Branch(Spring(40e3, 500.0), 0.8), Branch(Spring(25e3, 500.0), 15.0))
+    )
+    time = np.linspace(0.0, 60.0, 1201)
+    # up and down at several speeds, and held in between
+    corners = np.array([0.0, 2.0, 10.0, 12.0, 22.0, 30.0, 30.5, 45.0, 60.0])
+    stretch = np.interp(time, corners, [1.0, 1.6, 1.6, 1.1, 2.2, 2.2, 1.4, 1.4, 1.0])
+    stress = nominal_stress(network, "uniaxial", time, stretch).stress
+    stress = stress + noise * np.random.default_rng(seed).standard_normal(time.size)
+    return network, FilmRecord("film", time, stretch, stress, noise)
+
+
+def test_a_film_of_two_branches_is_found_again():
+    network, record = film_record()
+    fit = identify([record], network, kinematics="uniaxial", intervals=False)
+    assert fit.cost == pytest.approx(1.0, abs=0.15)
+    found = fit.model
+    assert found.times == pytest.approx(network.times, rel=0.02)
+    for a, b in zip(found.springs, network.springs, strict=True):
+        assert a.modulus == pytest.approx(b.modulus, rel=0.02)
+    assert found.equilibrium.limit == pytest.approx(30.0, rel=0.02)
+
+
+def test_what_does_not_fit_is_said():
+    record = made(TABLE_3)
+    bent = ActuatorRecord(
+        "bent", record.drive, record.displacement + 2e-5 * np.sin(7.0 * record.time), NOISE
+    )
+    fit = identify([bent], Actuator(THESIS_FILM, THESIS_LOAD, ONE), intervals=False)
+    assert fit.cost > 10.0
+    assert any("the model lacks something" in w for w in fit.warnings)
+
+
+def test_algorithm_1_as_printed_improves_with_its_generations(monkeypatch):
+    record = made(TABLE_3, rate=50.0)
+    problem = Problem([record], Layout(Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)))
+    seen = []
+
+    def rms(generations):
+        settings = Algorithm1(generations=generations, members=40)
+        values = algorithm_1(problem, 0, lambda _, part: seen.append(part), settings)
+        predicted, _ = problem.predict(values)
+        return np.sqrt(np.mean((predicted[0] - record.displacement) ** 2))
+
+    few, more = rms(2), rms(25)
+    assert more < few
+    assert seen[-1] == 1.0
+    assert rms(2) == few
+
+    short = functools.partial(algorithm_1, settings=Algorithm1(generations=3, members=20))
+    monkeypatch.setattr(identify_module, "algorithm_1", short)
+    fit = identify([record], Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3), method="de", seed=4)
+    assert fit.method == "de"
+    assert not any(e.determined for e in fit.estimates)
+    assert fit.model.network.times == tuple(sorted(fit.model.network.times))
+
+
+def test_progress_is_told():
+    told = []
+    identify(
+        [made(ONE, rate=50.0)],
+        Actuator(THESIS_FILM, THESIS_LOAD, ONE),
+        progress=lambda stage, part: told.append((stage, part)),
+    )
+    assert {stage for stage, _ in told} == {"global search", "descents", "intervals"}
+    assert all(0.0 <= part <= 1.0 for _, part in told)
+    assert told[-1] == ("intervals", 1.0)
+
+
+@pytest.mark.parametrize(
+    ("records", "base", "method", "message"),
+    [
+        (lambda: [made(ONE)], "actuator", "newton", "'newton' is not one of hybrid, de"),
+        (list, "actuator", "hybrid", "at least one record"),
+        (lambda: [made(ONE), film_record()[1]], "actuator", "hybrid", "voltage and by stretch"),
+        (lambda: [film_record()[1]], "actuator", "hybrid", "not of one kind"),
+        (lambda: [made(ONE)], "network", "hybrid", "not of one kind"),
+        (lambda: [short()], "actuator", "hybrid", "4 samples cannot determine 5 parameters"),
+    ],
+)
+def test_refusals(records, base, method, message):
+    model = Actuator(THESIS_FILM, THESIS_LOAD, ONE) if base == "actuator" else ONE
+    with pytest.raises(ModelError, match=message):
+        identify(records(), model, method=method)
+
+
+def test_unknown_kinematics():
+    with pytest.raises(ModelError, match="'radial' is not one of constrained-width, uniaxial"):
+        identify([film_record()[1]], ONE, kinematics="radial")
+
+
+def short():
+    drive = Drive(np.arange(4.0), np.zeros(4))
+    return ActuatorRecord("short", drive, np.zeros(4), NOISE)
+
+
+def test_layout_names_and_order():
+    layout = Layout(Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3))
+    names = "mu_0 mu_1 mu_2 mu_3 J_0 J_1 J_2 J_3 T_1 T_2 T_3"
+    assert layout.names == tuple(names.split())
+    values = layout.initial()
+    np.testing.assert_allclose(values, [truths(TABLE_3)[n] for n in layout.names])
+    np.testing.assert_allclose(layout.values(layout.coordinates(values)), values)
+    ordered = layout.by_relaxation_time(values)
+    np.testing.assert_allclose(ordered, [truths(SORTED)[n] for n in layout.names])
+    np.testing.assert_array_equal(layout.by_relaxation_time(ordered), ordered)
+    assert layout.build(values).times == pytest.approx(TABLE_3.times)
+
+
+@pytest.mark.parametrize("time", [0.0, 0.4])
+def test_a_model_of_fewer_branches_is_padded_with_weak_ones(time):
+    layout = Layout(Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3))
+    fewer = Network.gent((45e3, 60e3), (1e4, 1e4), (time,))
+    built = layout.build(layout.values(layout.padded(fewer)))
+    assert [s.modulus for s in built.springs] == pytest.approx([45e3, 60e3, 60.0, 0.06])
+    assert built.times == pytest.approx([max(time, 1e-6)] * 3)
+
+
+def test_neo_hookean_springs_have_no_limit_to_fit():
+    network = Network(Spring(1e4, kind="neo-hookean"), (Branch(Spring(1e4, 9.0), 1.0),))
+    assert Layout(network).names == ("mu_0", "mu_1", "J_1", "T_1")
+
+
+def test_a_descent_finds_the_bottom_from_nearby():
+    problem = Problem([made(ONE)], Layout(Actuator(THESIS_FILM, THESIS_LOAD, ONE)))
+    truth = problem.layout.coordinates(problem.layout.initial())
+    start = truth + np.array([500.0, -8e3, 0.0, 0.0, 0.4])
+    fixed = np.array([False, False, True, True, False])
+    fit = descend(problem, start, fixed)
+    assert fit.converged
+    assert fit.cost <= problem.costs(truth[None, :])[0]
+    np.testing.assert_array_equal(fit.x[fixed], truth[fixed])
+
+
+def test_correlation_time():
+    rng = np.random.default_rng(5)
+    white = rng.standard_normal(20000)
+    assert correlation_time(white) == pytest.approx(1.0, abs=0.15)
+    red = np.zeros(20000)
+    for k in range(1, red.size):
+        red[k] = 0.8 * red[k - 1] + white[k]
+    # (1 + a)/(1 - a) of an AR(1) process
+    assert correlation_time(red) == pytest.approx(9.0, rel=0.25)
+    assert correlation_time(np.zeros(100)) == 1.0
+
+
+def test_covariance_is_the_inverse_where_there_is_one():
+    normal = np.array([[4.0, 1.0], [1.0, 1e8]])
+    np.testing.assert_allclose(covariance(normal, 2.0), 2.0 * np.linalg.inv(normal), rtol=1e-9)
+    unseen = covariance(np.diag([1.0, 0.0]), 1.0)
+    assert np.isfinite(unseen).all()
+    assert unseen[1, 1] > 1e9

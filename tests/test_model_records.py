@@ -1,0 +1,138 @@
+"""Records as a fit sees them, and the measures of error."""
+
+import math
+
+import numpy as np
+import pytest
+
+from model.actuator import Actuator, Drive
+from model.errors import ModelError
+from model.excitation import Sequence
+from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from model.measures import errors
+from model.records import ActuatorRecord, FilmRecord, at_sensor, noise_of
+
+THESIS = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
+
+
+def record(rate=1000.0, hold=True, sigma=1e-9):
+    time, voltage = Sequence.thesis(periods=1).sample(rate)
+    drive = Drive(time, voltage, hold)
+    x = THESIS.simulate(drive).displacement
+    return ActuatorRecord("made", drive, x, sigma)
+
+
+def test_measures_by_hand():
+    measured = np.array([0.0, 1e-3, 2e-3, 1e-3])
+    model = np.array([0.0, 1.1e-3, 1.7e-3, 1e-3])
+    e = errors(measured, model)
+    rms = math.sqrt((0.1e-3**2 + 0.3e-3**2) / 4.0)
+    assert e.rms == pytest.approx(rms)
+    assert e.max == pytest.approx(0.3e-3)
+    assert e.nrmse_pct == pytest.approx(100.0 * rms / 2e-3)
+    assert e.peak_pct == pytest.approx(100.0 * rms / 2e-3)
+    # eq. 50 as printed: millimetres times 100 %, and the model's range
+    assert e.e_rms_thesis_pct == pytest.approx(100.0 * rms * 1e3)
+    assert e.e_m_thesis_pct == pytest.approx(100.0 * 0.3 / 1.7)
+    assert e.samples == 4
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_measures_agree_with_one_another(seed):
+    rng = np.random.default_rng(seed)
+    e = errors(rng.normal(size=100), rng.normal(size=100))
+    assert e.rms <= e.max
+    assert e.nrmse_pct <= 100.0 * e.max
+    assert e.nrmse_pct <= 2.0 * e.peak_pct
+
+
+@pytest.mark.parametrize(("model", "pct"), [(1.0, 0.0), (2.0, math.inf)])
+def test_a_range_of_zero(model, pct):
+    e = errors(np.ones(3), np.full(3, model))
+    assert (e.nrmse_pct, e.e_m_thesis_pct) == (pct, pct)
+
+
+@pytest.mark.parametrize("slope", [0.0, 1.0, -300.0])
+def test_noise_of_a_ramp(slope):
+    rng = np.random.default_rng(2)
+    values = slope * np.arange(20000) + rng.normal(0.0, 1e-3, 20000)
+    assert noise_of(values) == pytest.approx(1e-3, rel=0.02)
+
+
+def test_noise_of_nothing():
+    with pytest.raises(ModelError, match="3 samples are too few to read a noise from"):
+        noise_of(np.zeros(3))
+
+
+@pytest.mark.parametrize("lag", [0.0, 2.5e-4, 1e-3, 0.0123, -4e-4])
+def test_at_sensor_is_the_value_of_a_little_earlier(lag):
+    time = np.cumsum(np.random.default_rng(3).uniform(0.5e-3, 1.5e-3, 2000))
+    w = 2.0 * math.pi * 3.0
+    shown = np.zeros(time.size)
+    at_sensor(time, np.sin(w * time), w * np.cos(w * time), lag, shown)
+    inside = (time - lag > time[0]) & (time - lag < time[-1])
+    np.testing.assert_allclose(shown[inside], np.sin(w * (time - lag))[inside], atol=1e-9)
+    assert (shown[time - lag <= time[0]] == np.sin(w * time[0])).all()
+
+
+@pytest.mark.parametrize(("rate", "bent", "shifted"), [(125.0, 0.2e-6, 5e-6), (40.0, 1.2e-6, 5e-5)])
+@pytest.mark.parametrize("hold", [True, False])
+def test_a_coarse_record_still_fits_its_model(rate, bent, shifted, hold):
+    fine = record(hold=hold)
+    coarse = fine.coarse(rate)
+    assert rate / 1.3 < 1.0 / np.diff(coarse.time).max() < 1.3 * rate
+    assert coarse.noise < fine.noise
+    assert not coarse.drive.hold
+    model = THESIS.simulate(coarse.drive).displacement
+    assert np.abs(model - coarse.displacement).max() < bent
+    # means bend the crests, and shift the curve by less than a thousandth of a sample
+    speed = np.gradient(model, coarse.time)
+    late = np.sum((model - coarse.displacement) * speed) / np.sum(speed**2)
+    assert abs(late) < shifted
+
+
+def test_a_coarse_record_matches_to_a_twentieth_of_a_micrometre():
+    fine = record()
+    coarse = fine.coarse(125.0)
+    error = THESIS.simulate(coarse.drive).displacement - coarse.displacement
+    assert np.sqrt(np.mean(error**2)) < 0.05e-6
+
+
+def test_what_coarse_takes_the_mean_of():
+    time = np.arange(100) * 1e-3
+    fine = ActuatorRecord("x", Drive(time, 1e3 * time, True), 2.0 * time, 1e-3, lag=0.01)
+    coarse = fine.coarse(200.0)
+    np.testing.assert_allclose(coarse.time, time[2::5])
+    np.testing.assert_allclose(coarse.displacement, 2.0 * coarse.time)
+    # a held voltage is half a sample late
+    np.testing.assert_allclose(coarse.drive.voltage, 1e3 * (coarse.time - 0.5e-3))
+    assert coarse.noise == pytest.approx(1e-3 / math.sqrt(5.0))
+    assert coarse.lag == 0.01
+    assert fine.coarse(1000.0) is fine
+
+
+def test_a_coarse_film_record_keeps_its_ends():
+    time = np.arange(1001.0)
+    fine = FilmRecord("x", time, 1.0 + 1e-3 * time, 5.0 * time, 2.0)
+    coarse = fine.coarse(100)
+    assert coarse.time[0] == 0.0
+    assert coarse.time.size == 101
+    np.testing.assert_allclose(coarse.stress, 5.0 * coarse.time)
+    assert coarse.noise == pytest.approx(2.0 / math.sqrt(10.0))
+    assert fine.coarse(900) is fine
+
+
+@pytest.mark.parametrize(
+    ("time", "values", "noise", "message"),
+    [
+        ([0.0, 1.0, 2.0], [0.0, 1.0], 1.0, "x: 2 readings at 3 times"),
+        ([0.0, 1.0, 2.0], [0.0, math.nan, 1.0], 1.0, "x: sample 1 is not a finite number"),
+        ([0.0, 2.0, 1.0], [0.0] * 3, 1.0, r"does not increase from sample 1 \(2 s\)"),
+        ([0.0, 1.0, 2.0], [0.0] * 3, 0.0, "x: noise = 0.0 must be a finite number above 0"),
+    ],
+)
+def test_refusals(time, values, noise, message):
+    with pytest.raises(ModelError, match=message):
+        ActuatorRecord("x", Drive(np.array(time), np.zeros(3)), np.array(values), noise)
+    with pytest.raises(ModelError, match=message):
+        FilmRecord("x", np.array(time), np.ones(3), np.array(values), noise)

@@ -1,0 +1,71 @@
+"""Model files: what is saved is what is simulated again, and where it comes from."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.errors import InputError
+from app.modelfile import load_model, save_model
+from model.actuator import Actuator
+from model.material import (
+    TABLE_3,
+    THESIS_FILM,
+    THESIS_LOAD,
+    Branch,
+    Film,
+    Load,
+    Network,
+    Spring,
+)
+
+STRANGE_FILM = Film(0.05, 0.04, 0.0005, 3.1, 970.0, "uniaxial")
+MODELS = {
+    "thesis": Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3),
+    "measured rest": Actuator(STRANGE_FILM, Load(0.1, 0.0555), TABLE_3),
+    "no limits": Actuator(THESIS_FILM, THESIS_LOAD, Network(Spring(5e4))),
+    "springs of three kinds": Network(
+        Spring(1e4, 50.0, "arruda-boyce"),
+        (Branch(Spring(2e4, math.inf), 0.5), Branch(Spring(3e4, 99.0, "gent"), 7.0)),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_model_comes_back_to_the_last_bit(tmp_path: Path, name: str) -> None:
+    model = MODELS[name]
+    save_model(tmp_path / "m.toml", name, model, "equibiaxial", {"seconds": 1.5})
+    loaded = load_model(tmp_path / "m.toml")
+    assert loaded.model == model
+    assert loaded.name == name
+    assert loaded.kind == ("actuator" if isinstance(model, Actuator) else "film")
+    assert loaded.kinematics == getattr(getattr(model, "film", None), "kinematics", "equibiaxial")
+    assert loaded.history == {"seconds": 1.5}
+
+
+def test_history_takes_what_toml_does_not_have(tmp_path: Path) -> None:
+    history = {
+        "low": None,
+        "count": np.int64(3),
+        "values": [np.float64(1.5), None],
+        "train": [{"name": "a\udcff", "sha256": "12ab"}],
+    }
+    save_model(tmp_path / "m.toml", "x", MODELS["thesis"], "", history)
+    loaded = load_model(tmp_path / "m.toml")
+    train = [{"name": "a?", "sha256": "12ab"}]
+    assert loaded.history == {"count": 3, "values": [1.5], "train": train}
+    assert loaded.fitted == {"12ab"}
+
+
+def test_a_model_is_not_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    save_model(path, "one", MODELS["thesis"], "", {})
+    with pytest.raises(InputError, match="exists already"):
+        save_model(path, "two", MODELS["thesis"], "", {})
+    assert load_model(path).name == "one"
+    save_model(path, "two", MODELS["thesis"], "", {}, overwrite=True)
+    assert load_model(path).name == "two"
+    assert [p.name for p in tmp_path.iterdir()] == ["m.toml"]
