@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
 
@@ -88,8 +88,20 @@ class _Fixed:
         return self  # type: ignore[return-value]
 
 
+class _FromZero(_Fixed):
+    """A segment that starts and ends at 0 V."""
+
+    @property
+    def start(self) -> float:
+        return 0.0
+
+    @property
+    def end(self) -> float:
+        return 0.0
+
+
 @dataclass(frozen=True)
-class HalfSine(_Fixed):
+class HalfSine(_FromZero):
     """One unipolar lobe, v = a sin(pi f t) for 0 <= t <= 1/f (one line of eq. 49)."""
 
     amplitude: float
@@ -103,21 +115,13 @@ class HalfSine(_Fixed):
     def duration(self) -> float:
         return 1.0 / self.frequency
 
-    @property
-    def start(self) -> float:
-        return 0.0
-
-    @property
-    def end(self) -> float:
-        return 0.0
-
     def voltage(self, t: np.ndarray) -> np.ndarray:
         # sin(pi) is -1e-16 in floating point, and a unipolar rig refuses any negative voltage
         return self.amplitude * np.maximum(np.sin(np.pi * self.frequency * t), 0.0)
 
 
 @dataclass(frozen=True)
-class Lobes(_Fixed):
+class Lobes(_FromZero):
     """Eq. 49: ``periods`` times the half-sine lobes of ``amplitudes`` V and ``frequencies`` Hz."""
 
     amplitudes: tuple[float, ...] = THESIS_AMPLITUDES
@@ -147,14 +151,6 @@ class Lobes(_Fixed):
     @property
     def duration(self) -> float:
         return self.periods * self.period
-
-    @property
-    def start(self) -> float:
-        return 0.0
-
-    @property
-    def end(self) -> float:
-        return 0.0
 
     def voltage(self, t: np.ndarray) -> np.ndarray:
         within = np.mod(t, self.period)
@@ -196,7 +192,7 @@ class Sine(_Fixed):
 
 
 @dataclass(frozen=True)
-class Triangle(_Fixed):
+class Triangle(_FromZero):
     """From 0 to ``amplitude`` and back in 1/f, both ways at one slope."""
 
     amplitude: float
@@ -209,14 +205,6 @@ class Triangle(_Fixed):
     @property
     def duration(self) -> float:
         return 1.0 / self.frequency
-
-    @property
-    def start(self) -> float:
-        return 0.0
-
-    @property
-    def end(self) -> float:
-        return 0.0
 
     def voltage(self, t: np.ndarray) -> np.ndarray:
         return self.amplitude * np.maximum(1.0 - np.abs(2.0 * self.frequency * t - 1.0), 0.0)
@@ -333,8 +321,30 @@ def _taper(t: np.ndarray, duration: float, taper: float) -> np.ndarray:
     return 0.5 - 0.5 * np.cos(np.pi * nearest)
 
 
+class _AboutOffset:
+    """A segment of ``length`` s from ``offset`` V (None: where the one before ended) and back."""
+
+    length: float
+    offset: float | None
+
+    @property
+    def duration(self) -> float:
+        return self.length
+
+    @property
+    def start(self) -> float:
+        return 0.0 if self.offset is None else self.offset
+
+    @property
+    def end(self) -> float:
+        return self.start
+
+    def after(self, end: float) -> Segment:
+        return cast(Segment, replace(self, offset=end) if self.offset is None else self)  # type: ignore[type-var]
+
+
 @dataclass(frozen=True)
-class Chirp:
+class Chirp(_AboutOffset):
     """A sine about ``offset`` whose frequency goes from ``low`` to ``high`` Hz in ``length`` s.
 
     The frequency grows exponentially (equal time in each octave) or, with ``linear``, evenly. A
@@ -356,18 +366,6 @@ class Chirp:
         if not 0.0 < self.taper <= self.length / 2.0:
             raise ModelError(f"chirp: taper = {self.taper} s must lie in (0, {self.length / 2}] s")
 
-    @property
-    def duration(self) -> float:
-        return self.length
-
-    @property
-    def start(self) -> float:
-        return 0.0 if self.offset is None else self.offset
-
-    @property
-    def end(self) -> float:
-        return self.start
-
     def voltage(self, t: np.ndarray) -> np.ndarray:
         ratio = math.log(self.high / self.low)
         if self.linear or abs(ratio) < 1e-9:
@@ -377,12 +375,9 @@ class Chirp:
         swing = np.sin(2.0 * np.pi * cycles) * _taper(t, self.length, self.taper)
         return self.start + self.amplitude * swing
 
-    def after(self, end: float) -> Segment:
-        return replace(self, offset=end) if self.offset is None else self
-
 
 @dataclass(frozen=True)
-class Multisine:
+class Multisine(_AboutOffset):
     """Sines of ``frequencies`` Hz about ``offset``, Schroeder's phases, scaled to ``amplitude``.
 
     ``amplitude`` is the largest excursion from the offset, so that a limit is easy to keep.
@@ -407,18 +402,6 @@ class Multisine:
                 f"multisine: taper = {self.taper} s must lie in (0, {self.length / 2}] s"
             )
 
-    @property
-    def duration(self) -> float:
-        return self.length
-
-    @property
-    def start(self) -> float:
-        return 0.0 if self.offset is None else self.offset
-
-    @property
-    def end(self) -> float:
-        return self.start
-
     def _sum(self, t: np.ndarray) -> np.ndarray:
         n = len(self.frequencies)
         total = np.zeros_like(t)
@@ -434,9 +417,6 @@ class Multisine:
         crest = float(np.max(np.abs(self._sum(grid) * _taper(grid, self.length, self.taper))))
         shape = self._sum(t) * _taper(t, self.length, self.taper) / crest
         return self.start + self.amplitude * np.clip(shape, -1.0, 1.0)
-
-    def after(self, end: float) -> Segment:
-        return replace(self, offset=end) if self.offset is None else self
 
 
 @dataclass(frozen=True, eq=False)
@@ -550,12 +530,16 @@ class Sequence:
     def voltage(self, t: np.ndarray) -> np.ndarray:
         """Voltage in V at times ``t`` (N,) in s since the start of the run; 0 V outside it."""
         t = np.asarray(t, dtype=np.float64)
-        edges = self.boundaries
         v = np.zeros_like(t)
+        order = np.argsort(t, kind="stable")
+        ticks = t[order]
+        edges = self.boundaries
+        # one slice a segment: thousands of repeats of a short one would else read t as often
+        cuts = np.searchsorted(ticks, edges)
         for i, segment in enumerate(self.segments):
-            inside = (t >= edges[i]) & (t < edges[i + 1])
-            local = np.minimum(t[inside] - edges[i], segment.duration)
-            v[inside] = segment.voltage(local)
+            inside = slice(cuts[i], cuts[i + 1])
+            local = np.minimum(ticks[inside] - edges[i], segment.duration)
+            v[order[inside]] = segment.voltage(local)
         return v
 
     def sample(self, rate: float) -> tuple[np.ndarray, np.ndarray]:

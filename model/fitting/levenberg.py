@@ -41,7 +41,7 @@ def descend(
     start: np.ndarray,
     fixed: np.ndarray | None = None,
     iterations: int = 60,
-    gain: float = _GAIN_MIN,
+    gain: float | None = None,
     damping: float = 1e-2,
     patience: int = _PATIENCE,
 ) -> LocalFit:
@@ -51,8 +51,11 @@ def descend(
     the length of its own Jacobian column) keeps numbers that the data hardly see, such as J at
     small stretch, from stopping or misleading the others. Each iteration tries several dampings at
     once, as one population on all cores, each with its geodesic acceleration: the valleys of
-    relaxation spectra are long, narrow and curved. Ends when the quadratic model promises a gain in
-    chi-square of less than ``gain``, or ``patience`` iterations have together gained no more.
+    relaxation spectra are long, narrow and curved.
+
+    Ends when the quadratic model promises a gain in chi-square of less than ``gain``, or when
+    ``patience`` iterations have together gained no more. Without a ``gain`` it is a tenth, times
+    the mean square of the residuals where that is above 1: a third of a standard deviation then.
     ``damping`` is the first one, relative to the scaled curvature; near an optimum it may be small.
     """
     layout = problem.layout
@@ -82,8 +85,9 @@ def descend(
             break
         w, q = eigh((normal / np.outer(safe, safe))[np.ix_(move, move)])
         target = q.T @ (gradient / safe)[move]
+        enough = _GAIN_MIN * max(1.0, chi2 / problem.samples) if gain is None else gain
         # what the quadratic model still promises, flat directions apart
-        if float(np.sum(target**2 / np.maximum(w, _FLAT))) < gain:
+        if float(np.sum(target**2 / np.maximum(w, _FLAT))) < enough:
             converged = True
             break
         improved = False
@@ -110,7 +114,7 @@ def descend(
             break
         r = problem.residuals(x)
         history.append(chi2)
-        converged = len(history) > patience and history[-1 - patience] - chi2 < gain
+        converged = len(history) > patience and history[-1 - patience] - chi2 < enough
     return LocalFit(x, chi2 / problem.samples, r, jac, done, converged)
 
 

@@ -232,7 +232,7 @@ class Layout:
         for kind in ("mu", "J", "T"):
             columns = [j for j in self.column(kind) if self.quantities[j].index > 0]
             if len(columns) == len(order):
-                sorted_values[columns] = values[np.array(columns)[order]]
+                sorted_values[columns] = values[np.array(columns, dtype=int)[order]]
         return sorted_values
 
 
