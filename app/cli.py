@@ -598,7 +598,7 @@ def _tell_of_compiling() -> None:
     from model.jit import is_compiled
 
     if not is_compiled():
-        sys.stderr.write("Compiling the numerical kernels, once: this takes about a minute.\n")
+        sys.stderr.write("Compiling the numerical kernels, once: this takes some ten seconds.\n")
 
 
 def main() -> None:

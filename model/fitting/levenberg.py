@@ -16,6 +16,7 @@ _DAMPING_MIN, _DAMPING_MAX = 1e-12, 1e8
 _GAIN_MIN = 0.1  # of chi-square: a third of a standard deviation of any number
 _PROBE = 0.1  # of a step, to see how the residuals curve along it
 _BEND_MAX = 0.4  # of a step: a larger correction is no correction
+_GAIN_MISFIT = 0.01  # the same over the mean square of residuals that are more than noise
 _PATIENCE = 5  # iterations that together must gain something
 _FLAT = 1e-9  # of the scaled curvature: flatter directions are not seen by the data
 
@@ -54,9 +55,9 @@ def descend(
     relaxation spectra are long, narrow and curved.
 
     Ends when the quadratic model promises a gain in chi-square of less than ``gain``, or when
-    ``patience`` iterations have together gained no more. Without a ``gain`` it is a tenth, times
-    the mean square of the residuals where that is above 1: a third of a standard deviation then.
-    ``damping`` is the first one, relative to the scaled curvature; near an optimum it may be small.
+    ``patience`` iterations have together gained no more. Without a ``gain`` it is a tenth, or
+    more where the residuals are far above the noise. ``damping`` is the first one, relative to the
+    scaled curvature; near an optimum it may be small.
     """
     layout = problem.layout
     free = np.ones(layout.size, dtype=bool) if fixed is None else ~fixed
@@ -85,7 +86,9 @@ def descend(
             break
         w, q = eigh((normal / np.outer(safe, safe))[np.ix_(move, move)])
         target = q.T @ (gradient / safe)[move]
-        enough = _GAIN_MIN * max(1.0, chi2 / problem.samples) if gain is None else gain
+        enough = gain
+        if enough is None:
+            enough = max(_GAIN_MIN, _GAIN_MISFIT * chi2 / problem.samples)
         # what the quadratic model still promises, flat directions apart
         if float(np.sum(target**2 / np.maximum(w, _FLAT))) < enough:
             converged = True
