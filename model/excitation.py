@@ -81,6 +81,15 @@ def _require_positive(kind: str, **values: float) -> None:
             raise ModelError(f"{kind}: {name} = {value!r} must be above 0")
 
 
+def _between(start: float | np.ndarray, target: float | np.ndarray, part: np.ndarray) -> np.ndarray:
+    """Voltage a ``part`` of the way: both ends are met exactly, and rounding passes neither.
+
+    A limit that a ramp ends at must not be broken by the last bit of its last sample.
+    """
+    v = start * (1.0 - part) + target * part
+    return np.clip(v, np.minimum(start, target), np.maximum(start, target))
+
+
 class _Fixed:
     """A segment whose start does not depend on what came before."""
 
@@ -235,9 +244,7 @@ class Ramp:
         return self.target
 
     def voltage(self, t: np.ndarray) -> np.ndarray:
-        part = np.clip(t / self.length, 0.0, 1.0)
-        # weights, not a slope: both ends are then met exactly
-        return self.start * (1.0 - part) + self.target * part
+        return _between(self.start, self.target, np.clip(t / self.length, 0.0, 1.0))
 
     def after(self, end: float) -> Segment:
         return replace(self, origin=end) if self.origin is None else self
@@ -307,7 +314,7 @@ class Steps:
         i = np.clip((t / self.dwell).astype(np.int64), 0, len(self.levels) - 1)
         steps = np.array((self.start, *self.levels))
         part = np.clip((t - i * self.dwell) / self.rise, 0.0, 1.0)
-        return steps[i] * (1.0 - part) + steps[i + 1] * part
+        return _between(steps[i], steps[i + 1], part)
 
     def after(self, end: float) -> Segment:
         return replace(self, origin=end) if self.origin is None else self
