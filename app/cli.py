@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -179,6 +180,11 @@ def record(
         f"{result.path}: {result.samples} samples, {seconds:.1f} s at {result.rate_Hz:g} Hz, "
         f"{result.outcome}",
     )
+    for margin in result.margins:
+        _print(
+            console,
+            f"  {margin.quantity}: {margin.reached:.4g} of {margin.allowed:.4g} {margin.unit}",
+        )
     for event in result.events:
         _print(console, f"  {event}")
     if json is not None:
@@ -190,6 +196,7 @@ def record(
                 "rate_Hz": result.rate_Hz,
                 "outcome": result.outcome,
                 "events": list(result.events),
+                "margins": [asdict(margin) for margin in result.margins],
             },
             json,
         )
@@ -466,7 +473,7 @@ def simulate(
 
     _check_files(force, (model, drive, rig_file), out, json=json)
     with _working(json) as (console, _):
-        path = simulate_model(
+        prediction = simulate_model(
             model,
             drive,
             out,
@@ -474,14 +481,21 @@ def simulate(
             voltage=voltage.value,
             overwrite=force,
         )
-    _print(console, str(path))
+    _print(console, str(prediction.path))
+    if prediction.field_max is not None:
+        limit = "no static pull-in: the springs stiffen first"
+        if prediction.pull_in is not None:
+            limit = f"static pull-in at {prediction.pull_in * 1e-3:.3g} kV"
+        _print(console, f"true field up to {prediction.field_max * 1e-6:.3g} MV/m; {limit}")
     if json is not None:
         write_json(
             {
                 "format": "dearig-simulation/1",
                 "model": str(model),
                 "drive": drive,
-                "out": str(path),
+                "out": str(prediction.path),
+                "true_field_max_V_per_m": prediction.field_max,
+                "pull_in_voltage_V": prediction.pull_in,
             },
             json,
         )

@@ -16,7 +16,7 @@ from app.recording.writer import RecordingWriter
 from app.rigfile import RigFile
 from app.sequencefile import LoadedSequence
 from drivers.errors import AddressError, RefusedWaveform, RigError
-from drivers.gate import GatedWaveform, admit
+from drivers.gate import GatedWaveform, Margin, admit
 from drivers.rig import Rig
 from model.actuator import Actuator, Drive
 from model.errors import ModelError
@@ -32,13 +32,17 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class RunResult:
-    """A run that was recorded: where, how much, how it ended, and what happened on the way."""
+    """A run that was recorded: where, how much, how it ended, and what happened on the way.
+
+    ``margins`` say how near it was planned to come to each limit of the gate.
+    """
 
     path: Path
     samples: int
     rate_Hz: float
     outcome: str
     events: tuple[str, ...]
+    margins: tuple[Margin, ...]
 
 
 class _NotSafe(InstrumentFault):
@@ -143,7 +147,7 @@ def record(
                 notes=notes, seed=seed, overwrite=overwrite,
             )  # fmt: skip
             events = _follow(rig, writer, waveform.voltage.size, interrupts, progress)
-        return RunResult(out, writer.samples, rate, "finished", events)
+        return RunResult(out, writer.samples, rate, "finished", events, waveform.margins)
     finally:
         _close(rig)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,22 @@ from app.sequencefile import load_sequence
 from model.actuator import Actuator, Drive
 from model.film import nominal_stress
 from model.material import Network
+from model.stability import pull_in_voltage
 
-__all__ = ["simulate_model"]
+__all__ = ["Prediction", "simulate_model"]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What was written where, and for an actuator how near it came to breaking down.
+
+    ``field_max`` is the largest true field phi/z in V/m. ``pull_in`` is the voltage in V beyond
+    which the film has no stable stretch; None where it stiffens first. Both are None for a film.
+    """
+
+    path: Path
+    field_max: float | None = None
+    pull_in: float | None = None
 
 
 def simulate_model(
@@ -29,7 +44,7 @@ def simulate_model(
     rig_file: RigFile,
     voltage: str = "command",
     overwrite: bool = False,
-) -> Path:
+) -> Prediction:
     """Drive the model with a recording (``.h5``) or a sequence, and write ``.h5`` or ``.csv``.
 
     A recorded voltage is followed as the recording says (held by the converter, or linear between
@@ -41,6 +56,7 @@ def simulate_model(
     if target.suffix not in (".h5", ".csv"):
         raise InputError(f"{out}: the output is a recording (.h5) or a table (.csv)")
     sequence_toml, hold, kinematics = "", False, loaded.kinematics
+    field_max, pull_in = None, None
     if Path(drive).suffix in (".h5", ".hdf5", ".nxs"):
         recording = open_recording(drive)
         title = f"{loaded.name} under {recording.title or recording.name}"
@@ -50,19 +66,20 @@ def simulate_model(
             kinematics = recording.kinematics
         else:
             given = recording_drive(recording, voltage)
-            values, hold = _actuator(loaded.model, given), given.hold
+            values, field_max, pull_in = _actuator(loaded.model, given)
+            hold = given.hold
     else:
         plan = load_sequence(drive)
         title = f"{loaded.name} under {plan.sequence.name}"
         sequence_toml = plan.toml
         time, volts = plan.sample(float(rig_file.card.sample_rate_Hz))
-        values = _actuator(loaded.model, Drive(time, volts))
+        values, field_max, pull_in = _actuator(loaded.model, Drive(time, volts))
     if target.suffix == ".csv":
         with replaced_when_done(target) as partial:
             _write_csv(partial, values)
-        return target
+        return Prediction(target, field_max, pull_in)
     actuator = loaded.model if isinstance(loaded.model, Actuator) else None
-    return save_recording(
+    save_recording(
         target,
         "film" if "stretch" in values else "actuator",
         values,
@@ -76,9 +93,13 @@ def simulate_model(
         notes="a prediction of a model, not a measurement",
         overwrite=overwrite,
     )
+    return Prediction(target, field_max, pull_in)
 
 
-def _actuator(model: Actuator | Network, drive: Drive) -> dict[str, np.ndarray]:
+def _actuator(
+    model: Actuator | Network, drive: Drive
+) -> tuple[dict[str, np.ndarray], float, float | None]:
+    """Arrays of the prediction, its largest true field in V/m, and the pull-in voltage in V."""
     if not isinstance(model, Actuator):
         raise InputError(
             "the model is of a bare film, which a voltage does not move: drive it with a recording "
@@ -87,11 +108,12 @@ def _actuator(model: Actuator | Network, drive: Drive) -> dict[str, np.ndarray]:
     response = model.simulate(drive)
     if not response.ok:
         raise InputError(f"the model cannot follow this voltage: {response.in_words}")
-    return {
+    values = {
         "time": drive.time,
         "voltage_command": drive.voltage,
         "displacement": response.displacement,
     }
+    return values, float(np.max(np.abs(response.field))), pull_in_voltage(model)
 
 
 def _film(

@@ -161,7 +161,8 @@ def admit(
                 f"{quantity} reaches {reached * scale:.6g} {unit} at {at / rate:.4g} s, "
                 f"{allowed * scale:.6g} {unit} is allowed"
             )
-        return Margin(quantity, reached * scale, allowed * scale, unit)
+        # + 0.0: a waveform that never goes negative reaches 0, not -0
+        return Margin(quantity, reached * scale + 0.0, allowed * scale + 0.0, unit)
 
     with np.errstate(over="ignore"):  # what overflows is inf, and beyond every limit
         slew = np.abs(np.diff(voltage)) * rate

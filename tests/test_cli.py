@@ -228,10 +228,29 @@ def test_the_same_seed_records_the_same_counts(tmp_path: Path) -> None:
 def test_record_says_in_json_what_it_did(tmp_path: Path) -> None:
     out = tmp_path / "run.h5"
     found = done("record", write(tmp_path / "s.toml", LOBE), "--out", out, "--json", "-").json
+    margins = {m["quantity"]: m for m in found.pop("margins")}
     assert found == {
         "format": "dearig-run/1", "recording": str(out), "samples": 1501, "rate_Hz": 1000.0,
         "outcome": "finished", "events": [],
     }  # fmt: skip
+    assert margins["voltage"]["allowed"] == 8.5
+    assert 0.0 < margins["true field"]["reached"] < margins["true field"]["allowed"]
+
+
+def test_simulate_says_how_near_breakdown_it_comes(tmp_path: Path) -> None:
+    model = thesis_model(tmp_path / "m.toml")
+    answer = done(
+        "simulate", model, "--drive", write(tmp_path / "s.toml", LOBE),
+        "--out", tmp_path / "p.csv", "--json", tmp_path / "p.json",
+    )  # fmt: skip
+    found = strict_json((tmp_path / "p.json").read_text(encoding="utf-8"))
+    prediction = np.genfromtxt(tmp_path / "p.csv", delimiter=",", names=True)
+    # held in width, z = Z/lam: the loaded film of Table 3 rests at 1.1894
+    stretch = 1.18942 + prediction["displacement_mm"] / 75.0
+    field = np.max(prediction["voltage_V"] * stretch) / 1e-3
+    assert found["true_field_max_V_per_m"] == pytest.approx(field, rel=1e-4)
+    assert "true field up to" in answer.out
+    assert "pull-in" in answer.out
 
 
 def test_json_goes_to_a_file_and_words_to_the_terminal(lobe: Path, tmp_path: Path) -> None:

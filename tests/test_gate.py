@@ -125,6 +125,7 @@ def test_margins_say_how_near_it_comes():
     assert margins["slew"].reached == pytest.approx(200.0)
     assert margins["true field"].reached == pytest.approx(0.2)
     assert margins["true field"].unit == "MV/m"
+    assert str(margins["negative voltage"].reached) == "0.0"
 
 
 def test_no_other_way_in():
