@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -166,10 +166,6 @@ class Network:
     def times(self) -> tuple[float, ...]:
         """Relaxation times of the branches in s."""
         return tuple(b.relaxation_time for b in self.branches)
-
-    def with_equilibrium_modulus(self, modulus: float) -> Network:
-        """The same network with another mu_0."""
-        return replace(self, equilibrium=replace(self.equilibrium, modulus=modulus))
 
     def coefficients(self, held: int) -> np.ndarray:
         """Coefficients as ``model.network`` lays them out; of the head only ``held`` is filled."""
