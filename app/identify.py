@@ -20,7 +20,7 @@ from app.records import PUBLISHED_FIT, as_record, compare, open_all
 from app.rigfile import RigFile
 from model.actuator import Actuator
 from model.errors import ModelError
-from model.fitting import Identification, identify
+from model.fitting import Identification, add_intervals, identify
 from model.material import Branch, Film, Load, Network, Spring
 from model.records import Record
 
@@ -74,41 +74,41 @@ def identify_recordings(
             raise InputError(
                 f"{count} branches cannot be fitted; give a number from 1 to {BRANCHES_MAX}"
             )
-    fits: list[tuple[int, Identification]] = []
-    trials = []
+    counts = sorted(set(branches))
+    alone = len(counts) == 1
+    fits: list[Identification] = []
     smaller: Network | None = None
-    for i, count in enumerate(sorted(set(branches))):
+    for i, count in enumerate(counts):
         base = _base(recordings, count, spring, rest_length_mm, rig_file)
 
         def report(stage: str, fraction: float, done: int = i) -> None:
-            label = stage if len(branches) == 1 else f"{sorted(set(branches))[done]} branches"
-            progress(label, fraction if len(branches) == 1 else (done + fraction) / len(branches))
+            if alone:
+                progress(stage, fraction)
+            else:
+                progress(f"{counts[done]} branches", (done + fraction) / len(counts))
 
-        last = len(set(branches)) == 1
         try:
             fit = identify(
-                records, base, method, kinematics, seed, intervals and last, smaller,
+                records, base, method, kinematics, seed, intervals and alone, smaller,
                 progress=report,
             )  # fmt: skip
         except ModelError as error:
             raise InputError(f"these recordings cannot be fitted: {error}") from error
         smaller = fit.model.network if isinstance(fit.model, Actuator) else fit.model
-        fits.append((count, fit))
+        fits.append(fit)
     # one count of independent samples for all, from the fit that left the least structure behind
-    correlation = max(1.0, min(fit.correlation for _, fit in fits))
-    scores = [_bic(fit, records, correlation) for _, fit in fits]
+    correlation = max(1.0, min(fit.correlation for fit in fits))
+    scores = [_bic(fit, records, correlation) for fit in fits]
     best = int(np.argmin(scores))
-    count, fit = fits[best]
-    if len(fits) > 1:
-        for i, (n, candidate) in enumerate(fits):
-            trials.append(
-                _trial(n, candidate, recordings, others, kinematics, drive, scores[i], i == best)
-            )
+    count, fit = counts[best], fits[best]
+    trials: list[BranchTrial] = []
+    if not alone:
+        trials = [
+            _trial(n, candidate, recordings, others, kinematics, drive, score, chosen=n == count)
+            for n, candidate, score in zip(counts, fits, scores, strict=True)
+        ]
         if intervals and method == "hybrid":
-            network = fit.model.network if isinstance(fit.model, Actuator) else fit.model
-            fit = identify(
-                records, fit.model, method, kinematics, seed, True, network, progress=progress
-            )
+            fit = add_intervals(records, fit, kinematics, progress=progress)
     compared = [compare(r, fit.model, kinematics, "train", drive) for r in recordings]
     validated = [compare(r, fit.model, kinematics, "validation", drive) for r in others]
     seconds = clock() - started

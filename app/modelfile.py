@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from app.errors import InputError
 from app.recording.files import check_output, replaced_when_done
-from app.toml_input import allowed, meant, parse_toml, read_text, shown
+from app.toml_input import Table, allowed, meant, parse_toml, read_text, shown
 from model.actuator import Actuator
 from model.errors import ModelError
 from model.material import Branch, Film, Load, Network, Spring
@@ -52,11 +52,7 @@ class ModelFile:
         return frozenset(str(t["sha256"]) for t in tables if isinstance(t, dict) and "sha256" in t)
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-
-class _Film(_Table):
+class _Film(Table):
     length_m: _Positive
     width_m: _Positive
     thickness_m: _Positive
@@ -64,12 +60,12 @@ class _Film(_Table):
     density_kg_m3: _Positive = 1000.0
 
 
-class _Load(_Table):
+class _Load(Table):
     mass_kg: Annotated[float, Field(ge=0.0)]
     rest_length_m: _Positive | None = None
 
 
-class _Spring(_Table):
+class _Spring(Table):
     spring: _Kind = "gent"
     modulus_Pa: Annotated[float, Field(ge=0.0)]
     limit: _Positive | None = None
@@ -82,12 +78,12 @@ class _Branch(_Spring):
     relaxation_time_s: Annotated[float, Field(ge=0.0)]
 
 
-class _Effect(_Table):
+class _Effect(Table):
     name: str
     values: dict[str, float]
 
 
-class _File(_Table):
+class _File(Table):
     format: str
     name: str = Field(min_length=1)
     kinematics: Literal["constrained-width", "uniaxial", "equibiaxial"]
@@ -225,7 +221,7 @@ def _plain(value: Any) -> Any:
 
 #: Keys that hold one table for each of several things.
 _LISTS = ("branch", "effect")
-_TABLES: Mapping[str, type[_Table]] = {
+_TABLES: Mapping[str, type[Table]] = {
     "film": _Film,
     "load": _Load,
     "equilibrium": _Spring,
@@ -238,7 +234,7 @@ def _sentence(error: ValidationError) -> str:
     faults = error.errors(include_url=False)
     fault = min(faults, key=lambda f: f["type"] != "extra_forbidden")
     place = [p for p in fault["loc"] if p != "[key]"]
-    table: type[_Table] = _File
+    table: type[Table] = _File
     dotted = ""
     for part in place[:-1]:
         if isinstance(part, int):

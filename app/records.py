@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -213,29 +214,34 @@ def _other_rig(recording: Recording, model: Actuator) -> list[str]:
 
 def _place(recording: Recording) -> tuple[str, str, Published | None]:
     """Table, row and printed figures of a run that the thesis made too."""
-    for preset, frequency in VALIDATION_A.items():
-        if _plays(recording, preset):
-            return "A", f"f = {frequency:g} Hz", Published(*_TABLE_4[preset])
-    for preset, amplitude in VALIDATION_B.items():
-        if _plays(recording, preset):
-            return "B", f"a = {amplitude:g} kV", Published(*_TABLE_5[preset])
-    if _plays(recording, "thesis"):
-        return "", "identification", PUBLISHED_FIT
-    return "", recording.name, None
-
-
-def _plays(recording: Recording, preset: str) -> bool:
-    """True when the recording's sequence is the lobes of ``preset``, however often repeated."""
+    elsewhere = ("", recording.name, None)
     if not recording.sequence_toml:
-        return False
+        return elsewhere
     try:
-        played = parse_sequence(recording.sequence_toml, recording.name, Path()).sequence.segments
+        played = _lobes(recording.sequence_toml, recording.name)
     except InputError:
-        return False  # a sequence with a CSV that is not here: not one of the thesis's
-    wanted = parse_sequence(PRESETS[preset], preset, Path()).sequence.segments
-    return len(played) == 1 and _one_period(played[0]) == _one_period(wanted[0])
+        return elsewhere  # a sequence with a CSV that is not here: not one of the thesis's
+    return elsewhere if played is None else _thesis_runs().get(played, elsewhere)
 
 
-def _one_period(segment: object) -> object:
-    """A thesis segment with one period, so that runs of any length compare equal."""
-    return replace(segment, periods=1) if isinstance(segment, Lobes) else segment
+@cache
+def _thesis_runs() -> Mapping[Lobes, tuple[str, str, Published | None]]:
+    """Table, row and printed figures of the thesis's runs, by one period of their lobes."""
+    places: dict[str, tuple[str, str, Published | None]] = {
+        "thesis": ("", "identification", PUBLISHED_FIT)
+    }
+    for preset, frequency in VALIDATION_A.items():
+        places[preset] = ("A", f"f = {frequency:g} Hz", Published(*_TABLE_4[preset]))
+    for preset, amplitude in VALIDATION_B.items():
+        places[preset] = ("B", f"a = {amplitude:g} kV", Published(*_TABLE_5[preset]))
+    runs = {_lobes(PRESETS[preset], preset): place for preset, place in places.items()}
+    return {lobes: place for lobes, place in runs.items() if lobes is not None}
+
+
+def _lobes(toml: str, name: str) -> Lobes | None:
+    """One period of a sequence that is nothing but the thesis's lobes; None for any other."""
+    segments = parse_sequence(toml, name, Path()).sequence.segments
+    if len(segments) == 1 and isinstance(segments[0], Lobes):
+        # one period, so that runs of any length compare equal
+        return replace(segments[0], periods=1)
+    return None

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, ValidationError, model_validator
+from pydantic import Discriminator, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
 from app.errors import InputError
 from app.presets import PRESETS
-from app.toml_input import allowed, meant, parse_toml, read_text, shown
+from app.toml_input import Table, allowed, meant, parse_toml, read_text, shown
 from model import excitation
 from model.errors import ModelError
 from model.excitation import THESIS_AMPLITUDES, THESIS_FREQUENCIES, Segment, Sequence
@@ -84,11 +84,7 @@ def _fastest(segment: Segment) -> float:
     return 0.0
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-
-class _Segment(_Table):
+class _Segment(Table):
     repeats: int = Field(default=1, ge=1, le=SEGMENTS_MAX, description="how often it is played")
 
     def build(self, folder: Path) -> Segment:
@@ -239,6 +235,7 @@ class _Csv(_Segment):
     file: str = Field(min_length=1, description="beside the sequence, with time_s and voltage_kV")
 
     def build(self, folder: Path) -> Segment:
+        from app.recording.clockwork import not_forward
         from app.recording.importers.csv_file import CsvFile
         from app.recording.importers.source import listing
 
@@ -255,10 +252,8 @@ class _Csv(_Segment):
         time = columns["time_s"]
         if time.size < 2:
             raise InputError(f"{source.path} has one line of data; a waveform takes at least 2")
-        back = np.flatnonzero(np.diff(time) <= 0.0)
-        if back.size:
-            at = int(back[0]) + 1
-            how = "stands still" if time[at] == time[at - 1] else "goes back"
+        if (back := not_forward(time)) is not None:
+            at, how = back
             raise InputError(
                 f"{source.path}, {source.row(at)}: time {how}, from {time[at - 1]:.9g} s to "
                 f"{time[at]:.9g} s; a step takes two lines with a little time between them"
@@ -281,7 +276,7 @@ _KINDS: dict[str, type[_Segment]] = {
 }
 
 
-class _File(_Table):
+class _File(Table):
     name: str = Field(min_length=1, description="what the recording will be called")
     lead_in_s: float = Field(default=2.0, ge=0.0, le=3600.0, description="quiet, at 0 V, before")
     tail_s: float = Field(default=1.0, ge=0.0, le=3600.0, description="quiet, at 0 V, after")

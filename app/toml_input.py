@@ -11,11 +11,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
+from pydantic import BaseModel, ConfigDict
 from pydantic.fields import FieldInfo
 
 from app.errors import InputError
 
-__all__ = ["allowed", "meant", "parse_toml", "read_text", "shown"]
+__all__ = ["Table", "allowed", "meant", "parse_toml", "read_text", "shown"]
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 # what a key can end in: used to tell a wrong unit from a wrong name
@@ -23,6 +24,12 @@ _UNITS = frozenset(
     {"nm", "um", "mm", "cm", "m", "m3", "us", "ms", "s", "mv", "v", "kv", "ua", "ma", "a"}
     | {"hz", "khz", "mhz", "g", "kg", "n", "k", "mk", "celsius", "ppm", "percent", "pct", "per"}
 )
+
+
+class Table(BaseModel):
+    """A table of a file that people write: immutable, no unknown keys, no text for numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
 def read_text(path: Path, what: str) -> str:

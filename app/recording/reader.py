@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 
 from app.errors import InputError
+from app.recording.clockwork import not_forward
 from app.recording.files import in_words
 from app.recording.layout import (
     FORMAT,
@@ -244,10 +245,8 @@ class _Reader:
                 raise InputError(
                     f"{self.path}: /entry/data/{name} is {array[at]} at sample {at}, not a number"
                 )
-        back = np.flatnonzero(np.diff(time) <= 0.0)
-        if back.size:
-            at = int(back[0]) + 1
-            how = "stands still" if time[at] == time[at - 1] else "goes back"
+        if (back := not_forward(time)) is not None:
+            at, how = back
             raise InputError(
                 f"{self.path}: /entry/data/time {how} at sample {at} ({time[at]:.9g} s)"
             )

@@ -19,7 +19,7 @@ from model.kinematics import KINEMATICS
 from model.material import Network
 from model.records import ActuatorRecord, Record
 
-__all__ = ["METHODS", "Identification", "identify"]
+__all__ = ["METHODS", "Identification", "add_intervals", "identify"]
 
 METHODS = ("hybrid", "de")
 
@@ -35,9 +35,10 @@ class Identification:
     """What a fit found.
 
     ``model`` is the fitted actuator or network, ``estimates`` its numbers with 95 % intervals,
-    ``covariance`` (f, f) that of ``covariance_names``, in SI units. ``cost`` is the mean square
-    of the residuals over the noise (1 when nothing is left but noise); ``correlation`` the
-    correlation time of the residuals in samples, by which the intervals are widened. ``warnings``
+    ``covariance`` (f, f) that of ``covariance_names``, in SI units. ``cost`` is the mean square of
+    the residuals over the noise (1 when nothing is left but noise); ``correlation`` the correlation
+    time of the residuals in samples, by which the intervals are widened. ``held_limits`` names the
+    locking limits that were held because the data do not see them. ``warnings``
     are sentences for the operator.
     """
 
@@ -51,6 +52,7 @@ class Identification:
     simulations: int
     converged: bool
     warnings: tuple[str, ...]
+    held_limits: tuple[str, ...] = ()
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -91,40 +93,55 @@ def identify(
     problem = Problem(records, layout, workers)
     require_free(layout, problem.samples)
     if method == "de":
-        values = algorithm_1(problem, seed, progress)
-        fit = descend(problem, layout.coordinates(values), iterations=0)
-        values = layout.by_relaxation_time(values)
-        estimates = [
-            Estimate(
-                q.name, q.unit, float(v), 0.0, math.inf, False, "Algorithm 1 gives no interval"
-            )
-            for q, v in zip(layout.quantities, values, strict=True)
-        ]
-        return _result("de", problem, values, estimates, fit, (), np.empty((0, 0)))
+        found = algorithm_1(problem, seed, progress)
+        fit = descend(problem, layout.coordinates(found), iterations=0)
+        return _result(problem, method, fit, found, "Algorithm 1 gives no interval", ())
     fit, held_limits = _hybrid(problem, nested, progress)
-    values = layout.by_relaxation_time(layout.values(fit.x))
-    if not intervals:
-        estimates = [
-            Estimate(q.name, q.unit, float(v), 0.0, math.inf, False, "no interval was asked for")
-            for q, v in zip(layout.quantities, values, strict=True)
-        ]
-        return _result("hybrid", problem, values, estimates, fit, (), np.empty((0, 0)))
-    estimates, names, cov = _intervals(problem, values, held_limits, progress)
-    return _result("hybrid", problem, values, estimates, fit, names, cov)
+    limits = tuple(n for n, h in zip(layout.names, held_limits, strict=True) if h)
+    words = "no interval was asked for"
+    result = _result(problem, method, fit, layout.values(fit.x), words, limits)
+    return add_intervals(records, result, kinematics, workers, progress) if intervals else result
+
+
+def add_intervals(
+    records: Sequence[Record],
+    fitted: Identification,
+    kinematics: str = "uniaxial",
+    workers: int = 2,
+    progress: Progress = _quiet,
+) -> Identification:
+    """``fitted`` with the 95 % intervals of its numbers; ``records`` are those it was fitted to."""
+    model = fitted.model
+    layout = Layout(model, 0 if isinstance(model, Actuator) else KINEMATICS.index(kinematics))
+    problem = Problem(records, layout, workers)
+    held = np.array([name in fitted.held_limits for name in layout.names])
+    estimates, names, cov = _intervals(problem, layout.initial(), held, progress)
+    return replace(
+        fitted,
+        estimates=(*(e for e in fitted.estimates if not e.free), *estimates),
+        covariance_names=names,
+        covariance=cov,
+        simulations=fitted.simulations + problem.simulations,
+    )
 
 
 def _result(
-    method: str,
     problem: Problem,
-    values: np.ndarray,
-    estimates: list[Estimate],
+    method: str,
     fit: LocalFit,
-    names: tuple[str, ...],
-    cov: np.ndarray,
+    found: np.ndarray,
+    words: str,
+    held_limits: tuple[str, ...],
 ) -> Identification:
+    """A fit that ended at natural values ``found`` (d,); ``words``: why it has no interval."""
     layout = problem.layout
+    values = layout.by_relaxation_time(found)
     model = layout.model(values)
     base = layout.base
+    estimates = [
+        Estimate(q.name, q.unit, float(v), 0.0, math.inf, False, words)
+        for q, v in zip(layout.quantities, values, strict=True)
+    ]
     if isinstance(base, Actuator) and base.load.rest_length is not None:
         modulus = layout.build(values).equilibrium.modulus
         estimates.insert(
@@ -148,8 +165,9 @@ def _result(
         method=method,
         model=model,
         estimates=tuple(estimates),
-        covariance_names=names,
-        covariance=cov,
+        covariance_names=(),
+        covariance=np.empty((0, 0)),
+        held_limits=held_limits,
         cost=fit.cost,
         correlation=correlation,
         simulations=problem.simulations,

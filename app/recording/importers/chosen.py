@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from app.errors import InputError
+from app.recording.clockwork import not_forward
 from app.recording.importers.columns import (
     QUANTITIES,
     TARGETS,
@@ -190,10 +191,8 @@ class Chosen:
         seconds, name = found["time"], picked["time"][1]
         if seconds.size < 2:
             raise InputError(f"{path} has {seconds.size} row of data; at least 2 are needed")
-        back = np.flatnonzero(np.diff(seconds) <= 0.0)
-        if back.size:
-            at = int(back[0]) + 1
-            how = "stands still" if seconds[at] == seconds[at - 1] else "goes back"
+        if (back := not_forward(seconds)) is not None:
+            at, how = back
             raise InputError(
                 f"{path}, {row(at)}, column {name!r}: time {how}, from {seconds[at - 1]:.9g} s to "
                 f"{seconds[at]:.9g} s; leave out or mend the rows that do not follow"

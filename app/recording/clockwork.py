@@ -1,0 +1,19 @@
+"""Time that does not go forward: where, and in which of the two ways."""
+
+from __future__ import annotations
+
+import numpy as np
+
+__all__ = ["not_forward"]
+
+
+def not_forward(time: np.ndarray) -> tuple[int, str] | None:
+    """First sample of ``time`` (N,) that is not after the one before, and how it is not; else None.
+
+    The words are ``goes back`` or ``stands still``, for a sentence that begins with time.
+    """
+    back = np.flatnonzero(np.diff(time) <= 0.0)
+    if not back.size:
+        return None
+    at = int(back[0]) + 1
+    return at, "stands still" if time[at] == time[at - 1] else "goes back"
