@@ -119,17 +119,26 @@ def demo(
     json: Json = None,
     force: Force = False,
 ) -> None:
-    """Run the thesis's experiment on the simulated rig: record, identify, validate, report."""
+    """Run the thesis's experiment on a simulated rig, and find what another one hides."""
     from app.demo import run_demo
-    from app.terminal import identify_table, outcome_json, validate_tables, write_json
+    from app.terminal import (
+        diagnosis_json,
+        diagnosis_tables,
+        identify_table,
+        outcome_json,
+        validate_tables,
+        write_json,
+    )
 
     _check_files(force, (), json=json)
     with _working(json) as (console, progress):
         result = run_demo(out, seed=seed, overwrite=force, clock=time.monotonic, progress=progress)
     console.print(identify_table(result.identified))
     console.print(validate_tables(result.validated))
-    _print(console, f"Recordings, model and report lie in {out}")
+    console.print(diagnosis_tables(result.diagnosed))
+    _print(console, f"Recordings, models and reports lie in {out}")
     _print(console, f"Report: {result.report}")
+    _print(console, f"Diagnosis: {result.diagnosis_report}")
     if json is not None:
         write_json(
             {
@@ -137,6 +146,8 @@ def demo(
                 "report": str(result.report),
                 "identification": outcome_json(result.identified),
                 "validation": outcome_json(result.validated),
+                "diagnosis_report": str(result.diagnosis_report),
+                "diagnosis": diagnosis_json(result.diagnosed),
                 "seconds": result.seconds,
             },
             json,
@@ -151,6 +162,10 @@ def record(
         str, typer.Option(help="sim, or sim:SEED for a rig that hides an effect.")
     ] = "sim",
     rig_file: RigFileOption = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(metavar="MODEL.toml", help="What the simulated rig sim is made of."),
+    ] = None,
     paced: Annotated[bool, typer.Option("--paced", help="Simulate in real time.")] = False,
     seed: Seed = 0,
     operator: Annotated[str, typer.Option(help="Who runs it; kept in the recording.")] = "",
@@ -160,19 +175,26 @@ def record(
     force: Force = False,
 ) -> None:
     """Play a sequence on a rig and record it; ctrl-C ramps down to 0 V and keeps the recording."""
+    from app.modelfile import load_actuator
     from app.rigfile import load_rig_file
     from app.run import record as run
     from app.sequencefile import load_sequence
     from app.terminal import write_json
+    from app.together import of_rig
     from app.toml_input import read_text
 
-    _check_files(force, (sequence, rig_file), out, json=json, recording=out)
+    _check_files(force, (sequence, rig_file, model), out, json=json, recording=out)
     settings = load_rig_file(rig_file)
     text = "" if rig_file is None else read_text(rig_file, "rig file")
+    actuator = None
+    if model is not None:
+        actuator = load_actuator(model)
+        settings = of_rig(settings, actuator.film, actuator.load)
     with _working(json) as (console, progress):
         result = run(
             load_sequence(sequence), rig, settings, text, out, seed=seed, paced=paced,
-            operator=operator, film_id=film, notes=notes, overwrite=force, progress=progress,
+            actuator=actuator, operator=operator, film_id=film, notes=notes, overwrite=force,
+            progress=progress,
         )  # fmt: skip
     seconds = result.samples / result.rate_Hz
     _print(
@@ -455,6 +477,92 @@ def validate(
 
 
 @app.command()
+def diagnose(
+    train: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="TRAIN.h5...", help="Recordings to fit.", show_default=False),
+    ] = None,
+    validate_: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--validate",
+            metavar="VAL.h5",
+            help="Untouched recordings, read once at the end; may be repeated.",
+        ),
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="OUT.html", help="A report with figures.")
+    ] = None,
+    model_out: Annotated[
+        Path | None, typer.Option(metavar="MODEL.toml", help="The model with what was found.")
+    ] = None,
+    branches: Annotated[int, typer.Option(help="Maxwell branches of the baseline.")] = 3,
+    drive: Annotated[
+        DriveChannel, typer.Option(help="Voltage that drives.")
+    ] = DriveChannel.command,
+    rig_file: RigFileOption = None,
+    rig: Annotated[
+        str | None,
+        typer.Option(help="Record on this rig (sim:SEED), and run the separating experiments."),
+    ] = None,
+    experiments: Annotated[
+        int, typer.Option(min=0, max=20, help="With --rig: how many, at most.")
+    ] = 1,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="With --rig: where everything goes.")
+    ] = Path("diagnosis"),
+    seed: Seed = 0,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Find what the model lacks, put it in, and compare the error before and after."""
+    from app.diagnose import diagnose_recordings, diagnose_rig
+    from app.errors import Interrupted
+    from app.folder import result_folder
+    from app.report.diagnosis_page import write_diagnosis_report
+    from app.rigfile import load_rig_file
+    from app.terminal import diagnosis_json, diagnosis_tables, write_json
+    from app.toml_input import read_text
+
+    given, others = train or [], validate_ or []
+    if rig is None and not given:
+        raise InputError(
+            "give recordings to diagnose, or a rig to record on with --rig; dearig diagnose --help "
+            "says more"
+        )
+    _check_files(force, (*given, *others, rig_file), *_given(report), *_given(model_out), json=json)
+    settings = None if rig_file is None else load_rig_file(rig_file)
+    if rig is not None:
+        result_folder(out, force)
+        report, model_out = report or out / "report.html", model_out or out / "model.toml"
+    with _working(json, whole=True) as (console, progress):
+        if rig is None:
+            outcome = diagnose_recordings(
+                given, validation=others, model_out=model_out, branches=branches,
+                drive=drive.value, rig_file=settings, overwrite=force, clock=time.monotonic,
+                progress=progress,
+            )  # fmt: skip
+        else:
+            outcome = diagnose_rig(
+                rig, out, experiments=experiments, train=given, validation=others,
+                model_out=model_out, branches=branches, drive=drive.value, rig_file=settings,
+                configuration="" if rig_file is None else read_text(rig_file, "rig file"),
+                seed=seed, overwrite=force, clock=time.monotonic, progress=progress,
+            )  # fmt: skip
+        if report is not None:
+            progress("report", 1.0)
+            write_diagnosis_report(outcome, report)
+    console.print(diagnosis_tables(outcome))
+    for label, path in (("Model", model_out), ("Report", report)):
+        if path is not None:
+            _print(console, f"{label}: {path}")
+    if json is not None:
+        write_json(diagnosis_json(outcome), json)
+    if outcome.finding.interrupted:
+        raise Interrupted("interrupted: what had been found until then was kept")
+
+
+@app.command()
 def simulate(
     model: Annotated[Path, typer.Argument(metavar="MODEL.toml", help="A model file.")],
     drive: Annotated[
@@ -535,7 +643,7 @@ def presets(json: Json = None, force: Force = False) -> None:
 
 def _branches(text: str) -> list[int]:
     """``3`` or ``1-4`` as numbers."""
-    from app.identify import BRANCHES_MAX
+    from app.together import BRANCHES_MAX
 
     found = re.fullmatch(r"\s*([0-9]{1,9})\s*(?:-\s*([0-9]{1,9}))?\s*", text)
     if not found:
@@ -595,16 +703,18 @@ def _print(console: Console, text: str, style: str | None = None) -> None:
 
 
 @contextmanager
-def _working(json: str | None, computes: bool = True) -> Iterator[tuple[Console, Progress]]:
+def _working(
+    json: str | None, computes: bool = True, whole: bool = False
+) -> Iterator[tuple[Console, Progress]]:
     """A console for results and a progress bar on standard error while the body works.
 
-    ``computes``: the body uses the compiled kernels.
+    ``computes``: the body uses the compiled kernels. ``whole``: it tells of all its work as one.
     """
     from app.terminal import progress
 
     if computes:
         _tell_of_compiling()
-    with progress("dearig") as report:
+    with progress("dearig", whole=whole) as report:
         yield _console(json), report
 
 

@@ -1,4 +1,4 @@
-"""The main job on the simulated rig: the thesis's experiment from excitation to error tables."""
+"""The main job on simulated rigs: from excitation to error tables, and to what a model lacks."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.errors import InputError
+from app.diagnose import VALIDATION, diagnose_recordings
+from app.folder import result_folder
 from app.identify import identify_recordings
-from app.outcomes import IdentifyOutcome, ValidateOutcome
+from app.outcomes import DiagnoseOutcome, IdentifyOutcome, ValidateOutcome
 from app.presets import VALIDATION_A, VALIDATION_B
 from app.progress import Progress, quiet
+from app.report.diagnosis_page import write_diagnosis_report
 from app.report.figures import overview_figure, save_png
 from app.report.html import write_demo_report
 from app.rigfile import RigFile
@@ -18,16 +20,21 @@ from app.run import record
 from app.sequencefile import load_sequence
 from app.validate import validate_model
 
-__all__ = ["DemoResult", "run_demo"]
+__all__ = ["HIDDEN", "DemoResult", "run_demo"]
+
+#: A simulated rig that hides an effect which nobody declares to the diagnosis.
+HIDDEN = "sim:8"
 
 
 @dataclass(frozen=True)
 class DemoResult:
-    """What the demonstration found, and where its report lies."""
+    """What the demonstration found, and where its reports lie."""
 
     identified: IdentifyOutcome
     validated: ValidateOutcome
+    diagnosed: DiagnoseOutcome
     report: Path
+    diagnosis_report: Path
     seconds: float
 
 
@@ -39,20 +46,15 @@ def run_demo(
     clock: Callable[[], float],
     progress: Progress = quiet,
 ) -> DemoResult:
-    """Record the identification run and the ten validation runs, identify, validate, report.
+    """Record the thesis's runs, identify, validate, report; then diagnose a rig with a secret.
 
-    Everything goes into the folder ``out``: recordings, ``model.toml``, ``report.html``,
-    ``overview.png``. Raises ``InputError`` where the folder holds something, unless ``overwrite``.
+    Everything goes into the folder ``out``: recordings, ``model.toml``, ``report.html`` and
+    ``overview.png`` of the rig that obeys the model; ``hidden-*.h5``, ``improved.toml`` and
+    ``diagnosis.html`` of the other. Raises ``InputError`` where the folder holds something, unless
+    ``overwrite``.
     """
     started = clock()
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out} is a file; give a folder for the results")
-    if out.is_dir() and any(out.iterdir()) and not overwrite:
-        raise InputError(f"{out} is not empty; give another folder with --out, or --force")
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{out} cannot be made: {error.strerror or error}") from error
+    result_folder(out, overwrite)
     rig_file = RigFile()
     presets = ("thesis", *VALIDATION_A, *VALIDATION_B)
     files = {preset: out / f"{preset}.h5" for preset in presets}
@@ -80,4 +82,21 @@ def run_demo(
     overview = overview_figure(identified.train[0], validated.comparisons)
     save_png(overview, out / "overview.png", dpi=110)
     progress("report", 1.0)
-    return DemoResult(identified, validated, report, clock() - started)
+    hidden = {preset: out / f"hidden-{preset}.h5" for preset in ("thesis", *VALIDATION)}
+    for n, (preset, path) in enumerate(hidden.items()):
+        record(
+            load_sequence(preset), HIDDEN, rig_file, "", path,
+            seed=seed * len(hidden) + n, overwrite=overwrite,
+        )  # fmt: skip
+        progress("recording another rig", (n + 1) / len(hidden))
+    diagnosed = diagnose_recordings(
+        [hidden["thesis"]],
+        validation=[hidden[preset] for preset in VALIDATION],
+        model_out=out / "improved.toml",
+        overwrite=overwrite,
+        clock=clock,
+        progress=lambda _, fraction: progress("diagnosis", fraction),
+    )
+    page = out / "diagnosis.html"
+    write_diagnosis_report(diagnosed, page)
+    return DemoResult(identified, validated, diagnosed, report, page, clock() - started)

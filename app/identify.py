@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +17,13 @@ from app.recording.files import check_output
 from app.recording.recording import Recording
 from app.records import PUBLISHED_FIT, as_record, compare, open_all
 from app.rigfile import RigFile
-from model.actuator import Actuator
+from app.together import base_model, check_apart, check_branches, check_named_once
 from model.errors import ModelError
 from model.fitting import Identification, add_intervals, identify
-from model.material import Branch, Film, Load, Network, Spring
+from model.material import Network
 from model.records import Record
 
-__all__ = ["BRANCHES_MAX", "identify_recordings"]
-
-#: Maxwell branches of a model, at most: no data of this kind determine more.
-BRANCHES_MAX = 8
+__all__ = ["identify_recordings"]
 
 
 def identify_recordings(
@@ -56,30 +52,21 @@ def identify_recordings(
     anything is written.
     """
     check_output(out, overwrite, *train, *validation)
-    for path in validation:
-        if any(Path(path).resolve() == Path(t).resolve() for t in train):
-            raise InputError(
-                f"{path} is given both to fit and to validate: an error on fitted data proves "
-                f"nothing; leave it out of one of them"
-            )
+    check_named_once(train, validation)
     started = clock()
     recordings = open_all(train)
     others = open_all(validation)
-    _check_apart(recordings, others)
+    check_apart(recordings, others)
     records = [as_record(r, drive) for r in recordings]
     kind = recordings[0].kind
-    kinematics = recordings[0].kinematics
     for count in branches:
-        if not 1 <= count <= BRANCHES_MAX:
-            raise InputError(
-                f"{count} branches cannot be fitted; give a number from 1 to {BRANCHES_MAX}"
-            )
+        check_branches(count)
     counts = sorted(set(branches))
     alone = len(counts) == 1
     fits: list[Identification] = []
     smaller: Network | None = None
     for i, count in enumerate(counts):
-        base = _base(recordings, count, spring, rest_length_mm, rig_file)
+        base = base_model(recordings, count, spring, rest_length_mm, rig_file)
 
         def report(stage: str, fraction: float, done: int = i) -> None:
             if alone:
@@ -89,12 +76,12 @@ def identify_recordings(
 
         try:
             fit = identify(
-                records, base, method, kinematics, seed, intervals and alone, smaller,
+                records, base, method, seed, intervals and alone, smaller,
                 progress=report,
             )  # fmt: skip
         except ModelError as error:
             raise InputError(f"these recordings cannot be fitted: {error}") from error
-        smaller = fit.model.network if isinstance(fit.model, Actuator) else fit.model
+        smaller = fit.model.network
         fits.append(fit)
     # one count of independent samples for all, from the fit that left the least structure behind
     correlation = max(1.0, min(fit.correlation for fit in fits))
@@ -104,18 +91,18 @@ def identify_recordings(
     trials: list[BranchTrial] = []
     if not alone:
         trials = [
-            _trial(n, candidate, recordings, others, kinematics, drive, score, chosen=n == count)
+            _trial(n, candidate, recordings, others, drive, score, chosen=n == count)
             for n, candidate, score in zip(counts, fits, scores, strict=True)
         ]
         if intervals and method == "hybrid":
-            fit = add_intervals(records, fit, kinematics, progress=progress)
-    compared = [compare(r, fit.model, kinematics, "train", drive) for r in recordings]
-    validated = [compare(r, fit.model, kinematics, "validation", drive) for r in others]
+            fit = add_intervals(records, fit, progress=progress)
+    compared = [compare(r, fit.model, "train", drive) for r in recordings]
+    validated = [compare(r, fit.model, "validation", drive) for r in others]
     seconds = clock() - started
     title = recordings[0].title or recordings[0].name
     name = f"{title}, {count} branches" if count != 1 else f"{title}, 1 branch"
     history = _history(fit, recordings, compared, validated, spring, drive, seconds)
-    path = save_model(out, name, fit.model, kinematics, history, overwrite)
+    path = save_model(out, name, fit.model, history, overwrite)
     is_thesis_run = kind == "actuator" and any(c.row == "identification" for c in compared)
     return IdentifyOutcome(
         title=name,
@@ -131,89 +118,6 @@ def identify_recordings(
     )
 
 
-def _base(
-    recordings: Sequence[Recording],
-    branches: int,
-    spring: str,
-    rest_length_mm: float | None,
-    rig_file: RigFile | None,
-) -> Actuator | Network:
-    """What to fit: its structure matters, its numbers do not."""
-    limit = {"neo-hookean": math.inf, "gent": 1e4, "arruda-boyce": 1e4}.get(spring)
-    if limit is None:
-        raise InputError(f"spring {spring!r} is not one of neo-hookean, gent, arruda-boyce")
-    one = Spring(1e5, limit, spring)
-    network = Network(one, tuple(Branch(one, 1.0) for _ in range(branches)))
-    if recordings[0].kind == "film":
-        held = {r.kinematics for r in recordings}
-        if len(held) > 1:
-            raise InputError(
-                f"films held in different ways ({', '.join(sorted(held))}) are fitted one by one"
-            )
-        if rest_length_mm is not None:
-            raise InputError("a rest length is of an actuator; these recordings are of films")
-        return network
-    films = {r.film for r in recordings if r.film is not None}
-    loads = {r.load for r in recordings if r.load is not None}
-    if len(films) > 1 or len(loads) > 1:
-        raise InputError(_differing(recordings))
-    default = rig_file or RigFile()
-    film = films.pop() if films and rig_file is None else default.as_film()
-    load = loads.pop() if loads and rig_file is None else default.as_load()
-    if rest_length_mm is not None:
-        # not (>), so that NaN is refused too
-        if not film.length * 1e3 < rest_length_mm < 1e4:
-            raise InputError(
-                f"a rest length of {rest_length_mm:g} mm is not above the film's own "
-                f"{film.length * 1e3:g} mm, or beyond 10 m: under its load the film is longer than "
-                f"before"
-            )
-        try:
-            load = Load(load.mass, rest_length_mm / 1e3)
-        except ModelError as error:
-            raise InputError(f"a rest length of {rest_length_mm:g} mm: {error}") from error
-    return Actuator(film, load, network)
-
-
-def _check_apart(train: Sequence[Recording], validation: Sequence[Recording]) -> None:
-    """Refuse data that would be both fitted and validated, and kinds that do not go together."""
-    fitted = {r.sha256: r.path for r in train}
-    for recording in validation:
-        if recording.sha256 in fitted:
-            raise InputError(
-                f"{recording.path}, to validate, is a copy of {fitted[recording.sha256]}, to fit: "
-                f"an error on fitted data proves nothing; leave it out of one of them"
-            )
-        if recording.kind != train[0].kind:
-            raise InputError(
-                f"{recording.path}, to validate, is of kind {recording.kind}, and "
-                f"{train[0].path}, to fit, of kind {train[0].kind}: give data of one kind"
-            )
-
-
-def _differing(recordings: Sequence[Recording]) -> str:
-    """Which two recordings are not of one film and load."""
-    first = next(r for r in recordings if r.film is not None or r.load is not None)
-    for other in recordings:
-        for what, one, two in (
-            ("films", first.film, other.film),
-            ("loads", first.load, other.load),
-        ):
-            if one is not None and two is not None and one != two:
-                return (
-                    f"{first.path} and {other.path} are of different {what} "
-                    f"({_apart(one, two)}, in SI units); fit them one by "
-                    f"one, or say with --rig-file what holds for all"
-                )
-    return "these recordings are of different films or loads; fit them one by one"
-
-
-def _apart(one: Film | Load, two: Film | Load) -> str:
-    """The numbers in which two films or two loads differ."""
-    pairs = ((f.name, getattr(one, f.name), getattr(two, f.name)) for f in fields(one))
-    return ", ".join(f"{name.replace('_', ' ')} {a} and {b}" for name, a, b in pairs if a != b)
-
-
 def _bic(fit: Identification, records: Sequence[Record], correlation: float) -> float:
     """Bayesian information criterion that counts correlated residuals as what they are worth."""
     samples = sum(r.measured.size for r in records) / correlation
@@ -226,13 +130,12 @@ def _trial(
     fit: Identification,
     train: Sequence[Recording],
     validation: Sequence[Recording],
-    kinematics: str,
     drive: str,
     bic: float,
     chosen: bool,
 ) -> BranchTrial:
-    fitted = [compare(r, fit.model, kinematics, "train", drive) for r in train]
-    checked = [compare(r, fit.model, kinematics, "validation", drive) for r in validation]
+    fitted = [compare(r, fit.model, "train", drive) for r in train]
+    checked = [compare(r, fit.model, "validation", drive) for r in validation]
     return BranchTrial(
         branches=count,
         train_rms=_pooled(fitted),

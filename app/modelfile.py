@@ -16,9 +16,10 @@ from app.recording.files import check_output, replaced_when_done
 from app.toml_input import Table, allowed, meant, parse_toml, read_text, shown
 from model.actuator import Actuator
 from model.errors import ModelError
+from model.film import Strip
 from model.material import Branch, Film, Load, Network, Spring
 
-__all__ = ["FORMAT", "ModelFile", "load_model", "model_toml", "save_model"]
+__all__ = ["FORMAT", "ModelFile", "load_actuator", "load_model", "model_toml", "save_model"]
 
 FORMAT = "dearig-model/1"
 
@@ -28,15 +29,14 @@ _Kind = Literal["neo-hookean", "gent", "arruda-boyce"]
 
 @dataclass(frozen=True)
 class ModelFile:
-    """A model by ``name``: an actuator, or the network of a film held as ``kinematics`` says.
+    """A model by ``name``: an actuator, or a strip of film whose stretch is imposed.
 
     ``history`` is what the file says about where the model comes from: data with their checksums,
     method, intervals.
     """
 
     name: str
-    model: Actuator | Network
-    kinematics: str
+    model: Actuator | Strip
     history: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -123,18 +123,28 @@ def load_model(path: str | Path) -> ModelFile:
         model = _build(file)
         if isinstance(model, Actuator):
             model.rest()  # a load that the springs cannot carry is a fault of this file
-        return ModelFile(file.name, model, file.kinematics, file.history)
+        return ModelFile(file.name, model, file.history)
     except ModelError as error:
         raise InputError(f"{name}: {error}") from error
 
 
-def _build(file: _File) -> Actuator | Network:
+def load_actuator(path: str | Path) -> Actuator:
+    """The actuator in a model file; ``InputError`` for a bare film."""
+    model = load_model(path).model
+    if isinstance(model, Actuator):
+        return model
+    raise InputError(
+        f"model file {path} is of a bare film, which a voltage does not move: give one of an "
+        f"actuator"
+    )
+
+
+def _build(file: _File) -> Actuator | Strip:
     branches = tuple(Branch(b.build(), b.relaxation_time_s) for b in file.branch)
     network = Network(file.equilibrium.build(), branches)
+    effects = tuple((e.name, tuple(e.values.items())) for e in file.effect)
     if file.film is None and file.load is None:
-        if file.effect:
-            raise ModelError("effects need a [film] and a [load]: this model is of a bare film")
-        return network
+        return Strip(network, file.kinematics, effects)
     if file.film is None or file.load is None:
         raise ModelError("[film] and [load] go together: an actuator has both, a bare film neither")
     film = Film(
@@ -145,19 +155,16 @@ def _build(file: _File) -> Actuator | Network:
         density=file.film.density_kg_m3,
         kinematics=file.kinematics,
     )
-    effects = tuple((e.name, tuple(e.values.items())) for e in file.effect)
     load = Load(file.load.mass_kg, file.load.rest_length_m)
     return Actuator(film, load, network, effects)
 
 
-def model_toml(
-    name: str, model: Actuator | Network, kinematics: str, history: Mapping[str, Any]
-) -> str:
+def model_toml(name: str, model: Actuator | Strip, history: Mapping[str, Any]) -> str:
     """The model as the text of a model file."""
-    data: dict[str, Any] = {"format": FORMAT, "name": _plain(name), "kinematics": kinematics}
-    network = model
-    if isinstance(model, Actuator):
-        network = model.network
+    data: dict[str, Any] = {"format": FORMAT, "name": _plain(name)}
+    if isinstance(model, Strip):
+        data["kinematics"] = model.kinematics
+    else:
         data["kinematics"] = model.film.kinematics
         data["film"] = {
             "length_m": model.film.length,
@@ -169,10 +176,9 @@ def model_toml(
         data["load"] = {"mass_kg": model.load.mass}
         if model.load.rest_length is not None:
             data["load"]["rest_length_m"] = model.load.rest_length
-        if model.effects:
-            data["effect"] = [{"name": n, "values": dict(v)} for n, v in model.effects]
-    if not isinstance(network, Network):
-        raise TypeError(f"{type(model).__name__} is not a model")
+    if model.effects:
+        data["effect"] = [{"name": n, "values": dict(v)} for n, v in model.effects]
+    network = model.network
     data["equilibrium"] = _spring_table(network.equilibrium)
     data["branch"] = [
         {**_spring_table(b.spring), "relaxation_time_s": b.relaxation_time}
@@ -186,15 +192,14 @@ def model_toml(
 def save_model(
     path: str | Path,
     name: str,
-    model: Actuator | Network,
-    kinematics: str,
+    model: Actuator | Strip,
     history: Mapping[str, Any],
     overwrite: bool = False,
 ) -> Path:
     """Write a model file, whole or not at all; ``InputError`` where it may not be written."""
     out = check_output(path, overwrite)
     with replaced_when_done(out) as partial:
-        partial.write_text(model_toml(name, model, kinematics, history), encoding="utf-8")
+        partial.write_text(model_toml(name, model, history), encoding="utf-8")
     return out
 
 

@@ -1,4 +1,4 @@
-"""What identification and validation hand to the terminal, to JSON and to the report."""
+"""What identification, validation and diagnosis hand to terminal, JSON and report."""
 
 from __future__ import annotations
 
@@ -6,10 +6,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from model.diagnosis.findings import Diagnosis
 from model.fitting import Identification
 from model.measures import Errors
 
-__all__ = ["BranchTrial", "Comparison", "IdentifyOutcome", "Published", "ValidateOutcome"]
+__all__ = [
+    "BranchTrial",
+    "Comparison",
+    "DiagnoseOutcome",
+    "IdentifyOutcome",
+    "Published",
+    "SeparatingExperiment",
+    "Stand",
+    "ValidateOutcome",
+]
 
 
 @dataclass(frozen=True)
@@ -25,7 +35,8 @@ class Comparison:
     """One recording beside a model of it.
 
     ``kind`` is actuator (``drive`` in V, ``measured`` and ``model`` in m) or film (``drive`` is the
-    stretch, the others in Pa); all arrays are (N,) on ``time`` s. ``noise`` is the noise floor in
+    stretch, the others in Pa); all arrays are (N,) on ``time`` s, ``measured`` is NaN where a
+    reading must not be used. ``noise`` is the noise floor in
     the measured unit, None where it could not be read. ``role`` is train or validation. ``table``
     is A, B, or "" for a run that is in neither of the thesis's validation tables, ``row`` its label
     there (f = 0.2 Hz).
@@ -88,3 +99,69 @@ class ValidateOutcome:
     model_name: str
     model_path: str
     comparisons: tuple[Comparison, ...]
+
+
+@dataclass(frozen=True)
+class Stand:
+    """One model beside all recordings: ``effects`` it has, and how it does on them.
+
+    ``train`` was fitted, ``validation`` was not seen by any fit or choice.
+    """
+
+    effects: tuple[str, ...]
+    train: tuple[Comparison, ...]
+    validation: tuple[Comparison, ...]
+
+
+@dataclass(frozen=True)
+class SeparatingExperiment:
+    """The sequence under which rival models differ most.
+
+    ``rivals`` are the labels of the models, ``separates`` their families. ``separation`` is the
+    smallest RMS difference between the predictions of any two of them, in noise floors; ``closest``
+    names those two. ``tried`` are all sequences with that number and their duration in s.
+    """
+
+    name: str
+    sequence: str
+    rivals: tuple[str, ...]
+    separates: tuple[str, ...]
+    separation: float
+    closest: tuple[str, str]
+    seconds: float
+    tried: tuple[tuple[str, float, float], ...]
+
+
+@dataclass(frozen=True)
+class DiagnoseOutcome:
+    """A finished (or interrupted) diagnosis, with its errors on recordings of either role.
+
+    ``stands`` are the baseline, the model after each step, and last the final one. ``noise`` is the
+    pooled noise floor of the training recordings in m or Pa. ``experiment`` separates what the data
+    do not; ``experiment_words`` says of it, or of why there is none. ``performed`` tells of the
+    experiments that were run on a rig, one sentence each. ``quality`` are sentences on recordings.
+    """
+
+    title: str
+    kind: str
+    drive: str
+    finding: Diagnosis
+    stands: tuple[Stand, ...]
+    noise: float
+    experiment: SeparatingExperiment | None
+    experiment_words: str
+    quality: tuple[str, ...]
+    model_path: str
+    seconds: float
+    performed: tuple[str, ...] = ()
+    rig: str = ""
+
+    @property
+    def before(self) -> Stand:
+        """The baseline."""
+        return self.stands[0]
+
+    @property
+    def after(self) -> Stand:
+        """The final model."""
+        return self.stands[-1]

@@ -12,16 +12,17 @@ import numpy as np
 from app.errors import InputError
 from app.outcomes import Comparison, Published
 from app.presets import PRESETS, VALIDATION_A, VALIDATION_B
+from app.quality import driven_by, inspect
+from app.recording.quiet import noise_floor
 from app.recording.reader import open_recording
 from app.recording.recording import Recording
 from app.sequencefile import parse_sequence
 from model.actuator import Actuator, Drive
 from model.errors import ModelError
 from model.excitation import Lobes
-from model.film import nominal_stress
-from model.material import Network
+from model.film import Strip
 from model.measures import errors
-from model.records import ActuatorRecord, FilmRecord, Record, at_sensor, noise_of
+from model.records import ActuatorRecord, FilmRecord, Record, noise_of
 
 __all__ = ["PUBLISHED_FIT", "as_record", "compare", "open_all"]
 
@@ -79,36 +80,57 @@ _KIND_WORDS = {"actuator": "an actuator (voltage)", "film": "a film (stretch)"}
 def as_record(recording: Recording, drive: str = "command") -> Record:
     """What a fit sees of a recording; ``drive`` is command or monitor, for actuators.
 
-    The noise comes from the quiet lead-in, or from second differences where there is none.
+    The noise comes from the quiet lead-in, or from second differences where there is none. Readings
+    that must not be used (see ``app.quality``) are masked, and replaced by a line across them.
     """
     try:
         if recording.kind == "film":
             stretch, stress = _present(recording.stretch), _present(recording.nominal_stress)
-            return FilmRecord(recording.name, recording.time, stretch, stress, _noise(stress))
+            _noise(stress)  # one that never changes has its own words
+            valid = inspect(recording, drive).valid
+            stress = _bridged(recording.time, stress, valid)
+            return FilmRecord(
+                recording.name, recording.time, stretch, stress, _noise(stress), valid
+            )
         displacement = _present(recording.displacement)
         noise = recording.noise_floor or _noise(displacement)
+        driven = recording_drive(recording, drive)
+        valid = inspect(recording, drive).valid
+        if valid is not None:
+            displacement = _bridged(recording.time, displacement, valid)
+            quiet = recording.quiet & valid
+            noise = noise_floor(recording.time[quiet], displacement[quiet]) or _noise(displacement)
         return ActuatorRecord(
             recording.name,
-            recording_drive(recording, drive),
+            driven,
             displacement,
             noise,
             recording.displacement_delay - recording.displacement_skew,
+            valid,
         )
     except ModelError as error:
         raise InputError(f"{recording.path}: {error}") from error
 
 
+def _bridged(time: np.ndarray, values: np.ndarray, valid: np.ndarray | None) -> np.ndarray:
+    """``values`` (N,) with a straight line across what is not ``valid``."""
+    if valid is None:
+        return values
+    return np.where(valid, values, np.interp(time, time[valid], values[valid]))
+
+
 def recording_drive(recording: Recording, drive: str) -> Drive:
-    """The voltage of a recording: what was commanded, or what the monitor read."""
-    voltage = recording.voltage_command
-    if drive == "monitor":
-        voltage = recording.voltage_monitor
-        if voltage is None:
-            raise InputError(
-                f"{recording.path} has no voltage monitor; leave --drive out to use the command"
-            )
+    """The voltage of a recording: what was commanded, or what the monitor read.
+
+    With a thermometer, the temperature above that of the first second comes along.
+    """
+    voltage = driven_by(recording, drive)
+    warmth = None
+    if recording.temperature is not None:
+        start = recording.time < recording.time[0] + 1.0
+        warmth = recording.temperature - float(recording.temperature[start].mean())
     try:
-        return Drive(recording.time, _present(voltage), recording.hold)
+        return Drive(recording.time, _present(voltage), recording.hold, warmth)
     except ModelError as error:
         raise InputError(f"{recording.path}: {error}") from error
 
@@ -131,32 +153,38 @@ def _noise(values: np.ndarray) -> float:
 
 def compare(
     recording: Recording,
-    model: Actuator | Network,
-    kinematics: str,
+    model: Actuator | Strip,
     role: str,
     drive: str = "command",
 ) -> Comparison:
     """The recording beside what ``model`` says, with its errors.
 
-    Raises ``InputError`` where model and recording are not of one kind, or where the model cannot
-    follow the drive.
+    Readings that must not be used are NaN in it, and no part of its errors. Raises ``InputError``
+    where model and recording are not of one kind, or where the model cannot follow the drive.
     """
-    warnings: list[str] = []
+    look = inspect(recording, drive, to_fit=False)
+    warnings = list(look.findings)
+    signal = recording.signal
+    usable = np.ones(signal.size, dtype=bool) if look.valid is None else look.valid
     if recording.kind == "film":
         if isinstance(model, Actuator):
             raise InputError(
                 f"{recording.path} is of a film (stretch), and the model is of an actuator "
                 f"(voltage): validate it on recordings of the actuator, or identify a film model"
             )
-        if recording.kinematics != kinematics:
-            warnings.append(f"the film was held {recording.kinematics}, the model's {kinematics}")
-        record = as_record(recording)
+        if recording.kinematics != model.kinematics:
+            warnings.append(
+                f"the film was held {recording.kinematics}, the model's {model.kinematics}"
+            )
         stretch = _present(recording.stretch)
-        answer = nominal_stress(model, recording.kinematics, recording.time, stretch)
+        answer = replace(model, kinematics=recording.kinematics).simulate(recording.time, stretch)
         if not answer.ok:
             raise InputError(f"{recording.path}: the model cannot follow it: {answer.in_words}")
         predicted, driven = answer.stress, stretch
-        noise: float | None = record.noise
+        try:
+            noise: float | None = _noise(signal[usable])
+        except ModelError as error:
+            raise InputError(f"{recording.path}: {error}") from error
         table, row, published = "", "", None
     else:
         if not isinstance(model, Actuator):
@@ -167,18 +195,13 @@ def compare(
             )
         warnings += _other_rig(recording, model)
         drive_of = recording_drive(recording, drive)
-        response = model.simulate(drive_of)
+        lag = recording.displacement_delay - recording.displacement_skew
+        response = model.simulate(drive_of, lag)
         if not response.ok:
             raise InputError(f"{recording.path}: the model cannot follow it: {response.in_words}")
-        predicted = np.empty_like(response.displacement)
-        at_sensor(
-            drive_of.time,
-            response.displacement,
-            response.rate * model.film.length,
-            recording.displacement_delay - recording.displacement_skew,
-            predicted,
-        )
-        driven, noise = drive_of.voltage, recording.noise_floor
+        predicted = response.displacement
+        quiet = recording.quiet & usable
+        driven, noise = drive_of.voltage, noise_floor(recording.time[quiet], signal[quiet])
         table, row, published = _place(recording)
     if not recording.complete:
         warnings.append("the recording is incomplete: the run was interrupted or killed")
@@ -188,9 +211,9 @@ def compare(
         role=role,
         time=recording.time,
         drive=driven,
-        measured=recording.signal,
+        measured=np.where(usable, signal, np.nan),
         model=predicted,
-        errors=errors(recording.signal, predicted),
+        errors=errors(signal[usable], predicted[usable]),
         noise=noise,
         table=table,
         row=row,

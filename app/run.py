@@ -49,13 +49,26 @@ class _NotSafe(InstrumentFault):
     """The voltage may still be up."""
 
 
-def open_rig(address: str, rig_file: RigFile, *, seed: int, paced: bool) -> Rig:
-    """The rig at ``address``. Raises ``InputError`` for an address that names none."""
+def open_rig(
+    address: str,
+    rig_file: RigFile,
+    *,
+    seed: int,
+    paced: bool,
+    actuator: Actuator | None = None,
+) -> Rig:
+    """The rig at ``address``. Raises ``InputError`` for an address that names none.
+
+    ``actuator`` takes the place of the film that ``sim`` has by default.
+    """
+    if actuator is not None and address != "sim":
+        raise InputError(f"rig {address!r} has a film of its own; only sim takes a model")
     try:
         if is_simulated(address):
             return open_simulated_rig(
-                address, rig_file, rig_file.as_film(), rig_file.as_load(), seed=seed, paced=paced
-            )
+                address, rig_file, rig_file.as_film(), rig_file.as_load(), seed=seed, paced=paced,
+                actuator=actuator,
+            )  # fmt: skip
     except AddressError as error:
         raise InputError(str(error)) from error
     except ValueError as error:  # a film that cannot hang at rest
@@ -67,17 +80,20 @@ def open_rig(address: str, rig_file: RigFile, *, seed: int, paced: bool) -> Rig:
     raise InputError(f"rig {address!r} is not known: write sim, or sim:SEED such as sim:7")
 
 
-def gate_sequence(loaded: LoadedSequence, rig_file: RigFile) -> GatedWaveform:
+def gate_sequence(
+    loaded: LoadedSequence, rig_file: RigFile, model: Actuator | None = None
+) -> GatedWaveform:
     """The sequence sampled on the rig's clock and passed through the gate.
 
-    The true field is predicted with the model of the rig file's film (Table 3's network): a
-    stretched film is thinner. Raises ``InputError`` with a sentence for every limit it breaks.
+    The true field is predicted with ``model``, by default that of the rig file's film with Table
+    3's network: a stretched film is thinner. Raises ``InputError`` with a sentence for every limit
+    it breaks.
     """
     rate, limits = float(rig_file.card.sample_rate_Hz), rig_file.gate_limits()
     name = loaded.sequence.name
     try:
         time, voltage = loaded.sample(rate)
-        actuator = Actuator(rig_file.as_film(), rig_file.as_load(), TABLE_3)
+        actuator = model or Actuator(rig_file.as_film(), rig_file.as_load(), TABLE_3)
         # the film at its thickest: what is refused here needs no prediction, and what a voltage far
         # beyond every limit would do to the model is not the operator's question
         thick = np.full(voltage.size, 1.0 / actuator.film.thickness)
@@ -116,6 +132,7 @@ def record(
     *,
     seed: int = 0,
     paced: bool = False,
+    actuator: Actuator | None = None,
     operator: str = "",
     film_id: str = "",
     notes: str = "",
@@ -124,14 +141,15 @@ def record(
 ) -> RunResult:
     """Play ``loaded`` on the rig at ``address`` and record it to ``out``.
 
-    ``configuration`` is the text of the rig file, kept with the recording. Raises ``InputError``
+    ``configuration`` is the text of the rig file, kept with the recording; ``actuator`` is what the
+    simulated rig ``sim`` is made of, where it is not Table 3's film. Raises ``InputError``
     before anything is touched; after the rig was made safe and the recording was closed,
     ``InstrumentFault`` or ``DiskFault`` for what failed during the run, and ``Interrupted`` where
     the operator ended it: the first ctrl-C ramps down in the set time, the second is 0 V at once.
     """
     out = check_output(out, overwrite)
-    waveform = gate_sequence(loaded, rig_file)
-    rig = open_rig(address, rig_file, seed=seed, paced=paced)
+    waveform = gate_sequence(loaded, rig_file, actuator)
+    rig = open_rig(address, rig_file, seed=seed, paced=paced, actuator=actuator)
     try:
         with Interrupts() as interrupts:
             try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +16,7 @@ from app.records import recording_drive
 from app.rigfile import RigFile
 from app.sequencefile import load_sequence
 from model.actuator import Actuator, Drive
-from model.film import nominal_stress
-from model.material import Network
+from model.film import Strip
 from model.stability import pull_in_voltage
 
 __all__ = ["Prediction", "simulate_model"]
@@ -55,7 +54,7 @@ def simulate_model(
     target = check_output(out, overwrite, model_path, drive)
     if target.suffix not in (".h5", ".csv"):
         raise InputError(f"{out}: the output is a recording (.h5) or a table (.csv)")
-    sequence_toml, hold, kinematics = "", False, loaded.kinematics
+    sequence_toml, hold, kinematics = "", False, "uniaxial"
     field_max, pull_in = None, None
     if Path(drive).suffix in (".h5", ".hdf5", ".nxs"):
         recording = open_recording(drive)
@@ -89,7 +88,7 @@ def simulate_model(
         film=actuator.film if actuator and "stretch" not in values else None,
         load=actuator.load if actuator and "stretch" not in values else None,
         sequence_toml=sequence_toml,
-        model_toml=model_toml(loaded.name, loaded.model, loaded.kinematics, {}),
+        model_toml=model_toml(loaded.name, loaded.model, {}),
         notes="a prediction of a model, not a measurement",
         overwrite=overwrite,
     )
@@ -97,7 +96,7 @@ def simulate_model(
 
 
 def _actuator(
-    model: Actuator | Network, drive: Drive
+    model: Actuator | Strip, drive: Drive
 ) -> tuple[dict[str, np.ndarray], float, float | None]:
     """Arrays of the prediction, its largest true field in V/m, and the pull-in voltage in V."""
     if not isinstance(model, Actuator):
@@ -117,12 +116,12 @@ def _actuator(
 
 
 def _film(
-    model: Actuator | Network, kinematics: str, time: np.ndarray, stretch: np.ndarray | None
+    model: Actuator | Strip, kinematics: str, time: np.ndarray, stretch: np.ndarray | None
 ) -> dict[str, np.ndarray]:
     if stretch is None:
         raise InputError("the recording holds no stretch")
-    network = model.network if isinstance(model, Actuator) else model
-    answer = nominal_stress(network, kinematics, time, stretch)
+    strip = Strip(model.network) if isinstance(model, Actuator) else model
+    answer = replace(strip, kinematics=kinematics).simulate(time, stretch)
     if not answer.ok:
         raise InputError(f"the model cannot follow this stretch: {answer.in_words}")
     return {"time": time, "stretch": stretch, "nominal_stress": answer.stress}

@@ -14,7 +14,18 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from app.report.as_json import outcome_json, write_json
+from app.report.as_json import diagnosis_json, outcome_json, write_json
+from app.report.diagnosis import (
+    HEADLINES,
+    before_after,
+    effect_table,
+    experiment_table,
+    ranking,
+    road,
+    summary,
+    thesis_before_after,
+    warnings,
+)
 from app.report.numbers import plain
 from app.report.tables import (
     Table,
@@ -27,10 +38,18 @@ from app.report.tables import (
 from app.report.words import identify_summary, listed, validate_summary, warnings_of
 
 if TYPE_CHECKING:
-    from app.outcomes import Comparison, IdentifyOutcome, Published, ValidateOutcome
+    from app.outcomes import (
+        Comparison,
+        DiagnoseOutcome,
+        IdentifyOutcome,
+        Published,
+        ValidateOutcome,
+    )
 
 __all__ = [
     "branch_table",
+    "diagnosis_json",
+    "diagnosis_tables",
     "identify_table",
     "outcome_json",
     "progress",
@@ -77,6 +96,33 @@ def branch_table(outcome: IdentifyOutcome) -> RenderableType:
     if not outcome.trials:
         return Group()
     return _Fitted([branch_trials(outcome.trials, outcome.kind)], ())
+
+
+_RANKED = 6  # candidates of a round that a terminal shows
+
+
+def diagnosis_tables(outcome: DiagnoseOutcome) -> RenderableType:
+    """The verdict in words, errors before and after, what was found, and what was tried."""
+    finding = outcome.finding
+    pieces: list[_Piece] = [f"{HEADLINES[finding.verdict]}.", *summary(outcome)]
+    for heading, before, after in (
+        ("Untouched recordings", outcome.before.validation, outcome.after.validation),
+        ("Training recordings", outcome.before.train, outcome.after.train),
+    ):
+        if before and after:
+            pieces.append(before_after(heading, before, after, outcome.kind))
+            theirs = f"{heading}, by the thesis's formulas"
+            pieces.append(thesis_before_after(theirs, before, after, outcome.kind))
+    pieces.append(road(outcome))
+    if finding.steps:
+        pieces.append(effect_table(outcome))
+    for found in finding.rounds:
+        table = ranking(found, _RANKED)
+        pieces.append(table if table.rows else f"{table.title}: {table.note}")
+    experiments = experiment_table(outcome)
+    if experiments is not None:
+        pieces.append(experiments)
+    return _Fitted(pieces, warnings(outcome))
 
 
 def _grouped(alone: str, comparisons: tuple[Comparison, ...]) -> list[_Piece]:
@@ -208,13 +254,14 @@ def _cut(name: str) -> str:
 
 @contextmanager
 def progress(
-    description: str, console: Console | None = None
+    description: str, console: Console | None = None, whole: bool = False
 ) -> Iterator[Callable[[str, float], None]]:
     """A progress bar on standard error while the body runs.
 
     Gives a callback ``(stage, fraction)`` with the fraction of that stage that is done; the bar
-    starts anew with every stage, the time elapsed does not. Where standard error is no terminal,
-    nothing is written.
+    starts anew with every stage, the time elapsed does not. With ``whole`` the fraction is of all
+    the work, and the bar only changes its words. Where standard error is no terminal, nothing is
+    written.
     """
     console = Console(stderr=True) if console is None else console
     if not console.is_terminal:
@@ -237,7 +284,10 @@ def progress(
     def report(stage: str, fraction: float) -> None:
         nonlocal current
         done = min(max(fraction, 0.0), 1.0) if math.isfinite(fraction) else 0.0
-        if stage != current:
+        if stage != current and whole:
+            current = stage
+            bar.update(task, description=f"{description}: {stage}")
+        elif stage != current:
             # a new stage has another speed, by which the remaining time is reckoned
             current = stage
             began = bar.tasks[0].start_time

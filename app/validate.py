@@ -29,7 +29,7 @@ def validate_model(
     comparisons = []
     for i, recording in enumerate(recordings):
         role = "train" if recording.sha256 in model.fitted else "validation"
-        comparisons.append(compare(recording, model.model, model.kinematics, role, drive))
+        comparisons.append(compare(recording, model.model, role, drive))
         progress("validation", (i + 1) / len(recordings))
     return ValidateOutcome(
         title=f"{model.name} on {len(recordings)} recording{'s' if len(recordings) > 1 else ''}",

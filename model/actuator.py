@@ -9,13 +9,25 @@ from types import MappingProxyType
 
 import numpy as np
 
-from model import kernel, network
-from model.effects import EFFECTS
+from model import coefficients as at
+from model import kernel
+from model.effects import EFFECTS, MEMORY, NEUTRAL, PLACES, SLOTS, EffectValues
 from model.errors import ModelError
 from model.kinematics import thinning
 from model.material import VACUUM_PERMITTIVITY, Film, Load, Network
+from model.network import HEAD, nominal_pull
+from model.sensor import at_sensor
 
-__all__ = ["Actuator", "Drive", "Response", "displacements"]
+__all__ = [
+    "STATUS_WORDS",
+    "Actuator",
+    "Drive",
+    "Response",
+    "at_rest",
+    "displacements",
+    "effect_values",
+    "initial_state",
+]
 
 STATUS_WORDS = MappingProxyType(
     {
@@ -34,15 +46,17 @@ class Drive:
     """Voltage at the film over time: ``time`` (N,) s, ``voltage`` (N,) V.
 
     Time increases and need not be even. ``hold`` says what happens between samples: True, the
-    voltage stands until the next (a converter's output); False, it is linear.
+    voltage stands until the next (a converter's output); False, it is linear. ``warmth`` (N,) K is
+    the temperature above that of the start, None where no thermometer was recorded.
     """
 
     time: np.ndarray
     voltage: np.ndarray
     hold: bool = False
+    warmth: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        for name in ("time", "voltage"):
+        for name in ("time", "voltage", *([] if self.warmth is None else ["warmth"])):
             object.__setattr__(
                 self, name, np.ascontiguousarray(getattr(self, name), dtype=np.float64)
             )
@@ -51,14 +65,21 @@ class Drive:
                 f"a drive takes two arrays of one length of at least 2, "
                 f"not {self.time.shape} and {self.voltage.shape}"
             )
+        if self.warmth is not None and self.warmth.shape != self.time.shape:
+            raise ModelError(f"{self.warmth.size} temperatures at {self.time.size} times")
+
+    @property
+    def temperature(self) -> np.ndarray:
+        """``warmth`` as the kernel takes it: (N,), or (0,) where there is none."""
+        return np.zeros(0) if self.warmth is None else self.warmth
 
 
 @dataclass(frozen=True)
 class Response:
     """What the film did: arrays (N,) on the drive's time, and how the computation ended.
 
-    ``stretch`` lam, ``rate`` dlam/dt in 1/s, ``displacement`` (lam - lam_rest) L1 in m, ``field``
-    the true field phi/z in V/m. ``status`` is one of ``model.kernel``'s; beyond sample ``reached``
+    ``stretch`` lam, ``rate`` dlam/dt in 1/s, ``displacement`` in m what the sensor reads, which is
+    (lam - lam_rest) L1 unless an effect acts on it, ``field`` the true field phi/z in V/m. ``status`` is one of ``model.kernel``'s; beyond sample ``reached``
     the arrays repeat the last stretch that was computed.
     """
 
@@ -95,29 +116,25 @@ class Actuator:
     film: Film
     load: Load
     network: Network
-    effects: tuple[tuple[str, tuple[tuple[str, float], ...]], ...] = field(default=())
+    effects: EffectValues = field(default=())
 
     def __post_init__(self) -> None:
-        for name, values in self.effects:
-            if name not in EFFECTS:
-                raise ModelError(f"effect {name!r} is not one of {', '.join(EFFECTS)}")
-            wanted = {p.name for p in EFFECTS[name].parameters}
-            if {n for n, _ in values} != wanted:
-                raise ModelError(
-                    f"effect {name!r} takes the parameters {', '.join(sorted(wanted))}"
-                )
+        effect_values(self.effects, "voltage")
 
     def coefficients(self) -> np.ndarray:
-        """The kernel's coefficient vector (see ``model.network``)."""
+        """The kernel's coefficient vector (see ``model.coefficients``)."""
         film, load = self.film, self.load
         c = self.network.coefficients(film.held)
-        c[network.INERTIA] = film.inertia
-        c[network.FORCE] = load.weight / (film.width * film.thickness)
-        c[network.ELECTRIC] = VACUUM_PERMITTIVITY * film.permittivity / film.thickness**2
+        permittivity = VACUUM_PERMITTIVITY * film.permittivity
+        c[at.INERTIA] = film.inertia
+        c[at.FORCE] = load.weight / (film.width * film.thickness)
+        c[at.ELECTRIC] = permittivity / film.thickness**2
+        c[at.LENGTH], c[at.THICKNESS] = film.length, film.thickness
+        c[at.SECTION] = film.width * film.thickness
+        c[at.CAPACITANCE] = permittivity * film.length * film.width / film.thickness
         if load.rest_length is not None:
-            c[network.HEAD + network.MODULUS] = _modulus_at_rest(c, load.rest_length / film.length)
-        for name, values in self.effects:
-            EFFECTS[name].contribute(c, dict(values), film, load)
+            c[HEAD + at.MODULUS] = _modulus_at_rest(c, load.rest_length / film.length)
+        c[at.EFFECTS_AT : at.EFFECTS_AT + SLOTS] = effect_values(self.effects, "voltage")
         return c
 
     def rest(self) -> float:
@@ -130,22 +147,28 @@ class Actuator:
             )
         return stretch
 
-    def simulate(self, drive: Drive) -> Response:
-        """Follow ``drive`` from the loaded rest state with relaxed branches."""
+    def simulate(self, drive: Drive, lag: float = 0.0) -> Response:
+        """Follow ``drive`` from the loaded rest state with relaxed branches.
+
+        ``lag`` s is the known age of a reading: the time by which the displacement is late.
+        """
         c = self.coefficients()
-        status, rest = kernel.rest_stretch(c, 0.0)
+        status, rest = at_rest(c)
         stretch, rate = np.full(drive.time.size, rest), np.zeros(drive.time.size)
         reached = 0
+        y = initial_state(c, rest)
         if status == kernel.OK:
-            y = initial_state(c, rest)
             status, reached = kernel.drive_by_voltage(
-                c, drive.time, drive.voltage, drive.hold, y, stretch, rate
+                c, drive.time, drive.voltage, drive.hold, drive.temperature, y, stretch, rate
             )
+        displacement, velocity = np.empty_like(stretch), rate * self.film.length
+        at_sensor(drive.time, (stretch - rest) * self.film.length, velocity, lag, displacement)
+        kernel.read_sensor(c, drive.time, displacement, velocity, np.zeros(MEMORY))
         return Response(
             time=drive.time,
             stretch=stretch,
             rate=rate,
-            displacement=(stretch - rest) * self.film.length,
+            displacement=displacement,
             field=drive.voltage / self.film.thickness * thinning(self.film.held, stretch),
             rest_stretch=rest,
             status=status,
@@ -153,50 +176,90 @@ class Actuator:
         )
 
 
+def effect_values(effects: EffectValues, drive: str) -> np.ndarray:
+    """The coefficients (SLOTS,) of ``effects``, neutral where there are none.
+
+    Raises ``ModelError`` for effects and numbers that do not exist, are out of bounds, or are not
+    of a film driven by ``drive`` (voltage or stretch).
+    """
+    found = NEUTRAL.copy()
+    for name, values in effects:
+        if name not in EFFECTS:
+            raise ModelError(f"effect {name!r} is not one of {', '.join(EFFECTS)}")
+        effect = EFFECTS[name]
+        if drive not in effect.drives:
+            raise ModelError(f"effect {name!r} is not one of films driven by {drive}")
+        given = dict(values)
+        if given.keys() != {p.name for p in effect.parameters}:
+            wanted = ", ".join(p.name for p in effect.parameters)
+            raise ModelError(f"effect {name!r} takes the parameters {wanted}")
+        for parameter in effect.parameters:
+            value, (low, high) = given[parameter.name], parameter.bounds
+            if not low <= value <= high:
+                raise ModelError(
+                    f"effect {name!r}: {parameter.name} = {value!r} {parameter.unit} must lie "
+                    f"between {low:g} and {high:g}"
+                )
+            found[PLACES[name].column(effect, parameter.name) - at.EFFECTS_AT] = value
+    return found
+
+
 def _modulus_at_rest(c: np.ndarray, stretch: float) -> float:
     """mu_0 with which the load rests at ``stretch``."""
-    held, k = int(c[network.HELD]), network.HEAD
-    pull = network.nominal_pull(
-        held, int(c[k + network.KIND]), c[k + network.LIMIT], c[k + network.LOCKING], stretch
-    )
+    held, k = int(c[at.HELD]), HEAD
+    pull = nominal_pull(held, int(c[k + at.KIND]), c[k + at.LIMIT], c[k + at.LOCKING], stretch)
     if not 0.0 < pull < np.inf:
         raise ModelError(
             f"load: a measured rest stretch of {stretch:.4g} needs a pull between 0 and the "
             f"locking limit; it must be above 1 and below the spring's locking stretch"
         )
-    return float(c[network.FORCE] / pull)
+    return float(c[at.FORCE] / pull)
+
+
+def at_rest(c: np.ndarray) -> tuple[int, float]:
+    """``(status, stretch)`` under the load at 0 V; the coefficients ``c`` get to know it."""
+    status, rest = kernel.rest_stretch(c, 0.0)
+    c[at.REST] = rest
+    return status, rest
 
 
 def initial_state(c: np.ndarray, rest: float) -> np.ndarray:
-    """Kernel state at rest: branches relaxed, xi_i = lam_rest (eq. 48's initial condition)."""
-    y = np.full(2 + (c.size - network.HEAD) // network.WIDTH - 1, rest)
+    """Kernel state at rest: branches relaxed, xi_i = lam_rest (eq. 48), nothing to remember."""
+    branches = (c.size - HEAD) // at.WIDTH - 1
+    y = np.zeros(2 + branches + MEMORY)
+    y[: 2 + branches] = rest
     y[1] = 0.0
     return y
 
 
 def displacements(
-    coefficients: np.ndarray, length: float, drive: Drive, workers: int = 2
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A population under one drive: ``coefficients`` (P, C) to displacement (P, N) in m.
+    coefficients: np.ndarray, length: float, drive: Drive, lag: float = 0.0, workers: int = 2
+) -> tuple[np.ndarray, np.ndarray]:
+    """A population under one drive: ``coefficients`` (P, C) to readings (P, N) in m.
 
-    Also returns the rates of displacement (P, N) in m/s and the statuses (P,). Members run on
+    ``lag`` s is the known age of a reading. Also returns the statuses (P,). Members run on
     ``workers`` threads (the kernels release the interpreter).
     """
     population = coefficients.shape[0]
-    x = np.zeros((population, drive.time.size))
-    u = np.zeros_like(x)
+    readings = np.zeros((population, drive.time.size))
     status = np.zeros(population, dtype=np.int64)
+    temperature = drive.temperature
 
     def run(members: Sequence[int]) -> None:
+        x, u = np.zeros(drive.time.size), np.zeros(drive.time.size)
         for p in members:
-            c = coefficients[p]
-            status[p], rest = kernel.rest_stretch(c, 0.0)
+            c = coefficients[p].copy()
+            status[p], rest = at_rest(c)
             if status[p] == kernel.OK:
+                y = initial_state(c, rest)
                 status[p], _ = kernel.drive_by_voltage(
-                    c, drive.time, drive.voltage, drive.hold, initial_state(c, rest), x[p], u[p]
+                    c, drive.time, drive.voltage, drive.hold, temperature, y, x, u
                 )
-                x[p] = (x[p] - rest) * length
-                u[p] *= length
+                x -= rest
+                x *= length
+                u *= length
+                at_sensor(drive.time, x, u, lag, readings[p])
+                kernel.read_sensor(c, drive.time, readings[p], u, np.zeros(MEMORY))
 
     if workers <= 1 or population == 1:
         run(range(population))
@@ -204,4 +267,4 @@ def displacements(
         with ThreadPoolExecutor(workers) as pool:
             # interleaved, so that stiff members (neighbours in a population) spread over threads
             list(pool.map(run, [range(w, population, workers) for w in range(workers)]))
-    return x, u, status
+    return readings, status

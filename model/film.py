@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from model import kernel
-from model.actuator import STATUS_WORDS
+from model.actuator import STATUS_WORDS, effect_values
+from model.coefficients import EFFECTS_AT, MODULUS, REST, WIDTH
+from model.effects import MEMORY, NEUTRAL, SLOTS, EffectValues
 from model.errors import ModelError
-from model.film_kernel import drive_by_stretch
+from model.film_kernel import add_effects, drive_by_stretch
 from model.kinematics import KINEMATICS
 from model.material import Network
-from model.network import HEAD, MODULUS, WIDTH
+from model.network import HEAD
 
-__all__ = ["StressResponse", "nominal_stress"]
+__all__ = ["StressResponse", "Strip", "stress_of", "unit_stresses"]
 
 
 @dataclass(frozen=True)
@@ -36,31 +38,59 @@ class StressResponse:
         return STATUS_WORDS[self.status]
 
 
-def nominal_stress(
-    network: Network, kinematics: str, time: np.ndarray, stretch: np.ndarray
-) -> StressResponse:
-    """Stress of ``network`` under ``stretch`` (N,) at ``time`` (N,) s, linear between samples.
+@dataclass(frozen=True)
+class Strip:
+    """A piece of film whose stretch is imposed: its network, how it is held, and any effects.
 
-    The film is taken to be relaxed at the first sample. Raises ``ModelError`` for unknown
-    kinematics or arrays that do not fit; everything else is a status.
+    ``effects`` maps the names of ``model.effects.EFFECTS`` to their parameter values.
     """
-    if kinematics not in KINEMATICS:
-        raise ModelError(f"kinematics {kinematics!r} is not one of {', '.join(KINEMATICS)}")
-    time = np.ascontiguousarray(time, dtype=np.float64)
-    stretch = np.ascontiguousarray(stretch, dtype=np.float64)
-    if time.ndim != 1 or time.shape != stretch.shape or time.size == 0:
-        raise ModelError(
-            f"time {time.shape} and stretch {stretch.shape} must be rows of one length"
-        )
-    c = network.coefficients(KINEMATICS.index(kinematics))
-    stress, status, reached = stress_of(c, time, stretch)
-    return StressResponse(stress, status, reached)
+
+    network: Network
+    kinematics: str = "uniaxial"
+    effects: EffectValues = field(default=())
+
+    def __post_init__(self) -> None:
+        if self.kinematics not in KINEMATICS:
+            raise ModelError(
+                f"kinematics {self.kinematics!r} is not one of {', '.join(KINEMATICS)}"
+            )
+        effect_values(self.effects, "stretch")
+
+    @property
+    def held(self) -> int:
+        """Code of the kinematics, as the kernels use it."""
+        return KINEMATICS.index(self.kinematics)
+
+    def coefficients(self) -> np.ndarray:
+        """The kernels' coefficient vector (see ``model.coefficients``)."""
+        c = self.network.coefficients(self.held)
+        c[EFFECTS_AT : EFFECTS_AT + SLOTS] = effect_values(self.effects, "stretch")
+        return c
+
+    def simulate(self, time: np.ndarray, stretch: np.ndarray) -> StressResponse:
+        """Stress under ``stretch`` (N,) at ``time`` (N,) s, linear between samples.
+
+        The film is taken to be relaxed at the first sample. Raises ``ModelError`` for arrays that
+        do not fit; everything else is a status.
+        """
+        time = np.ascontiguousarray(time, dtype=np.float64)
+        stretch = np.ascontiguousarray(stretch, dtype=np.float64)
+        if time.ndim != 1 or time.shape != stretch.shape or time.size == 0:
+            raise ModelError(
+                f"time {time.shape} and stretch {stretch.shape} must be rows of one length"
+            )
+        return StressResponse(*stress_of(self.coefficients(), time, stretch))
 
 
 def stress_of(c: np.ndarray, time: np.ndarray, stretch: np.ndarray) -> tuple[np.ndarray, int, int]:
-    """``(stress, status, reached)`` of coefficient vector ``c`` (see ``model.network``)."""
+    """``(stress, status, reached)`` of coefficient vector ``c`` (see ``model.coefficients``)."""
     parts, status, reached = unit_stresses(c, time, stretch)
-    return c[HEAD + MODULUS :: WIDTH] @ parts, status, reached
+    stress = c[HEAD + MODULUS :: WIDTH] @ parts
+    if not np.array_equal(c[EFFECTS_AT : EFFECTS_AT + SLOTS], NEUTRAL):
+        c = c.copy()
+        c[REST] = stretch[0]
+        add_effects(c, time, stretch, np.zeros(MEMORY), stress)
+    return stress, status, reached
 
 
 def unit_stresses(

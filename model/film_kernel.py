@@ -12,29 +12,22 @@ import math
 
 import numpy as np
 
+from model.coefficients import HELD, KIND, LIMIT, LOCKING, RATE, WIDTH
+from model.effects import assembly
 from model.jit import jit
 from model.kernel import BAD_INPUT, LOCKED, NOT_CONVERGED, OK
 from model.kinematics import strain_and_pull
-from model.network import (
-    HEAD,
-    HELD,
-    KIND,
-    LIMIT,
-    LOCKING,
-    RATE,
-    WIDTH,
-    branch_count,
-    nominal_pull,
-    nominal_pull_slope,
-    true_pull,
-)
+from model.network import HEAD, branch_count, nominal_pull, nominal_pull_slope, true_pull
 from model.rodas import ALPHA, GAMMA, A, C, D
 
-__all__ = ["drive_by_stretch"]
+__all__ = ["add_effects", "drive_by_stretch"]
 
 _TOLERANCE = 1e-7  # relative, in the inner stretch: 0.01 Pa on a modulus of 100 kPa
 _GENTLE = 0.1  # relaxation within one interval below which the branch is not stiff
 _SMALLEST_PART = 1e-9  # of a sample interval
+
+_soften, _stress = assembly.soften, assembly.stress
+_commit, _felt = assembly.commit, assembly.felt
 
 
 @jit
@@ -169,3 +162,24 @@ def drive_by_stretch(
         for i in range(springs):
             parts[i, k] = parts[i, reached - 1] if reached > 0 else 0.0
     return status, reached
+
+
+@jit
+def add_effects(
+    c: np.ndarray, time: np.ndarray, stretch: np.ndarray, memory: np.ndarray, stress: np.ndarray
+) -> None:
+    """Make of the network's nominal ``stress`` (N,) Pa, in place, what a film with effects has.
+
+    ``memory`` (MEMORY,) is carried along; ``c`` must know the stretch at rest.
+    """
+    for k in range(time.shape[0]):
+        before, dt, rate = stretch[k], 0.0, 0.0
+        t = time[k]
+        if k:
+            before, dt = stretch[k - 1], time[k] - time[k - 1]
+            rate, t = (stretch[k] - before) / dt, time[k - 1]
+        total = stress[k] * _soften(c, memory, stretch[k], dt, t, 0.0)
+        total += _stress(c, memory, stretch[k], rate, before, dt, t)
+        if k:
+            _commit(c, memory, stretch[k], rate, before, dt, t)
+        stress[k] = _felt(c, memory, total)

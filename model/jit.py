@@ -2,7 +2,8 @@
 
 Numba checks only the file that holds a function, not the files that function calls, so a cached
 kernel would survive an edit of the spring it calls. The cache folder is therefore named after the
-text of every source file of this package: a changed file means a new folder and one compilation.
+text of every source file that kernels are made of: a changed file means a new folder and one
+compilation.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import platformdirs
 __all__ = ["cache_folder", "inlined", "is_compiled", "jit"]
 
 _KERNEL_ROOT = Path(__file__).parent
+_WITHOUT_KERNELS = ("diagnosis", "fitting")  # folders that compile nothing
 # numba fills this module from the environment when it is imported: a type checker finds it empty
 _settings: dict[str, Any] = vars(numba.config)
 
@@ -27,12 +29,15 @@ _settings: dict[str, Any] = vars(numba.config)
 def _sources_digest() -> str:
     digest = hashlib.sha256(numba.__version__.encode())
     for path in sorted(_KERNEL_ROOT.rglob("*.py")):
-        digest.update(path.read_bytes())
+        if path.relative_to(_KERNEL_ROOT).parts[0] not in _WITHOUT_KERNELS:
+            digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
 
 def cache_folder() -> Path:
-    """Folder of the compiled kernels of exactly these sources."""
+    """Folder of the compiled kernels of exactly these sources, or the one numba was told of."""
+    if "NUMBA_CACHE_DIR" in os.environ:
+        return Path(os.environ["NUMBA_CACHE_DIR"])
     return Path(platformdirs.user_cache_dir("dearig")) / f"kernels-{_sources_digest()}"
 
 

@@ -11,6 +11,11 @@ steps as accuracy asks for. Two methods:
   an error estimate, where it is: moduli of MPa, relaxation times of microseconds, springs near
   locking. Its Jacobian is an arrow (each branch knows only lam and itself), so a step costs O(n).
 
+Where effects of ``model.effects`` change the motion, Runge-Kutta runs with their hooks in it; what
+they remember (a voltage behind a resistance, the strain of a yielding element) goes from step to
+step in closed form, so that no effect makes the film stiffer than its own stress does. Their
+numbers stand in the state behind the branches.
+
 Which one runs follows from the film's own stiffness and the sample interval, never from measured
 data, so a fit sees a smooth function. Nothing here raises: every outcome is a status.
 """
@@ -21,12 +26,9 @@ import math
 
 import numpy as np
 
-from model.jit import inlined, jit
-from model.kinematics import electric, electric_slope, strain_and_pull
-from model.network import (
+from model.coefficients import (
     ELECTRIC,
     FORCE,
-    HEAD,
     HELD,
     INERTIA,
     KIND,
@@ -36,11 +38,11 @@ from model.network import (
     RATE,
     UNIFORM,
     WIDTH,
-    branch_count,
-    nominal_pull,
-    nominal_pull_slope,
-    true_pull,
 )
+from model.effects import MEMORY, assembly
+from model.jit import inlined, jit
+from model.kinematics import electric, electric_slope, strain_and_pull
+from model.network import HEAD, branch_count, nominal_pull, nominal_pull_slope, true_pull
 from model.rodas import ALPHA, GAMMA, A, C, D
 from model.springs import SPRINGS, gent, neo_hookean
 
@@ -52,6 +54,7 @@ __all__ = [
     "OK",
     "PULL_IN",
     "drive_by_voltage",
+    "read_sensor",
     "rest_stretch",
 ]
 
@@ -72,14 +75,25 @@ _MOVED = 5e-3  # of the stretch: then the stiffness is looked at again
 _STIFFER = 1.25  # growth of the number of steps that a sample may meet on its way
 _RK4_SUBSTEPS_MAX = 2  # beyond that, one RODAS step is cheaper
 _LEAN_SUBSTEPS_MAX = 4  # the same for the quicker form
+_EFFECT_SUBSTEPS_MAX = 2000  # with effects there is no other method: beyond, the film is given up
 _RODAS_TOLERANCE = 5e-9  # in stretch, a step: 0.4 nm on 75 mm
 _RODAS_STEP_MAX = 2e-2  # s; the error estimate rules below that
 _RODAS_HALVINGS = 2.0**-17
+
+_inertia, _supply, _polarise = assembly.inertia, assembly.supply, assembly.polarise
+_permittivity, _soften, _stress = assembly.permittivity, assembly.soften, assembly.stress
+_stiffness, _commit, _sense = assembly.stiffness, assembly.commit, assembly.sense
+_acting = assembly.acting
+_SUPPLY, _POLARISE = assembly.BITS["supply"], assembly.BITS["polarise"]
+_PERMITTIVITY, _SOFTEN = assembly.BITS["permittivity"], assembly.BITS["soften"]
+_STRESS, _COMMIT = assembly.BITS["stress"], assembly.BITS["commit"]
+_MOVING = _SUPPLY | _POLARISE | _PERMITTIVITY | _SOFTEN | _STRESS
 
 _NEO_HOOKEAN, _GENT = SPRINGS.index(neo_hookean.NAME), SPRINGS.index(gent.NAME)
 
 _SHORTEST = WIDTH
 _LONGEST = WIDTH + 1
+_STIFFENING = WIDTH + 2
 
 
 @jit
@@ -177,7 +191,9 @@ def _speed_limit(c: np.ndarray, y: np.ndarray) -> tuple[float, float]:
         bend = nominal_pull_slope(held, int(c[k + KIND]), c[k + LIMIT], c[k + LOCKING], e)
         stiffness += c[k + MODULUS] * bend / (y[2 + i] * y[2 + i])
         fastest = max(fastest, c[k + RATE] * bend * e / y[2 + i])
-    swing = math.sqrt(max(stiffness, 0.0) / c[INERTIA])
+    more, damping = _stiffness(c, y[2 + branch_count(c) :], lam)
+    swing = math.sqrt(max(stiffness + more, 0.0) / c[INERTIA])
+    fastest = max(fastest, damping / c[INERTIA])
     return swing, max(max(swing, fastest) / _RK4_PHASE_MAX, 1.0 / _RK4_STEP_MAX)
 
 
@@ -222,19 +238,21 @@ def _locking_stretch(held: int, locking: float, sign: float) -> float:
 
 @jit
 def _spring_table(c: np.ndarray) -> np.ndarray:
-    """Springs as (WIDTH + 2, n + 1): one row a property, so that loops over springs read in order.
+    """Springs as (WIDTH + 3, n + 1): one row a property, so that loops over springs read in order.
 
-    The two rows added are the least and the greatest stretch short of locking.
+    The rows added are the least and the greatest stretch short of locking, and 1/J (0 for a
+    neo-Hookean spring, of no meaning for a spring of chains).
     """
     held = int(c[HELD])
     count = branch_count(c) + 1
-    table = np.empty((WIDTH + 2, count))
+    table = np.empty((WIDTH + 3, count))
     for i in range(count):
         k = HEAD + WIDTH * i
         for m in range(WIDTH):
             table[m, i] = c[k + m]
         table[_SHORTEST, i] = _locking_stretch(held, c[k + LOCKING], -1.0)
         table[_LONGEST, i] = _locking_stretch(held, c[k + LOCKING], 1.0)
+        table[_STIFFENING, i] = 0.0 if c[k + KIND] == _NEO_HOOKEAN else 1.0 / c[k + LIMIT]
     return table
 
 
@@ -269,7 +287,7 @@ def _rk4_steps(
     ``trace`` carries the acceleration at the last two of every ``stride`` steps; its last number
     becomes the largest second difference of these accelerations met on the way.
     """
-    n = y.shape[0]
+    n = 1 + springs.shape[1]
     k1, k2, k3, k4, z = work[0], work[1], work[2], work[3], work[4]
     trace[2] = 0.0
     for m in range(steps):
@@ -305,6 +323,161 @@ def _lean_pull(p: float, q: float, stiffening: float) -> float:
     return d * (p + q) / (p * q - d * d * stiffening)
 
 
+@inlined
+def _affected(
+    acting: int,
+    c: np.ndarray,
+    m: np.ndarray,
+    lam: float,
+    rate: float,
+    warmth: float,
+    lam0: float,
+    since: float,
+    t: float,
+    field2: float,
+    pull: float,
+    held_back: float,
+    over: float,
+) -> float:
+    """Maxwell stress less the network's, with the effects in both: ``since`` s after ``t`` and lam0.
+
+    ``acting`` says which hooks have anything to do; all stresses are divided by ``over``.
+    """
+    if acting & _PERMITTIVITY:
+        pull *= _permittivity(c, m, lam, field2)
+    if acting & _SOFTEN:
+        held_back *= _soften(c, m, lam, since, t, warmth)
+    if acting & _STRESS:
+        held_back += _stress(c, m, lam, rate, lam0, since, t) / over
+    return pull - held_back
+
+
+@inlined
+def _supplied_now(
+    acting: int, c: np.ndarray, m: np.ndarray, t: float, lam: float, speed: float, va: float
+) -> tuple[float, float]:
+    """Voltage at the film when a step begins, and the voltage squared that pulls on it."""
+    if acting & _SUPPLY:
+        va, _ = _supply(c, m, t, va, va, 0.0, lam, speed)
+    ea = va * va
+    if acting & _POLARISE:
+        pa, _ = _polarise(c, m, va, va, 0.0)
+        ea += pa
+    return va, ea
+
+
+@inlined
+def _supplied(
+    acting: int,
+    c: np.ndarray,
+    m: np.ndarray,
+    t: float,
+    half: float,
+    lam: float,
+    speed: float,
+    gain: float,
+    now: float,
+    va: float,
+    vm: float,
+    vb: float,
+) -> tuple[float, float]:
+    """Voltage squared that pulls on the film amid and after a step of 2 ``half`` s.
+
+    ``now`` V is at the film when the step begins. What reaches it follows from how it goes on with
+    the acceleration ``gain`` of the start: a film that grows lowers its own voltage.
+    """
+    if acting & _SUPPLY:
+        early, late = 0.5 * half, 1.5 * half
+        _, middle = _supply(
+            c, m, t, va, vm, half, lam + early * speed, speed + early * gain
+        )  # fmt: skip
+        _, vb = _supply(
+            c, m, t + half, vm, vb, half, lam + late * speed, speed + late * gain
+        )  # fmt: skip
+        vm = middle
+    em, eb = vm * vm, vb * vb
+    if acting & _POLARISE:
+        _, pm = _polarise(c, m, now, vm, half)
+        _, pb = _polarise(c, m, vm, vb, half)
+        em, eb = em + pm, eb + pb
+    return em, eb
+
+
+@inlined
+def _pull(
+    acting: int,
+    c: np.ndarray,
+    springs: np.ndarray,
+    y: np.ndarray,
+    m: np.ndarray,
+    field2: float,
+    warmth: float,
+    lam0: float,
+    since: float,
+    t: float,
+    dy: np.ndarray,
+) -> None:
+    """As ``_rates`` with the effects in it, ``since`` s after the step began at ``t`` and lam0."""
+    held = int(c[HELD])
+    _rates(held, int(c[UNIFORM]), c, springs, y, 0.0, dy)
+    maxwell = c[ELECTRIC] * field2 * electric(held, y[0])
+    held_back = c[FORCE] - dy[1] * c[INERTIA]
+    dy[1] = _affected(
+        acting, c, m, y[0], y[1], warmth, lam0, since, t, field2, maxwell, held_back, 1.0
+    )
+    dy[1] = (c[FORCE] + dy[1]) / c[INERTIA]
+
+
+@jit
+def _effect_steps(
+    acting: int,
+    c: np.ndarray,
+    springs: np.ndarray,
+    y: np.ndarray,
+    v0: float,
+    v1: float,
+    t0: float,
+    warmth: float,
+    h: float,
+    steps: int,
+    stride: int,
+    work: np.ndarray,
+    trace: np.ndarray,
+) -> None:
+    """As ``_rk4_steps``, with effects in the motion; ``t0`` s is the time at the beginning."""
+    n = 1 + springs.shape[1]
+    m = y[n:]
+    k1, k2, k3, k4, z = work[0], work[1], work[2], work[3], work[4]
+    trace[2] = 0.0
+    half = 0.5 * h
+    for step in range(steps):
+        t = t0 + step * h
+        va = v0 + (v1 - v0) * (step / steps)
+        vm = v0 + (v1 - v0) * ((step + 0.5) / steps)
+        vb = v0 + (v1 - v0) * ((step + 1.0) / steps)
+        lam0 = y[0]
+        now, ea = _supplied_now(acting, c, m, t, lam0, y[1], va)
+        _pull(acting, c, springs, y, m, ea, warmth, lam0, 0.0, t, k1)
+        em, eb = _supplied(acting, c, m, t, half, lam0, y[1], k1[1], now, va, vm, vb)
+        if step % stride == 0:
+            trace[2] = max(trace[2], abs(k1[1] - 2.0 * trace[0] + trace[1]))
+            trace[1] = trace[0]
+            trace[0] = k1[1]
+        for j in range(n):
+            z[j] = y[j] + half * k1[j]
+        _pull(acting, c, springs, z, m, em, warmth, lam0, half, t, k2)
+        for j in range(n):
+            z[j] = y[j] + half * k2[j]
+        _pull(acting, c, springs, z, m, em, warmth, lam0, half, t, k3)
+        for j in range(n):
+            z[j] = y[j] + h * k3[j]
+        _pull(acting, c, springs, z, m, eb, warmth, lam0, h, t, k4)
+        for j in range(n):
+            y[j] += h / 6.0 * (k1[j] + 2.0 * (k2[j] + k3[j]) + k4[j])
+        if acting & _COMMIT:
+            _commit(c, m, y[0], y[1], lam0, h, t)
+
+
 @jit
 def _lean_table(c: np.ndarray, springs: np.ndarray) -> np.ndarray:
     """What ``_lean_steps`` reads: load and field over the inertia, then three numbers a spring.
@@ -315,18 +488,21 @@ def _lean_table(c: np.ndarray, springs: np.ndarray) -> np.ndarray:
     table[0], table[1] = c[FORCE] / c[INERTIA], c[ELECTRIC] / c[INERTIA]
     for i in range(springs.shape[1]):
         table[2 + 3 * i] = springs[MODULUS, i] / c[INERTIA]
-        neo_hookean = springs[KIND, i] == _NEO_HOOKEAN
-        table[3 + 3 * i] = 0.0 if neo_hookean else 1.0 / springs[LIMIT, i]
+        table[3 + 3 * i] = springs[_STIFFENING, i]
         table[4 + 3 * i] = springs[RATE, i]
     return table
 
 
 @jit
 def _lean_steps(
+    acting: int,
+    c: np.ndarray,
     table: np.ndarray,
     y: np.ndarray,
     v0: float,
     v1: float,
+    t0: float,
+    warmth: float,
     h: float,
     steps: int,
     stride: int,
@@ -335,8 +511,12 @@ def _lean_steps(
     """As ``_rk4_steps`` for the thesis's case: width held, springs of Gent's kind, n <= 3.
 
     Twice as fast, because nothing leaves the registers on the way. ``table`` is ``_lean_table``'s.
+    Where effects are ``acting`` it does what ``_effect_steps`` does.
     """
-    n = y.shape[0] - 2
+    n = y.shape[0] - 2 - MEMORY
+    memory = y[2 + n :]
+    inertia = c[INERTIA]
+    lam0, t = y[0], t0
     load, electric_gain = table[0], table[1]
     m0, g0 = table[2], table[3]
     m1, g1, r1 = table[5], table[6], table[7]
@@ -352,14 +532,28 @@ def _lean_steps(
     for m in range(steps):
         va = v0 + dv * m
         vm, vb = va + 0.5 * dv, va + dv
-        e0, em, e1 = electric_gain * va * va, electric_gain * vm * vm, electric_gain * vb * vb
+        f0, fm, fb = va * va, vm * vm, vb * vb
+        now = va
+        if acting:
+            lam0, t = lam, t0 + m * h
+            now, f0 = _supplied_now(acting, c, memory, t, lam, speed, va)
+        e0 = electric_gain * f0
         # four times the same, written out: a loop over stages would go through memory
 
         p = lam * lam
         t1, t2 = _lean_pull(p, x1 * x1, g1), _lean_pull(p, x2 * x2, g2)
         t3 = _lean_pull(p, x3 * x3, g3)
         stress = m0 * _lean_pull(p, 1.0, g0) + m1 * t1 + m2 * t2 + m3 * t3
-        a = load + e0 * lam - stress / lam
+        a = e0 * lam - stress / lam
+        if acting:
+            a = _affected(
+                acting, c, memory, lam, speed, warmth, lam0, 0.0, t, f0, e0 * lam,
+                stress / lam, inertia,
+            )  # fmt: skip
+        a += load
+        if acting:
+            fm, fb = _supplied(acting, c, memory, t, half, lam, speed, a, now, va, vm, vb)
+        em, e1 = electric_gain * fm, electric_gain * fb
         if m % stride == 0:
             bend = max(bend, abs(a - 2.0 * last + last_but_one))
             last_but_one, last = last, a
@@ -373,7 +567,13 @@ def _lean_steps(
         t1, t2 = _lean_pull(p, z1 * z1, g1), _lean_pull(p, z2 * z2, g2)
         t3 = _lean_pull(p, z3 * z3, g3)
         stress = m0 * _lean_pull(p, 1.0, g0) + m1 * t1 + m2 * t2 + m3 * t3
-        a = load + em * z - stress / z
+        a = em * z - stress / z
+        if acting:
+            a = _affected(
+                acting, c, memory, z, v, warmth, lam0, half, t, fm, em * z,
+                stress / z, inertia,
+            )  # fmt: skip
+        a += load
         f1, f2, f3 = r1 * t1, r2 * t2, r3 * t3
         sum_v, sum_a = sum_v + 2.0 * v, sum_a + 2.0 * a
         sum_1, sum_2, sum_3 = sum_1 + 2.0 * f1, sum_2 + 2.0 * f2, sum_3 + 2.0 * f3
@@ -384,7 +584,13 @@ def _lean_steps(
         t1, t2 = _lean_pull(p, z1 * z1, g1), _lean_pull(p, z2 * z2, g2)
         t3 = _lean_pull(p, z3 * z3, g3)
         stress = m0 * _lean_pull(p, 1.0, g0) + m1 * t1 + m2 * t2 + m3 * t3
-        a = load + em * z - stress / z
+        a = em * z - stress / z
+        if acting:
+            a = _affected(
+                acting, c, memory, z, v, warmth, lam0, half, t, fm, em * z,
+                stress / z, inertia,
+            )  # fmt: skip
+        a += load
         f1, f2, f3 = r1 * t1, r2 * t2, r3 * t3
         sum_v, sum_a = sum_v + 2.0 * v, sum_a + 2.0 * a
         sum_1, sum_2, sum_3 = sum_1 + 2.0 * f1, sum_2 + 2.0 * f2, sum_3 + 2.0 * f3
@@ -395,9 +601,17 @@ def _lean_steps(
         t1, t2 = _lean_pull(p, z1 * z1, g1), _lean_pull(p, z2 * z2, g2)
         t3 = _lean_pull(p, z3 * z3, g3)
         stress = m0 * _lean_pull(p, 1.0, g0) + m1 * t1 + m2 * t2 + m3 * t3
-        a = load + e1 * z - stress / z
+        a = e1 * z - stress / z
+        if acting:
+            a = _affected(
+                acting, c, memory, z, v, warmth, lam0, h, t, fb, e1 * z,
+                stress / z, inertia,
+            )  # fmt: skip
+        a += load
         lam += sixth * (sum_v + v)
         speed += sixth * (sum_a + a)
+        if acting & _COMMIT:
+            _commit(c, memory, lam, speed, lam0, h, t)
         x1 += sixth * (sum_1 + r1 * t1)
         x2 += sixth * (sum_2 + r2 * t2)
         x3 += sixth * (sum_3 + r3 * t3)
@@ -426,7 +640,7 @@ def _rodas_step(
 
     Returns the error estimate over its tolerance; inf where a stage left the admissible region.
     """
-    n = y.shape[0]
+    n = 1 + springs.shape[1]
     branches = n - 2
     held = int(c[HELD])
     lam = y[0]
@@ -517,7 +731,7 @@ def _rodas(
         va = v0 + (v1 - v0) * (done / dt)
         error = _rodas_step(c, springs, y, va, (v1 - v0) * (step / dt), step, work, out)
         if error <= 1.0:
-            for j in range(y.shape[0]):
+            for j in range(1 + springs.shape[1]):
                 y[j] = out[j]
             done += step
             grow = 0.9 * max(error, 1e-4) ** -0.25
@@ -538,15 +752,18 @@ def drive_by_voltage(
     time: np.ndarray,
     voltage: np.ndarray,
     hold: bool,
+    warmth: np.ndarray,
     y: np.ndarray,
     stretch: np.ndarray,
     rate: np.ndarray,
 ) -> tuple[int, int]:
-    """Carry state ``y`` (2 + n,) in place along a record; fill ``stretch`` and ``rate`` (N,).
+    """Carry state ``y`` (2 + n + MEMORY,) along a record; fill ``stretch`` and ``rate`` (N,).
 
     ``time`` s and ``voltage`` V are (N,), increasing and not necessarily even. With ``hold`` each
     voltage stands until the next sample (a converter's output), else the voltage is linear between
-    samples. Element 0 is the state as given, so a record can be cut and continued.
+    samples. ``warmth`` (N,) K is the temperature above that of the start, or (0,) where none was
+    recorded. Element 0 is the state as given, so a record can be cut and continued. ``c`` must know
+    the stretch at rest (``model.actuator.at_rest``).
 
     Returns ``(status, reached)``: on any status but ``OK`` the samples from ``reached`` on are
     filled with the last stretch that was reached, never with NaN.
@@ -554,9 +771,16 @@ def drive_by_voltage(
     samples = time.shape[0]
     held, uniform = int(c[HELD]), int(c[UNIFORM])
     springs = _spring_table(c)
+    c = c.copy()
+    c[INERTIA] += _inertia(c, y)
+    acting = _acting(c)
+    moves = acting & _MOVING != 0
+    warm = warmth.shape[0] == samples
     lean = held == 0 and springs.shape[1] <= 4 and np.max(springs[KIND]) <= _GENT
     table = _lean_table(c, springs) if lean else np.zeros(0)
     most = _LEAN_SUBSTEPS_MAX if lean else _RK4_SUBSTEPS_MAX
+    if moves:
+        most = _EFFECT_SUBSTEPS_MAX
     work = np.zeros((15, y.shape[0]))
     before = np.empty(y.shape[0])
     trace = np.zeros(3)
@@ -621,8 +845,17 @@ def drive_by_voltage(
                 forced = 3.0 * min(abs(kick), kick_before)
             for j in range(y.shape[0]):
                 before[j] = y[j]
+            theta = warmth[k] if warm else 0.0
             if lean:
-                _lean_steps(table, y, v0, v1, dt / fine, fine, refine, trace)
+                _lean_steps(
+                    acting if moves else 0, c, table, y, v0, v1, time[k], theta, dt / fine, fine,
+                    refine, trace,
+                )  # fmt: skip
+            elif moves:
+                _effect_steps(
+                    acting, c, springs, y, v0, v1, time[k], theta, dt / fine, fine, refine, work,
+                    trace,
+                )  # fmt: skip
             else:
                 h_fine = dt / fine
                 _rk4_steps(held, uniform, c, springs, y, v0, v1, h_fine, fine, refine, work, trace)
@@ -632,7 +865,7 @@ def drive_by_voltage(
                 bound_before = bound
                 swing, bound = _speed_limit(c, y)
                 lam_seen, step_before = y[0], 0.0
-                explicit = bound <= _STIFFER * bound_before
+                explicit = moves or bound <= _STIFFER * bound_before
             if explicit:
                 ring = max(ring * fading, trace[2] * per_phase2 - forced)
             else:
@@ -641,7 +874,10 @@ def drive_by_voltage(
         last = v0
         if not explicit:
             fresh = True
-            status, h = _rodas(c, springs, y, v0, v1, dt, h, work)
+            if moves:
+                status = NOT_CONVERGED
+            else:
+                status, h = _rodas(c, springs, y, v0, v1, dt, h, work)
         if status != OK:
             status, reached = _runaway(c, y, max(v0 * v0, v1 * v1)), k + 1
             break
@@ -650,3 +886,21 @@ def drive_by_voltage(
             stretch[k] = stretch[reached - 1]
             rate[k] = 0.0
     return status, reached
+
+
+@jit
+def read_sensor(
+    c: np.ndarray,
+    time: np.ndarray,
+    displacement: np.ndarray,
+    velocity: np.ndarray,
+    memory: np.ndarray,
+) -> None:
+    """What the sensor makes of ``displacement`` (N,) m, in place, by the effects that act on it.
+
+    ``velocity`` (N,) m/s is the film's; ``memory`` (MEMORY,) is carried along. Element 0 is the
+    last reading of the call before, or the first of the record.
+    """
+    for k in range(time.shape[0]):
+        dt = time[k] - time[k - 1] if k else 0.0
+        displacement[k] = _sense(c, memory, time[k], dt, displacement[k], velocity[k])

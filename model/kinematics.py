@@ -25,6 +25,8 @@ __all__ = [
     "pull_slope",
     "strain_and_pull",
     "thinning",
+    "thinning_squared",
+    "thinning_squared_slope",
 ]
 
 #: Names in the order of the integer codes that the kernels use.
@@ -69,6 +71,26 @@ def directions(held: int) -> float:
 def thinning(held: int, stretch: np.ndarray) -> np.ndarray:
     """Z/z, the thickness before over the thickness after: true field = phi/Z times this."""
     return stretch ** (1.0, 0.5, 2.0)[held]
+
+
+@jit
+def thinning_squared(held: int, lam: float) -> float:
+    """(Z/z)^2: the true field squared over (phi/Z)^2, and the capacitance over that at rest."""
+    if held == 0:
+        return lam * lam
+    if held == 1:
+        return lam
+    return lam * lam * lam * lam
+
+
+@jit
+def thinning_squared_slope(held: int, lam: float) -> float:
+    """d(thinning_squared)/dlam."""
+    if held == 0:
+        return 2.0 * lam
+    if held == 1:
+        return 1.0
+    return 4.0 * lam * lam * lam
 
 
 @jit

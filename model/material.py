@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from model import network
+from model import coefficients as at
+from model.effects import NEUTRAL, SLOTS
 from model.errors import ModelError
 from model.kinematics import KINEMATICS
+from model.network import HEAD
 from model.springs import SPRINGS, locking_strain
 
 __all__ = [
@@ -168,23 +170,24 @@ class Network:
         return tuple(b.relaxation_time for b in self.branches)
 
     def coefficients(self, held: int) -> np.ndarray:
-        """Coefficients as ``model.network`` lays them out; of the head only ``held`` is filled."""
+        """Coefficients as ``model.coefficients`` has them; of the head only ``held`` is filled."""
         springs = self.springs
-        c = np.zeros(network.HEAD + network.WIDTH * len(springs))
-        c[network.HELD] = held
-        c[network.INERTIA] = 1.0
+        c = np.zeros(HEAD + at.WIDTH * len(springs))
+        c[at.HELD] = held
+        c[at.INERTIA] = c[at.LENGTH] = c[at.SECTION] = c[at.THICKNESS] = c[at.REST] = 1.0
+        c[at.EFFECTS_AT : at.EFFECTS_AT + SLOTS] = NEUTRAL
         kinds = {SPRINGS.index(spring.kind) for spring in springs}
-        c[network.UNIFORM] = kinds.pop() if len(kinds) == 1 else -1
+        c[at.UNIFORM] = kinds.pop() if len(kinds) == 1 else -1
         for i, spring in enumerate(springs):
-            k = network.HEAD + network.WIDTH * i
+            k = HEAD + at.WIDTH * i
             kind = SPRINGS.index(spring.kind)
-            c[k + network.KIND] = kind
-            c[k + network.MODULUS] = spring.modulus
-            c[k + network.LIMIT] = spring.limit
-            c[k + network.LOCKING] = locking_strain(kind, spring.limit)
+            c[k + at.KIND] = kind
+            c[k + at.MODULUS] = spring.modulus
+            c[k + at.LIMIT] = spring.limit
+            c[k + at.LOCKING] = locking_strain(kind, spring.limit)
             if i:
                 # a branch that relaxes within a nanosecond carries nothing; 1/0 would be no number
-                c[k + network.RATE] = 1.0 / max(self.times[i - 1], 1e-9)
+                c[k + at.RATE] = 1.0 / max(self.times[i - 1], 1e-9)
         return c
 
 

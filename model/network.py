@@ -1,31 +1,17 @@
-"""The generalised Maxwell network: stress and stiffness of its springs, flow of its dashpots.
-
-Layout of the coefficient vector that every kernel reads (one row a parameter set, so that a
-population is a matrix): a head of ``HEAD`` numbers, then ``WIDTH`` numbers for each spring, the
-equilibrium spring first.
-"""
+"""The generalised Maxwell network: stress and stiffness of its springs."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from model.coefficients import EFFECTS_AT, HELD, KIND, LIMIT, LOCKING, MODULUS, WIDTH
+from model.effects import SLOTS
 from model.jit import jit
 from model.kinematics import directions, pull_slope, strain_and_pull
 from model.springs import curvature, slope
 
 __all__ = [
-    "ELECTRIC",
-    "FORCE",
     "HEAD",
-    "HELD",
-    "INERTIA",
-    "KIND",
-    "LIMIT",
-    "LOCKING",
-    "MODULUS",
-    "RATE",
-    "UNIFORM",
-    "WIDTH",
     "branch_count",
     "network_stress",
     "nominal_pull",
@@ -33,21 +19,7 @@ __all__ = [
     "true_pull",
 ]
 
-# head
-HELD = 0  #: code of the kinematics
-INERTIA = 1  #: kg/m: the coefficient of lam'' in the motion equation (a stress per lam'')
-FORCE = 2  #: Pa: nominal stress of the hanging load, F/(L2 Z)
-ELECTRIC = 3  #: Pa/V^2: eps/Z^2
-UNIFORM = 4  #: code of the strain energy that all springs share, or -1
-HEAD = 5
-
-# each spring
-KIND = 0  #: code of the strain energy
-MODULUS = 1  #: Pa
-LIMIT = 2  #: J or n
-LOCKING = 3  #: I1 - 3 where it locks
-RATE = 4  #: 1/T in 1/s; of no meaning for the equilibrium spring
-WIDTH = 5
+HEAD = EFFECTS_AT + SLOTS  #: where the springs begin in the coefficient vector
 
 
 @jit

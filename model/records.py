@@ -9,9 +9,8 @@ import numpy as np
 
 from model.actuator import Drive
 from model.errors import ModelError
-from model.jit import jit
 
-__all__ = ["ActuatorRecord", "FilmRecord", "Record", "at_sensor", "noise_of"]
+__all__ = ["ActuatorRecord", "FilmRecord", "Record", "noise_of"]
 
 
 @dataclass(frozen=True)
@@ -20,7 +19,8 @@ class ActuatorRecord:
 
     ``noise`` is the standard deviation of one reading in m. ``lag`` is the known time in s by which
     a reading is older than its time stamp (an averaging sensor), less the converter's skew: the
-    model is evaluated at ``time - lag``.
+    model is evaluated at ``time - lag``. ``valid`` (N,) bool is False where a reading must not be
+    used (a dropout, a clipped sensor), None where all are good.
     """
 
     name: str
@@ -28,6 +28,7 @@ class ActuatorRecord:
     displacement: np.ndarray
     noise: float
     lag: float = 0.0
+    valid: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         _check(self.name, self.measured, self.drive.time, self.noise)
@@ -59,18 +60,28 @@ class ActuatorRecord:
         late = 0.5 * float(np.median(steps)) if self.drive.hold else 0.0
         drive = Drive(t, np.interp(t - late, self.time, self.drive.voltage), hold=False)
         x = self.displacement[rows].mean(axis=1)
-        return replace(self, drive=drive, displacement=x, noise=self.noise / math.sqrt(every))
+        warmth = self.drive.warmth
+        if warmth is not None:
+            drive = replace(drive, warmth=warmth[rows].mean(axis=1))
+        valid = None if self.valid is None else np.all(self.valid[rows], axis=1)
+        return replace(
+            self, drive=drive, displacement=x, noise=self.noise / math.sqrt(every), valid=valid
+        )
 
 
 @dataclass(frozen=True)
 class FilmRecord:
-    """Nominal stress (N,) in Pa under an imposed ``stretch`` (N,) at ``time`` (N,) s."""
+    """Nominal stress (N,) in Pa under an imposed ``stretch`` (N,) at ``time`` (N,) s.
+
+    ``valid`` as of an ``ActuatorRecord``.
+    """
 
     name: str
     time: np.ndarray
     stretch: np.ndarray
     stress: np.ndarray
     noise: float
+    valid: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for name in ("time", "stretch", "stress"):
@@ -102,6 +113,9 @@ class FilmRecord:
             stretch=thin(self.stretch),
             stress=thin(self.stress),
             noise=self.noise / math.sqrt(every),
+            valid=None
+            if self.valid is None
+            else np.concatenate([self.valid[:1], self.valid[rows].all(axis=1)]),
         )
 
 
@@ -133,30 +147,3 @@ def noise_of(values: np.ndarray) -> float:
     if values.size < 4:
         raise ModelError(f"{values.size} samples are too few to read a noise from; 4 are needed")
     return float(np.sqrt(np.mean(np.diff(values, 2) ** 2) / 6.0))
-
-
-@jit
-def at_sensor(
-    time: np.ndarray, value: np.ndarray, rate: np.ndarray, lag: float, out: np.ndarray
-) -> None:
-    """``value`` (N,) as a sensor shows it that is ``lag`` s late, into ``out``: cubic Hermite."""
-    last = time.shape[0] - 1
-    j = 0
-    for k in range(last + 1):
-        t = time[k] - lag
-        if t <= time[0]:
-            out[k] = value[0]  # before the record the film was at rest
-            continue
-        if t >= time[last]:
-            out[k] = value[last] + rate[last] * (t - time[last])
-            continue
-        while time[j + 1] < t:
-            j += 1
-        h = time[j + 1] - time[j]
-        s = (t - time[j]) / h
-        r = 1.0 - s
-        out[k] = (
-            value[j] * (1.0 + 2.0 * s) * r * r
-            + value[j + 1] * (3.0 - 2.0 * s) * s * s
-            + h * (rate[j] * s * r * r - rate[j + 1] * s * s * r)
-        )

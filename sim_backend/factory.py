@@ -37,7 +37,7 @@ def open_simulated_rig(
     """Open the rig at ``address``.
 
     ``sim`` is a film of ``actuator``, by default ``film`` under ``load`` with the network of the
-    thesis's Table 3. ``sim:SEED`` is a film of the same network with something hidden that SEED
+    thesis's Table 3. ``sim:SEED`` is a film of that make with something hidden, or nothing: SEED
     decides. The instruments' noise follows SEED and ``seed`` together, so that another ``seed``
     records the same rig again. ``paced`` runs in real time, else as fast as it is read; ``clock``
     replaces either.

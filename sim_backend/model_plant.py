@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from model import kernel
-from model.actuator import STATUS_WORDS, Actuator, initial_state
+from model.actuator import STATUS_WORDS, Actuator, at_rest, initial_state
+from model.effects import MEMORY
 from model.kinematics import thinning
 from model.material import VACUUM_PERMITTIVITY
 from sim_backend.plant import Motion
@@ -23,14 +24,18 @@ class ModelPlant:
     coefficients: np.ndarray
     rest: float
     state: np.ndarray
+    sensor: np.ndarray
     failed: bool = False
 
     @classmethod
     def at_rest(cls, actuator: Actuator) -> ModelPlant:
         """The film relaxed under its load. Raises ``ModelError`` where it has no rest state."""
-        rest = actuator.rest()
+        actuator.rest()
         coefficients = actuator.coefficients()
-        return cls(actuator, coefficients, rest, initial_state(coefficients, rest))
+        _, rest = at_rest(coefficients)
+        return cls(
+            actuator, coefficients, rest, initial_state(coefficients, rest), np.zeros(MEMORY)
+        )
 
     @property
     def capacitance(self) -> float:
@@ -47,17 +52,21 @@ class ModelPlant:
         if not self.failed:
             state = self.state.copy()
             status, reached = kernel.drive_by_voltage(
-                self.coefficients, time, voltage, hold, state, stretch, rate
+                self.coefficients, time, voltage, hold, np.zeros(0), state, stretch, rate
             )
             if status != kernel.OK:
                 fault, fault_at = STATUS_WORDS[status], int(reached)
                 state = np.concatenate((stretch[-1:], [0.0], state[2:]))
             after = replace(self, state=state, failed=fault is not None)
         length = self.actuator.film.length
+        displacement, velocity = (stretch - self.rest) * length, rate * length
+        memory = self.sensor.copy()
+        kernel.read_sensor(self.coefficients, time, displacement, velocity, memory)
+        after = replace(after, sensor=memory)
         nothing = np.zeros(time.size)
         motion = Motion(
-            displacement=(stretch - self.rest) * length,
-            velocity=rate * length,
+            displacement=displacement,
+            velocity=velocity,
             capacitance=self._capacitance(stretch),
             leakage=nothing,
             heating=nothing,

@@ -16,7 +16,7 @@ import numpy as np
 from app.cli import main
 from app.modelfile import save_model
 from model.actuator import Actuator
-from model.film import nominal_stress
+from model.film import Strip
 from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
 
 #: A short run: one lobe of 3 kV, 1.5 s in all.
@@ -93,19 +93,19 @@ def write(path: Path, text: str) -> Path:
 
 def thesis_model(path: Path) -> Path:
     """Model file of the thesis's actuator with Table 3's numbers, as the rig ``sim`` has them."""
-    return save_model(path, "Table 3", Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3), "", {}, True)
+    return save_model(path, "Table 3", Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3), {}, True)
 
 
 def film_model(path: Path) -> Path:
     """Model file of a bare film."""
-    return save_model(path, "a film", FILM_NETWORK, "uniaxial", {}, True)
+    return save_model(path, "a film", Strip(FILM_NETWORK), {}, True)
 
 
 def film_csv(path: Path, rate: float, seed: int, samples: int = 400) -> Path:
     """A tensile test of ``FILM_NETWORK``: to stretch 1.5 at ``rate`` 1/s and back, with noise."""
     time = np.linspace(0.0, 1.0 / rate, samples)
     stretch = 1.5 - 0.5 * np.abs(2.0 * rate * time - 1.0)
-    answer = nominal_stress(FILM_NETWORK, "uniaxial", time, stretch)
+    answer = Strip(FILM_NETWORK).simulate(time, stretch)
     assert answer.ok
     noise = np.random.default_rng(seed).normal(0.0, 50.0, samples)
     table = np.column_stack([time, stretch, (answer.stress + noise) * 1e-3])

@@ -10,6 +10,7 @@ import numpy as np
 from app.outcomes import BranchTrial, Comparison, IdentifyOutcome, Published, ValidateOutcome
 from model.actuator import Actuator
 from model.excitation import Sequence
+from model.film import Strip
 from model.fitting import Estimate, Identification
 from model.material import TABLE_3, THESIS_FILM, Load, Network
 from model.measures import errors
@@ -140,11 +141,11 @@ TRIALS = (
 
 
 def film_outcome(**changes) -> IdentifyOutcome:
-    network = Network.gent((1e4, 2e4), (50.0, 60.0), (3.0,))
+    strip = Strip(Network.gent((1e4, 2e4), (50.0, 60.0), (3.0,)))
     outcome = identify_outcome(
         title="Tensile tests",
         kind="film",
-        fit=fit(model=network, estimates=ESTIMATES[1:]),
+        fit=fit(model=strip, estimates=ESTIMATES[1:]),
         train=(film_comparison("cycle.h5"), film_comparison("again.h5")),
         validation=(film_comparison("other.h5", "validation", noise=None),),
         trials=TRIALS,

@@ -457,6 +457,53 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
         "validate {s}/actuator.toml {s}/run.h5 --report {s}/actuator.toml --force",
         ["the file that is read"],
     ),
+    # diagnose
+    "nothing to diagnose": (
+        "diagnose --json o.json",
+        ["give recordings to diagnose, or a rig to record on with --rig"],
+    ),
+    "diagnosed twice": ("diagnose {s}/run.h5 {s}/run.h5", ["is named twice"]),
+    "diagnosed and validated": (
+        "diagnose {s}/run.h5 --validate {s}/run.h5",
+        ["given both to fit and to validate", "proves nothing"],
+    ),
+    "validated on a copy, diagnosed": (
+        "diagnose {s}/run.h5 --validate {s}/copy.h5 --report r.html",
+        ["copy.h5, to validate, is a copy of", "run.h5"],
+    ),
+    "validated on another kind, diagnosed": (
+        "diagnose {s}/run.h5 --validate {s}/film.h5",
+        ["to validate, is of kind film", "of kind actuator"],
+    ),
+    "two loads, diagnosed": (
+        "diagnose {s}/run.h5 {s}/light.h5",
+        ["are of different loads", "mass 0.2 and 0.15"],
+    ),
+    "two films, diagnosed": (
+        "diagnose {s}/run.h5 {s}/thin.h5",
+        ["are of different films", "thickness"],
+    ),
+    "two kinds, diagnosed": ("diagnose {s}/run.h5 {s}/film.h5", ["cannot be used together"]),
+    "a lobe only, diagnosed": (
+        "diagnose {s}/run.h5 --model-out m.toml",
+        ["run.h5: 1.09 s and", "too few to tell one effect from another", "several lobes"],
+    ),
+    "no branches, diagnosed": ("diagnose {s}/run.h5 --branches 0", ["0 branches", "from 1 to 8"]),
+    "no monitor, diagnosed": ("diagnose {s}/few.h5 --drive monitor", ["no voltage monitor"]),
+    "diagnosed into a full folder": ("diagnose --rig sim:7 --out {s}", ["is not empty", "--force"]),
+    "diagnosed into a file": ("diagnose --rig sim:7 --out {s}/rig.toml", ["is a file; give a"]),
+    "a report that is there": (
+        "diagnose {s}/run.h5 --report {s}/rig.toml",
+        ["rig.toml exists already", "--force"],
+    ),
+    "a model over a recording": (
+        "diagnose {s}/run.h5 --model-out {s}/run.h5 --force",
+        ["the file that is read"],
+    ),
+    "one name for report and model": (
+        "diagnose {s}/run.h5 --report o.x --model-out o.x",
+        ["named for two outputs"],
+    ),
     # simulate
     "an unknown ending": ("simulate {s}/actuator.toml --drive thesis --out o.txt", [".h5", ".csv"]),
     "simulated over its drive": (

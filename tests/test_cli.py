@@ -15,6 +15,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from app.modelfile import load_model
 from app.presets import PRESETS, VALIDATION_A, VALIDATION_B
 from app.recording import open_recording
 from app.rigfile import RigFile
@@ -83,7 +84,9 @@ def run(code: str, *arguments: str, **options: object) -> subprocess.CompletedPr
 COMMAND = "from app.cli import main; main()"
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["record", "--help"], ["identify", "-h"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["record", "--help"], ["identify", "-h"], ["diagnose", "-h"]]
+)
 def test_help_answers_without_anything_heavy(arguments: list[str]) -> None:
     ended = run(
         "import sys\n"
@@ -487,6 +490,14 @@ def test_demo_does_the_main_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     for row in rows:
         assert row["rms_um"] < 2.0 * found["validation"]["noise_floor_um"]
     assert Path(found["report"]).stat().st_size > 10_000
+    # and of the rig that hides something
+    diagnosis = found["diagnosis"]
+    assert diagnosis["verdict"] == "explained"
+    before = diagnosis["baseline"]["validation"]["rms_um"]
+    after = diagnosis["final"]["validation"]["rms_um"]
+    assert after < 1.15 * diagnosis["noise_floor_um"] < before
+    assert names(folder) >= {"hidden-thesis.h5", "improved.toml", "diagnosis.html"}
+    assert load_model(folder / "improved.toml").model.effects
     again = dearig("demo", "--out", folder)
     assert again.code == 2
     assert "is not empty; give another folder with --out, or --force" in again.err

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from model import kernel
 from model.errors import ModelError
-from model.film import nominal_stress, unit_stresses
+from model.film import Strip, unit_stresses
 from model.material import Branch, Network, Spring
 from tests.model_oracle import spring_stress
 
@@ -46,7 +46,7 @@ def test_against_scipy(kinematics, relaxation_time):
     time = np.concatenate([[0.0], np.cumsum(rng.choice([0.002, 0.03, 0.4, 2.0], 25))])
     stretch = 1.3 + 0.25 * np.sin(0.9 * time)
     network = Network(ELASTIC, (Branch(Spring(80e3, 5.0), relaxation_time),))
-    found = nominal_stress(network, kinematics, time, stretch)
+    found = Strip(network, kinematics).simulate(time, stretch)
     assert found.ok, found.in_words
     expected = expected_stress(network, kinematics, time, stretch)
     assert np.abs(found.stress - expected).max() < 1.0  # Pa of some 50 kPa
@@ -59,7 +59,7 @@ def test_mixed_springs_against_scipy():
         Spring(50e3, 30.0, "arruda-boyce"),
         (Branch(Spring(30e3, kind="neo-hookean"), 0.3), Branch(Spring(20e3, 2.0), 4.0)),
     )
-    found = nominal_stress(network, "uniaxial", time, stretch)
+    found = Strip(network).simulate(time, stretch)
     expected = expected_stress(network, "uniaxial", time, stretch)
     assert np.abs(found.stress - expected).max() < 1.0
 
@@ -70,7 +70,7 @@ def test_a_small_step_relaxes_exponentially():
     time = np.concatenate([[0.0, 1e-6], np.linspace(0.1, 5.0, 50)])
     stretch = np.where(time > 0.0, 1.0 + step, 1.0)
     network = Network(Spring(0.0), (Branch(Spring(mu, 1e6), relaxation_time),))
-    stress = nominal_stress(network, "uniaxial", time, stretch).stress
+    stress = Strip(network).simulate(time, stretch).stress
     expected = 3.0 * mu * step * np.exp(-3.0 * time[1:] / relaxation_time)
     np.testing.assert_allclose(stress[1:], expected, rtol=1e-4)
 
@@ -85,7 +85,7 @@ def test_a_neo_hookean_branch_relaxes_as_in_closed_form():
     time = np.concatenate([[0.0], np.cumsum(elapsed)])
     stretch = np.where(time > 0.0, lam, 1.0)
     network = Network(Spring(0.0), (Branch(Spring(mu, kind="neo-hookean"), relaxation_time),))
-    found = nominal_stress(network, "constrained-width", time, stretch)
+    found = Strip(network, "constrained-width").simulate(time, stretch)
     np.testing.assert_allclose(found.stress[1:], mu * (u**-2 - u**2) / lam, rtol=1e-5)
 
 
@@ -96,7 +96,7 @@ def test_stress_is_linear_in_the_moduli():
     parts, status, _ = unit_stresses(network.coefficients(1), time, stretch)
     assert status == kernel.OK
     moduli = [s.modulus for s in network.springs]
-    found = nominal_stress(network, "uniaxial", time, stretch)
+    found = Strip(network).simulate(time, stretch)
     np.testing.assert_allclose(moduli @ parts, found.stress, rtol=1e-12)
 
 
@@ -111,7 +111,7 @@ def test_stress_is_linear_in_the_moduli():
 )
 def test_how_it_can_end(time, stretch, status, reached):
     network = Network(ELASTIC, (Branch(Spring(80e3, 5.0), 0.1),))
-    found = nominal_stress(network, "uniaxial", np.array(time), np.array(stretch))
+    found = Strip(network).simulate(np.array(time), np.array(stretch))
     assert (found.status, found.reached) == (status, reached)
     assert np.isfinite(found.stress).all()
     assert not found.ok
@@ -126,4 +126,4 @@ def test_how_it_can_end(time, stretch, status, reached):
 )
 def test_refusals(kinematics, samples, message):
     with pytest.raises(ModelError, match=message):
-        nominal_stress(Network(ELASTIC), kinematics, np.arange(3.0), np.ones(samples))
+        Strip(Network(ELASTIC), kinematics).simulate(np.arange(3.0), np.ones(samples))

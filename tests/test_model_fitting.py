@@ -10,7 +10,7 @@ import pytest
 from model.actuator import Actuator, Drive
 from model.errors import ModelError
 from model.excitation import Sequence
-from model.film import nominal_stress
+from model.film import Strip
 from model.fitting import identify
 from model.fitting.intervals import correlation_time, covariance
 from model.fitting.levenberg import descend
@@ -136,16 +136,16 @@ def film_record(seed=0, noise=20.0):
     # up and down at several speeds, and held in between
     corners = np.array([0.0, 2.0, 10.0, 12.0, 22.0, 30.0, 30.5, 45.0, 60.0])
     stretch = np.interp(time, corners, [1.0, 1.6, 1.6, 1.1, 2.2, 2.2, 1.4, 1.4, 1.0])
-    stress = nominal_stress(network, "uniaxial", time, stretch).stress
+    stress = Strip(network).simulate(time, stretch).stress
     stress = stress + noise * np.random.default_rng(seed).standard_normal(time.size)
     return network, FilmRecord("film", time, stretch, stress, noise)
 
 
 def test_a_film_of_two_branches_is_found_again():
     network, record = film_record()
-    fit = identify([record], network, kinematics="uniaxial", intervals=False)
+    fit = identify([record], Strip(network), intervals=False)
     assert fit.cost == pytest.approx(1.0, abs=0.15)
-    found = fit.model
+    found = fit.model.network
     assert found.times == pytest.approx(network.times, rel=0.02)
     for a, b in zip(found.springs, network.springs, strict=True):
         assert a.modulus == pytest.approx(b.modulus, rel=0.02)
@@ -205,19 +205,14 @@ def test_progress_is_told():
         (list, "actuator", "hybrid", "at least one record"),
         (lambda: [made(ONE), film_record()[1]], "actuator", "hybrid", "voltage and by stretch"),
         (lambda: [film_record()[1]], "actuator", "hybrid", "not of one kind"),
-        (lambda: [made(ONE)], "network", "hybrid", "not of one kind"),
+        (lambda: [made(ONE)], "strip", "hybrid", "not of one kind"),
         (lambda: [short()], "actuator", "hybrid", "4 samples cannot determine 5 parameters"),
     ],
 )
 def test_refusals(records, base, method, message):
-    model = Actuator(THESIS_FILM, THESIS_LOAD, ONE) if base == "actuator" else ONE
+    model = Actuator(THESIS_FILM, THESIS_LOAD, ONE) if base == "actuator" else Strip(ONE)
     with pytest.raises(ModelError, match=message):
         identify(records(), model, method=method)
-
-
-def test_unknown_kinematics():
-    with pytest.raises(ModelError, match="'radial' is not one of constrained-width, uniaxial"):
-        identify([film_record()[1]], ONE, kinematics="radial")
 
 
 def short():
@@ -249,7 +244,7 @@ def test_a_model_of_fewer_branches_is_padded_with_weak_ones(time):
 
 def test_neo_hookean_springs_have_no_limit_to_fit():
     network = Network(Spring(1e4, kind="neo-hookean"), (Branch(Spring(1e4, 9.0), 1.0),))
-    assert Layout(network).names == ("mu_0", "mu_1", "J_1", "T_1")
+    assert Layout(Strip(network)).names == ("mu_0", "mu_1", "J_1", "T_1")
 
 
 def test_a_descent_finds_the_bottom_from_nearby():

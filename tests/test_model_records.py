@@ -10,7 +10,8 @@ from model.errors import ModelError
 from model.excitation import Sequence
 from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from model.measures import errors
-from model.records import ActuatorRecord, FilmRecord, at_sensor, noise_of
+from model.records import ActuatorRecord, FilmRecord, noise_of
+from model.sensor import at_sensor
 
 THESIS = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
 

@@ -11,6 +11,7 @@ import pytest
 from app.errors import InputError
 from app.modelfile import load_model, save_model
 from model.actuator import Actuator
+from model.film import Strip
 from model.material import (
     TABLE_3,
     THESIS_FILM,
@@ -27,9 +28,24 @@ MODELS = {
     "thesis": Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3),
     "measured rest": Actuator(STRANGE_FILM, Load(0.1, 0.0555), TABLE_3),
     "no limits": Actuator(THESIS_FILM, THESIS_LOAD, Network(Spring(5e4))),
-    "springs of three kinds": Network(
-        Spring(1e4, 50.0, "arruda-boyce"),
-        (Branch(Spring(2e4, math.inf), 0.5), Branch(Spring(3e4, 99.0, "gent"), 7.0)),
+    "springs of three kinds": Strip(
+        Network(
+            Spring(1e4, 50.0, "arruda-boyce"),
+            (Branch(Spring(2e4, math.inf), 0.5), Branch(Spring(3e4, 99.0, "gent"), 7.0)),
+        ),
+        "equibiaxial",
+    ),
+    "effects": Actuator(
+        THESIS_FILM,
+        THESIS_LOAD,
+        TABLE_3,
+        (
+            ("sensor lag", (("time_constant", 4.5e-3),)),
+            ("linear drag", (("drag", 1.25),)),
+        ),
+    ),
+    "a film's effect": Strip(
+        TABLE_3, "uniaxial", (("Mullins softening", (("softening", 0.25), ("width", 0.5))),)
     ),
 }
 
@@ -37,12 +53,11 @@ MODELS = {
 @pytest.mark.parametrize("name", MODELS)
 def test_a_model_comes_back_to_the_last_bit(tmp_path: Path, name: str) -> None:
     model = MODELS[name]
-    save_model(tmp_path / "m.toml", name, model, "equibiaxial", {"seconds": 1.5})
+    save_model(tmp_path / "m.toml", name, model, {"seconds": 1.5})
     loaded = load_model(tmp_path / "m.toml")
     assert loaded.model == model
     assert loaded.name == name
     assert loaded.kind == ("actuator" if isinstance(model, Actuator) else "film")
-    assert loaded.kinematics == getattr(getattr(model, "film", None), "kinematics", "equibiaxial")
     assert loaded.history == {"seconds": 1.5}
 
 
@@ -53,7 +68,7 @@ def test_history_takes_what_toml_does_not_have(tmp_path: Path) -> None:
         "values": [np.float64(1.5), None],
         "train": [{"name": "a\udcff", "sha256": "12ab"}],
     }
-    save_model(tmp_path / "m.toml", "x", MODELS["thesis"], "", history)
+    save_model(tmp_path / "m.toml", "x", MODELS["thesis"], history)
     loaded = load_model(tmp_path / "m.toml")
     train = [{"name": "a?", "sha256": "12ab"}]
     assert loaded.history == {"count": 3, "values": [1.5], "train": train}
@@ -62,10 +77,10 @@ def test_history_takes_what_toml_does_not_have(tmp_path: Path) -> None:
 
 def test_a_model_is_not_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "m.toml"
-    save_model(path, "one", MODELS["thesis"], "", {})
+    save_model(path, "one", MODELS["thesis"], {})
     with pytest.raises(InputError, match="exists already"):
-        save_model(path, "two", MODELS["thesis"], "", {})
+        save_model(path, "two", MODELS["thesis"], {})
     assert load_model(path).name == "one"
-    save_model(path, "two", MODELS["thesis"], "", {}, overwrite=True)
+    save_model(path, "two", MODELS["thesis"], {}, overwrite=True)
     assert load_model(path).name == "two"
     assert [p.name for p in tmp_path.iterdir()] == ["m.toml"]

@@ -13,7 +13,7 @@ from drivers.gate import admit
 from drivers.rig import RigState
 from drivers.settings import LaserSettings, RigSettings, ThermometerSettings
 from model import kernel
-from model.actuator import Actuator, initial_state
+from model.actuator import Actuator, at_rest, initial_state
 from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load, Network
 from sim_backend.card import INPUT_OVERWRITTEN
 from sim_backend.clock import ManualClock, PacedClock
@@ -68,10 +68,11 @@ def expected_displacement(voltage, rate, shift):
     time = np.union1d(np.union1d(ticks, fine), wanted[wanted >= 0.0])
     time = time[np.concatenate(([True], np.diff(time) > 1e-10))]
     at_time = held[np.searchsorted(ticks, time + 1e-9, side="right") - 1]
-    c, rest = actuator.coefficients(), actuator.rest()
+    c = actuator.coefficients()
+    _, rest = at_rest(c)
     stretch, speed = np.empty(time.size), np.empty(time.size)
     status, _ = kernel.drive_by_voltage(
-        c, time, at_time, True, initial_state(c, rest), stretch, speed
+        c, time, at_time, True, np.zeros(0), initial_state(c, rest), stretch, speed
     )
     assert status == kernel.OK
     at = np.searchsorted(time, np.maximum(wanted, 0.0) - 1e-9)

@@ -124,6 +124,18 @@ class TestProgress:
         assert "25 %" in text
         assert "\x1b[2K" in text.rpartition("intervals")[2]
 
+    def test_of_the_whole_work_the_bar_goes_on_through_all_stages(self):
+        stream = io.StringIO()
+        console = Console(file=stream, force_terminal=True, width=80, legacy_windows=False)
+        with progress("diagnosing", console, whole=True) as report:
+            report("baseline", 0.25)
+            report("refitting", 0.75)
+        text = stream.getvalue()
+        last = text.rpartition("diagnosing: refitting")[2]
+        assert "75 %" in last
+        # a new stage does not take the bar back to its beginning
+        assert " 0 %" not in text.partition("diagnosing: baseline")[2]
+
     def test_survives_an_exception(self):
         stream = io.StringIO()
         console = Console(file=stream, force_terminal=True, width=80, legacy_windows=False)

@@ -45,7 +45,7 @@ def test_without_effects_it_is_the_models_film(drive, hold, rest_length):
 
 
 def test_the_moving_mass_is_the_models_when_it_is_the_same():
-    moving = cases.TruthCase(0, THESIS_FILM, THESIS_LOAD, (_moving(0.2),)).plant()
+    moving = TruthPlant.at_rest(NUMBERS, (load_inertia.moving(0.2),))
     effects = (("load inertia", (("moving_mass", 0.2),)),)
     model = ModelPlant.at_rest(Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, effects))
     time, voltage = ramps()
@@ -53,36 +53,9 @@ def test_the_moving_mass_is_the_models_when_it_is_the_same():
     assert np.abs(moving.advance(time, voltage, True)[0].displacement - expected).max() < 0.05e-6
 
 
-def _moving(mass):
-    """The effect with exactly ``mass``: drawn once to learn the factor, then made up for."""
-    factor = np.random.default_rng(0).uniform(0.9, 1.15)
-    return load_inertia.draw(np.random.default_rng(0), Load(mass=mass / factor))
-
-
-def test_its_own_steps_have_converged():
-    time, voltage = ramps(1000.0)
-    case = cases.draw(1, THESIS_FILM, THESIS_LOAD)
-    coarse = case.plant().advance(time, voltage, True)[0].displacement
-    fine_time = np.arange(8 * (time.size - 1) + 1) / (8.0 * 1000.0)
-    fine = case.plant().advance(fine_time, np.repeat(voltage, 8)[: fine_time.size], True)[0]
-    assert np.abs(fine.displacement[::8] - coarse).max() < 1e-11
-
-
-def test_carrying_on_is_the_same_as_going_through():
-    time, voltage = lobe_train(seconds=1.0)
-    plant = cases.draw(2, THESIS_FILM, THESIS_LOAD).plant()
-    whole, _ = plant.advance(time, voltage, True)
-    head, middle = plant.advance(time[:401], voltage[:401], True)
-    tail, _ = middle.advance(time[400:], voltage[400:], True)
-    joined = np.append(head.displacement, tail.displacement[1:])
-    np.testing.assert_array_equal(joined, whole.displacement)
-    # a plant is a value: the first one still stands where it stood
-    np.testing.assert_array_equal(plant.advance(time, voltage, True)[0].velocity, whole.velocity)
-
-
 def test_drag_takes_the_swing_out():
     generator = np.random.default_rng(0)
-    effects = (_moving(0.2), drag.draw(generator, THESIS_LOAD))
+    effects = (load_inertia.moving(0.2), drag.mixed(generator, THESIS_LOAD))
     time, voltage = ramps()
     free = TruthPlant.at_rest(NUMBERS, effects[:1]).advance(time, voltage, True)[0].velocity
     damped = TruthPlant.at_rest(NUMBERS, effects).advance(time, voltage, True)[0].velocity
@@ -110,15 +83,6 @@ def test_stages_act_on_voltage_and_on_what_the_sensor_sees_and_are_carried_on():
     np.testing.assert_allclose(first.displacement, plain.displacement + 1e-3, atol=1e-15)
     second, _ = after.advance(time, voltage, True)
     assert second.displacement[0] - first.displacement[-1] == pytest.approx(1e-3)
-
-
-def test_a_seed_is_a_case_for_good():
-    drawn = [cases.draw(seed, THESIS_FILM, THESIS_LOAD) for seed in range(40)]
-    again = [cases.draw(seed, THESIS_FILM, THESIS_LOAD) for seed in range(40)]
-    assert [c.description for c in drawn] == [c.description for c in again]
-    assert len({c.description for c in drawn}) > 35
-    assert all(c.families[0] == "load_inertia" for c in drawn)
-    assert {c.families[1:] for c in drawn} == {(), ("drag",)}
 
 
 def test_the_rig_of_a_seed_has_that_film():

@@ -13,10 +13,19 @@ from app.report.units import SHOWN
 from app.report.words import pooled_noise, warnings_of
 
 if TYPE_CHECKING:
-    from app.outcomes import BranchTrial, Comparison, IdentifyOutcome, Published, ValidateOutcome
+    from app.outcomes import (
+        BranchTrial,
+        Comparison,
+        DiagnoseOutcome,
+        IdentifyOutcome,
+        Published,
+        Stand,
+        ValidateOutcome,
+    )
+    from model.diagnosis.findings import Candidate, Signature, Stage, Step
     from model.fitting import Estimate
 
-__all__ = ["outcome_json", "write_json"]
+__all__ = ["diagnosis_json", "outcome_json", "write_json"]
 
 
 def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
@@ -130,6 +139,190 @@ def _trial_json(trial: BranchTrial, kind: str) -> dict[str, Any]:
         "bic": _number(trial.bic),
         "chosen": bool(trial.chosen),
     }
+
+
+# ---------------------------------------------------------------- a diagnosis
+
+
+def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
+    """``outcome`` for ``--json`` of diagnose, in the units that the keys end with."""
+    finding, shown = outcome.finding, SHOWN[outcome.kind]
+    before, after = outcome.before, outcome.after
+    experiment = outcome.experiment
+    return {
+        "format": "dearig-diagnosis/1",
+        "title": outcome.title,
+        "kind": outcome.kind,
+        "records": {
+            "train": _names(before.train, after.train),
+            "validation": _names(before.validation, after.validation),
+        },
+        f"noise_floor_{shown.suffix}": _number(outcome.noise * shown.error_factor),
+        "baseline": {"model": "thesis", **_stand_json(before)},
+        "steps": [
+            {
+                "effect": step.effect,
+                "family": step.family,
+                "acts_on": step.acts_on,
+                "parameters": [_effect_number_json(e) for e in step.estimates],
+                "train": _measures_json(stand.train, outcome.kind),
+                "selection": _selection_json(step.stage, after.train, outcome.kind),
+                "validation": _measures_json(stand.validation, outcome.kind),
+                "indistinguishable_from": list(step.indistinguishable_from),
+                "evidence": _evidence_json(step),
+            }
+            for step, stand in zip(finding.steps, outcome.stands[1:], strict=False)
+        ],
+        "final": _stand_json(after),
+        "residual_after": {
+            "is_noise": all(s.is_noise for s in finding.after),
+            "signature": {s.record: _signature_json(s, outcome.kind) for s in finding.after},
+        },
+        "residual_before": {s.record: _signature_json(s, outcome.kind) for s in finding.before},
+        "verdict": finding.verdict,
+        "unnamed": None
+        if finding.unnamed is None
+        else {
+            "acts_on": finding.unnamed.acts_on,
+            "expression": finding.unnamed.expression,
+            "signature": finding.unnamed.signature,
+        },
+        "experiment": None
+        if experiment is None
+        else {
+            "separates": list(experiment.separates),
+            "sequence": experiment.sequence,
+            "rivals": list(experiment.rivals),
+            "separation_over_noise": _number(experiment.separation),
+            "seconds": _number(experiment.seconds),
+        },
+        "experiment_words": outcome.experiment_words,
+        "rounds": [
+            {
+                "base": list(r.base),
+                "chosen": r.chosen,
+                "reason": r.reason,
+                "candidates": [_candidate_json(c, outcome.kind) for c in r.candidates],
+            }
+            for r in finding.rounds
+        ],
+        "performed": list(outcome.performed),
+        "parameters": [_effect_number_json(e) for e in finding.final.estimates],
+        "quality": list(outcome.quality),
+        "notes": list(finding.notes),
+        "interrupted": finding.interrupted,
+        "model_path": outcome.model_path,
+        "simulations": int(finding.simulations),
+        "seconds": _number(outcome.seconds),
+    }
+
+
+def _names(*groups: tuple[Comparison, ...]) -> list[str]:
+    """Each name once, also of a recording that one of the models could not follow."""
+    return list(dict.fromkeys(c.name for group in groups for c in group))
+
+
+def _stand_json(stand: Stand) -> dict[str, Any]:
+    kind = stand.train[0].kind if stand.train else "actuator"
+    by_record = {c.name: _measures_json((c,), kind) for c in stand.validation}
+    return {
+        "train": _measures_json(stand.train, kind),
+        "validation": _measures_json(stand.validation, kind),
+        "validation_by_record": by_record if stand.validation else None,
+    }
+
+
+def _measures_json(comparisons: tuple[Comparison, ...], kind: str) -> dict[str, Any] | None:
+    """Errors pooled over recordings (see ``app.report.diagnosis.pooled``); None without any."""
+    from app.report.diagnosis import pooled
+
+    errors = pooled(comparisons)
+    if errors is None:
+        return None
+    shown = SHOWN[kind]
+    return {
+        f"rms_{shown.suffix}": _number(errors.rms * shown.error_factor),
+        "nrmse_pct": _number(errors.nrmse_pct),
+        "e_rms_thesis_pct": None if kind == "film" else _number(errors.e_rms_thesis_pct),
+        "e_m_thesis_pct": _number(errors.e_m_thesis_pct),
+        f"max_{shown.suffix}": _number(errors.max * shown.error_factor),
+    }
+
+
+def _selection_json(stage: Stage, train: tuple[Comparison, ...], kind: str) -> dict[str, Any]:
+    """Of a cross-validation: its errors, relative to the ranges of the training recordings."""
+    from app.report.diagnosis import pooled
+
+    shown, errors = SHOWN[kind], pooled(train)
+
+    def relative(of: float, known: float, value: float) -> float | None:
+        return _number(of * value / known) if known > 0.0 else None
+
+    return {
+        f"rms_{shown.suffix}": _number(stage.selection_rms * shown.error_factor),
+        "nrmse_pct": None
+        if errors is None
+        else relative(errors.nrmse_pct, errors.rms, stage.selection_rms),
+        "e_rms_thesis_pct": None if kind == "film" else _number(stage.selection_rms * 1e5),
+        "e_m_thesis_pct": None
+        if errors is None
+        else relative(errors.e_m_thesis_pct, errors.max, stage.selection_max),
+        f"max_{shown.suffix}": _number(stage.selection_max * shown.error_factor),
+    }
+
+
+def _effect_number_json(estimate: Estimate) -> dict[str, Any]:
+    return {
+        "name": estimate.name,
+        "value": _number(estimate.value),
+        "unit": estimate.unit,
+        "ci95": [_number(estimate.low), _number(estimate.high)],
+        "determined": bool(estimate.determined),
+        "note": estimate.note,
+    }
+
+
+def _evidence_json(step: Step) -> dict[str, Any]:
+    return {
+        "sentences": list(step.evidence),
+        "criterion": _number(step.stage.criterion),
+        **{name: _number(value) for name, value in step.numbers},
+    }
+
+
+def _signature_json(signature: Signature, kind: str) -> dict[str, Any]:
+    shown = SHOWN[kind]
+    return {
+        f"rms_{shown.suffix}": _number(signature.rms * shown.error_factor),
+        "rms_over_noise": _number(signature.rms / signature.noise),
+        "is_noise": bool(signature.is_noise),
+        "ljung_box_p": _number(signature.ljung_box_p),
+        "runs_p": _number(signature.runs_p),
+        "correlation_time_s": _number(signature.correlation_time),
+        "explained": {d.quantity: _number(d.explained) for d in signature.dependences},
+        "words": list(signature.words),
+    }
+
+
+def _candidate_json(candidate: Candidate, kind: str) -> dict[str, Any]:
+    shown = SHOWN[kind]
+    stage = candidate.stage
+    return {
+        "effect": candidate.effect,
+        "family": candidate.family,
+        "acts_on": candidate.acts_on,
+        "verdict": candidate.verdict,
+        f"train_rms_{shown.suffix}": _number(stage.train_rms * shown.error_factor),
+        f"selection_rms_{shown.suffix}": _number(stage.selection_rms * shown.error_factor),
+        "promised": _number(candidate.promised),
+        "gained": _number(candidate.gained),
+        "gain": _number(candidate.gain),
+        "behind": _number(candidate.behind),
+        "note": candidate.note,
+    }
+
+
+# ---------------------------------------------------------------- writing
 
 
 def write_json(obj: dict[str, Any], target: str | Path) -> None:

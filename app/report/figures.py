@@ -29,14 +29,27 @@ if TYPE_CHECKING:  # matplotlib takes most of a second to load: only a command t
     from model.fitting import Estimate, Identification
 
 __all__ = [
+    "COLUMNS",
+    "DRIVE",
+    "MARK",
+    "NOISE",
+    "UNSURE",
+    "WIDTH",
+    "blank",
     "branches_figure",
     "comparison_figure",
+    "decimated_log",
+    "drawable",
+    "few_ticks",
+    "legend",
+    "log_axis",
     "loop_figure",
     "overview_figure",
     "parameters_figure",
     "residual_figure",
     "residual_panels",
     "save_png",
+    "style",
     "svg",
 ]
 
@@ -96,7 +109,8 @@ _STYLE = MappingProxyType(
 
 
 @contextmanager
-def _style() -> Iterator[None]:
+def style() -> Iterator[None]:
+    """Fonts, colours and lines of every figure, while it is drawn or saved."""
     from matplotlib import rc_context
 
     settings: Any = dict(_STYLE)  # matplotlib types its keys only in some versions
@@ -104,7 +118,8 @@ def _style() -> Iterator[None]:
         yield
 
 
-def _blank(width: float, height: float) -> Figure:
+def blank(width: float, height: float) -> Figure:
+    """An empty figure of ``width`` and ``height`` in inches."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
@@ -119,7 +134,7 @@ def save_png(figure: Figure, path: str | Path, dpi: int = 200) -> Path:
 
     path = check_output(path, overwrite=True)
     picture = io.BytesIO()
-    with _style():
+    with style():
         figure.savefig(picture, format="png", dpi=dpi)
     with replaced_when_done(path) as partial:
         partial.write_bytes(picture.getvalue())
@@ -133,7 +148,7 @@ def svg(figure: Figure, prefix: str, label: str) -> str:
     what is seen. It has no fixed size, takes the page's font, and refers to nothing outside.
     """
     stream = io.StringIO()
-    with _style():
+    with style():
         figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
     text = stream.getvalue()
     text = text[text.index("<svg") :]
@@ -168,8 +183,8 @@ def _rounded(path: str) -> str:
 
 def comparison_figure(comparison: Comparison) -> Figure:
     """Drive, measurement beside model, and error of one recording over time (thesis Fig. 10-16)."""
-    with _style():
-        figure = _blank(WIDTH, 5.0)
+    with style():
+        figure = blank(WIDTH, 5.0)
         axes = figure.subplots(3, 1, sharex=True, height_ratios=(1.0, 1.7, 1.2))
         _stack(list(axes), comparison)
         figure.align_ylabels(axes)
@@ -179,8 +194,8 @@ def comparison_figure(comparison: Comparison) -> Figure:
 def loop_figure(comparison: Comparison) -> Figure:
     """Measured quantity and model against the drive: loops, whose area is what was dissipated."""
     shown = SHOWN[comparison.kind]
-    with _style():
-        figure = _blank(WIDTH, 3.4)
+    with style():
+        figure = blank(WIDTH, 3.4)
         ax = figure.subplots()
         drive = comparison.drive * shown.drive_factor
         for values, name, look in (
@@ -190,14 +205,14 @@ def loop_figure(comparison: Comparison) -> Figure:
             ax.plot(*decimate_path(drive, values * shown.factor, COLUMNS // 2), label=name, **look)
         ax.set_xlabel(shown.drive_label)
         ax.set_ylabel(shown.label)
-        _legend(ax)
+        legend(ax)
     return figure
 
 
 def residual_figure(comparison: Comparison) -> Figure:
     """The residual in one row: its histogram, its correlation with itself, its spectrum."""
-    with _style():
-        figure = _blank(1.6 * WIDTH, 2.7)
+    with style():
+        figure = blank(1.6 * WIDTH, 2.7)
         for ax, draw in zip(figure.subplots(1, 3), _RESIDUAL_PANELS, strict=True):
             draw(ax, comparison)
     return figure
@@ -206,9 +221,9 @@ def residual_figure(comparison: Comparison) -> Figure:
 def residual_panels(comparison: Comparison) -> tuple[Figure, Figure, Figure]:
     """The panels of ``residual_figure`` one by one, for a page that sets them as it has room."""
     figures = []
-    with _style():
+    with style():
         for draw in _RESIDUAL_PANELS:
-            figure = _blank(0.6 * WIDTH, 2.5)
+            figure = blank(0.6 * WIDTH, 2.5)
             draw(figure.subplots(), comparison)
             figures.append(figure)
     return figures[0], figures[1], figures[2]
@@ -221,8 +236,8 @@ def parameters_figure(fit: Identification) -> Figure:
     """
     groups = _groups(fit)
     rows = [len(g) for g in groups.values()]
-    with _style():
-        figure = _blank(WIDTH, 0.75 + 0.27 * sum(rows) + 0.62 * len(rows))
+    with style():
+        figure = blank(WIDTH, 0.75 + 0.27 * sum(rows) + 0.62 * len(rows))
         axes = figure.subplots(len(rows), 1, squeeze=False, height_ratios=[n + 0.6 for n in rows])[
             :, 0
         ]
@@ -247,8 +262,8 @@ def branches_figure(trials: Sequence[BranchTrial], kind: str) -> Figure:
         [math.nan if t.validation_rms is None else t.validation_rms for t in trials]
     )
     bic = np.array([t.bic for t in trials])
-    with _style():
-        figure = _blank(WIDTH, 4.2)
+    with style():
+        figure = blank(WIDTH, 4.2)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.5, 1.0))
         upper.plot(n, train, "o-", color=MEASURED, label="training", markersize=5)
         if np.isfinite(validation).any():
@@ -259,7 +274,7 @@ def branches_figure(trials: Sequence[BranchTrial], kind: str) -> Figure:
         finite = np.concatenate((train, validation * shown.error_factor))
         finite = finite[np.isfinite(finite)]
         if finite.size and finite.min() > 0.0 and finite.max() > 8.0 * finite.min():
-            _log_axis(upper, "y", 0.8 * finite.min(), 1.25 * finite.max())
+            log_axis(upper, "y", 0.8 * finite.min(), 1.25 * finite.max())
         else:
             upper.set_ylim(bottom=0.0)
         upper.set_ylabel(f"RMS error ({shown.error_unit})")
@@ -279,7 +294,7 @@ def branches_figure(trials: Sequence[BranchTrial], kind: str) -> Figure:
                         trial.branches, color=THESIS, linewidth=7, alpha=0.25, zorder=0,
                         label="chosen" if i == 0 else None,
                     )  # fmt: skip
-        _legend(upper, 3)
+        legend(upper, 3)
         figure.align_ylabels([upper, lower])
     return figure
 
@@ -287,8 +302,8 @@ def branches_figure(trials: Sequence[BranchTrial], kind: str) -> Figure:
 def overview_figure(train: Comparison, validation: Sequence[Comparison]) -> Figure:
     """One picture of a whole identification: its training run, and its error on every other."""
     bars = len(validation)
-    with _style():
-        figure = _blank(1.2 * WIDTH, 5.6 + (0.9 + 0.24 * bars if bars else 0.0))
+    with style():
+        figure = blank(1.2 * WIDTH, 5.6 + (0.9 + 0.24 * bars if bars else 0.0))
         upper: Figure | SubFigure = figure
         if bars:
             halves = figure.subfigures(2, 1, squeeze=False, height_ratios=(5.6, 0.9 + 0.24 * bars))[
@@ -324,14 +339,14 @@ def _stack(axes: list[Axes], comparison: Comparison) -> None:
 
     def curve(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # the first sample lies at time zero, where a logarithmic axis never gets
-        return _decimated_log(time[1:], values[1:]) if log else decimate(time, values, COLUMNS)
+        return decimated_log(time[1:], values[1:]) if log else decimate(time, values, COLUMNS)
 
     drive.plot(*curve(comparison.drive * shown.drive_factor), color=DRIVE, linewidth=1.2)
     drive.set_ylabel(shown.drive_label)
     both.plot(*curve(comparison.measured * shown.factor), label="measured", **_measured_look())
     both.plot(*curve(comparison.model * shown.factor), label="model", **_model_look())
     both.set_ylabel(shown.label)
-    _legend(both)
+    legend(both)
     _noise_band(error, comparison, shown)
     error.plot(
         *curve((comparison.measured - comparison.model) * shown.error_factor),
@@ -341,12 +356,12 @@ def _stack(axes: list[Axes], comparison: Comparison) -> None:
     error.set_ylabel(shown.error_label)
     if log:
         error.set_xlabel("Time since the start (s)")
-        _log_axis(error, "x", time[1], time[-1])
+        log_axis(error, "x", time[1], time[-1])
     else:
         error.set_xlabel("Time (s)")
         error.set_xlim(time[0], time[-1])
     for ax in axes:
-        _few_ticks(ax, y=5)
+        few_ticks(ax, y=5)
 
 
 def _is_hold(comparison: Comparison) -> bool:
@@ -375,7 +390,7 @@ def _noise_band(ax: Axes, comparison: Comparison, shown: Shown) -> None:
                 label=None if i else
                 f"\N{PLUS-MINUS SIGN} noise floor, {significant(floor)} {shown.error_unit}",
             )  # fmt: skip
-        _legend(ax)
+        legend(ax)
     ax.axhline(0.0, color=UNSURE, linewidth=0.6, zorder=0.6)
 
 
@@ -404,8 +419,8 @@ def _histogram(ax: Axes, comparison: Comparison) -> None:
     ax.set_xlim(edges[0], edges[-1])
     ax.set_xlabel(shown.error_label)
     ax.set_ylabel(f"Density (1/{shown.error_unit})")
-    _few_ticks(ax, x=4, y=4)
-    _legend(ax)
+    few_ticks(ax, x=4, y=4)
+    legend(ax)
 
 
 def _correlation(ax: Axes, comparison: Comparison) -> None:
@@ -414,28 +429,28 @@ def _correlation(ax: Axes, comparison: Comparison) -> None:
     chance = 2.0 / math.sqrt(residual.size)
     ax.axhspan(-chance, chance, color=NOISE, linewidth=0, zorder=0.5, label="chance, 95 %")
     ax.axhline(0.0, color=UNSURE, linewidth=0.6, zorder=0.6)
-    ax.plot(*_decimated_log(lag, correlation), color=MEASURED, linewidth=1.1)
-    _log_axis(ax, "x", lag[0], lag[-1])
+    ax.plot(*decimated_log(lag, correlation), color=MEASURED, linewidth=1.1)
+    log_axis(ax, "x", lag[0], lag[-1])
     ax.set_ylim(min(-0.25, 1.1 * float(correlation.min())), 1.05)
     ax.set_yticks([-0.5, 0.0, 0.5, 1.0] if correlation.min() < -0.4 else [0.0, 0.5, 1.0])
     ax.set_xlabel("Lag (s)")
     ax.set_ylabel("Autocorrelation")
-    _legend(ax)
+    legend(ax)
 
 
 def _spectrum(ax: Axes, comparison: Comparison) -> None:
     shown = SHOWN[comparison.kind]
     step, residual = even(comparison.time, _residual(comparison) * shown.error_factor)
     frequency, density = spectrum(step, residual)
-    ax.plot(*_decimated_log(frequency, density), color=MEASURED, linewidth=1.1)
+    ax.plot(*decimated_log(frequency, density), color=MEASURED, linewidth=1.1)
     if comparison.noise:
         level = comparison.noise * shown.error_factor * math.sqrt(2.0 * step)
         ax.axhline(level, color=MODEL, linewidth=1.4, label="white noise")
-        _legend(ax)
-    _log_axis(ax, "x", frequency[0], frequency[-1])
+        legend(ax)
+    log_axis(ax, "x", frequency[0], frequency[-1])
     highest = float(density.max())
     if highest > 0.0:
-        _log_axis(ax, "y", 0.7 * max(float(density.min()), 1e-5 * highest), 1.4 * highest)
+        log_axis(ax, "y", 0.7 * max(float(density.min()), 1e-5 * highest), 1.4 * highest)
     ax.set_xlabel("Frequency (Hz)")
     ax.set_ylabel(f"Density ({shown.error_unit}/\N{SQUARE ROOT}Hz)")
 
@@ -512,13 +527,13 @@ def _intervals(ax: Axes, label: str, estimates: Sequence[Estimate], fit: Identif
                 label=_TABLE_3, linestyle="none", zorder=2.5,
             )  # fmt: skip
     if log:
-        _log_axis(ax, "x", left, right)
+        log_axis(ax, "x", left, right)
     else:
         ax.set_xlim(left, right)
     ax.set_ylim(len(estimates) - 0.4, -0.6)
-    ax.set_yticks(range(len(estimates)), [_drawable(symbol(e.name), 18) for e in estimates])
+    ax.set_yticks(range(len(estimates)), [drawable(symbol(e.name), 18) for e in estimates])
     ax.grid(visible=False, axis="y")
-    ax.set_xlabel(_drawable(label, 60), labelpad=1.5)
+    ax.set_xlabel(drawable(label, 60), labelpad=1.5)
 
 
 def _interval(
@@ -561,23 +576,24 @@ def _validation_bars(ax: Axes, train: Comparison, validation: Sequence[Compariso
     if floors:
         floor = float(np.median(floors)) * shown.error_factor
         ax.axvline(floor, color=MARK, linewidth=1.1, linestyle=(0, (3, 2)), label="noise floor")
-    ax.set_yticks(range(len(validation)), [_drawable(c.row or c.name, 24) for c in validation])
+    ax.set_yticks(range(len(validation)), [drawable(c.row or c.name, 24) for c in validation])
     ax.set_ylim(len(validation) - 0.4, -0.6)
     ax.set_xlim(0.0, 1.12 * longest or 1.0)
     ax.grid(visible=False, axis="y")
     ax.set_xlabel(f"RMS error on recordings the fit did not see ({shown.error_unit})")
-    _legend(ax, 4)
+    legend(ax, 4)
 
 
 # ---------------------------------------------------------------- small parts
 
 
-def _legend(ax: Axes, columns: int = 2) -> None:
+def legend(ax: Axes, columns: int = 2) -> None:
     """A legend above the axes, where no curve can run through it."""
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns)
 
 
-def _few_ticks(ax: Axes, x: int | None = None, y: int | None = None) -> None:
+def few_ticks(ax: Axes, x: int | None = None, y: int | None = None) -> None:
+    """At most about ``x`` and ``y`` ticks."""
     from matplotlib.ticker import MaxNLocator
 
     if x is not None:
@@ -586,7 +602,7 @@ def _few_ticks(ax: Axes, x: int | None = None, y: int | None = None) -> None:
         ax.yaxis.set_major_locator(MaxNLocator(y, min_n_ticks=3))
 
 
-def _log_axis(ax: Axes, which: str, low: float, high: float) -> None:
+def log_axis(ax: Axes, which: str, low: float, high: float) -> None:
     """A logarithmic axis from ``low`` to ``high`` > 0, with a few labels but at least two."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -617,12 +633,13 @@ def _log_ticks(axis: Axis) -> None:
     axis.set_major_formatter(FuncFormatter(label))
 
 
-def _decimated_log(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def decimated_log(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A curve for a logarithmic axis of ``x`` (N,) > 0, made short."""
     log_x, kept = decimate(np.log(x), y, COLUMNS // 2)
     return np.exp(log_x), kept
 
 
-def _drawable(text: str, longest: int) -> str:
+def drawable(text: str, longest: int) -> str:
     """``text`` with what the font has, and no longer than there is room for.
 
     The full name, in any script, stands in the page around the figure.

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from app.report import figures
 from app.report.numbers import seconds, significant
@@ -33,7 +33,15 @@ if TYPE_CHECKING:  # jinja2 and matplotlib are loaded by the command that writes
 
     from app.outcomes import Comparison, IdentifyOutcome, Published, ValidateOutcome
 
-__all__ = ["write_demo_report", "write_identify_report", "write_validate_report"]
+__all__ = [
+    "Picture",
+    "picture",
+    "prefixes",
+    "write_demo_report",
+    "write_identify_report",
+    "write_page",
+    "write_validate_report",
+]
 
 
 @dataclass(frozen=True)
@@ -98,17 +106,31 @@ def write_demo_report(
 def _write(
     path: str | Path, title: str, parts: Callable[[Iterator[str]], tuple[Part, ...]]
 ) -> Path:
+    def contents() -> dict[str, Any]:
+        made = parts(prefixes())
+        return {
+            "parts": made,
+            "title": title,
+            "film": all(p.film for p in made),
+            "rest_length_known": any(p.rest_length_known for p in made),
+        }
+
+    return write_page(path, "report.html.j2", contents)
+
+
+def write_page(path: str | Path, template: str, contents: Callable[[], dict[str, Any]]) -> Path:
+    """Write ``template`` with ``contents`` to ``path``. Raises ``InputError``."""
     from app.recording.files import check_output, replaced_when_done
 
     path = check_output(path, overwrite=True)  # before seconds go into the figures
-    page = _render(parts(_prefixes()), title)
+    page = _render(template, contents())
     with replaced_when_done(path) as partial:
         # a file's name may hold bytes that are no text: shown as ?, rather than no report at all
         partial.write_text(page, encoding="utf-8", errors="replace", newline="\n")
     return path
 
 
-def _render(parts: tuple[Part, ...], title: str) -> str:
+def _render(template: str, contents: dict[str, Any]) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -119,12 +141,7 @@ def _render(parts: tuple[Part, ...], title: str) -> str:
         lstrip_blocks=True,
     )
     environment.filters["glued"] = _glued
-    return environment.get_template("report.html.j2").render(
-        parts=parts,
-        title=title,
-        film=all(p.film for p in parts),
-        rest_length_known=any(p.rest_length_known for p in parts),
-    )
+    return environment.get_template(template).render(contents)
 
 
 def _glued(sentence: str) -> str:
@@ -134,7 +151,7 @@ def _glued(sentence: str) -> str:
     )
 
 
-def _prefixes() -> Iterator[str]:
+def prefixes() -> Iterator[str]:
     """What keeps the figures of one page apart."""
     return (f"f{n}" for n in count(1))
 
@@ -155,7 +172,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
     if outcome.trials:
         branch_tables = (branch_trials(outcome.trials, outcome.kind),)
         branch_pictures = (
-            _picture(
+            picture(
                 figures.branches_figure(outcome.trials, outcome.kind),
                 prefixes,
                 "Error on training and validation data, and the information criterion (BIC) of "
@@ -171,7 +188,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
         errors=tuple(errors),
         parameters=(parameter_table(fit),),
         parameter_pictures=(
-            _picture(
+            picture(
                 figures.parameters_figure(fit),
                 prefixes,
                 "Parameters with their 95 % intervals. An arrow is an end that the data leave "
@@ -243,7 +260,8 @@ def _validation_sides(comparisons: Sequence[Comparison], alone: str) -> list[Sid
     return [_side(title, members, None) for title, members in groups]
 
 
-def _picture(figure: Figure, prefixes: Iterator[str], caption: str) -> Picture:
+def picture(figure: Figure, prefixes: Iterator[str], caption: str) -> Picture:
+    """``figure`` for a page, whose ``prefixes`` keep its figures apart."""
     from markupsafe import Markup
 
     # matplotlib has escaped all text in the drawing, and the label is an escaped attribute
@@ -259,7 +277,7 @@ def _comparison_pictures(
         name = f"{c.name} ({c.row})" if c.row else c.name
         error = f"{significant(c.errors.rms * shown.error_factor)} {shown.error_unit} RMS"
         pictures.append(
-            _picture(
+            picture(
                 figures.comparison_figure(c),
                 prefixes,
                 f"{name}: {shown.drive.lower()}, {shown.quantity.lower()} measured and by the "
@@ -268,7 +286,7 @@ def _comparison_pictures(
         )
         if c.kind == "film":
             caption = f"{name}: nominal stress against stretch."
-            pictures.append(_picture(figures.loop_figure(c), prefixes, caption))
+            pictures.append(picture(figures.loop_figure(c), prefixes, caption))
     return tuple(pictures)
 
 
@@ -279,6 +297,6 @@ def _residual_pictures(comparison: Comparison, prefixes: Iterator[str]) -> tuple
         "How the error spreads over frequency; white noise would be flat.",
     )
     return tuple(
-        _picture(figure, prefixes, caption)
+        picture(figure, prefixes, caption)
         for figure, caption in zip(figures.residual_panels(comparison), captions, strict=True)
     )

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from model.actuator import Actuator
-    from model.material import Network
+    from model.film import Strip
 
 __all__ = ["table_3"]
 
 
-def table_3(model: Actuator | Network) -> dict[str, float]:
+def table_3(model: Actuator | Strip) -> dict[str, float]:
     """The thesis's Table 3 by parameter name (SI), if ``model`` is an actuator of that make.
 
     Table 3's branches are put in order of relaxation time, as fitted ones are: its order is a

@@ -12,8 +12,8 @@ from app.report.units import SHOWN
 if TYPE_CHECKING:
     from app.outcomes import Comparison, IdentifyOutcome, ValidateOutcome
     from model.actuator import Actuator
+    from model.film import Strip
     from model.fitting import Identification
-    from model.material import Network
 
 __all__ = [
     "describe_model",
@@ -65,19 +65,15 @@ def pooled_noise(comparisons: Sequence[Comparison]) -> float | None:
     return math.sqrt(sum(n * n for n in floors) / len(floors)) if floors else None
 
 
-def describe_model(model: Actuator | Network) -> str:
+def describe_model(model: Actuator | Strip) -> str:
     """Springs, branches and effects of a model, in a few words."""
-    from model.actuator import Actuator
-
-    network = model.network if isinstance(model, Actuator) else model
+    network = model.network
     kinds = sorted({s.kind for s in network.springs})
     names = {"gent": "Gent", "neo-hookean": "neo-Hookean", "arruda-boyce": "Arruda-Boyce"}
     springs = listed(names.get(k, k) for k in kinds)
     words = f"{springs} springs with {_counted(len(network.branches), 'relaxation branch')}"
     words = words.replace("branchs", "branches")
-    effects = (
-        [name.replace("_", " ") for name, _ in model.effects] if isinstance(model, Actuator) else []
-    )
+    effects = [name for name, _ in model.effects]
     return f"{words}, and {listed(effects)}" if effects else words
 
 

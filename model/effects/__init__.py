@@ -1,21 +1,84 @@
 """Effects that the thesis's model lacks: each one file, each with a value at which it vanishes.
 
-An effect describes itself (name, family, what it acts on, its parameters with units, bounds and
-neutral value), so that reports, windows and model files need to know none of them by name, and it
-contributes to the coefficients that the kernel reads. To add one, add a file and list it here.
+A file holds ``EFFECT``, its description, from which reports, windows, fits and model files read all
+they need to know, and the compiled functions by which it takes part in the kernel (``HOOKS`` of
+``model.effects.assembly`` says which there are). To add an effect, add a file: it is found here,
+given its place in the coefficient vector and in the kernel's memory, and compiled in.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
+from dataclasses import dataclass
+from importlib import import_module
+from pkgutil import iter_modules
+from types import MappingProxyType, ModuleType
 
-from model.effects import load_inertia
-from model.effects.description import Effect, Parameter
+import numpy as np
 
-__all__ = ["EFFECTS", "Effect", "Parameter"]
+from model.coefficients import EFFECTS_AT
+from model.effects.description import FAMILIES, Effect, EffectValues, Parameter
+
+__all__ = [
+    "EFFECTS",
+    "FAMILIES",
+    "MEMORY",
+    "NEUTRAL",
+    "PLACES",
+    "SLOTS",
+    "Effect",
+    "EffectValues",
+    "Parameter",
+    "Place",
+]
+
+_NOT_EFFECTS = ("assembly", "description")
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an effect lives: its ``module``, first coefficient ``at``, first ``memory`` slot."""
+
+    module: ModuleType
+    at: int
+    memory: int
+
+    def column(self, effect: Effect, parameter: str) -> int:
+        """Index of one of the effect's numbers in the coefficient vector."""
+        return self.at + [p.name for p in effect.parameters].index(parameter)
+
+
+def _found() -> tuple[dict[str, Effect], dict[str, Place]]:
+    effects: dict[str, Effect] = {}
+    places: dict[str, Place] = {}
+    at, memory = EFFECTS_AT, 0
+    names = sorted(m.name for m in iter_modules(__path__) if m.name not in _NOT_EFFECTS)
+    for name in names:
+        module = import_module(f"{__name__}.{name}")
+        effect: Effect = module.EFFECT
+        if effect.name in effects:
+            raise ImportError(f"two effects are called {effect.name!r}")
+        effects[effect.name] = effect
+        places[effect.name] = Place(module, at, memory)
+        at += len(effect.parameters)
+        memory += effect.memory
+    return effects, places
+
+
+_effects, _places = _found()
 
 #: Every effect this version knows, by name.
-EFFECTS: Mapping[str, Effect] = MappingProxyType(
-    {effect.name: effect for effect in (load_inertia.EFFECT,)}
+EFFECTS: Mapping[str, Effect] = MappingProxyType(_effects)
+#: Where each of them lives.
+PLACES: Mapping[str, Place] = MappingProxyType(_places)
+#: How many coefficients all effects have together, and how many numbers they remember.
+SLOTS = sum(len(e.parameters) for e in EFFECTS.values())
+MEMORY = sum(e.memory for e in EFFECTS.values())
+#: The coefficients (SLOTS,) of a model without effects; shapes are at a typical value.
+NEUTRAL = np.array(
+    [
+        p.neutral if p.neutral is not None else p.typical
+        for e in EFFECTS.values()
+        for p in e.parameters
+    ]
 )

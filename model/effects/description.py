@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
 
-import numpy as np
-
-if TYPE_CHECKING:
-    from model.material import Film, Load
-
-__all__ = ["ACTS_ON", "Effect", "Parameter"]
+__all__ = ["ACTS_ON", "FAMILIES", "Effect", "EffectValues", "Parameter"]
 
 #: The places of the signal path where an effect can act.
 ACTS_ON = (
@@ -25,28 +18,80 @@ ACTS_ON = (
     "environment",
 )
 
+#: What an effect can be a kind of. ``slack`` is of film strips only, which cannot push.
+FAMILIES = (
+    "load_inertia",
+    "drag",
+    "friction",
+    "rate_independent_hysteresis",
+    "electrode_resistance",
+    "leakage",
+    "dielectric_relaxation",
+    "permittivity",
+    "creep",
+    "softening",
+    "thermal",
+    "drift",
+    "sensor_lag",
+    "sensor_nonlinearity",
+    "amplifier",
+    "interference",
+    "slack",
+    "unknown",
+)
+
+#: Effects of a model with their values: ((name, ((parameter, value), ...)), ...).
+EffectValues = tuple[tuple[str, tuple[tuple[str, float], ...]], ...]
+
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of an effect: SI ``unit``, ``neutral`` value at which it vanishes, ``bounds``."""
+    """One number of an effect, in SI ``unit``, within ``bounds``.
+
+    ``neutral`` is the value at which the effect vanishes, of a size; a shape (a relaxation time, a
+    threshold) has no such value and is None there. ``typical`` is a value that would be noticed:
+    the scale on which a fit steps. ``starts`` are the values from which a fit sets out, of a shape
+    (a size starts where the residual says). With ``part_of`` displacement or voltage they are parts
+    of the largest one in the records; with duration the start is sought along the records, with
+    spectrum also where the residual's spectrum is highest. ``logarithmic`` numbers are sought by
+    ratios.
+    """
 
     name: str
     unit: str
-    neutral: float
     bounds: tuple[float, float]
     meaning: str
+    typical: float
+    neutral: float | None = None
+    starts: tuple[float, ...] = ()
+    logarithmic: bool = False
+    part_of: str = ""
 
 
 @dataclass(frozen=True)
 class Effect:
-    """A physical effect: what it is called, where it acts, its parameters, what it contributes.
+    """A physical effect: its name, its family, where it acts, its numbers, what it remembers.
 
-    ``contribute(coefficients, values, film, load)`` adds the effect, in place, to a coefficient
-    vector as laid out in ``model.network``; at the neutral values it adds nothing.
+    The sizes come first among ``parameters``: while all of them are neutral, the effect is skipped.
+    ``memory`` is how many numbers of the kernel's state are its own; they are 0 at rest. ``drives``
+    says for which measurements it makes sense: under ``voltage``, under an imposed ``stretch``.
+    ``words`` is one sentence for a person: what the effect is and what betrays it.
     """
 
     name: str
     family: str
     acts_on: str
+    words: str
     parameters: tuple[Parameter, ...]
-    contribute: Callable[[np.ndarray, Mapping[str, float], Film, Load], None]
+    memory: int = 0
+    drives: tuple[str, ...] = field(default=("voltage",))
+
+    @property
+    def sizes(self) -> tuple[Parameter, ...]:
+        """The numbers at whose neutral values the effect vanishes."""
+        return tuple(p for p in self.parameters if p.neutral is not None)
+
+    @property
+    def shapes(self) -> tuple[Parameter, ...]:
+        """The other numbers."""
+        return tuple(p for p in self.parameters if p.neutral is None)

@@ -7,32 +7,25 @@ against the film's own 1.9 kg/m. The film alone rings at about 70 Hz, with the l
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
-import numpy as np
-
+from model.coefficients import LENGTH, SECTION
 from model.effects.description import Effect, Parameter
-from model.network import INERTIA
+from model.jit import jit
 
-if TYPE_CHECKING:
-    from model.material import Film, Load
-
-__all__ = ["EFFECT"]
-
-
-def _contribute(c: np.ndarray, values: Mapping[str, float], film: Film, _load: Load) -> None:
-    c[INERTIA] += values["moving_mass"] * film.length / (film.width * film.thickness)
-
+__all__ = ["EFFECT", "inertia"]
 
 EFFECT = Effect(
     name="load inertia",
     family="load_inertia",
     acts_on="inertia",
+    words="mass moves with the film's lower edge: ringing after edges, force against acceleration",
     parameters=(
         Parameter(
-            "moving_mass", "kg", 0.0, (0.0, 2.0), "mass that moves with the film's lower edge"
+            "moving_mass", "kg", (0.0, 2.0), "mass that moves with the film's lower edge", 0.1, 0.0
         ),
     ),
-    contribute=_contribute,
 )
+
+
+@jit
+def inertia(c, k, m, j):
+    return c[k] * c[LENGTH] / c[SECTION]

@@ -10,16 +10,23 @@ import numpy as np
 
 from model.actuator import Actuator
 from model.errors import ModelError
+from model.film import Strip
 from model.fitting.intervals import CHI2_95, correlation_time, covariance, profile
 from model.fitting.levenberg import LocalFit, descend
 from model.fitting.parameters import Estimate, Layout, require_free
 from model.fitting.problem import Problem
 from model.fitting.search import Progress, algorithm_1, film_starts, voltage_starts
-from model.kinematics import KINEMATICS
 from model.material import Network
 from model.records import ActuatorRecord, Record
 
-__all__ = ["METHODS", "Identification", "add_intervals", "identify"]
+__all__ = [
+    "METHODS",
+    "Identification",
+    "add_intervals",
+    "fit_globally",
+    "identify",
+    "is_determined",
+]
 
 METHODS = ("hybrid", "de")
 
@@ -43,7 +50,7 @@ class Identification:
     """
 
     method: str
-    model: Actuator | Network
+    model: Actuator | Strip
     estimates: tuple[Estimate, ...]
     covariance_names: tuple[str, ...]
     covariance: np.ndarray
@@ -66,9 +73,8 @@ def _quiet(stage: str, fraction: float) -> None:
 
 def identify(
     records: Sequence[Record],
-    base: Actuator | Network,
+    base: Actuator | Strip,
     method: str = "hybrid",
-    kinematics: str = "uniaxial",
     seed: int = 0,
     intervals: bool = True,
     nested: Network | None = None,
@@ -77,42 +83,37 @@ def identify(
 ) -> Identification:
     """Fit ``base`` to ``records``: all its moduli, locking limits and relaxation times are free.
 
-    ``base`` is an ``Actuator`` for records driven by voltage (its film, load and effects are kept),
-    a ``Network`` for films driven by stretch, held as ``kinematics`` says. Its parameter values are
-    not used as a start, only its number of branches and kinds of spring. ``seed`` matters to "de"
+    ``base`` is an ``Actuator`` for records driven by voltage (its film and load are kept), a
+    ``Strip`` for films driven by stretch. The values of its springs are not used as a start, only
+    the number of branches and the kinds of spring; the numbers of its effects are. ``seed`` matters to "de"
     only. ``nested`` is a fit with fewer branches, from which one more descent starts, so that more
     branches never fit worse. ``progress(stage, fraction)`` is called often. Raises ``ModelError``
     for records and models that do not fit together.
     """
     if method not in METHODS:
         raise ModelError(f"method {method!r} is not one of {', '.join(METHODS)}")
-    if kinematics not in KINEMATICS:
-        raise ModelError(f"kinematics {kinematics!r} is not one of {', '.join(KINEMATICS)}")
-    held = 0 if isinstance(base, Actuator) else KINEMATICS.index(kinematics)
-    layout = Layout(base, held)
+    layout = Layout(base)
     problem = Problem(records, layout, workers)
     require_free(layout, problem.samples)
     if method == "de":
         found = algorithm_1(problem, seed, progress)
         fit = descend(problem, layout.coordinates(found), iterations=0)
         return _result(problem, method, fit, found, "Algorithm 1 gives no interval", ())
-    fit, held_limits = _hybrid(problem, nested, progress)
+    fit, held_limits = fit_globally(problem, nested, progress)
     limits = tuple(n for n, h in zip(layout.names, held_limits, strict=True) if h)
     words = "no interval was asked for"
     result = _result(problem, method, fit, layout.values(fit.x), words, limits)
-    return add_intervals(records, result, kinematics, workers, progress) if intervals else result
+    return add_intervals(records, result, workers, progress) if intervals else result
 
 
 def add_intervals(
     records: Sequence[Record],
     fitted: Identification,
-    kinematics: str = "uniaxial",
     workers: int = 2,
     progress: Progress = _quiet,
 ) -> Identification:
     """``fitted`` with the 95 % intervals of its numbers; ``records`` are those it was fitted to."""
-    model = fitted.model
-    layout = Layout(model, 0 if isinstance(model, Actuator) else KINEMATICS.index(kinematics))
+    layout = Layout(fitted.model)
     problem = Problem(records, layout, workers)
     held = np.array([name in fitted.held_limits for name in layout.names])
     estimates, names, cov = _intervals(problem, layout.initial(), held, progress)
@@ -209,7 +210,7 @@ def _coarse_about(problem: Problem, values: np.ndarray) -> Problem:
     return coarse
 
 
-def _hybrid(
+def fit_globally(
     problem: Problem, nested: Network | None, progress: Progress
 ) -> tuple[LocalFit, np.ndarray]:
     """Global search, descents from several starts, then the limits: the fit, and what is held.
@@ -277,10 +278,12 @@ def _intervals(
         sides = (-1.0,) if held[j] else (-1.0, 1.0)  # a held limit is already as high as counts
         low, high = profile(coarse, centre.x, chi2, j, jac, inflation, held, tick, sides)
         value = float(values[j])
-        if q.kind != "mu":
+        if q.logarithmic:
             low, high = math.exp(low), math.exp(high)
-        low, high = float(max(min(low, value), 0.0)), float(max(high, value))
-        determined = bool(low > 0.0 and high < math.inf and high / low <= _DETERMINED_RATIO)
+        if q.kind != "effect":
+            low = max(low, 0.0)
+        low, high = float(min(low, value)), float(max(high, value))
+        determined = is_determined(low, high)
         note = "" if determined else _open_words(low, high)
         if held[j]:
             note = _J_WORDS if low > 0.0 else "these data say nothing about it"
@@ -288,11 +291,19 @@ def _intervals(
     progress("intervals", 1.0)
     problem.simulations += coarse.simulations
     names = tuple(n for n, f in zip(layout.names, free, strict=True) if f)
-    natural = np.where([q.kind == "mu" for q in layout.quantities], 1.0, values)[free]
+    natural = np.where([q.logarithmic for q in layout.quantities], values, 1.0)[free]
     return estimates, names, cov * np.outer(natural, natural)
 
 
+def is_determined(low: float, high: float) -> bool:
+    """True where an interval is narrow enough for its value to be quoted, and leaves 0 out."""
+    near, far = sorted((abs(low), abs(high)))
+    return low * high > 0.0 and far < math.inf and far / near <= _DETERMINED_RATIO
+
+
 def _open_words(low: float, high: float) -> str:
+    if low < 0.0 < high:
+        return "these data do not tell it from 0"
     if low == 0.0 and math.isinf(high):
         return "these data say nothing about it"
     if math.isinf(high):

@@ -8,20 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from model.actuator import Actuator
+from model.coefficients import FORCE, HELD, KIND, LIMIT, LOCKING, MODULUS, RATE, WIDTH
+from model.effects import EFFECTS, PLACES, EffectValues, Parameter
 from model.errors import ModelError
+from model.film import Strip
 from model.material import Branch, Network, Spring
-from model.network import (
-    FORCE,
-    HEAD,
-    HELD,
-    KIND,
-    LIMIT,
-    LOCKING,
-    MODULUS,
-    RATE,
-    WIDTH,
-    nominal_pull,
-)
+from model.network import HEAD, nominal_pull
 from model.springs import SPRINGS, locking_strain
 
 __all__ = ["THESIS_RANGES", "Estimate", "Layout", "Quantity"]
@@ -35,25 +27,53 @@ _FLOOR = {"mu": 1e-2, "J": 1e-3, "T": 1e-6}
 
 @dataclass(frozen=True)
 class Quantity:
-    """One free number: ``kind`` mu, J or T of spring ``index`` (0 is the equilibrium spring)."""
+    """One free number, and where the kernel reads it.
+
+    ``kind`` is mu, J or T of spring ``index`` (0 is the equilibrium spring), or ``effect``: then it
+    is number ``index`` of the effect ``effect``.
+    """
 
     kind: str
     index: int
+    effect: str = ""
+
+    @property
+    def parameter(self) -> Parameter:
+        """What an effect says of its number."""
+        return EFFECTS[self.effect].parameters[self.index]
 
     @property
     def name(self) -> str:
-        """mu_0, J_0, T_1, ..."""
+        """mu_0, J_0, T_1, ..., or effect and number, as in ``linear drag: drag``."""
+        if self.kind == "effect":
+            return f"{self.effect}: {self.parameter.name}"
         return f"{self.kind}_{self.index}"
 
     @property
     def unit(self) -> str:
         """SI unit, empty for a pure number."""
+        if self.kind == "effect":
+            return self.parameter.unit
         return {"mu": "Pa", "J": "", "T": "s"}[self.kind]
 
     @property
     def bounds(self) -> tuple[float, float]:
         """Range in which it is sought."""
+        if self.kind == "effect":
+            return self.parameter.bounds
         return _FLOOR[self.kind], THESIS_RANGES[self.kind][1]
+
+    @property
+    def logarithmic(self) -> bool:
+        """True where a fit moves by ratios."""
+        return self.parameter.logarithmic if self.kind == "effect" else self.kind != "mu"
+
+    @property
+    def column(self) -> int:
+        """Where it stands in the coefficient vector (a relaxation time as its inverse)."""
+        if self.kind == "effect":
+            return PLACES[self.effect].at + self.index
+        return HEAD + WIDTH * self.index + {"mu": MODULUS, "J": LIMIT, "T": RATE}[self.kind]
 
 
 @dataclass(frozen=True)
@@ -76,18 +96,19 @@ class Estimate:
 
 
 class Layout:
-    """The free numbers of a network, moduli first, then limits, then times, as in the thesis.
+    """The free numbers of a model: moduli, then limits, then times, as in the thesis, then effects.
 
     ``base`` carries everything that is not free. A fit moves in *coordinates*: moduli as they are,
     limits and times as logarithms. The data fix sums of moduli long before their parts, and such
     valleys are straight only while the moduli stay linear; times and limits spread over decades.
+    ``times`` narrows the range of the relaxation times, in s.
     """
 
-    def __init__(self, base: Actuator | Network, held: int = 0) -> None:
+    def __init__(self, base: Actuator | Strip, times: tuple[float, float] | None = None) -> None:
         self.base = base
-        self.network = base.network if isinstance(base, Actuator) else base
-        self.held = base.film.held if isinstance(base, Actuator) else held
-        self._c = base.coefficients() if isinstance(base, Actuator) else base.coefficients(held)
+        self.network = base.network
+        self.held = base.film.held if isinstance(base, Actuator) else base.held
+        self._c = base.coefficients()
         self._rest = None
         if isinstance(base, Actuator) and base.load.rest_length is not None:
             self._rest = base.load.rest_length / base.film.length
@@ -96,15 +117,20 @@ class Layout:
             *(Quantity("mu", i) for i in range(len(springs)) if i or self._rest is None),
             *(Quantity("J", i) for i, s in enumerate(springs) if s.kind != "neo-hookean"),
             *(Quantity("T", i) for i in range(1, len(springs))),
+            *(
+                Quantity("effect", i, name)
+                for name, _ in base.effects
+                for i in range(len(EFFECTS[name].parameters))
+            ),
         )
-        self._columns = np.array(
-            [
-                HEAD + WIDTH * q.index + {"mu": MODULUS, "J": LIMIT, "T": RATE}[q.kind]
-                for q in self.quantities
-            ]
+        self._columns = np.array([q.column for q in self.quantities])
+        self._log = np.array([q.logarithmic for q in self.quantities])
+        self._typical = np.array(
+            [q.parameter.typical if q.kind == "effect" else 0.0 for q in self.quantities]
         )
-        self._log = np.array([q.kind != "mu" for q in self.quantities])
         bounds = np.array([q.bounds for q in self.quantities])
+        if times is not None:
+            bounds[self.column("T")] = times
         self.lower, self.upper = self.coordinates(bounds[:, 0]), self.coordinates(bounds[:, 1])
 
     @property
@@ -132,27 +158,36 @@ class Layout:
     def reach(self, x: np.ndarray) -> np.ndarray:
         """How far (d,) one step from ``x`` may go in each coordinate before linearity is no guide.
 
-        A factor of 20 for a time or a limit; for a modulus the sum of all moduli.
+        A factor of 20 for a time or a limit; for a modulus the sum of all moduli; for a number of
+        an effect ten times what would be noticed, or itself.
         """
-        moduli = x[~self._log]
-        return np.where(self._log, 3.0, max(float(moduli.sum()), 1.0) if moduli.size else 1.0)
+        moduli = x[self.column("mu")]
+        effects = np.maximum(10.0 * self._typical, np.abs(x))
+        linear = np.where(
+            self._typical > 0.0, effects, max(float(moduli.sum()), 1.0) if moduli.size else 1.0
+        )
+        return np.where(self._log, 3.0, linear)
 
     def differences(self, x: np.ndarray) -> np.ndarray:
         """Steps (d,) for difference quotients at coordinates ``x``."""
-        return np.where(self._log, 1e-4, 1e-4 * np.maximum(x, 1e-3 * self.reach(x)))
+        # effects have kinks, and a model with one has them everywhere: wide enough to look across
+        springs = 1e-3 if self.base.effects else 1e-4
+        moduli = springs * np.maximum(np.abs(x), 1e-3 * self.reach(x))
+        # but not past a moment or a line
+        placed = [
+            q.kind == "effect" and q.parameter.part_of in ("duration", "spectrum")
+            for q in self.quantities
+        ]
+        sizes = np.maximum(np.where(placed, 0.0, 1e-3 * np.abs(x)), 0.02 * self._typical)
+        linear = np.where(self._typical > 0.0, sizes, moduli)
+        return np.where(self._log, np.where(self._typical > 0.0, 2e-2, springs), linear)
 
     def initial(self) -> np.ndarray:
         """Natural values (d,) of the base itself, inside the bounds."""
-        springs, times = self.network.springs, self.network.times
-        values = [
-            springs[q.index].modulus
-            if q.kind == "mu"
-            else springs[q.index].limit
-            if q.kind == "J"
-            else times[q.index - 1]
-            for q in self.quantities
-        ]
-        return self.values(np.clip(self.coordinates(np.array(values)), self.lower, self.upper))
+        values = self._c[self._columns].copy()
+        rates = self.column("T")
+        values[rates] = self.network.times
+        return self.values(np.clip(self.coordinates(values), self.lower, self.upper))
 
     def padded(self, network: Network) -> np.ndarray:
         """Coordinates (d,) of ``network``, with weak branches added until it has as many as this.
@@ -168,14 +203,11 @@ class Layout:
             times.append(middle)
         branches = tuple(Branch(s, t) for s, t in zip(springs[1:], times, strict=True))
         other = Network(springs[0], branches)
-        base = replace(self.base, network=other) if isinstance(self.base, Actuator) else other
-        values = [
-            {"mu": other.springs[q.index].modulus, "J": other.springs[q.index].limit}.get(
-                q.kind, other.times[q.index - 1] if q.index else 0.0
-            )
-            for q in Layout(base, self.held).quantities
-        ]
-        return np.clip(self.coordinates(np.array(values)), self.lower, self.upper)
+        return np.clip(
+            self.coordinates(Layout(replace(self.base, network=other)).initial()),
+            self.lower,
+            self.upper,
+        )
 
     def coefficients(self, values: np.ndarray) -> np.ndarray:
         """Kernel coefficients (P, C) of a population ``values`` (P, d), natural, no logarithms."""
@@ -212,10 +244,21 @@ class Layout:
         branches = tuple(Branch(s, t) for s, t in zip(springs[1:], times, strict=True))
         return Network(springs[0], branches)
 
-    def model(self, values: np.ndarray) -> Actuator | Network:
+    def model(self, values: np.ndarray) -> Actuator | Strip:
         """The base with the free numbers set to ``values`` (d,)."""
-        network = self.build(values)
-        return replace(self.base, network=network) if isinstance(self.base, Actuator) else network
+        return replace(self.base, network=self.build(values), effects=self._effects(values))
+
+    def _effects(self, values: np.ndarray) -> EffectValues:
+        given = {
+            # a logarithm and back may round to just outside
+            (q.effect, q.parameter.name): float(min(max(v, q.bounds[0]), q.bounds[1]))
+            for q, v in zip(self.quantities, values, strict=True)
+            if q.kind == "effect"
+        }
+        return tuple(
+            (name, tuple((p.name, given[name, p.name]) for p in EFFECTS[name].parameters))
+            for name, _ in self.base.effects
+        )
 
     def by_relaxation_time(self, values: np.ndarray) -> np.ndarray:
         """``values`` (d,) with the branches in order of relaxation time.

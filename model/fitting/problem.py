@@ -12,7 +12,7 @@ from model.actuator import Actuator, displacements
 from model.errors import ModelError
 from model.film import stress_of
 from model.fitting.parameters import Layout
-from model.records import ActuatorRecord, FilmRecord, Record, at_sensor
+from model.records import ActuatorRecord, FilmRecord, Record
 
 __all__ = ["Problem"]
 
@@ -38,30 +38,33 @@ class Problem:
         self.workers = workers
         self.simulations = 0
         self.measured = np.concatenate([r.measured for r in records])
-        self.sigma = np.concatenate([np.full(r.measured.size, r.noise) for r in records])
+        # a reading that must not be used has no weight
+        self.sigma = np.concatenate(
+            [
+                np.full(r.measured.size, r.noise)
+                if r.valid is None
+                else np.where(r.valid, r.noise, np.inf)
+                for r in records
+            ]
+        )
         self._edges = np.cumsum([0, *(r.measured.size for r in records)])
 
     @property
     def samples(self) -> int:
         """How many readings are fitted."""
-        return int(self.measured.size)
+        return int(np.count_nonzero(np.isfinite(self.sigma)))
 
     def predict(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Model readings (P, N) and statuses (P,) of a population ``values`` (P, d), natural."""
         c = self.layout.coefficients(values)
-        out = np.zeros((c.shape[0], self.samples))
+        out = np.zeros((c.shape[0], self.measured.size))
         status = np.zeros(c.shape[0], dtype=np.int64)
         for i, record in enumerate(self.records):
             part = out[:, self._edges[i] : self._edges[i + 1]]
             if isinstance(record, ActuatorRecord):
                 base = self.layout.base
                 length = base.film.length if isinstance(base, Actuator) else 1.0
-                x, u, s = displacements(c, length, record.drive, self.workers)
-                if record.lag == 0.0:
-                    part[:] = x
-                else:
-                    for p in range(c.shape[0]):
-                        at_sensor(record.time, x[p], u[p], record.lag, part[p])
+                part[:], s = displacements(c, length, record.drive, record.lag, self.workers)
             else:
                 s = self._stresses(c, record, part)
             status = np.where(status == kernel.OK, s, status)
@@ -92,17 +95,27 @@ class Problem:
 
         Members that the model cannot follow cost more than doing nothing at all.
         """
-        predicted, status = self.predict(self.layout.values(x))
-        still = np.mean((self.measured / self.sigma) ** 2)
-        costs = np.mean(((predicted - self.measured) / self.sigma) ** 2, axis=1)
-        return np.where(status == kernel.OK, costs, 10.0 * still + costs)
+        return self.evaluate(x)[0]
 
-    def jacobian(self, x: np.ndarray, free: np.ndarray) -> np.ndarray:
+    def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Costs (P,) as ``costs`` has them, and residuals (P, N), of coordinates (P, d)."""
+        predicted, status = self.predict(self.layout.values(x))
+        still = float(np.sum((self.measured / self.sigma) ** 2)) / self.samples
+        residuals = (predicted - self.measured) / self.sigma
+        costs = np.sum(residuals**2, axis=1) / self.samples
+        return np.where(status == kernel.OK, costs, 10.0 * still + costs), residuals
+
+    def jacobian(
+        self, x: np.ndarray, free: np.ndarray, residuals: np.ndarray | None = None
+    ) -> np.ndarray:
         """d(residuals)/dx (N, f) over the ``free`` (d,) coordinates, as one population.
 
         Central differences: two branches of nearly one relaxation time have nearly parallel columns
         (to 1e-5), and a one-sided difference would blur just the direction that is hard to see.
+        With the ``residuals`` at ``x`` given, one-sided ones, for half of the cost.
         """
+        if residuals is not None:
+            return self._one_sided(x, free, residuals)
         steps = np.diag(self.layout.differences(x))[free]
         up = np.minimum(x + steps, self.layout.upper)
         down = np.maximum(x - steps, self.layout.lower)
@@ -110,3 +123,11 @@ class Problem:
         width = (up - down).sum(axis=1)
         half = width.size
         return ((predicted[:half] - predicted[half:]) / self.sigma).T / width
+
+    def _one_sided(self, x: np.ndarray, free: np.ndarray, residuals: np.ndarray) -> np.ndarray:
+        steps = self.layout.differences(x)
+        # away from a bound that is near
+        steps = np.where(x + steps > self.layout.upper, -steps, steps)
+        there = x + np.diag(steps)[free]
+        predicted, _ = self.predict(self.layout.values(there))
+        return ((predicted - self.measured) / self.sigma - residuals).T / steps[free]

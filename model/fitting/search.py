@@ -12,13 +12,14 @@ from scipy.optimize import OptimizeResult, differential_evolution, nnls
 
 from model import kernel
 from model.actuator import Actuator
+from model.coefficients import ELECTRIC, MODULUS
 from model.errors import ModelError
 from model.film import unit_stresses
 from model.fitting.parameters import THESIS_RANGES, Layout
 from model.fitting.problem import Problem
 from model.kinematics import electric
 from model.material import Branch, Network, Spring
-from model.network import ELECTRIC, HEAD, MODULUS
+from model.network import HEAD
 from model.records import ActuatorRecord, FilmRecord
 
 __all__ = ["ALGORITHM_1", "Algorithm1", "algorithm_1", "film_starts", "voltage_starts"]

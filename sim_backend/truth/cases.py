@@ -2,31 +2,111 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
-from model.material import TABLE_3, Film, Load, Network
-from sim_backend.truth.effect import TruthEffect
-from sim_backend.truth.effects import drag, load_inertia
+from model.material import TABLE_3, Branch, Film, Load, Network, Spring
+from sim_backend.truth.effect import Draw, TruthEffect
+from sim_backend.truth.effects import (
+    amplifier,
+    creep,
+    dielectric_relaxation,
+    drag,
+    drift,
+    electrode_resistance,
+    end_stop,
+    friction,
+    interference,
+    leakage,
+    load_inertia,
+    loose_contact,
+    permittivity,
+    rate_independent_hysteresis,
+    second_mode,
+    sensor_lag,
+    sensor_nonlinearity,
+    softening,
+    sudden,
+    thermal,
+)
 from sim_backend.truth.film import FilmNumbers
 from sim_backend.truth.plant import TruthPlant
 
-__all__ = ["TruthCase", "draw"]
+__all__ = ["FORMS", "KINDS", "UNKNOWN", "TruthCase", "draw"]
 
-#: Effects of which a case has at most one, besides the moving mass that every rig has.
-_DRAWN: tuple[Callable[[np.random.Generator, Load], TruthEffect], ...] = (drag.draw,)
+UNKNOWN = "unknown"
+
+#: Forms of each family, and of what is in none, in the order of the signal path.
+FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
+    {
+        "amplifier": (
+            amplifier.offset,
+            amplifier.saturation,
+            amplifier.slew,
+            amplifier.second_order,
+        ),
+        "electrode_resistance": (electrode_resistance.ladder, electrode_resistance.percolating),
+        "leakage": (leakage.poole_frenkel, leakage.hopping),
+        "dielectric_relaxation": (
+            dielectric_relaxation.three_terms,
+            dielectric_relaxation.cole_cole,
+        ),
+        "permittivity": (permittivity.with_strain, permittivity.with_field),
+        "creep": (creep.fractional, creep.broad),
+        "softening": (softening.first_loading, softening.ageing),
+        "thermal": (thermal.self_heating, thermal.room),
+        "rate_independent_hysteresis": (
+            rate_independent_hysteresis.bouc_wen,
+            rate_independent_hysteresis.iwan,
+        ),
+        "load_inertia": (load_inertia.hung,),
+        "drag": (drag.mixed, drag.air_film),
+        "friction": (friction.lugre, friction.elasto_plastic),
+        "sensor_lag": (sensor_lag.moving_average, sensor_lag.low_pass),
+        "sensor_nonlinearity": (
+            sensor_nonlinearity.cubic,
+            sensor_nonlinearity.ripple,
+            sensor_nonlinearity.soft_clip,
+        ),
+        "drift": (drift.root, drift.wander),
+        "interference": (interference.mains,),
+        UNKNOWN: (
+            end_stop.end_stop,
+            second_mode.hanger,
+            second_mode.frame,
+            sudden.load_slips,
+            sudden.electrode_tears,
+            sudden.mount_slips,
+            loose_contact.loose_contact,
+        ),
+    }
+)
+_COVERED = tuple(family for family in FORMS if family != UNKNOWN)
+
+#: How often each kind of case is drawn.
+KINDS: Mapping[str, float] = MappingProxyType(
+    {"clean": 0.10, "covered": 0.62, "pair": 0.13, UNKNOWN: 0.15}
+)
+
+# standard deviations of the logarithms, from film to film
+_MODULI, _TIMES = 0.15, 0.20
 
 
 @dataclass(frozen=True)
 class TruthCase:
-    """What the rig of ``seed`` hides. For tests and scores only: no program shows it to anybody."""
+    """What the rig of ``seed`` hides, in a film of its own ``network``.
+
+    For tests and scores only: no program shows it to anybody.
+    """
 
     seed: int
     film: Film
     load: Load
     effects: tuple[TruthEffect, ...]
+    network: Network = TABLE_3
 
     @property
     def families(self) -> tuple[str, ...]:
@@ -38,16 +118,66 @@ class TruthCase:
         """The effects in words."""
         return "; ".join(effect.description for effect in self.effects)
 
-    def plant(self, network: Network = TABLE_3) -> TruthPlant:
+    def plant(self) -> TruthPlant:
         """The film at rest."""
-        return TruthPlant.at_rest(FilmNumbers.of(self.film, self.load, network), self.effects)
+        return TruthPlant.at_rest(self._numbers(), self.effects)
+
+    def size(self, time: np.ndarray, voltage: np.ndarray) -> float:
+        """RMS in m by which the effects change what the sensor sees under ``voltage`` (N,) V.
+
+        It is the raw difference at ``time`` (N,) s to the same film without them: how much of it a
+        fit of the film's own numbers can hide is not asked. ``inf`` when the film fails.
+        """
+        hiding, _ = self.plant().advance(time, voltage, True)
+        plain, _ = TruthPlant.at_rest(self._numbers()).advance(time, voltage, True)
+        if hiding.fault is not None or plain.fault is not None:
+            return float("inf")
+        return float(np.sqrt(np.mean((hiding.displacement - plain.displacement) ** 2)))
+
+    def _numbers(self) -> FilmNumbers:
+        return FilmNumbers.of(self.film, self.load, self.network)
 
 
-def draw(seed: int, film: Film, load: Load) -> TruthCase:
-    """The case of ``seed``: the load's inertia, and one more effect or none with equal chances."""
+def _drawn_network(generator: np.random.Generator) -> Network:
+    """Table 3, as another film of the same make would have it."""
+
+    def spring(of: Spring) -> Spring:
+        return Spring(of.modulus * np.exp(generator.normal(0.0, _MODULI)), of.limit, of.kind)
+
+    return Network(
+        spring(TABLE_3.equilibrium),
+        tuple(
+            Branch(spring(b.spring), b.relaxation_time * np.exp(generator.normal(0.0, _TIMES)))
+            for b in TABLE_3.branches
+        ),
+    )
+
+
+def _drawn_families(generator: np.random.Generator, kind: str) -> list[str]:
+    if kind == "any":
+        kind = str(generator.choice(list(KINDS), p=list(KINDS.values())))
+    if kind == "clean":
+        return []
+    if kind in FORMS:
+        return [kind]
+    # in the order of the signal path, which is that of the table
+    places = generator.choice(len(_COVERED), size=2 if kind == "pair" else 1, replace=False)
+    return [_COVERED[place] for place in sorted(places)]
+
+
+def draw(seed: int, film: Film, load: Load, kind: str = "any") -> TruthCase:
+    """The case of ``seed``.
+
+    ``kind`` is ``any``, one of ``KINDS``, or a family of ``FORMS``; ``ValueError`` for another.
+    The film of a seed is the same for every kind.
+    """
+    if kind not in ("any", *KINDS, *FORMS):
+        offered = ", ".join(("any", *KINDS, *_COVERED))
+        raise ValueError(f"no case of kind {kind!r}: it is one of {offered}")
     generator = np.random.default_rng(seed)
-    effects = [load_inertia.draw(generator, load)]
-    choice = int(generator.integers(len(_DRAWN) + 1))
-    if choice < len(_DRAWN):
-        effects.append(_DRAWN[choice](generator, load))
-    return TruthCase(seed, film, load, tuple(effects))
+    network = _drawn_network(generator)
+    effects = []
+    for family in _drawn_families(generator, kind):
+        form = FORMS[family][int(generator.integers(len(FORMS[family])))]
+        effects.append(form(generator, load))
+    return TruthCase(seed, film, load, tuple(effects), network)

@@ -3,24 +3,45 @@
 The network of Gent springs is written in the logarithmic elastic stretch z_i = ln(lam/xi_i) of each
 branch, in which the flow reads z_i' = lam'/lam - e pull(e)/(T_i lam) with e = exp(z_i), and it is
 integrated by the fifth-order Runge-Kutta formula of Dormand and Prince in fixed steps. Effects come
-in as numbers, so this is the one file of the truth that is compiled.
+in as numbers, which stand at values that change nothing until an effect sets them.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from model.jit import jit
 from model.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY, Film, Load, Network
 
-__all__ = ["LOST", "FilmNumbers", "follow", "rest_stretch"]
+__all__ = [
+    "COURSE_ELECTRIC",
+    "COURSE_HEATING",
+    "COURSE_PULL",
+    "COURSE_STIFFNESS",
+    "LOST",
+    "NO_COURSE",
+    "FilmNumbers",
+    "FilmState",
+    "Hidden",
+    "follow",
+    "leakage",
+    "rest_stretch",
+]
 
 LOST = 1  #: status: the stretch ran away or a spring locked
 
+#: Rows of a course: factors on the load, on the Maxwell stress and on all moduli, and the room's
+#: warming in K (which a thermometer sees; what it does to the moduli stands in their row).
+COURSE_PULL, COURSE_ELECTRIC, COURSE_STIFFNESS, COURSE_HEATING = range(4)
+NO_COURSE = (1.0, 1.0, 1.0, 0.0)
+
 _STRETCH_MAX = 20.0
+_STABLE = 1.0  # of a step times the fastest decay: the formula is stable up to 3.3
+_STEPS_MAX = 1e4  # in an interval: what runs away may do so
 
 # Dormand and Prince's RK5(4)7M, J. Comp. Appl. Math. 6 (1980), the fifth-order solution
 _STAGES = np.array(
@@ -38,16 +59,98 @@ _WEIGHTS = np.array(
 )
 
 
+class Hidden(NamedTuple):
+    """Numbers of the effects within the equation of motion; the defaults change nothing.
+
+    Formulas and sources stand in the files of ``effects``. Lengths are stretches (of L1), forces
+    nominal stresses.
+    """
+
+    # drag: (linear + quadratic |r| + power |r|^1/2) r for the rate r = lam'; Pa s, Pa s^2, Pa s^1.5
+    drag: float = 0.0
+    drag_quadratic: float = 0.0
+    drag_power: float = 0.0
+    # friction of bristles: Coulomb and static stress Pa, Stribeck rate 1/s, the bristles' reach,
+    # their damping Pa s, and the share of the reach within which they do not slip
+    friction: float = 0.0
+    friction_static: float = 0.0
+    friction_stribeck: float = 1.0
+    friction_reach: float = 1.0
+    friction_damping: float = 0.0
+    friction_elastic: float = 0.0
+    # Bouc-Wen: saturated stress Pa, reach, exponent, share of what opens the loop
+    bouc: float = 0.0
+    bouc_reach: float = 1.0
+    bouc_exponent: float = 1.0
+    bouc_share: float = 0.5
+    # electrode: resistances of two sections in ohm (one if the second is 0), growth with stretch
+    ladder_1: float = 0.0
+    ladder_2: float = 0.0
+    ladder_gauge: float = 0.0
+    # leakage behind a series resistance in ohm: conductance S; exponent of Poole and Frenkel
+    # in V^-1/2 or, when above 0, of hopping in 1/V
+    leak_series: float = 0.0
+    leak_conductance: float = 0.0
+    leak_frenkel: float = 0.0
+    leak_hopping: float = 0.0
+    # permittivity: share gained at large strain, reach; inverse square of a voltage
+    permittivity_strain: float = 0.0
+    permittivity_reach: float = 1.0
+    permittivity_field: float = 0.0
+    # softening: share lost to the largest stretch so far, reach, exponent; to the path, reach
+    damage: float = 0.0
+    damage_reach: float = 1.0
+    damage_exponent: float = 1.0
+    ageing: float = 0.0
+    ageing_reach: float = 1.0
+    # self-heating: K/s for each V^2, time constant s, share of the second body and its time
+    # constant s, relative change of moduli per K
+    heat: float = 0.0
+    heat_time: float = 1.0
+    heat_share: float = 0.0
+    heat_time_2: float = 1.0
+    heat_stiffness: float = 0.0
+    # end stop: travel beyond rest, Pa at a depth of 1, damping s
+    stop_travel: float = math.inf
+    stop_stiffness: float = 0.0
+    stop_damping: float = 0.0
+    # mass on a spring: kg/m as the film's inertia, angular frequency 1/s, damping ratio
+    second_inertia: float = 0.0
+    second_frequency: float = 0.0
+    second_damping: float = 0.0
+
+
+_NOTHING = Hidden()
+
+
+class _Body(NamedTuple):
+    """The film itself, as the compiled equation reads it."""
+
+    inertia: float
+    pull: float
+    electric: float
+    capacitance: float
+    rest: float
+
+
+@dataclass(frozen=True)
+class FilmState:
+    """``y``: stretch, rate, what ``_BRISTLE`` and following name, z_1..n. ``memory``: see there."""
+
+    y: np.ndarray
+    memory: np.ndarray
+
+
 @dataclass(frozen=True)
 class FilmNumbers:
     """All numbers of the equation of motion, SI units; an effect hands back a changed copy.
 
     ``moduli`` mu_0..n Pa, ``limits`` J_0..n, ``times`` T_1..n s. ``inertia`` kg/m multiplies
     lam'', ``pull`` Pa is the load's nominal stress, ``electric`` Pa/V^2 times phi^2 lam the nominal
-    Maxwell stress, ``drag`` Pa s times lam' that of a linear drag. ``length`` L1 m and ``section``
-    L2 Z m^2 turn stretch into travel and stress into force; ``capacitance`` F is the unstretched
-    film's. ``step`` s is the longest integration step: it carries the 7 Hz of a hung load to a
-    picometre, and an effect with sharp corners asks for less.
+    Maxwell stress. ``length`` L1 m and ``section`` L2 Z m^2 turn stretch into travel and stress
+    into force; ``capacitance`` F is the unstretched film's. ``stops`` are pairs of reach and
+    stiffness Pa of elements that slip. ``step`` s is the longest integration step: it carries the
+    70 Hz of a film without a moving load to a nanometre, and a stiff effect asks for less.
     """
 
     moduli: tuple[float, ...]
@@ -59,8 +162,9 @@ class FilmNumbers:
     length: float
     section: float
     capacitance: float
-    drag: float = 0.0
-    step: float = 1e-3
+    hidden: Hidden = _NOTHING
+    stops: tuple[tuple[float, float], ...] = ()
+    step: float = 5e-4
 
     @classmethod
     def of(cls, film: Film, load: Load, network: Network) -> FilmNumbers:
@@ -93,14 +197,42 @@ class FilmNumbers:
         modulus = numbers.pull / _gent(1.0, numbers.limits[0], stretch)
         return replace(numbers, moduli=(modulus, *numbers.moduli[1:]))
 
-    def vector(self) -> np.ndarray:
-        """The numbers as ``follow`` reads them: ``_HEAD`` of the film, then three a spring."""
-        head = (self.inertia, self.pull, self.electric, self.drag)
-        springs = zip(self.moduli, self.limits, (math.inf, *self.times), strict=True)
-        return np.array([*head, *(number for spring in springs for number in spring)])
+    def hiding(self, **numbers: float) -> FilmNumbers:
+        """The film with some numbers of ``Hidden`` set."""
+        return replace(self, hidden=self.hidden._replace(**numbers))
+
+    def stepping(self, step: float) -> FilmNumbers:
+        """The film integrated in steps of at most ``step`` s."""
+        return replace(self, step=min(self.step, step))
+
+    def body(self, rest: float) -> _Body:
+        """The film as ``follow`` reads it, with its rest stretch."""
+        return _Body(self.inertia, self.pull, self.electric, self.capacitance, rest)
+
+    def springs(self) -> np.ndarray:
+        """Rows (3, 1 + n) of moduli, limits and times; the equilibrium spring never relaxes."""
+        return np.array([self.moduli, self.limits, (math.inf, *self.times)])
+
+    def slipping(self) -> np.ndarray:
+        """Rows (2, m) of reaches and stiffnesses of ``stops``."""
+        return np.array(self.stops, dtype=float).reshape(-1, 2).T.copy()
+
+    def at_rest(self, rest: float) -> FilmState:
+        """State at stretch ``rest``: relaxed branches carry no elastic stretch, z_i = 0."""
+        y = np.zeros(_BRANCH + len(self.times))
+        memory = np.zeros(_SLIPPED + len(self.stops))
+        y[0] = memory[_START] = memory[_LARGEST] = rest
+        return FilmState(y, memory)
 
 
-_HEAD = 4
+# Places in y after stretch and rate: the bristles, Bouc and Wen's variable, voltages of the
+# electrode's sections, warming of film and surroundings, path travelled, the second mass
+_BRISTLE, _BOUC, _SECTION_1, _SECTION_2, _WARM_1, _WARM_2, _PATH, _SECOND, _SECOND_RATE = range(
+    2, 11
+)
+_BRANCH = 11  # z_1, z_2, ...
+# Memory changes at the end of a step only: stretch there, largest stretch, slipped elements
+_START, _LARGEST, _SLIPPED = 0, 1, 2
 
 
 @jit
@@ -112,64 +244,231 @@ def _gent(modulus: float, limit: float, e: float) -> float:
 
 
 @jit
-def _derivative(p: np.ndarray, y: np.ndarray, voltage: float, dy: np.ndarray) -> None:
-    """dy/dt for y = [lam, lam', z_1 .. z_n] under ``voltage``."""
-    lam, rate = y[0], y[1]
-    stress = p[1] + p[2] * voltage * voltage * lam - p[3] * rate
-    stress -= _gent(p[_HEAD], p[_HEAD + 1], lam)
-    for i in range(y.shape[0] - 2):
-        k = _HEAD + 3 * (i + 1)
-        e = math.exp(y[2 + i])
-        spring = _gent(p[k], p[k + 1], e)
-        stress -= spring * e / lam
-        strain = e * e + 1.0 / (e * e) - 2.0
-        flow = (e * e - 1.0 / (e * e)) / (1.0 - strain / p[k + 1]) / p[k + 2]
-        dy[2 + i] = rate / lam - flow * e / lam
-    dy[0] = rate
-    dy[1] = stress / p[0]
+def _leak(h: Hidden, v: float, lam: float) -> tuple[float, float]:
+    """Current in A through the film under ``v`` >= 0 V, and its slope in S."""
+    if h.leak_hopping > 0.0:
+        k = h.leak_hopping * lam
+        return h.leak_conductance / k * math.sinh(k * v), h.leak_conductance * math.cosh(k * v)
+    root = h.leak_frenkel * math.sqrt(v * lam)
+    conductance = h.leak_conductance * math.exp(root)
+    return conductance * v, conductance * (1.0 + 0.5 * root)
 
 
 @jit
-def _sound(p: np.ndarray, y: np.ndarray) -> bool:
+def _behind_leak(h: Hidden, voltage: float, lam: float) -> float:
+    """Voltage that the leakage current leaves of ``voltage`` behind the series resistance."""
+    source = abs(voltage)
+    v = source
+    for _ in range(30):  # the current is convex: Newton's steps come down without overshoot
+        current, slope = _leak(h, v, lam)
+        change = (v + h.leak_series * current - source) / (1.0 + h.leak_series * slope)
+        v = max(v - change, 0.0)
+        if abs(change) < 1e-9 * source:
+            break
+    return math.copysign(v, voltage)
+
+
+@jit
+def leakage(h: Hidden, voltage: np.ndarray, stretch: np.ndarray, current: np.ndarray) -> None:
+    """Fill ``current`` (N,) A through the film under source ``voltage`` (N,) V."""
+    for k in range(voltage.shape[0]):
+        v = _behind_leak(h, voltage[k], stretch[k])
+        current[k] = math.copysign(_leak(h, abs(v), stretch[k])[0], v)
+
+
+@jit
+def _slipped(start: float, reach: float, moved: float) -> float:
+    """Strain of an element that slips beyond ``reach``."""
+    return min(max(start + moved, -reach), reach)
+
+
+@jit
+def _bristles(h: Hidden, x: float, rate: float) -> tuple[float, float]:
+    """Friction stress in Pa and the rate of the bristles' deflection ``x``."""
+    ratio = rate / h.friction_stribeck
+    level = h.friction + (h.friction_static - h.friction) * math.exp(-ratio * ratio)
+    stiffness = h.friction / h.friction_reach
+    steady = level / stiffness
+    slip = 1.0
+    if h.friction_elastic > 0.0:
+        least = h.friction_elastic * steady
+        if x * rate <= 0.0 or abs(x) <= least:
+            slip = 0.0
+        elif abs(x) < steady:
+            slip = 0.5 - 0.5 * math.cos(math.pi * (abs(x) - least) / (steady - least))
+    speed = rate - slip * abs(rate) * x / steady
+    return stiffness * x + h.friction_damping * speed, speed
+
+
+@jit
+def _derivative(
+    body: _Body,
+    h: Hidden,
+    springs: np.ndarray,
+    slipping: np.ndarray,
+    memory: np.ndarray,
+    y: np.ndarray,
+    voltage: float,
+    pull: float,
+    electric: float,
+    stiffness: float,
+    dy: np.ndarray,
+) -> None:
+    """dy/dt under ``voltage`` and the present factors of the course."""
+    lam, rate = y[0], y[1]
+    away = lam - body.rest
+    for j in range(2, _BRANCH):
+        dy[j] = 0.0
+
+    v = voltage
+    if h.leak_conductance > 0.0:
+        v = _behind_leak(h, voltage, lam)
+    square = v * v
+    if h.heat > 0.0:
+        exchange = (y[_WARM_1] - y[_WARM_2]) / h.heat_time
+        dy[_WARM_1] = h.heat * square - exchange
+        dy[_WARM_2] = h.heat_share * exchange - y[_WARM_2] / h.heat_time_2
+        stiffness *= 1.0 + h.heat_stiffness * y[_WARM_1]
+    if h.ladder_1 > 0.0:
+        grown = math.exp(h.ladder_gauge * away)
+        capacitance = body.capacitance * lam * lam
+        v1, v2, growth = y[_SECTION_1], y[_SECTION_2], 2.0 * rate / lam
+        into = (v - v1) / (h.ladder_1 * grown)
+        if h.ladder_2 > 0.0:
+            on = (v1 - v2) / (h.ladder_2 * grown)
+            dy[_SECTION_1] = 2.0 * (into - on) / capacitance - growth * v1
+            dy[_SECTION_2] = 2.0 * on / capacitance - growth * v2
+            square = 0.5 * (v1 * v1 + v2 * v2)
+        else:
+            dy[_SECTION_1] = into / capacitance - growth * v1
+            square = v1 * v1
+    electric *= body.electric
+    if h.permittivity_strain != 0.0:
+        u = away / h.permittivity_reach
+        electric *= 1.0 + h.permittivity_strain * u / math.sqrt(1.0 + u * u)
+    electric /= 1.0 + h.permittivity_field * square * lam * lam
+
+    stress = pull * body.pull + electric * square * lam
+    speed = abs(rate)
+    stress -= (h.drag + h.drag_quadratic * speed + h.drag_power * math.sqrt(speed)) * rate
+    if h.friction > 0.0:
+        held, dy[_BRISTLE] = _bristles(h, y[_BRISTLE], rate)
+        stress -= held
+    if h.bouc > 0.0:
+        b = y[_BOUC]
+        opening = h.bouc_share * math.copysign(1.0, rate * b) + 1.0 - h.bouc_share
+        dy[_BOUC] = rate / h.bouc_reach * (1.0 - abs(b) ** h.bouc_exponent * opening)
+        stress -= h.bouc * b
+    for i in range(slipping.shape[1]):
+        strain = _slipped(memory[_SLIPPED + i], slipping[0, i], lam - memory[_START])
+        stress -= slipping[1, i] * strain
+    if away > h.stop_travel:
+        depth = away - h.stop_travel
+        stress -= h.stop_stiffness * depth**1.5 * max(1.0 + h.stop_damping * rate, 0.0)
+
+    whole = 1.0
+    if h.damage > 0.0:
+        farthest = (max(memory[_LARGEST], lam) - body.rest) / h.damage_reach
+        damage = farthest**h.damage_exponent
+        whole -= h.damage * damage / (1.0 + damage)
+    if h.ageing > 0.0:
+        dy[_PATH] = speed
+        whole -= h.ageing * math.log1p(y[_PATH] / h.ageing_reach)
+    stress -= stiffness * whole * _gent(springs[0, 0], springs[1, 0], lam)
+    for i in range(1, springs.shape[1]):
+        e = math.exp(y[_BRANCH - 1 + i])
+        squared = e * e
+        stretched = 1.0 - (squared + 1.0 / squared - 2.0) / springs[1, i]
+        flow = (squared - 1.0 / squared) / stretched / springs[2, i]
+        stress -= stiffness * springs[0, i] * (squared - 1.0 / squared) / stretched / lam
+        dy[_BRANCH - 1 + i] = rate / lam - flow * e / lam
+    if h.second_inertia > 0.0:
+        back = h.second_frequency * y[_SECOND] + 2.0 * h.second_damping * y[_SECOND_RATE]
+        back *= h.second_frequency
+        stress += h.second_inertia * back
+        dy[_SECOND] = y[_SECOND_RATE]
+        dy[_SECOND_RATE] = -back - stress / body.inertia
+    dy[0] = rate
+    dy[1] = stress / body.inertia
+
+
+@jit
+def _fastest(body: _Body, h: Hidden, rate: float) -> float:
+    """How fast in 1/s drag and friction bring anything to rest at ``rate``: what limits a step.
+
+    Bristles begin to slip at a corner, so that a step may bend them by a quarter of their reach.
+    """
+    slope = h.drag + 2.0 * h.drag_quadratic * rate + 1.5 * h.drag_power * math.sqrt(rate)
+    bending = 4.0 * rate / h.friction_reach if h.friction > 0.0 else 0.0
+    return slope / body.inertia + bending
+
+
+@jit
+def _sound(springs: np.ndarray, y: np.ndarray) -> bool:
     """True while the film is whole: finite, not run away, no spring at its locking strain."""
     if not (0.0 < y[0] < _STRETCH_MAX and math.isfinite(y[1])):
         return False
-    for i in range(y.shape[0] - 1):
-        e = y[0] if i == 0 else math.exp(y[1 + i])
-        if not e * e + 1.0 / (e * e) - 2.0 < p[_HEAD + 3 * i + 1]:
+    for i in range(springs.shape[1]):
+        e = y[0] if i == 0 else math.exp(y[_BRANCH - 1 + i])
+        if not e * e + 1.0 / (e * e) - 2.0 < springs[1, i]:
             return False
     return True
 
 
 @jit
 def follow(
-    p: np.ndarray,
+    body: _Body,
+    h: Hidden,
+    springs: np.ndarray,
+    slipping: np.ndarray,
     step_max: float,
     time: np.ndarray,
     voltage: np.ndarray,
+    courses: np.ndarray,
     hold: bool,
     y: np.ndarray,
-    stretch: np.ndarray,
-    rate: np.ndarray,
+    memory: np.ndarray,
+    rows: np.ndarray,
 ) -> tuple[int, int]:
-    """Carry ``y`` in place through ``voltage`` (N,) V on ``time`` (N,) s; fill the rows (N,).
+    """Carry ``y`` and ``memory`` in place through ``voltage`` (N,) V on ``time`` (N,) s.
 
-    Returns ``(status, reached)``: 0, or ``LOST`` with the node from which the rows only repeat the
-    last sound stretch.
+    ``courses`` (4, N) hold from node to node. Fills ``rows`` (3, N): stretch, its rate in 1/s, the
+    film's warming in K. Returns ``(status, reached)``: 0, or ``LOST`` with the node from which the
+    rows only repeat the last sound stretch.
     """
     n = y.shape[0]
     nodes = time.shape[0]
     slopes = np.empty((6, n))
     trial = np.empty(n)
+    damped = _fastest(body, h, 1.0) > 0.0
     for k in range(nodes):
-        stretch[k], rate[k] = y[0], y[1]
+        rows[0, k], rows[1, k], rows[2, k] = y[0], y[1], y[_WARM_1]
         if k == nodes - 1:
             break
         interval = time[k + 1] - time[k]
         change = 0.0 if hold else voltage[k + 1] - voltage[k]
-        steps = max(1, math.ceil(interval / step_max - 1e-9))
-        h = interval / steps
-        for step in range(steps):
+        elapsed, steps = 0.0, 2
+        while steps > 1:
+            left = interval - elapsed
+            steps = max(1, math.ceil(left / step_max - 1e-9))
+            if damped:
+                _derivative(
+                    body,
+                    h,
+                    springs,
+                    slipping,
+                    memory,
+                    y,
+                    voltage[k] + change * elapsed / interval,
+                    courses[0, k],
+                    courses[1, k],
+                    courses[2, k],
+                    slopes[0],
+                )
+                ahead = abs(y[1]) + abs(slopes[0, 1]) * left / steps
+                wanted = left * _fastest(body, h, ahead) / _STABLE
+                steps = max(steps, math.ceil(min(wanted, _STEPS_MAX)))
+            h_step = left / steps
             for stage in range(6):
                 fraction = 0.0  # of the step: a stage's time is the sum of its row
                 for j in range(n):
@@ -177,15 +476,33 @@ def follow(
                 for m in range(stage):
                     fraction += _STAGES[stage, m]
                     for j in range(n):
-                        trial[j] += h * _STAGES[stage, m] * slopes[m, j]
-                v = voltage[k] + change * (step + fraction) / steps
-                _derivative(p, trial, v, slopes[stage])
+                        trial[j] += h_step * _STAGES[stage, m] * slopes[m, j]
+                v = voltage[k] + change * (elapsed + fraction * h_step) / interval
+                _derivative(
+                    body,
+                    h,
+                    springs,
+                    slipping,
+                    memory,
+                    trial,
+                    v,
+                    courses[0, k],
+                    courses[1, k],
+                    courses[2, k],
+                    slopes[stage],
+                )
             for j in range(n):
                 for stage in range(6):
-                    y[j] += h * _WEIGHTS[stage] * slopes[stage, j]
-        if not _sound(p, y):
+                    y[j] += h_step * _WEIGHTS[stage] * slopes[stage, j]
+            moved = y[0] - memory[_START]
+            for i in range(slipping.shape[1]):
+                memory[_SLIPPED + i] = _slipped(memory[_SLIPPED + i], slipping[0, i], moved)
+            memory[_START] = y[0]
+            memory[_LARGEST] = max(memory[_LARGEST], y[0])
+            elapsed += h_step
+        if not _sound(springs, y):
             for late in range(k + 1, nodes):
-                stretch[late], rate[late] = stretch[k], 0.0
+                rows[0, late], rows[1, late], rows[2, late] = rows[0, k], 0.0, rows[2, k]
             return LOST, k + 1
     return 0, nodes
 

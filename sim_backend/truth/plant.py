@@ -8,19 +8,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim_backend.plant import Motion
-from sim_backend.truth.effect import Stage, TruthEffect
-from sim_backend.truth.film import FilmNumbers, follow, rest_stretch
+from sim_backend.truth.effect import Course, Stage, TruthEffect
+from sim_backend.truth.film import (
+    COURSE_ELECTRIC,
+    COURSE_HEATING,
+    NO_COURSE,
+    FilmNumbers,
+    FilmState,
+    follow,
+    leakage,
+    rest_stretch,
+)
 
 __all__ = ["TruthPlant"]
 
 
 @dataclass(frozen=True)
 class TruthPlant:
-    """The film of ``numbers`` with its present state, and the stages before and after it."""
+    """The film of ``numbers`` with its present state, and what stands before and after it."""
 
     numbers: FilmNumbers
     rest: float
-    state: np.ndarray
+    state: FilmState
+    on_course: tuple[Course, ...]
     on_voltage: tuple[Stage, ...]
     on_motion: tuple[Stage, ...]
     carries: tuple[object, ...]
@@ -36,18 +46,17 @@ class TruthPlant:
             if effect.on_film is not None:
                 numbers = effect.on_film(numbers)
         rest = rest_stretch(numbers)
-        # relaxed branches carry no elastic stretch: z_i = 0
-        state = np.zeros(2 + len(numbers.times))
-        state[0] = rest
+        on_course = tuple(e.on_course for e in effects if e.on_course is not None)
         on_voltage = tuple(e.on_voltage for e in effects if e.on_voltage is not None)
         on_motion = tuple(e.on_motion for e in effects if e.on_motion is not None)
         carries = (None,) * (len(on_voltage) + len(on_motion))
-        return cls(numbers, rest, state, on_voltage, on_motion, carries)
+        state = numbers.at_rest(rest)
+        return cls(numbers, rest, state, on_course, on_voltage, on_motion, carries)
 
     @property
     def capacitance(self) -> float:
         """Present capacitance in F: the area grows by lam, the thickness falls by it."""
-        return self.numbers.capacitance * float(self.state[0]) ** 2
+        return self.numbers.capacitance * float(self.state.y[0]) ** 2
 
     def advance(
         self, time: np.ndarray, voltage: np.ndarray, hold: bool
@@ -57,28 +66,53 @@ class TruthPlant:
         voltage = voltage.copy()
         for i, stage in enumerate(self.on_voltage):
             voltage, carries[i] = stage(time, voltage, carries[i])
-        stretch, rate = np.full(time.size, self.state[0]), np.zeros(time.size)
-        state, fault, fault_at = self.state.copy(), None, 0
+        courses = np.repeat(np.array(NO_COURSE)[:, None], time.size, axis=1)
+        for course in self.on_course:
+            courses = course(time, courses)
+
+        numbers, hidden = self.numbers, self.numbers.hidden
+        y, memory = self.state.y.copy(), self.state.memory.copy()
+        rows = np.zeros((3, time.size))
+        rows[0] = y[0]
+        fault, fault_at = None, 0
         if not self.failed:
-            numbers = self.numbers
             lost, reached = follow(
-                numbers.vector(), numbers.step, time, voltage, hold, state, stretch, rate
+                numbers.body(self.rest),
+                hidden,
+                numbers.springs(),
+                numbers.slipping(),
+                numbers.step,
+                time,
+                voltage,
+                courses,
+                hold,
+                y,
+                memory,
+                rows,
             )
             if lost:
                 fault, fault_at = "the stretch ran away or a spring locked", int(reached)
-                state = np.concatenate((stretch[-1:], np.zeros(state.size - 1)))
-        seen = np.stack((stretch - self.rest, rate)) * self.numbers.length
+                y = np.concatenate((rows[0, -1:], np.zeros(y.size - 1)))
+        stretch, rate, warming = rows
+        current = np.zeros(time.size)
+        if hidden.leak_conductance > 0.0:
+            leakage(hidden, voltage, stretch, current)
+        seen = np.stack((stretch - self.rest, rate)) * numbers.length
         for i, stage in enumerate(self.on_motion, start=len(self.on_voltage)):
             seen, carries[i] = stage(time, seen, carries[i])
-        nothing = np.zeros(time.size)
         motion = Motion(
             displacement=seen[0],
             velocity=seen[1],
-            capacitance=self.numbers.capacitance * stretch**2,
-            leakage=nothing,
-            heating=nothing,
+            capacitance=numbers.capacitance * courses[COURSE_ELECTRIC] * stretch**2,
+            leakage=current,
+            heating=warming + courses[COURSE_HEATING],
             fault=fault,
             fault_at=fault_at,
         )
-        failed = self.failed or fault is not None
-        return motion, replace(self, state=state, carries=tuple(carries), failed=failed)
+        after = replace(
+            self,
+            state=FilmState(y, memory),
+            carries=tuple(carries),
+            failed=self.failed or fault is not None,
+        )
+        return motion, after

@@ -3,14 +3,16 @@
 Run as ``python -m tests.benchmarks.bench_kernel``. One thesis record is two periods of eq. 49
 (22.8 s) with Table 3's film. The same right-hand side, compiled, goes to every solver; the general
 ones are set as loosely as their error against a 1e-10 reference stays below 0.1 um. SciPy has LSODA
-twice: stepped from Python (solve_ivp) and all in Fortran (odeint). Medians of repeats in one run:
-compare the ratios, the milliseconds belong to this machine and its load.
+twice: stepped from Python (solve_ivp) and all in Fortran (odeint). A second table has what effects
+of ``model.effects`` cost. Medians of repeats in one run: compare the ratios, the milliseconds
+belong to this machine and its load.
 """
 
 import math
 import statistics
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numba
@@ -19,7 +21,9 @@ from scipy.integrate import odeint, solve_ivp
 from sksundae.cvode import CVODE
 
 from model import kernel
-from model.actuator import Actuator, Drive, initial_state
+from model.actuator import Actuator, Drive, at_rest, initial_state
+from model.coefficients import REST
+from model.effects import EFFECTS, EffectValues, Parameter
 from model.excitation import Sequence
 from model.material import (
     STANDARD_GRAVITY,
@@ -84,6 +88,55 @@ def timed(run: Callable[[], np.ndarray], repeats: int) -> tuple[float, np.ndarra
     return statistics.median(spent), result
 
 
+def followed(c: np.ndarray, drive: Drive) -> np.ndarray:
+    """Stretch (N,) from rest, as a fit would have it."""
+    y = initial_state(c, c[REST])
+    stretch, rate = np.empty(drive.time.size), np.empty(drive.time.size)
+    kernel.drive_by_voltage(
+        c, drive.time, drive.voltage, drive.hold, drive.temperature, y, stretch, rate
+    )
+    return stretch
+
+
+def _value(parameter: Parameter, size: str) -> float:
+    if size == "neutral" and parameter.neutral is not None:
+        return parameter.neutral
+    low, high = parameter.bounds
+    return min(max(parameter.typical, low), high)
+
+
+def at_values(name: str, size: str) -> EffectValues:
+    """The effect with its sizes ``neutral`` or ``typical``."""
+    return ((name, tuple((p.name, _value(p, size)) for p in EFFECTS[name].parameters)),)
+
+
+def what_effects_cost(actuator: Actuator, drive: Drive) -> None:
+    """Print how long the kernel takes with effects, relative to itself without any."""
+    cases: list[tuple[str, EffectValues]] = [("no effect", ())]
+    voltage_effects = [e.name for e in EFFECTS.values() if "voltage" in e.drives]
+    neutral = tuple(values for n in voltage_effects for values in at_values(n, "neutral"))
+    cases.append((f"all {len(neutral)} effects, neutral", neutral))
+    active = ("linear drag", "electrode resistance", "dry friction", "load inertia")
+    cases += [(name, at_values(name, "typical")) for name in active]
+    rows = []
+    for _, effects in cases:
+        c = replace(actuator, effects=effects).coefficients()
+        at_rest(c)
+        rows.append(c)
+        followed(c, drive)
+    spent: list[list[float]] = [[] for _ in rows]
+    for _ in range(21):  # in turn, so that the machine's other work falls on all alike
+        for c, times in zip(rows, spent, strict=True):
+            before = time.perf_counter()
+            followed(c, drive)
+            times.append(time.perf_counter() - before)
+    base = statistics.median(spent[0])
+    print(f"{'this kernel with':<44}{'ms':>10}{'ratio':>9}")
+    for (label, _), times in zip(cases, spent, strict=True):
+        middle = statistics.median(times)
+        print(f"{label:<44}{middle * 1e3:>10.3f}{middle / base:>8.2f}x")
+
+
 def main() -> None:
     actuator = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
     sequence = Sequence.thesis()
@@ -91,15 +144,12 @@ def main() -> None:
     t = np.arange(math.ceil(duration * RATE)) / RATE
     drive = Drive(t, sequence.segments[0].voltage(t))
     c = actuator.coefficients()
-    rest = actuator.rest()
-    start = initial_state(c, rest)
+    _, rest = at_rest(c)
+    start = initial_state(c, rest)[:5]
     atol_weights = np.array([1.0, 100.0, 1.0, 1.0, 1.0])  # the rate may err more than the stretch
 
     def ours() -> np.ndarray:
-        y = start.copy()
-        stretch, rate = np.empty(t.size), np.empty(t.size)
-        kernel.drive_by_voltage(c, drive.time, drive.voltage, False, y, stretch, rate)
-        return stretch
+        return followed(c, drive)
 
     def lsoda(tolerance: float) -> np.ndarray:
         return solve_ivp(
@@ -145,6 +195,8 @@ def main() -> None:
             f"{label:<44}{spent * 1e3:>10.3f}{error(stretch) * 1e6:>11.4f}"
             f"{spent / base:>8.0f}x{target:>9}"
         )
+    print()
+    what_effects_cost(actuator, drive)
 
 
 if __name__ == "__main__":

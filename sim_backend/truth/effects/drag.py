@@ -1,32 +1,60 @@
-"""The load moves through air and a guide, which resist in proportion to its speed."""
+"""The load moves through air, oil or a greased guide, which resist the faster it goes.
+
+``mixed``: c v + d |v| v, a viscous guide and the wake of a paddle, with d such that both are equal
+at a drawn speed. ``air_film``: k |v|^1.5 sign(v), between the two, as of a boundary layer (Blasius:
+skin friction of a plate goes with v^1.5).
+"""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 
 from model.material import Load
+from sim_backend.truth.chance import log_uniform
 from sim_backend.truth.effect import TruthEffect
 from sim_backend.truth.film import FilmNumbers
 
-__all__ = ["draw"]
+__all__ = ["air_film", "mixed"]
 
-# N s/m for each kg of load: at 7 Hz these are 0.6 % to 4 % of critical damping
-_LEAST, _MOST = 0.5, 3.5
+_SPEED = 0.003  # m/s, of a lobe: where the sizes are compared
+_LEAST, _MOST = 0.8, 18.0  # N s/m at that speed
 
 
-def draw(generator: np.random.Generator, load: Load) -> TruthEffect:
-    """A linear drag coefficient in the range of a light guide."""
-    coefficient = load.mass * generator.uniform(_LEAST, _MOST)
+def mixed(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """A linear and a quadratic drag together."""
+    size = log_uniform(generator, _LEAST, _MOST)
+    equal_at = log_uniform(generator, 0.002, 0.02)
+    linear = size / (1.0 + _SPEED / equal_at)
+    quadratic = linear / equal_at
 
     def on_film(numbers: FilmNumbers) -> FilmNumbers:
-        # c L1 lam' over the section L2 Z
-        return replace(numbers, drag=numbers.drag + coefficient * numbers.length / numbers.section)
+        per_rate = numbers.length / numbers.section
+        return numbers.hiding(
+            drag=linear * per_rate, drag_quadratic=quadratic * numbers.length * per_rate
+        )
 
     return TruthEffect(
         family="drag",
         acts_on="load",
-        description=f"a linear drag of {coefficient:.3g} N s/m acts on the load",
+        description=(
+            f"drag of {linear:.3g} N s/m, and as much again in proportion to the square of the "
+            f"speed at {equal_at * 1e3:.2g} mm/s"
+        ),
+        on_film=on_film,
+    )
+
+
+def air_film(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """A drag with the speed to the power of 1.5."""
+    factor = log_uniform(generator, _LEAST, _MOST) / _SPEED**0.5
+
+    def on_film(numbers: FilmNumbers) -> FilmNumbers:
+        per_rate = numbers.length / numbers.section
+        return numbers.hiding(drag_power=factor * numbers.length**0.5 * per_rate)
+
+    return TruthEffect(
+        family="drag",
+        acts_on="load",
+        description=f"drag of {factor:.3g} N (s/m)^1.5 times the speed to the power of 1.5",
         on_film=on_film,
     )

@@ -7,21 +7,20 @@ from dataclasses import replace
 import numpy as np
 
 from model.material import Load
+from sim_backend.truth.chance import log_uniform
 from sim_backend.truth.effect import TruthEffect
 from sim_backend.truth.film import FilmNumbers
 
-__all__ = ["draw"]
+__all__ = ["hung", "moving"]
 
-# of the hung mass: what moves may be a little less (a guided load) or more (clamp and target)
-_LEAST, _MOST = 0.9, 1.15
+# of the hung mass: what moves may be less (a guided load, a counterweight) or more (clamp, target)
+_LEAST, _MOST = 0.6, 1.2
 
 
-def draw(generator: np.random.Generator, load: Load) -> TruthEffect:
-    """A moving mass near the hung one."""
-    mass = load.mass * generator.uniform(_LEAST, _MOST)
+def moving(mass: float) -> TruthEffect:
+    """``mass`` in kg moves with the film's lower edge: m L1 lam'' over the section L2 Z."""
 
     def on_film(numbers: FilmNumbers) -> FilmNumbers:
-        # m L1 lam'' over the section L2 Z
         return replace(numbers, inertia=numbers.inertia + mass * numbers.length / numbers.section)
 
     return TruthEffect(
@@ -30,3 +29,8 @@ def draw(generator: np.random.Generator, load: Load) -> TruthEffect:
         description=f"a mass of {mass * 1e3:.1f} g moves with the film's lower edge",
         on_film=on_film,
     )
+
+
+def hung(generator: np.random.Generator, load: Load) -> TruthEffect:
+    """A moving mass near the hung one."""
+    return moving(load.mass * log_uniform(generator, _LEAST, _MOST))

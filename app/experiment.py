@@ -1,0 +1,203 @@
+"""The excitation that tells rival models apart best, within what a rig allows."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from app.errors import InputError
+from app.outcomes import SeparatingExperiment
+from app.presets import PRESETS
+from app.rigfile import RigFile
+from app.run import gate_sequence
+from app.sequencefile import LoadedSequence, parse_sequence
+from drivers.gate import GatedWaveform
+from model.actuator import Actuator, Drive
+from model.excitation import THESIS_AMPLITUDES
+from model.kernel import OK
+
+__all__ = ["SEPARATES", "candidates", "separating_experiment"]
+
+#: RMS difference of two predictions, in noise floors, from which on an experiment tells them apart.
+SEPARATES = 0.5
+
+# amplitudes are lowered in these steps until the gate admits a sequence
+_SCALES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
+_NEARLY = 0.9  # of the best separation: among such, the one that separates most a second
+
+
+def candidates(top_kV: float) -> Mapping[str, str]:
+    """TOML of sequences that ask different questions, up to ``top_kV``, by name."""
+    half = round(0.45 * top_kV, 3)
+    low, middle = round(0.4 * top_kV, 3), round(0.7 * top_kV, 3)
+    found: dict[str, list[dict[str, Any]]] = {
+        "slow lobes of four heights": [
+            {"kind": "half_sine", "amplitude_kV": round(a * top_kV, 3), "frequency_Hz": 0.2}
+            for a in (0.4, 0.6, 0.8, 1.0)
+        ],
+        "fast lobes": [
+            {
+                "kind": "half_sine",
+                "amplitude_kV": round(a * top_kV, 3),
+                "frequency_Hz": f,
+                "repeats": 6,
+            }
+            for a, f in ((0.6, 2.0), (1.0, 2.0), (0.6, 5.0), (1.0, 5.0))
+        ],
+        "triangles within triangles": [
+            {"kind": "triangle", "amplitude_kV": a, "frequency_Hz": 0.25, "repeats": 2}
+            for a in (top_kV, low, middle, top_kV)
+        ],
+        "quick steps": [_steps(top_kV, 0.5, 2)],
+        "steps": [_steps(top_kV, 2.0, 1)],
+        "slow steps": [_steps(top_kV, 6.0, 1)],
+        "a long hold": [
+            {"kind": "ramp", "to_kV": round(0.9 * top_kV, 3), "duration_s": 0.2},
+            {"kind": "hold", "duration_s": 25.0},
+            {"kind": "ramp", "to_kV": 0.0, "duration_s": 0.2},
+            {"kind": "hold", "duration_s": 12.0},
+        ],
+    }
+    for name, (first, last) in {
+        "a slow chirp": (0.05, 1.0), "a chirp": (0.5, 15.0), "a fast chirp": (5.0, 60.0),
+    }.items():  # fmt: skip
+        found[name] = [
+            {"kind": "ramp", "to_kV": round(0.5 * top_kV, 3), "duration_s": 1.0},
+            {
+                "kind": "chirp", "amplitude_kV": half, "from_Hz": first, "to_Hz": last,
+                "duration_s": 20.0,
+            },
+            {"kind": "ramp", "to_kV": 0.0, "duration_s": 1.0},
+            {"kind": "hold", "duration_s": 1.0},
+        ]  # fmt: skip
+    made = {name: tomli_w.dumps({"name": name, "segment": found[name]}) for name in found}
+    named = ("rich", "validation-a-0.2", "validation-a-1.0", "validation-b-8.0")
+    return made | {name: PRESETS[name] for name in named}
+
+
+def _steps(top_kV: float, dwell_s: float, repeats: int) -> dict[str, Any]:
+    levels = [round(a * top_kV, 3) for a in (0.5, 1.0, 0.7, 0.9, 0.3, 0.8)]
+    return {
+        "kind": "steps", "levels_kV": [*levels, 0.0], "dwell_s": dwell_s, "rise_s": 0.02,
+        "repeats": repeats,
+    }  # fmt: skip
+
+
+def separating_experiment(
+    rivals: Sequence[tuple[str, str, Actuator]], rig_file: RigFile, noise: float
+) -> tuple[SeparatingExperiment | None, str]:
+    """The sequence under which the least separated two of ``rivals`` lie farthest apart.
+
+    ``rivals`` are (label, family, fitted model), the final model among them; ``noise`` is the floor
+    of one reading in m. Every sequence has passed the gate of ``rig_file``. Also returned is a
+    sentence, which says why where there is no such sequence.
+    """
+    labels = tuple(label for label, _, _ in rivals)
+    families = tuple(dict.fromkeys(family for _, family, _ in rivals))
+    # as much as the rig may give, and no more than the thesis's experiments
+    top = math.floor(min(rig_file.gate_limits().voltage_max / 1e3, 8.0) * 1e3) / 1e3
+    tried: list[tuple[str, float, float, tuple[str, str], str]] = []
+    for name, text in candidates(top).items():
+        admitted = _admitted(text, name, rig_file)
+        if admitted is None:
+            continue
+        loaded, waveform = admitted
+        predictions = _predictions(rivals, waveform)
+        if predictions is None:
+            continue
+        apart = {
+            (labels[i], labels[j]): _rms(predictions[i] - predictions[j]) / noise
+            for i, j in combinations(range(len(rivals)), 2)
+        }
+        closest = min(apart, key=lambda pair: apart[pair])
+        tried.append((name, apart[closest], waveform.duration, closest, loaded.toml))
+    if not tried:
+        return None, "The limits of the rig file admit none of the excitations that were considered"
+    tried.sort(key=lambda t: -t[1])
+    best = tried[0][1]
+    if best < SEPARATES:
+        return None, (
+            f"None of {len(tried)} excitations within the rig's limits would separate "
+            f"{_and(labels)}: at best their predictions differ by {best:.2g} times the noise"
+        )
+    good = [t for t in tried if t[1] >= _NEARLY * best]
+    name, separation, seconds, closest, toml = max(good, key=lambda t: t[1] / t[2])
+    found = SeparatingExperiment(
+        name=name,
+        sequence=toml,
+        rivals=labels,
+        separates=families,
+        separation=separation,
+        closest=closest,
+        seconds=seconds,
+        tried=tuple((t[0], t[1], t[2]) for t in tried),
+    )
+    return found, (
+        f"Of {len(tried)} excitations within the rig's limits, {name!r} ({seconds:.0f} s) "
+        f"separates {_and(labels)} best: the predictions of any two differ by at least "
+        f"{separation:.2g} times the noise"
+    )
+
+
+def _admitted(
+    text: str, name: str, rig_file: RigFile
+) -> tuple[LoadedSequence, GatedWaveform] | None:
+    """The sequence as high as the gate lets it pass; None where it does not at any height."""
+    for scale in _SCALES:
+        try:
+            loaded = parse_sequence(_scaled(text, scale), name, Path())
+            return loaded, gate_sequence(loaded, rig_file)
+        except InputError:
+            continue
+    return None
+
+
+def _scaled(text: str, scale: float) -> str:
+    """The sequence with all its voltages times ``scale``."""
+    if scale == 1.0:
+        return text
+
+    def lower(value: Any, key: str = "") -> Any:
+        if isinstance(value, dict):
+            return {k: lower(v, k) for k, v in value.items()}
+        if isinstance(value, list):
+            return [lower(v, key) for v in value]
+        return round(value * scale, 3) if key.endswith("_kV") else value
+
+    data = tomllib.loads(text)
+    for segment in data["segment"]:
+        if segment["kind"] == "thesis":
+            segment.setdefault("amplitudes_kV", [a / 1e3 for a in THESIS_AMPLITUDES])
+    return tomli_w.dumps(lower(data))
+
+
+def _predictions(
+    rivals: Sequence[tuple[str, str, Actuator]], waveform: GatedWaveform
+) -> list[np.ndarray] | None:
+    """Displacements of all rivals in m; None where one fails or sees more field than allowed."""
+    time = np.arange(waveform.voltage.size) / waveform.rate
+    drive = Drive(time, waveform.voltage, hold=True)
+    found = []
+    for _, _, model in rivals:
+        response = model.simulate(drive)
+        if response.status != OK:
+            return None
+        if float(np.max(np.abs(response.field))) > waveform.limits.field:
+            return None
+        found.append(response.displacement)
+    return found
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _and(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names)

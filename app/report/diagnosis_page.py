@@ -1,0 +1,350 @@
+"""The report of a diagnosis: the error before and after, and why it should be believed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from app.report import diagnosis_figures as drawn
+from app.report import figures
+from app.report.diagnosis import (
+    HEADLINES,
+    before_after,
+    called,
+    dropped,
+    effect_table,
+    estimate_table,
+    experiment_table,
+    kin,
+    ranking,
+    readable,
+    road,
+    summary,
+    thesis_before_after,
+    warnings,
+)
+from app.report.html import Picture, picture, prefixes, write_page
+from app.report.numbers import seconds, significant
+from app.report.tables import Table
+from app.report.units import SHOWN
+from app.report.words import describe_model
+
+if TYPE_CHECKING:
+    from app.outcomes import Comparison, DiagnoseOutcome
+    from model.diagnosis.findings import MissingStress, Signature
+
+__all__ = ["write_diagnosis_report"]
+
+_Of = TypeVar("_Of", "Signature", "MissingStress")
+
+#: Recordings whose residuals are drawn; more would make the page long, and say the same.
+_DRAWN_MAX = 2
+_UNTOUCHED_MAX = 6
+
+
+@dataclass(frozen=True)
+class Group:
+    """What is shown of one recording: sentences, wide figures, small figures."""
+
+    name: str
+    words: tuple[str, ...]
+    wide: tuple[Picture, ...]
+    small: tuple[Picture, ...]
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """One effect in words."""
+
+    title: str
+    about: str
+    evidence: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class DiagnosisPage:
+    """The whole page as the template takes it; empty tuples leave their sections out."""
+
+    title: str
+    headline: str
+    summary: tuple[str, ...]
+    warnings: tuple[str, ...]
+    errors: tuple[tuple[str, tuple[Table, ...]], ...]
+    bars: tuple[Picture, ...]
+    road: Table
+    steps: tuple[FoundEffect, ...]
+    effects: Table
+    unnamed: tuple[str, ...]
+    residuals: tuple[Group, ...]
+    missing: tuple[Group, ...]
+    rankings: tuple[Table, ...]
+    dropped: str
+    pictures: tuple[Picture, ...]
+    after: tuple[tuple[str, tuple[str, ...]], ...]
+    after_pictures: tuple[Picture, ...]
+    experiment_words: str
+    experiments: tuple[Table, ...]
+    sequence: str
+    parameters: Table
+    provenance: tuple[tuple[str, tuple[str, ...]], ...]
+    film: bool
+
+
+def write_diagnosis_report(outcome: DiagnoseOutcome, path: str | Path) -> Path:
+    """Write what a diagnosis found to ``path``. Raises ``InputError``."""
+    title = f"What the model lacks: {outcome.title}"
+    return write_page(path, "diagnosis.html.j2", lambda: {"d": _page(outcome, title, prefixes())})
+
+
+def _page(outcome: DiagnoseOutcome, title: str, names: Iterator[str]) -> DiagnosisPage:
+    finding, kind = outcome.finding, outcome.kind
+    changed = bool(finding.steps)
+    errors = []
+    for heading, before, after in (
+        ("Untouched recordings", outcome.before.validation, outcome.after.validation),
+        ("Training recordings", outcome.before.train, outcome.after.train),
+    ):
+        if before and after:
+            ours = before_after("Measured less model", before, after, kind)
+            theirs = thesis_before_after("By the thesis's formulas", before, after, kind)
+            errors.append((heading, (ours, theirs)))
+    pairs = [
+        *_paired(outcome.before.validation, outcome.after.validation),
+        *_paired(outcome.before.train, outcome.after.train),
+    ]
+    bars: tuple[Picture, ...] = ()
+    if pairs:
+        bars = (
+            picture(
+                drawn.bars_figure(pairs, outcome.noise, kind),
+                names,
+                "RMS error of every recording with the thesis's model (before) and with what was "
+                "found (after). At the noise floor, only noise is left.",
+            ),
+        )
+    experiments = experiment_table(outcome)
+    worst = sorted(finding.before, key=lambda s: -s.rms / s.noise)[:_DRAWN_MAX]
+    return DiagnosisPage(
+        title=title,
+        headline=HEADLINES[finding.verdict],
+        summary=summary(outcome),
+        warnings=warnings(outcome),
+        errors=tuple(errors),
+        bars=bars,
+        road=road(outcome),
+        steps=_steps(outcome),
+        effects=effect_table(outcome),
+        unnamed=_unnamed(outcome),
+        residuals=tuple(_residual(s, outcome, changed, names) for s in worst),
+        missing=tuple(
+            _missing(m, outcome, changed, names)
+            for m in finding.missing_before
+            if any(m.record == s.record for s in worst)
+        ),
+        rankings=tuple(ranking(r) for r in finding.rounds),
+        dropped=_capital(dropped(outcome)),
+        pictures=_untouched(outcome, changed, names),
+        after=tuple(
+            (s.record, tuple(readable(_ended(_capital(w))) for w in s.words)) for s in finding.after
+        ),
+        after_pictures=_after_pictures(outcome, worst, names),
+        experiment_words=readable(_ended(outcome.experiment_words)),
+        experiments=() if experiments is None else (experiments,),
+        sequence="" if outcome.experiment is None else outcome.experiment.sequence.strip(),
+        parameters=estimate_table(finding.final.estimates),
+        provenance=_provenance(outcome),
+        film=kind == "film",
+    )
+
+
+def _paired(
+    before: tuple[Comparison, ...], after: tuple[Comparison, ...]
+) -> list[tuple[Comparison, Comparison]]:
+    first = {c.name: c for c in before}
+    return [(first[c.name], c) for c in after if c.name in first]
+
+
+def _steps(outcome: DiagnoseOutcome) -> tuple[FoundEffect, ...]:
+    from model.effects import EFFECTS
+
+    found = []
+    for step in outcome.finding.steps:
+        about = _ended(EFFECTS[step.effect].words)
+        against: tuple[str, ...] = ()
+        if step.indistinguishable_from:
+            others = ", ".join(kin(f) for f in step.indistinguishable_from)
+            against = (f"Against it: these data are explained as well by {others}.",)
+        found.append(
+            FoundEffect(
+                _capital(called(step)),
+                _capital(about),
+                (*(readable(_ended(_capital(w))) for w in step.evidence), *against),
+            )
+        )
+    return tuple(found)
+
+
+def _unnamed(outcome: DiagnoseOutcome) -> tuple[str, ...]:
+    unnamed = outcome.finding.unnamed
+    if unnamed is None:
+        return ()
+    said = [f"It acts on the {unnamed.acts_on}."]
+    if unnamed.signature:
+        said.append(_ended(_capital(unnamed.signature)))
+    if unnamed.expression:
+        said.append(f"As a formula: {unnamed.expression}")
+    return tuple(readable(s) for s in said)
+
+
+def _residual(
+    before: Signature, outcome: DiagnoseOutcome, changed: bool, names: Iterator[str]
+) -> Group:
+    kind = outcome.kind
+    after = _same(outcome.finding.after, before.record) if changed else None
+    words = [
+        *before.words,
+        f"the residual resembles itself over {_duration(before.correlation_time)}; the "
+        f"probability that noise alone would be as correlated is "
+        f"{_probability(before.ljung_box_p)} (Ljung-Box), and that it would change its sign "
+        f"as seldom {_probability(before.runs_p)} (runs)",
+    ]
+    when = "before and after, each on its own scale" if after is not None else "over time"
+    wide = (
+        picture(
+            drawn.residual_time_figure(before, after, kind),
+            names,
+            f"{before.record}: measured less model, {when}. Dashed lines are the noise floor.",
+        ),
+        picture(
+            drawn.spectra_figure(before, after, kind),
+            names,
+            f"{before.record}: how the residual spreads over frequency. White noise would follow "
+            f"the dashed line.",
+        ),
+    )
+    small = tuple(
+        picture(
+            drawn.dependence_figure(d, kind),
+            names,
+            f"Before, against {d.quantity}: this alone accounts for "
+            f"{significant(100.0 * d.explained, 2)} % of the residual's variance.",
+        )
+        for d in before.dependences
+    )
+    return Group(before.record, tuple(readable(_ended(_capital(w))) for w in words), wide, small)
+
+
+def _missing(
+    missing: MissingStress, outcome: DiagnoseOutcome, changed: bool, names: Iterator[str]
+) -> Group:
+    after = _same(outcome.finding.missing_after, missing.record) if changed else None
+    size = math.sqrt(float(np.mean(missing.stress**2)))
+    what = "Maxwell stress" if outcome.kind == "actuator" else "measured stress"
+    words = [
+        f"{significant(size)} Pa RMS are missing, {significant(100.0 * size / missing.scale, 2)} % "
+        f"of the {what}'s {significant(missing.scale)} Pa."
+    ]
+    if after is not None:
+        left = math.sqrt(float(np.mean(after.stress**2)))
+        words.append(f"With what was found, {significant(left)} Pa RMS are left.")
+    wide = (
+        picture(
+            drawn.missing_time_figure(missing, after),
+            names,
+            f"{missing.record}: the missing stress over time, kept up to "
+            f"{significant(missing.band, 2)} Hz.",
+        ),
+    )
+    small = tuple(
+        picture(figure, names, f"Before, against {name}.")
+        for name, figure in drawn.missing_figures(missing, outcome.kind)
+    )
+    return Group(missing.record, tuple(words), wide, small)
+
+
+def _untouched(
+    outcome: DiagnoseOutcome, changed: bool, names: Iterator[str]
+) -> tuple[Picture, ...]:
+    shown = SHOWN[outcome.kind]
+    found = []
+    for before, after in _paired(outcome.before.validation, outcome.after.validation)[
+        :_UNTOUCHED_MAX
+    ]:
+        label = f"{after.name} ({after.row})" if after.row else after.name
+        last = f"{significant(after.errors.rms * shown.error_factor)} {shown.error_unit} RMS"
+        if not changed:
+            found.append(picture(figures.comparison_figure(after), names, f"{label}: {last}."))
+            continue
+        first = f"{significant(before.errors.rms * shown.error_factor)}"
+        found.append(
+            picture(
+                drawn.before_after_figure(before, after),
+                names,
+                f"{label}: {shown.drive.lower()}, {shown.quantity.lower()} measured and by both "
+                f"models, and the error before ({first}) and after ({last}); the "
+                f"axes of the errors differ.",
+            )
+        )
+    return tuple(found)
+
+
+def _after_pictures(
+    outcome: DiagnoseOutcome, worst: list[Signature], names: Iterator[str]
+) -> tuple[Picture, ...]:
+    """The last residual of the recording that was worst: its size, correlation and spectrum."""
+    chosen = [c for c in outcome.after.train if worst and c.name == worst[0].record]
+    if not chosen:
+        return ()
+    captions = (
+        "how large the error is, and how large noise alone would be.",
+        "how like itself the error is after a time; noise is not.",
+        "how the error spreads over frequency; white noise would be flat.",
+    )
+    return tuple(
+        picture(figure, names, f"{chosen[0].name}, after: {caption}")
+        for figure, caption in zip(figures.residual_panels(chosen[0]), captions, strict=True)
+    )
+
+
+def _provenance(outcome: DiagnoseOutcome) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    finding = outcome.finding
+    every = (*outcome.after.train, *outcome.after.validation)
+    rows = [
+        ("Fitted to", tuple(c.name for c in outcome.after.train)),
+        ("Validated on", tuple(c.name for c in outcome.after.validation) or ("nothing",)),
+        ("Samples", (f"{sum(c.errors.samples for c in every):,}",)),
+        ("Driven by", (f"voltage {outcome.drive}" if outcome.kind == "actuator" else "stretch",)),
+        ("Baseline", (describe_model(finding.baseline.model),)),
+        ("Model", (describe_model(finding.final.model),)),
+        ("Model file", (outcome.model_path or "not written",)),
+        ("Simulations", (f"{finding.simulations:,}",)),
+        ("Time taken", (seconds(outcome.seconds),)),
+    ]
+    if outcome.rig:
+        rows.insert(0, ("Rig", (outcome.rig,)))
+    return tuple(rows)
+
+
+def _same(of: Sequence[_Of], record: str) -> _Of | None:
+    return next((s for s in of if s.record == record), None)
+
+
+def _duration(value: float) -> str:
+    return f"{significant(value * 1e3)} ms" if value < 1.0 else seconds(value)
+
+
+def _probability(p: float) -> str:
+    return "below 0.001" if p < 1e-3 else significant(p, 2)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _ended(text: str) -> str:
+    return text if text.endswith((".", "!", "?")) else f"{text}."

@@ -1,0 +1,52 @@
+"""A voltage that was read back carries the reading's noise; a model driven by it would ring with it.
+
+The film under its load rings at some 70 Hz with hardly any damping, so a few volts of noise on the
+drive become a micrometre of displacement that nothing measured. The smoothest course that the
+readings allow is taken instead (Lepski's rule): at each sample a parabola over the widest window
+about it that the readings follow within their noise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import savgol_filter
+
+__all__ = ["quieted", "reading_noise"]
+
+_WINDOWS = (81, 41, 21, 11, 7)  # samples
+_AGREES = 1.25  # local RMS of what is smoothed away, over the noise
+_QUIET_MIN = 20  # samples
+
+
+def reading_noise(voltage: np.ndarray) -> float:
+    """Noise in V of readings (N,) that begin at rest; 0 where they begin without any.
+
+    Read from the start up to where the voltage leaves it for good.
+    """
+    start = voltage[:_QUIET_MIN]
+    if start.size < _QUIET_MIN:
+        return 0.0
+    noise = float(np.std(start, ddof=1))
+    if noise == 0.0 or noise > 0.02 * float(np.ptp(voltage)):
+        return 0.0
+    left = np.flatnonzero(np.abs(voltage - start.mean()) > 6.0 * noise)
+    quiet = voltage[: left[0]] if left.size else voltage
+    return float(np.std(quiet, ddof=1)) if quiet.size >= _QUIET_MIN else noise
+
+
+def quieted(voltage: np.ndarray, noise: float) -> np.ndarray:
+    """``voltage`` (N,) V with readings' ``noise`` V taken off it, edges kept as they are."""
+    out = voltage.copy()
+    open_ = np.ones(voltage.size, dtype=bool)
+    for window in _WINDOWS:
+        if window >= voltage.size:
+            continue
+        smooth = savgol_filter(voltage, window, 2, mode="interp")
+        away = voltage - smooth
+        # about the window, so that an edge beside it is not smoothed over either
+        local = np.sqrt(uniform_filter1d(away**2, window, mode="nearest"))
+        good = open_ & (local < _AGREES * noise) & (np.abs(away) < 4.5 * noise)
+        out[good] = smooth[good]
+        open_ &= ~good
+    return out

@@ -1,0 +1,8 @@
+"""From the residual of a fitted model to the effect that it lacks."""
+
+from __future__ import annotations
+
+from model.diagnosis.search import diagnose
+from model.diagnosis.findings import Diagnosis
+
+__all__ = ["Diagnosis", "diagnose"]

@@ -1,0 +1,270 @@
+"""The bench on which models are tried: records thinned to what matters, fits, and how they compare.
+
+Everything that chooses happens here, on the training records alone. A dense record is averaged over
+a few samples first, which costs nothing below half of the rate that is left; what is chosen is then
+fitted once more to every sample.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from model.actuator import Actuator
+from model.diagnosis.findings import Stage
+from model.film import Strip
+from model.fitting.identify import fit_globally, is_determined
+from model.fitting.intervals import correlation_time, covariance
+from model.fitting.levenberg import LocalFit, descend
+from model.fitting.secant import descend_by_secants
+from model.fitting.parameters import Estimate, Layout
+from model.fitting.problem import Problem
+from model.records import ActuatorRecord, FilmRecord, Record
+
+__all__ = ["Bench", "Trial", "information"]
+
+_RATE = 200.0  # Hz, to which records are thinned: mains and a load's ringing still show
+_FILM_SAMPLES = 1500
+_FILM_MODEL_ERROR = 5e-3  # of the largest stress: no model of a rubber is better than that
+#: s; a branch that relaxes faster than the excitation shows is a drag, and is sought as one
+FASTEST_BRANCH = 0.1
+_LONGER_THAN_RECORD = 3.0  # a branch slower than so many records is another equilibrium spring
+_SCOUTING = 3  # iterations from each start
+_NOT_WORTH = 0.02  # of what a fit lies behind: promising less, it is left where it is
+_SEGMENTS = 10  # of time, each predicted by a fit to the others
+
+
+def information(cost: float, free: int, samples: float) -> float:
+    """Bayesian information criterion of a fit of ``free`` numbers to ``samples`` independent ones.
+
+    ``cost`` is the mean square of residual over noise. The logarithm asks how much of what is left
+    an effect explains, so that it also compares models that all leave more than noise.
+    """
+    return samples * math.log(max(cost, 1e-12)) + free * math.log(max(samples, 2.0))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A model fitted on the bench: ``x`` (d,) in the coordinates of ``problem``'s layout.
+
+    ``fixed`` (d,) bool are numbers that were held; ``residuals`` (N,) are over the noise, ``cost``
+    their mean square, ``correlation`` their correlation time in samples.
+    """
+
+    problem: Problem
+    x: np.ndarray
+    fixed: np.ndarray
+    residuals: np.ndarray
+    cost: float
+    correlation: float
+
+    @property
+    def model(self) -> Actuator | Strip:
+        """The fitted model."""
+        layout = self.problem.layout
+        return layout.model(layout.values(self.x))
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects in it."""
+        return tuple(name for name, _ in self.problem.layout.base.effects)
+
+    @property
+    def free(self) -> int:
+        """How many numbers were fitted."""
+        return int(np.count_nonzero(~self.fixed))
+
+    def jacobian(self) -> np.ndarray:
+        """d(residuals)/dx (N, f) over the free numbers."""
+        return self.problem.jacobian(self.x, ~self.fixed)
+
+
+class Bench:
+    """Training records of one kind, and the fits made to them.
+
+    ``progress`` and ``stop`` are handed on by the diagnosis.
+    """
+
+    def __init__(self, records: Sequence[Record], workers: int) -> None:
+        self.full = tuple(_with_model_error(r) for r in records)
+        self.records = tuple(_thinned(r) for r in self.full)
+        self.workers = workers
+        self.simulations = 0
+        longest = max(float(r.time[-1] - r.time[0]) for r in records)
+        self.times = (
+            (FASTEST_BRANCH, _LONGER_THAN_RECORD * longest)
+            if isinstance(records[0], ActuatorRecord)
+            else None
+        )
+
+    @property
+    def samples(self) -> int:
+        """How many readings count."""
+        return sum(
+            r.measured.size if r.valid is None else int(np.count_nonzero(r.valid))
+            for r in self.records
+        )
+
+    def problem(self, model: Actuator | Strip, full: bool = False) -> Problem:
+        """The records, all samples or thinned, with ``model``'s numbers free."""
+        layout = Layout(model, self.times)
+        return Problem(self.full if full else self.records, layout, self.workers)
+
+    def baseline(self, base: Actuator | Strip, progress: Callable[[str, float], None]) -> Trial:
+        """``base`` fitted from a global search."""
+        problem = self.problem(replace(base, effects=()))
+        fit, fixed = fit_globally(problem, None, progress)
+        self.simulations += problem.simulations
+        return _trial(problem, fit, fixed)
+
+    def fit(
+        self,
+        model: Actuator | Strip,
+        starts: Sequence[tuple[np.ndarray, np.ndarray | None]],
+        fixed: np.ndarray,
+        leader: float = 0.0,
+    ) -> Trial:
+        """``model`` fitted from the best of several starts: coordinates and a Jacobian near them.
+
+        ``leader`` is the cost to beat: a fit that promises no more than a small part of what it
+        lies behind is not followed to its end.
+        """
+        problem = self.problem(model)
+        scouts = [
+            descend_by_secants(problem, start, fixed, jacobian, _SCOUTING, sure=False)
+            for start, jacobian in starts
+        ]
+        best = min(scouts, key=lambda f: f.cost)
+        behind = max(best.cost - leader, 0.0) * problem.samples
+        best = descend_by_secants(
+            problem, best.x, fixed, best.jacobian, gain=max(0.5, _NOT_WORTH * behind)
+        )
+        self.simulations += problem.simulations
+        return _trial(problem, best, fixed)
+
+    def settled(self, trial: Trial, iterations: int = 10) -> Trial:
+        """``trial`` followed to the end of its valley, on the thinned records."""
+        fit = descend(trial.problem, trial.x, trial.fixed, iterations=iterations, damping=1e-3)
+        return _trial(trial.problem, fit, trial.fixed)
+
+    def polished(self, trial: Trial) -> Trial:
+        """``trial`` fitted to every sample, to the end."""
+        problem = self.problem(trial.model, full=True)
+        fit = descend(problem, trial.x, trial.fixed, iterations=8, gain=0.5, damping=1e-4)
+        self.simulations += problem.simulations
+        return _trial(problem, fit, trial.fixed)
+
+    def stage(self, trial: Trial, correlation: float, estimates: bool = False) -> Stage:
+        """What the trial comes to, with the correlation time by which samples count."""
+        jac = trial.jacobian()
+        predicted = _left_out(trial, jac)
+        scale = trial.problem.sigma
+        good = np.isfinite(scale)
+        # thinning took noise away: put back, so that errors compare with those of every sample
+        lost = 0.0 if trial.problem.records is self.full else self._noise_lost()
+        rms = math.sqrt(float(np.mean((trial.residuals[good] * scale[good]) ** 2)) + lost)
+        left_out = predicted[good] * scale[good]
+        samples = trial.problem.samples / max(correlation, 1.0)
+        return Stage(
+            model=trial.model,
+            cost=trial.cost,
+            train_rms=rms,
+            selection_rms=math.sqrt(float(np.mean(left_out**2)) + lost),
+            selection_max=float(np.max(np.abs(left_out))),
+            criterion=information(trial.cost, trial.free, samples),
+            estimates=self.estimates(trial, jac) if estimates else (),
+        )
+
+    def _noise_lost(self) -> float:
+        """Mean square of the noise that thinning averaged away, pooled over readings."""
+        sizes = np.array([r.measured.size for r in self.records], dtype=float)
+        lost = np.array(
+            [f.noise**2 - r.noise**2 for f, r in zip(self.full, self.records, strict=True)]
+        )
+        return float(np.sum(sizes * lost) / np.sum(sizes))
+
+    def estimates(self, trial: Trial, jac: np.ndarray) -> tuple[Estimate, ...]:
+        """All numbers of the model with 95 % intervals from the curvature at the optimum.
+
+        Widened by what the residual is above the noise, and by its correlation.
+        """
+        layout = trial.problem.layout
+        inflation = max(1.0, trial.cost) * max(1.0, trial.correlation)
+        cov = covariance(jac.T @ jac, inflation)
+        spread = np.full(layout.size, math.inf)
+        spread[~trial.fixed] = 1.96 * np.sqrt(np.diag(cov))
+        values = layout.values(trial.x)
+        found = []
+        for q, x, value, s in zip(layout.quantities, trial.x, values, spread, strict=True):
+            if not math.isfinite(s):
+                found.append(Estimate(q.name, q.unit, float(value), 0.0, math.inf, False, "held"))
+                continue
+            low, high = (x - s, x + s)
+            if q.logarithmic:
+                low, high = math.exp(max(low, -700.0)), math.exp(min(high, 700.0))
+            bounds = q.bounds
+            low, high = max(float(low), bounds[0]), min(float(high), bounds[1])
+            sure = is_determined(low, high)
+            note = "" if sure else "these data hardly determine it"
+            found.append(Estimate(q.name, q.unit, float(value), low, high, sure, note))
+        return tuple(found)
+
+
+def _trial(problem: Problem, fit: LocalFit, fixed: np.ndarray) -> Trial:
+    return Trial(problem, fit.x, fixed, fit.residuals, fit.cost, _correlation(problem, fit))
+
+
+def _correlation(problem: Problem, fit: LocalFit) -> float:
+    """Correlation time of the residuals, the mean over records (each by its own)."""
+    times, sizes, start = [], [], 0
+    for record in problem.records:
+        part = fit.residuals[start : start + record.measured.size]
+        times.append(correlation_time(part))
+        sizes.append(part.size)
+        start += part.size
+    return float(np.average(times, weights=sizes))
+
+
+def _thinned(record: Record) -> Record:
+    """The record at a rate that is enough, with its noise read again from its quiet lead-in."""
+    if isinstance(record, FilmRecord):
+        return record.coarse(_FILM_SAMPLES)
+    thin = record.coarse(_RATE)
+    if thin is record:
+        return record
+    moving = np.flatnonzero(thin.drive.voltage)
+    quiet = thin.displacement[: moving[0] - 1] if moving.size and moving[0] > 100 else np.empty(0)
+    # a sensor that averages makes noise that thinning does not average away
+    return replace(thin, noise=max(thin.noise, float(quiet.std(ddof=1)))) if quiet.size else thin
+
+
+def _with_model_error(record: Record) -> Record:
+    if isinstance(record, ActuatorRecord):
+        return record
+    error = _FILM_MODEL_ERROR * float(np.max(np.abs(record.stress)))
+    return replace(record, noise=math.hypot(record.noise, error))
+
+
+def _left_out(trial: Trial, jac: np.ndarray) -> np.ndarray:
+    """Residuals over noise (N,) of each segment of time, predicted by a fit to all others.
+
+    The fit without a segment is the linear one about the optimum: exact where the model is linear
+    over the change that a segment makes, and the change is small where a segment is one of many.
+    """
+    n = trial.residuals.size
+    edges = np.linspace(0, n, _SEGMENTS + 1).astype(int)
+    out = trial.residuals.copy()
+    normal = jac.T @ jac
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        part, r = jac[low:high], trial.residuals[low:high]
+        rest = (normal - part.T @ part) / np.outer(scale, scale)
+        w, q = np.linalg.eigh(rest)
+        inverse = (q / np.maximum(w, 1e-8)) @ q.T
+        # at the optimum the gradient of the others is minus that of the segment
+        step = inverse @ ((part.T @ r) / scale) / scale
+        out[low:high] = r + part @ step
+    return out

@@ -1,0 +1,214 @@
+"""What a residual looks like: is it noise, and if not, what does it go with?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import welch
+from scipy.stats import chi2, norm
+
+from model.diagnosis.bench import Trial
+from model.diagnosis.findings import Dependence, Signature
+from model.fitting.intervals import correlation_time
+from model.records import ActuatorRecord, Record
+
+__all__ = ["signatures"]
+
+_LAGS = 20  # of the Ljung-Box test
+_BINS = 24
+_NOISE = 1.08  # residual over noise that still is noise: the noise is known to some per cent
+_SHARE = 0.03  # of the residual's variance, beyond what noise gives: less is no dependence
+_TELLING = 0.1  # the same, for a sentence
+
+
+def signatures(records: Sequence[Record], trial: Trial) -> tuple[Signature, ...]:
+    """The residual of each of ``records`` under the fitted model of ``trial``."""
+    found, start = [], 0
+    for record in records:
+        part = slice(start, start + record.measured.size)
+        start = part.stop
+        sigma = trial.problem.sigma[part]
+        # what must not be used counts as nothing
+        residual = np.where(np.isfinite(sigma), -trial.residuals[part] * record.noise, 0.0)
+        found.append(_signature(record, residual))
+    return tuple(found)
+
+
+def _signature(record: Record, residual: np.ndarray) -> Signature:
+    time, noise = record.time, record.noise
+    step = float(np.median(np.diff(time)))
+    model = record.measured - residual
+    # slow enough to tell up from down in a noisy reading
+    window = max(3, round(0.02 / step)) if isinstance(record, ActuatorRecord) else 3
+    smooth = np.convolve(np.pad(model, window // 2, mode="edge"), np.ones(window) / window, "valid")
+    rate = np.gradient(smooth[: time.size], time)
+    if isinstance(record, ActuatorRecord):
+        quantities = [
+            ("voltage squared", "kV^2", (record.drive.voltage * 1e-3) ** 2),
+            ("displacement", "mm", model * 1e3),
+            ("rate", "mm/s", rate * 1e3),
+            ("time", "s", time),
+        ]
+        up = rate
+    else:
+        up = np.gradient(record.stretch, time)
+        quantities = [
+            ("stretch", "", record.stretch),
+            ("rate of stretch", "1/s", up),
+            ("stress", "kPa", model * 1e-3),
+            ("time", "s", time),
+        ]
+    # standing still is neither loading nor unloading
+    moving = np.abs(up) > 0.02 * float(np.max(np.abs(up)) or 1.0)
+    dependences = tuple(_dependence(n, u, q, residual, up, moving) for n, u, q in quantities)
+    frequency, density = welch(
+        residual, 1.0 / step, nperseg=min(max(time.size // 6, 64), 4096, time.size)
+    )
+    rms = float(np.sqrt(np.mean(residual**2)))
+    along = dependences[1] if isinstance(record, ActuatorRecord) else dependences[0]
+    difference = along.loading - along.unloading
+    loops = float(np.nanmean(difference)) if np.isfinite(difference).any() else 0.0
+    repeats = _first_less_repeats(record, residual)
+    is_noise = rms < _NOISE * noise and all(d.explained < _SHARE for d in dependences)
+    return Signature(
+        record=record.name,
+        time=time,
+        residual=residual,
+        noise=noise,
+        rms=rms,
+        ljung_box_p=_ljung_box(residual),
+        runs_p=_runs(residual),
+        correlation_time=correlation_time(residual) * step,
+        frequency=frequency[1:],
+        density=density[1:],
+        floor_density=2.0 * noise**2 * step,
+        dependences=dependences,
+        loading_less_unloading=loops,
+        first_less_repeats=repeats,
+        is_noise=is_noise,
+        words=_words(record, rms, is_noise, dependences, loops, repeats, frequency, density, step),
+    )
+
+
+def _ljung_box(residual: np.ndarray) -> float:
+    """Probability that white noise is as correlated over the first lags."""
+    n = residual.size
+    lags = min(_LAGS, n // 4)
+    centred = residual - residual.mean()
+    total = float(centred @ centred)
+    if total == 0.0 or lags < 1:
+        return 1.0
+    r = np.array([centred[k:] @ centred[:-k] for k in range(1, lags + 1)]) / total
+    statistic = n * (n + 2.0) * float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
+    return float(chi2.sf(statistic, lags))
+
+
+def _runs(residual: np.ndarray) -> float:
+    """Probability that white noise changes its sign as seldom (Wald and Wolfowitz)."""
+    up = residual > np.median(residual)
+    a, b = int(np.count_nonzero(up)), int(np.count_nonzero(~up))
+    if a < 2 or b < 2:
+        return 1.0
+    runs = 1 + int(np.count_nonzero(up[1:] != up[:-1]))
+    mean = 1.0 + 2.0 * a * b / (a + b)
+    variance = (mean - 1.0) * (mean - 2.0) / (a + b - 1.0)
+    return float(norm.cdf((runs - mean) / math.sqrt(variance)))
+
+
+def _dependence(
+    name: str,
+    unit: str,
+    quantity: np.ndarray,
+    residual: np.ndarray,
+    up: np.ndarray,
+    moving: np.ndarray,
+) -> Dependence:
+    low, high = float(quantity.min()), float(quantity.max())
+    edges = np.linspace(low, high if high > low else low + 1.0, _BINS + 1)
+    index = np.clip(np.searchsorted(edges, quantity, side="right") - 1, 0, _BINS - 1)
+    count = np.bincount(index, minlength=_BINS)
+    total = np.bincount(index, residual, _BINS)
+    variance = float(np.var(residual)) or 1.0
+    filled = count > 0
+    centred = total[filled] / count[filled] - residual.mean()
+    between = float(np.sum(count[filled] * centred**2)) / residual.size
+    by_chance = np.count_nonzero(filled) * variance / residual.size
+    return Dependence(
+        quantity=name,
+        unit=unit,
+        at=0.5 * (edges[1:] + edges[:-1]),
+        loading=_means(index, residual, moving & (up > 0.0)),
+        unloading=_means(index, residual, moving & (up < 0.0)),
+        error=math.sqrt(variance) / np.sqrt(np.maximum(count, 1)),
+        explained=min(max((between - by_chance) / variance, 0.0), 1.0),
+    )
+
+
+def _means(index: np.ndarray, residual: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Mean of the residual in each bin over the samples ``which`` (N,), NaN where there is none."""
+    count = np.bincount(index[which], minlength=_BINS)
+    total = np.bincount(index[which], residual[which], _BINS)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _first_less_repeats(record: Record, residual: np.ndarray) -> float:
+    """RMS of the residual's change from the first period of the drive to the second.
+
+    Less what noise gives; NaN where the drive does not repeat itself.
+    """
+    drive = record.drive.voltage if isinstance(record, ActuatorRecord) else record.stretch - 1.0
+    active = np.flatnonzero(np.abs(drive) > 1e-3 * float(np.max(np.abs(drive)) or 1.0))
+    if active.size < 200 or np.ptp(np.diff(record.time)) > 0.01 * np.median(np.diff(record.time)):
+        return math.nan
+    first, last = int(active[0]), int(active[-1])
+    x = drive[first : last + 1]
+    n = x.size
+    spectrum = np.abs(np.fft.rfft(x - x.mean(), 2 * n)) ** 2
+    match = np.fft.irfft(spectrum)[:n] / np.arange(n, 0, -1)
+    lags = np.arange(n // 5, n // 2 + 2)
+    lags = lags[lags < n]
+    for lag in (int(lags[np.argmax(match[lags])]) + d for d in (0, -1, 1)):
+        if lag < n and np.max(np.abs(x[lag:] - x[:-lag])) < 0.02 * np.max(np.abs(x)):
+            change = residual[first + lag : last + 1] - residual[first : last + 1 - lag]
+            return math.sqrt(max(float(np.mean(change**2)) - 2.0 * record.noise**2, 0.0))
+    return math.nan
+
+
+def _words(
+    record: Record,
+    rms: float,
+    is_noise: bool,
+    dependences: tuple[Dependence, ...],
+    loops: float,
+    repeats: float,
+    frequency: np.ndarray,
+    density: np.ndarray,
+    step: float,
+) -> tuple[str, ...]:
+    unit, scale = ("um", 1e6) if isinstance(record, ActuatorRecord) else ("kPa", 1e-3)
+    words = [
+        f"{rms * scale:.3g} {unit} RMS, {rms / record.noise:.3g} times the noise floor of "
+        f"{record.noise * scale:.3g} {unit}" + (": noise is all that is left" if is_noise else "")
+    ]
+    if is_noise:
+        return tuple(words)
+    telling = [d for d in dependences if d.explained > _TELLING]
+    for d in sorted(telling, key=lambda d: -d.explained):
+        words.append(f"{100 * d.explained:.0f} % of it goes with {d.quantity} alone")
+    if abs(loops) > 0.3 * rms:
+        higher = "higher" if loops > 0.0 else "lower"
+        words.append(
+            f"{abs(loops) * scale:.3g} {unit} {higher} on loading than on unloading at one place"
+        )
+    if repeats > 0.5 * rms:
+        words.append(
+            f"the second period differs from the first by {repeats * scale:.3g} {unit} RMS: "
+            f"something remembers"
+        )
+    peak = int(np.argmax(density[1:])) + 1
+    floor = 2.0 * record.noise**2 * step
+    if frequency[peak] > 2.0 and density[peak] > 20.0 * floor:
+        words.append(f"a line stands in its spectrum at {frequency[peak]:.3g} Hz")
+    return tuple(words)

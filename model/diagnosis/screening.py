@@ -1,0 +1,194 @@
+"""The score test: what each effect promises to explain, before anything is fitted.
+
+To first order an effect of size s moves the model's answer by s times its sensitivity. What the
+baseline's own numbers could do as well is projected away; what is left of the sensitivity is
+compared with what is left of the residual. Shapes (relaxation times, thresholds, moments) are tried
+on a small grid, and each grid point comes with the size that the residual asks for.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from model.actuator import Actuator
+from model.diagnosis.bench import Bench, Trial
+from model.effects import EFFECTS, Effect, EffectValues, Parameter
+from model.film import Strip
+from model.fitting.parameters import Layout
+from model.fitting.problem import Problem
+from model.records import ActuatorRecord, FilmRecord
+
+__all__ = ["Promise", "Screen", "with_effect"]
+
+_MOMENTS = 40  # sought along the longest record
+_LINES = 400  # frequencies within an effect's bounds
+_SHAPES_MAX = 12
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What one effect, in one shape, promises on top of a fitted model.
+
+    ``model`` has the effect in it, ``start`` (d,) are the base model's coordinates with the effect
+    at the size that the residual asks for, ``columns`` (N, sizes) the sensitivities to its sizes, ``share`` is the part of the residual's mean square
+    that would go to first order.
+    """
+
+    model: Actuator | Strip
+    start: np.ndarray
+    columns: np.ndarray
+    share: float
+
+
+def with_effect(model: Actuator | Strip, name: str, values: tuple[float, ...]) -> Actuator | Strip:
+    """``model`` with effect ``name`` at ``values`` in the order of its parameters."""
+    pairs = zip((p.name for p in EFFECTS[name].parameters), values, strict=True)
+    effects: EffectValues = (*model.effects, (name, tuple(pairs)))
+    return replace(model, effects=effects)
+
+
+class Screen:
+    """Score tests on top of one fitted model."""
+
+    def __init__(self, bench: Bench, trial: Trial) -> None:
+        self.bench = bench
+        self.trial = trial
+        #: (N, f) of the base model
+        self.jacobian = trial.jacobian()
+        self._q, _ = np.linalg.qr(self.jacobian)
+        self._residual = trial.residuals - self._q @ (self._q.T @ trial.residuals)
+        self._base = trial.residuals * trial.problem.sigma
+        self._weight = 1.0 / trial.problem.sigma
+
+    def promises(self, effect: Effect) -> list[Promise]:
+        """Promises of ``effect``, best first: one for each shape on its grid."""
+        shapes = list(product(*(self._starts(p) for p in effect.shapes)))[: _SHAPES_MAX * 8]
+        found = self._scored(effect, shapes)
+        if any(p.part_of == "duration" for p in effect.shapes):
+            best = max(found, key=lambda p: p.share)
+            moment = best.model.effects[-1][1][-1][1]
+            step = self._duration() / _MOMENTS
+            finer = [(moment + f * step,) for f in np.linspace(-1.0, 1.0, 21)]
+            found += self._scored(effect, [s for s in finer if s[0] > 0.0])
+        return sorted(found, key=lambda p: -p.share)
+
+    def _duration(self) -> float:
+        return max(float(r.time[-1]) for r in self.bench.records)
+
+    def _starts(self, parameter: Parameter) -> list[float]:
+        """Values of a shape to try, for these records."""
+        records = self.bench.records
+        starts = list(parameter.starts)
+        if parameter.part_of == "displacement":
+            largest = max(float(np.max(r.measured)) for r in records)
+            starts = [s * largest for s in starts]
+        elif parameter.part_of == "voltage":
+            largest = max(
+                float(np.max(np.abs(r.drive.voltage)))
+                for r in records
+                if isinstance(r, ActuatorRecord)
+            )
+            starts = [s * largest for s in starts]
+        elif parameter.part_of == "duration":
+            starts = list((np.arange(_MOMENTS) + 0.5) / _MOMENTS * self._duration())
+        elif parameter.part_of == "spectrum":
+            starts = [self._strongest_line(*parameter.bounds), *starts]
+        low, high = parameter.bounds
+        return [min(max(s, low), high) for s in starts]
+
+    def _strongest_line(self, low: float, high: float) -> float:
+        """Frequency in Hz at which a sine explains most of the residual."""
+        records = self.bench.records
+        longest = max(records, key=lambda r: r.measured.size)
+        start = 0
+        for record in records:
+            if record is longest:
+                break
+            start += record.measured.size
+        residual = self._residual[start : start + longest.measured.size]
+        step = float(np.median(np.diff(longest.time)))
+        high = min(high, max(0.5 / step, low * 1.01)) if low < 0.5 / step else high
+        duration = float(longest.time[-1] - longest.time[0])
+        count = int(min(max((high - low) * duration * 2.0, 2), 8 * _LINES))
+        frequencies = np.linspace(low, high, count)
+        power = [abs(np.exp(-2j * np.pi * f * longest.time) @ residual) for f in frequencies]
+        return float(frequencies[int(np.argmax(power))])
+
+    def _scored(self, effect: Effect, shapes: list[tuple[float, ...]]) -> list[Promise]:
+        sizes = effect.sizes
+        rows, models = [], []
+        layout: Layout | None = None
+        for shape in shapes:
+            for i in range(len(sizes)):
+                values = tuple(
+                    self._probe(p) if j == i else float(p.neutral or 0.0)
+                    for j, p in enumerate(sizes)
+                )
+                model = with_effect(self.trial.model, effect.name, (*values, *shape))
+                models.append(model)
+                if layout is None:
+                    layout = Layout(model, self.bench.times)
+                rows.append(np.array((*values, *shape)))
+        if layout is None:
+            return []
+        problem = Problem(self.bench.records, layout, self.bench.workers)
+        base_values = self.trial.problem.layout.values(self.trial.x)
+        population = np.array([np.concatenate([base_values, row]) for row in rows])
+        predicted, status = problem.predict(population)
+        self.bench.simulations += problem.simulations
+        there = (predicted - problem.measured) - self._base
+        total = float(self._residual @ self._residual)
+        found = []
+        per = len(sizes)
+        for n, shape in enumerate(shapes):
+            part = slice(n * per, (n + 1) * per)
+            if status[part].any():
+                continue
+            probes = np.array([self._probe(p) for p in sizes])
+            columns = (there[part] * self._weight).T / probes
+            across = columns - self._q @ (self._q.T @ columns)
+            size, share = self._solve(across, columns, total)
+            size = np.array(
+                [min(max(s, p.bounds[0]), p.bounds[1]) for s, p in zip(size, sizes, strict=True)]
+            )
+            values = np.concatenate([base_values, size, shape])
+            start = np.clip(layout.coordinates(values), layout.lower, layout.upper)
+            found.append(Promise(models[n * per], start, columns, share))
+        return found
+
+    @staticmethod
+    def _probe(parameter: Parameter) -> float:
+        neutral = parameter.neutral or 0.0
+        return neutral + parameter.typical
+
+    def _solve(
+        self, across: np.ndarray, columns: np.ndarray, total: float
+    ) -> tuple[np.ndarray, float]:
+        """Sizes that the residual asks for, and the share of its mean square that they explain."""
+        own = np.linalg.norm(columns, axis=0)
+        seen = np.linalg.norm(across, axis=0)
+        # what the baseline can do as well is not seen: no size follows from it
+        if not np.all(np.isfinite(across)) or np.any(seen <= 1e-6 * np.maximum(own, 1e-300)):
+            return np.zeros(across.shape[1]), 0.0
+        size, *_ = np.linalg.lstsq(across, -self._residual, rcond=1e-9)
+        left = self._residual + across @ size
+        share = 1.0 - float(left @ left) / max(total, 1e-300)
+        return size, max(share, 0.0) if math.isfinite(share) else 0.0
+
+
+def is_of(effect: Effect, bench: Bench) -> bool:
+    """True where ``effect`` makes sense for the bench's records."""
+    first = bench.records[0]
+    if isinstance(first, FilmRecord):
+        return "stretch" in effect.drives
+    if "voltage" not in effect.drives:
+        return False
+    if effect.name == "temperature":
+        return any(
+            isinstance(r, ActuatorRecord) and r.drive.warmth is not None for r in bench.records
+        )
+    return True

@@ -1,0 +1,538 @@
+"""The search for what a model lacks: residual, candidates, refits, choice, pruning, and again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from model.actuator import Actuator
+from model.diagnosis.bench import Bench, Trial, information
+from model.diagnosis.findings import (
+    EXPLAINED,
+    NOTHING_MISSING,
+    PARTLY_EXPLAINED,
+    UNEXPLAINED,
+    Candidate,
+    Diagnosis,
+    Round,
+    Step,
+)
+from model.diagnosis.residual import signatures
+from model.diagnosis.screening import Promise, Screen, is_of
+from model.diagnosis.stress import missing_stress
+from model.diagnosis.unnamed import describe_unnamed
+from model.effects import EFFECTS
+from model.film import Strip
+from model.records import ActuatorRecord, Record
+
+__all__ = ["diagnose"]
+
+Progress = Callable[[str, float], None]
+
+_EFFECTS_MAX = 3  # more at once no record of this kind tells apart
+_DECISIVE = 12.0  # of the information criterion: odds of e^6, over some forty candidates
+_ALIKE = 10.0  # of the same: candidates nearer than that are not told apart
+_MATTERS = 0.01  # of the noise's mean square: less is not worth an effect
+_BEAM = 3  # how many explanations are followed on
+_BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed on
+_SETTLED = 4  # leading candidates that are fitted to the end of their valleys
+_UNNAMED_MARGIN = (
+    20.0  # of the criterion, by which an unnamed effect must be better than named ones
+)
+_FOLLOWED = 7  # candidates refitted in later rounds, the most promising ones
+_NOISE_RMS = (
+    1.08  # residual over noise that still is noise: the noise itself is known to some per cent
+)
+_EXPLAINED_RMS = 1.15
+_UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
+
+
+def _quiet(stage: str, fraction: float) -> None:
+    """Progress that nobody watches."""
+
+
+def _never() -> bool:
+    return False
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """One candidate of a round: its trial on the bench and what the score test promised."""
+
+    name: str
+    parent: Trial
+    trial: Trial | None
+    promised: float
+
+
+class _Interrupted(Exception):  # noqa: N818
+    """The operator wants the end: what was found until now is handed back."""
+
+
+def diagnose(
+    records: Sequence[Record],
+    base: Actuator | Strip,
+    *,
+    workers: int = 2,
+    progress: Progress = _quiet,
+    stop: Callable[[], bool] = _never,
+) -> Diagnosis:
+    """Fit ``base`` to ``records``, find what it lacks, and put that in.
+
+    ``records`` are all of actuators or all of films; nothing else is ever looked at, so errors on
+    other recordings are honest. ``progress(stage, fraction)`` is called often, the fraction being
+    that of the whole work; when ``stop()`` is True, what was found until then is returned. Raises
+    ``ModelError`` for records and models that do not fit together.
+    """
+    return _Search(records, base, workers, progress, stop).run()
+
+
+class _Search:
+    def __init__(
+        self,
+        records: Sequence[Record],
+        base: Actuator | Strip,
+        workers: int,
+        progress: Progress,
+        stop: Callable[[], bool],
+    ) -> None:
+        self.bench = Bench(records, workers)
+        self.base = base
+        self.report = progress
+        self.stop = stop
+        self.effects = [e for e in EFFECTS.values() if is_of(e, self.bench)]
+        self.rounds: list[Round] = []
+        self.found: dict[frozenset[str], Trial] = {}
+        self.settled: set[frozenset[str]] = set()
+        self.interrupted = False
+        self.held = False
+
+    # -- the course of things
+
+    def run(self) -> Diagnosis:
+        self.report("baseline", 0.0)
+        baseline = self.bench.baseline(self.base, lambda _, f: self.report("baseline", 0.1 * f))
+        baseline = self._timed(baseline)
+        self.found[frozenset()] = baseline
+        best, tried = baseline, []
+        try:
+            best, tried = self._search(baseline)
+            best = self._pruned(best)
+        except _Interrupted:
+            self.interrupted = True
+            best = self._leading()
+        return self._finding(baseline, best, tried)
+
+    def _timed(self, baseline: Trial) -> Trial:
+        """The baseline of a voltage that stands between samples, where that is all that is missing.
+
+        A table does not say what the voltage did between its rows. Half a sample too early, the
+        model would be found to lack a lag of half a sample.
+        """
+        records = self.bench.full
+        if self._is_noise(baseline) or not all(
+            isinstance(r, ActuatorRecord) and not r.drive.hold for r in records
+        ):
+            return baseline
+        held = [
+            replace(r, drive=replace(r.drive, hold=True))
+            for r in records
+            if isinstance(r, ActuatorRecord)
+        ]
+        bench = Bench(held, self.bench.workers)
+        trial = bench.baseline(self.base, lambda _, f: self.report("baseline", 0.1))
+        self.bench.simulations += bench.simulations
+        if not self._is_noise(trial) or trial.cost > baseline.cost - _MATTERS:
+            return baseline
+        bench.simulations = self.bench.simulations
+        self.bench, self.held = bench, True
+        return trial
+
+    def _search(self, baseline: Trial) -> tuple[Trial, list[_Tried]]:
+        best, beam = baseline, [baseline]
+        deciding: list[_Tried] = []
+        for depth in range(_EFFECTS_MAX):
+            tried: list[_Tried] = []
+            for i, parent in enumerate(beam):
+                span = (0.1 + 0.28 * (depth + i / len(beam)), 0.28 / len(beam))
+                tried += self._round(parent, depth, span)
+            fitted = [t for t in tried if t.trial is not None]
+            if not fitted:
+                break
+            fitted, correlation = self._settled(best, fitted)
+            leader = fitted[0].trial
+            gain = self._criterion(best, correlation) - self._criterion(leader, correlation)
+            matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
+            taken = gain > _DECISIVE and matters
+            unfitted = [t for t in tried if t.trial is None]
+            chosen = fitted[0] if taken else None
+            self._record(best, [*fitted, *unfitted], correlation, chosen, gain)
+            if not taken:
+                break
+            best, deciding = leader, fitted
+            beam = self._beam(fitted)
+            if self._is_noise(best):
+                break
+        return best, deciding
+
+    def _round(self, parent: Trial, depth: int, span: tuple[float, float]) -> list[_Tried]:
+        """All effects on top of ``parent``: promises of all, refits of all or the best of them."""
+        screen = Screen(self.bench, parent)
+        names = [e for e in self.effects if e.name not in parent.effects]
+        promises = {}
+        for n, effect in enumerate(names):
+            self._check()
+            promises[effect.name] = screen.promises(effect)
+            self.report(
+                _stage(parent, "screening"), span[0] + span[1] * 0.25 * (n + 1) / len(names)
+            )
+        order = sorted((n for n, p in promises.items() if p), key=lambda n: -promises[n][0].share)
+        refitted = order if depth == 0 else order[:_FOLLOWED]
+        tried = [_Tried(n, parent, None, promises[n][0].share) for n in order if n not in refitted]
+        for n, name in enumerate(refitted):
+            self._check()
+            key = frozenset((*parent.effects, name))
+            trial = self.found.get(key)
+            if trial is None:
+                trial = self._refit(parent, name, promises[name], screen.jacobian)
+                self.found[key] = trial
+            tried.append(_Tried(name, parent, trial, promises[name][0].share))
+            self.report(
+                _stage(parent, "refitting"),
+                span[0] + span[1] * (0.25 + 0.75 * (n + 1) / len(refitted)),
+            )
+        return tried
+
+    def _refit(
+        self, parent: Trial, name: str, promises: list[Promise], jacobian: np.ndarray
+    ) -> Trial:
+        """The best fit of one effect: from two shapes, and from a size beyond the linear guess."""
+        effect = EFFECTS[name]
+        model = promises[0].model
+        first = promises[0].start.size - len(effect.parameters)
+        # of shapes, and far from the base model, the sensitivities are not known yet
+        shapes = np.full((jacobian.shape[0], len(effect.shapes)), np.nan)
+        sizes = np.full((jacobian.shape[0], len(effect.sizes)), np.nan)
+        starts = []
+        for promise in promises[: 2 if effect.shapes else 1]:
+            # from nothing: the first step, which all numbers take together, is the linear guess
+            start = promise.start.copy()
+            start[first : first + len(effect.sizes)] = [p.neutral for p in effect.sizes]
+            starts.append((start, np.column_stack([jacobian, promise.columns, shapes])))
+        larger = promises[0].start.copy()
+        for j, p in enumerate(effect.sizes, start=first):
+            neutral = p.neutral or 0.0
+            reach = max(abs(larger[j] - neutral), p.typical)
+            sign = -1.0 if larger[j] < neutral else 1.0
+            larger[j] = np.clip(neutral + 3.0 * sign * reach, *p.bounds)
+        starts.append((larger, np.column_stack([jacobian, sizes, shapes])))
+        fixed = np.concatenate([parent.fixed, np.zeros(len(effect.parameters), dtype=bool)])
+        leader = min(t.cost for t in self.found.values())
+        return self.bench.fit(model, starts, fixed, leader)
+
+    def _settled(self, best: Trial, fitted: list[_Tried]) -> tuple[list[_Tried], float]:
+        """The candidates, best first, the leading ones fitted to the end of their valleys.
+
+        Named effects go before unnamed ones that do no better than a margin: an attached mode can
+        play a moved mass, and a step nearly anything.
+        """
+
+        def rank(tried: _Tried) -> float:
+            trial = tried.trial
+            if trial is None:
+                return math.inf
+            unnamed = EFFECTS[tried.name].family == "unknown"
+            return self._criterion(trial, correlation) + (_UNNAMED_MARGIN if unnamed else 0.0)
+
+        trials = [t.trial for t in fitted if t.trial is not None]
+        correlation = self._correlation([best, *trials])
+        order = sorted(fitted, key=rank)
+        settled: dict[frozenset[str], Trial] = {}
+        for n, tried in enumerate(order):
+            self._check()
+            if n >= _SETTLED or tried.trial is None:
+                continue
+            key = frozenset(tried.trial.effects)
+            if key not in settled and key not in self.settled:
+                settled[key] = self.bench.settled(tried.trial)
+        self.found.update(settled)
+        self.settled |= settled.keys()
+        order = [
+            replace(t, trial=self.found[frozenset(t.trial.effects)]) if t.trial else t
+            for t in order
+        ]
+        correlation = self._correlation([best, *(t.trial for t in order if t.trial is not None)])
+        return sorted(order, key=rank), correlation
+
+    def _beam(self, fitted: list[_Tried]) -> list[Trial]:
+        """The explanations to follow on: the best of different families."""
+        beam: list[Trial] = []
+        seen: set[frozenset[str]] = set()
+        for tried in fitted:
+            trial = tried.trial
+            if trial is None or trial.cost > _BEAM_COST * fitted[0].trial.cost:
+                continue
+            families = frozenset(EFFECTS[n].family for n in trial.effects)
+            if families not in seen:
+                seen.add(families)
+                beam.append(trial)
+            if len(beam) == _BEAM:
+                break
+        return beam
+
+    def _pruned(self, best: Trial) -> Trial:
+        """``best`` without what it does not need."""
+        while len(best.effects) > 1:
+            self._check()
+            smaller = [self._without(best, name) for name in best.effects]
+            correlation = self._correlation([best, *smaller])
+            least = min(smaller, key=lambda t: self._criterion(t, correlation))
+            loss = self._criterion(least, correlation) - self._criterion(best, correlation)
+            if loss > _DECISIVE:
+                break
+            best = least
+        return best
+
+    def _without(self, trial: Trial, name: str) -> Trial:
+        key = frozenset(trial.effects) - {name}
+        if key not in self.found:
+            model = replace(
+                trial.model, effects=tuple(e for e in trial.model.effects if e[0] != name)
+            )
+            layout = self.bench.problem(model).layout
+            fixed = self.found[frozenset()].fixed
+            fixed = np.concatenate([fixed, np.zeros(layout.size - fixed.size, dtype=bool)])
+            self.found[key] = self.bench.fit(
+                model, [(layout.coordinates(layout.initial()), None)], fixed
+            )
+        return self.found[key]
+
+    # -- judgement
+
+    def _criterion(self, trial: Trial, correlation: float) -> float:
+        return information(trial.cost, trial.free, self.bench.samples / correlation)
+
+    def _correlation(self, trials: Sequence[Trial]) -> float:
+        """One count of independent samples for all: by the fit that leaves the least structure."""
+        return max(1.0, min(t.correlation for t in trials))
+
+    def _is_noise(self, trial: Trial) -> bool:
+        return trial.cost < _NOISE_RMS**2 and trial.correlation < 2.0
+
+    def _leading(self) -> Trial:
+        trials = list(self.found.values())
+        correlation = self._correlation(trials)
+        best = min(trials, key=lambda t: self._criterion(t, correlation))
+        base = self.found[frozenset()]
+        gain = self._criterion(base, correlation) - self._criterion(best, correlation)
+        return best if gain > _DECISIVE else base
+
+    def _check(self) -> None:
+        if self.stop():
+            raise _Interrupted
+
+    # -- what is handed back
+
+    def _record(
+        self,
+        base: Trial,
+        tried: list[_Tried],
+        correlation: float,
+        chosen: _Tried | None,
+        gain: float,
+    ) -> None:
+        """Keep the round: the candidates on top of the base that the choice was made from."""
+        parent = base if chosen is None else chosen.parent
+        of_parent = [t for t in tried if t.parent is parent]
+        base_criterion = self._criterion(parent, correlation)
+        best = min(
+            (self._criterion(t.trial, correlation) for t in of_parent if t.trial is not None),
+            default=base_criterion,
+        )
+        candidates = []
+        for t in of_parent:
+            if t.trial is None:
+                continue
+            effect = EFFECTS[t.name]
+            criterion = self._criterion(t.trial, correlation)
+            behind = criterion - best
+            better = base_criterion - criterion
+            verdict = "worthless"
+            if chosen is not None and t is chosen:
+                verdict = "chosen"
+            elif better > _DECISIVE and behind < _ALIKE:
+                verdict = "indistinguishable"
+            elif better > _DECISIVE:
+                verdict = "better"
+            candidates.append(
+                Candidate(
+                    effect=t.name,
+                    family=effect.family,
+                    acts_on=effect.acts_on,
+                    stage=self.bench.stage(t.trial, correlation),
+                    promised=t.promised,
+                    gained=1.0 - t.trial.cost / parent.cost,
+                    gain=better,
+                    behind=behind,
+                    verdict=verdict,
+                    note=_note(t, parent),
+                )
+            )
+        candidates.sort(key=lambda c: c.behind)
+        if chosen is None:
+            reason = (
+                f"no effect explains significantly more (the best gains {gain:.1f} of the "
+                f"information criterion, {_DECISIVE:g} are asked for)"
+                if gain <= _DECISIVE
+                else "what the best effect explains is too little to matter"
+            )
+        else:
+            reason = f"{chosen.name} gains {gain:.0f} of the information criterion"
+        self.rounds.append(
+            Round(parent.effects, tuple(candidates), chosen.name if chosen else None, reason)
+        )
+
+    def _finding(self, baseline: Trial, best: Trial, tried: list[_Tried]) -> Diagnosis:
+        self.report("final fits", 0.94)
+        first = self.bench.polished(baseline)
+        last = self.bench.polished(best) if best.effects else first
+        correlation = max(1.0, last.correlation)
+        stage0 = self.bench.stage(first, correlation, estimates=True)
+        final = self.bench.stage(last, correlation, estimates=True)
+        steps, rivals = self._steps(best, last, final, correlation)
+        before = signatures(self.bench.full, first)
+        after = signatures(self.bench.full, last)
+        missing_before = missing_stress(self.bench.full, first.model)
+        missing_after = missing_stress(self.bench.full, last.model)
+        is_noise = all(s.is_noise for s in after)
+        excess = max(first.cost - 1.0, 1e-9)
+        explained = 1.0 - max(last.cost - 1.0, 0.0) / excess
+        small = last.cost < _EXPLAINED_RMS**2
+        if not best.effects:
+            verdict = NOTHING_MISSING if small else UNEXPLAINED
+        elif small:
+            verdict = EXPLAINED
+        else:
+            verdict = PARTLY_EXPLAINED if explained > _UNNAMED_SHARE else UNEXPLAINED
+        unnamed = None
+        if verdict in (UNEXPLAINED, PARTLY_EXPLAINED) or any(s.family == "unknown" for s in steps):
+            unnamed = describe_unnamed(missing_after, after, steps)
+        notes = []
+        if not is_noise and verdict in (NOTHING_MISSING, EXPLAINED):
+            notes.append("what is left is not quite white noise, but too small to name")
+        if self.held:
+            notes.append(
+                "the voltage stands between samples, as a converter's does, although the records "
+                "call it linear: half a sample's delay, and no effect of the rig"
+            )
+        self.report("final fits", 1.0)
+        return Diagnosis(
+            verdict=verdict,
+            baseline=stage0,
+            rounds=tuple(self.rounds),
+            steps=tuple(steps),
+            final=final,
+            before=before,
+            after=after,
+            missing_before=missing_before,
+            missing_after=missing_after,
+            unnamed=unnamed,
+            rivals=tuple(rivals),
+            simulations=self.bench.simulations,
+            interrupted=self.interrupted,
+            held=self.held,
+            notes=tuple(notes),
+        )
+
+    def _steps(
+        self, best: Trial, last: Trial, final: object, correlation: float
+    ) -> tuple[list[Step], list[tuple[str, Actuator | Strip]]]:
+        """The effects of ``best``, the one that explains most first, each with its evidence."""
+        names = best.effects
+        if not names:
+            return [], []
+        # in the order of what each is worth: the first alone, then with the next, ...
+        order: list[str] = []
+        while len(order) < len(names):
+            rest = [n for n in names if n not in order]
+            trials = {n: self._with_only(best, [*order, n]) for n in rest}
+            order.append(min(rest, key=lambda n: trials[n].cost))
+        numbers = self.bench.estimates(last, last.jacobian())
+        steps, rivals = [], []
+        correlation_thin = self._correlation([best])
+        for i, name in enumerate(order):
+            effect = EFFECTS[name]
+            alike = self._alike(best, name, correlation_thin)
+            rivals += [(EFFECTS[n].family, t.model) for n, t in alike]
+            families = tuple(dict.fromkeys(EFFECTS[n].family for n, _ in alike))
+            with_it = last if i == len(order) - 1 else self._with_only(best, order[: i + 1])
+            without = self._with_only(best, [n for n in order if n != name])
+            own = tuple(
+                replace(e, name=e.name.split(": ", 1)[1])
+                for e in numbers
+                if e.name.startswith(f"{name}: ")
+            )
+            worth = self._criterion(without, correlation_thin) - self._criterion(
+                best, correlation_thin
+            )
+            evidence = [
+                f"without it the residual is {np.sqrt(without.cost):.3g} times the noise, with it "
+                f"{np.sqrt(best.cost):.3g} times",
+                f"leaving it out costs {worth:.0f} of the information criterion",
+                *(f"{n} explains these data as well" for n, _ in alike),
+            ]
+            steps.append(
+                Step(
+                    effect=name,
+                    family=effect.family,
+                    acts_on=effect.acts_on,
+                    stage=self.bench.stage(with_it, correlation),
+                    estimates=own,
+                    indistinguishable_from=families,
+                    evidence=tuple(evidence),
+                    numbers=(("criterion_without", worth),),
+                )
+            )
+        return steps, rivals
+
+    def _with_only(self, best: Trial, names: list[str]) -> Trial:
+        """``best`` with only some of its effects, refitted."""
+        trial = best
+        for name in best.effects:
+            if name not in names:
+                trial = self._without(trial, name)
+        return trial
+
+    def _alike(self, best: Trial, name: str, correlation: float) -> list[tuple[str, Trial]]:
+        """Effects of other families that, in place of ``name``, explain the data as well."""
+        others = frozenset(best.effects) - {name}
+        family = EFFECTS[name].family
+        mark = self._criterion(best, correlation)
+        found: dict[str, tuple[float, str, Trial]] = {}
+        for key, trial in self.found.items():
+            fresh = key - others
+            if len(fresh) != 1 or not others <= key:
+                continue
+            (other,) = fresh
+            of = EFFECTS[other].family
+            behind = self._criterion(trial, correlation) - mark
+            if of != family and behind < _ALIKE and behind < found.get(of, (np.inf,))[0]:
+                found[of] = (behind, other, trial)
+        return [(n, t) for _, n, t in sorted(found.values(), key=lambda f: f[0])]
+
+
+def _stage(parent: Trial, what: str) -> str:
+    return f"{what} beside {', '.join(parent.effects)}" if parent.effects else what
+
+
+def _note(tried: _Tried, parent: Trial) -> str:
+    trial = tried.trial
+    if trial is None:
+        return ""
+    gained = 1.0 - trial.cost / parent.cost
+    if tried.promised < 0.1 < gained:
+        return "the baseline's own numbers hide it: it shows only when all are fitted anew"
+    return ""

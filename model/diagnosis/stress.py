@@ -1,0 +1,101 @@
+"""The stress that a model lacks, read off the measurement sample by sample, without deconvolution.
+
+The stretch is measured. With the branches driven by it, every term of the equation of motion is
+known but one: p = network stress - F/(L2 Z) - eps (phi/Z)^2 lam + M lam''. The same is computed for
+what the model itself predicts, and the difference is what the model lacks: smoothing bends both
+alike, and the effects that are in the model already cancel. It is a lens, not a measure: effects on
+the voltage or the sensor show in disguise, so every reported error comes from simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from model.actuator import Actuator, at_rest
+from model.coefficients import ELECTRIC, EFFECTS_AT, INERTIA, MODULUS, WIDTH
+from model.diagnosis.findings import MissingStress
+from model.effects import MEMORY, NEUTRAL, SLOTS, assembly
+from model.film import Strip, unit_stresses
+from model.kinematics import thinning
+from model.network import HEAD
+from model.records import ActuatorRecord, FilmRecord, Record
+
+__all__ = ["missing_stress"]
+
+_SMOOTHING = 0.015  # s: standard deviation of the window, so that lam'' is kept to about 10 Hz
+_BAND = 10.0  # Hz
+
+
+def missing_stress(records: Sequence[Record], model: Actuator | Strip) -> tuple[MissingStress, ...]:
+    """What ``model`` lacks in each record; records that it cannot follow are left out."""
+    found = []
+    for record in records:
+        if isinstance(record, ActuatorRecord) and isinstance(model, Actuator):
+            one = _of_actuator(record, model)
+        elif isinstance(record, FilmRecord) and isinstance(model, Strip):
+            one = _of_film(record, model)
+        else:
+            one = None
+        if one is not None:
+            found.append(one)
+    return tuple(found)
+
+
+def _of_film(record: FilmRecord, model: Strip) -> MissingStress | None:
+    answer = model.simulate(record.time, record.stretch)
+    if not answer.ok:
+        return None
+    step = float(np.median(np.diff(record.time)))
+    return MissingStress(
+        record=record.name,
+        time=record.time,
+        stress=record.stress - answer.stress,
+        stretch=record.stretch,
+        rate=np.gradient(record.stretch, record.time),
+        voltage=np.zeros_like(record.time),
+        band=0.5 / step,
+        scale=float(np.sqrt(np.mean(record.stress**2))),
+    )
+
+
+def _of_actuator(record: ActuatorRecord, model: Actuator) -> MissingStress | None:
+    response = model.simulate(record.drive, record.lag)
+    if not response.ok:
+        return None
+    # even in time, as filters want it; records are of a sample clock
+    time = record.time
+    step = float(np.median(np.diff(time)))
+    c = model.coefficients()
+    c[INERTIA] += assembly.inertia(c, np.zeros(MEMORY))
+    c[EFFECTS_AT : EFFECTS_AT + SLOTS] = NEUTRAL
+    _, rest = at_rest(c)
+    length = model.film.length
+    width = _SMOOTHING / step
+
+    def lacking(displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        stretch = rest + gaussian_filter1d(displacement, width, mode="nearest") / length
+        rate = gaussian_filter1d(displacement, width, order=1, mode="nearest") / (length * step)
+        bend = gaussian_filter1d(displacement, width, order=2, mode="nearest") / length / step**2
+        stretch[0] = rest
+        parts, _, _ = unit_stresses(c, time, stretch)
+        network = c[HEAD + MODULUS :: WIDTH] @ parts
+        return network + c[INERTIA] * bend, stretch, rate
+
+    measured, stretch, rate = lacking(record.displacement)
+    predicted, there, _ = lacking(response.displacement)
+    late = np.interp(time - record.lag, time, record.drive.voltage)
+    maxwell = c[ELECTRIC] * gaussian_filter1d(late**2, width, mode="nearest")
+    thrust = thinning(model.film.held, stretch) - thinning(model.film.held, there)
+    return MissingStress(
+        record=record.name,
+        time=time,
+        stress=measured - predicted - maxwell * thrust,
+        stretch=stretch,
+        rate=rate,
+        voltage=late,
+        band=_BAND,
+        scale=float(np.sqrt(np.mean((maxwell * stretch) ** 2))),
+    )

@@ -1,0 +1,47 @@
+"""Softening by use: the network loses stiffness with the path that the film has gone.
+
+The stress is multiplied by 1 - a (1 - exp(-p/p_0)), p the stretch gone up and down since the start.
+"""
+
+from __future__ import annotations
+
+import math
+
+from model.effects.description import Effect, Parameter
+from model.jit import jit
+
+__all__ = ["EFFECT", "commit", "soften"]
+
+EFFECT = Effect(
+    name="ageing",
+    family="softening",
+    acts_on="film stress",
+    words="softer with every cycle, most at the beginning",
+    parameters=(
+        Parameter(
+            "softening", "", (-0.5, 0.9), "part of the stress that is lost in the end", 2e-3, 0.0
+        ),
+        Parameter(
+            "path",
+            "",
+            (5e-3, 50.0),
+            "change of stretch, up and down, over which it is lost",
+            0.1,
+            starts=(0.1, 0.5),
+            logarithmic=True,
+        ),
+    ),
+    memory=1,
+    drives=("voltage", "stretch"),
+)
+
+
+@jit
+def soften(c, k, m, j, lam, since, t, warmth):
+    return 1.0 + c[k] * math.expm1(-m[j] / c[k + 1])
+
+
+@jit
+def commit(c, k, m, j, lam, rate, lam0, h, t):
+    m[j] += abs(lam - lam0)
+    return 0

@@ -1,0 +1,25 @@
+"""Lag of the amplifier, first order: dV/dt = (V_asked - V)/tau."""
+
+from __future__ import annotations
+
+from model.effects.description import Effect, Parameter
+from model.filters import lagged
+from model.jit import jit
+
+__all__ = ["EFFECT", "supply"]
+
+EFFECT = Effect(
+    name="amplifier lag",
+    family="amplifier",
+    acts_on="amplifier",
+    words="the film gets the voltage late, by a fixed time",
+    parameters=(Parameter("time_constant", "s", (0.0, 1.0), "of the amplifier", 5e-3, 0.0),),
+    memory=1,
+)
+
+
+@jit
+def supply(c, k, m, j, t, start, end, h, lam, rate):
+    before = m[j]
+    m[j] = lagged(before, start, end, h, c[k])
+    return before, m[j]

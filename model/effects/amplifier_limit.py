@@ -1,0 +1,39 @@
+"""A limit of the amplifier with a knee: beyond it the output has 1 - s of its slope."""
+
+from __future__ import annotations
+
+import math
+
+from model.effects.description import Effect, Parameter
+from model.jit import jit
+
+__all__ = ["EFFECT", "supply"]
+
+EFFECT = Effect(
+    name="amplifier limit",
+    family="amplifier",
+    acts_on="amplifier",
+    words="the film sees less than was asked for beyond one voltage, and all of it below",
+    parameters=(
+        Parameter("flattening", "", (0.0, 1.0), "part of the slope lost beyond the knee", 0.2, 0.0),
+        Parameter(
+            "knee",
+            "V",
+            (1e3, 2e4),
+            "voltage beyond which it flattens",
+            7e3,
+            starts=(0.85, 0.7, 0.5),
+            part_of="voltage",
+        ),
+    ),
+)
+
+
+@jit
+def _limited(volts, part, knee):
+    return volts - part * math.copysign(max(abs(volts) - knee, 0.0), volts)
+
+
+@jit
+def supply(c, k, m, j, t, start, end, h, lam, rate):
+    return _limited(start, c[k], c[k + 1]), _limited(end, c[k], c[k + 1])

@@ -1,0 +1,21 @@
+"""Offset of the amplifier: the film gets V + V_0, and pulls by 2 V V_0 more."""
+
+from __future__ import annotations
+
+from model.effects.description import Effect, Parameter
+from model.jit import jit
+
+__all__ = ["EFFECT", "supply"]
+
+EFFECT = Effect(
+    name="amplifier offset",
+    family="amplifier",
+    acts_on="amplifier",
+    words="a force in proportion to the voltage itself, beside its square",
+    parameters=(Parameter("offset", "V", (-2e3, 2e3), "of the output", 20.0, 0.0),),
+)
+
+
+@jit
+def supply(c, k, m, j, t, start, end, h, lam, rate):
+    return start + c[k], end + c[k]

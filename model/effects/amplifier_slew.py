@@ -1,0 +1,27 @@
+"""Slew limit of the amplifier: the output changes no faster than so many volts a second."""
+
+from __future__ import annotations
+
+from model.effects.description import Effect, Parameter
+from model.filters import slewed
+from model.jit import jit
+
+__all__ = ["EFFECT", "supply"]
+
+EFFECT = Effect(
+    name="amplifier slew",
+    family="amplifier",
+    acts_on="amplifier",
+    words="the film gets edges of the voltage late, and slow changes in time",
+    parameters=(
+        Parameter("inverse_slew", "s/V", (0.0, 2e-3), "one over the greatest slope", 5e-5, 0.0),
+    ),
+    memory=1,
+)
+
+
+@jit
+def supply(c, k, m, j, t, start, end, h, lam, rate):
+    before = m[j]
+    m[j] = slewed(before, start, end, h, 1.0 / c[k])
+    return before, m[j]

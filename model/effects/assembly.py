@@ -1,0 +1,164 @@
+"""The kernel's hooks, assembled from the functions of all effects and compiled once.
+
+Each hook is one place of the equations where effects take part. An effect at its neutral values is
+skipped, so one compiled kernel serves every combination. Numba needs real functions with literal
+offsets, and a file to cache them by, so the text of the hooks is written beside the compiled
+kernels, in the folder that is named after the sources of this package.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from types import MappingProxyType, ModuleType
+from typing import Any
+
+from model.effects import EFFECTS, PLACES
+from model.jit import cache_folder
+
+__all__ = [
+    "BITS",
+    "HOOKS",
+    "acting",
+    "commit",
+    "felt",
+    "inertia",
+    "permittivity",
+    "polarise",
+    "sense",
+    "soften",
+    "stiffness",
+    "stress",
+    "supply",
+]
+
+#: Hooks: what an effect's function of that name takes besides ``(c, k, m, j)``, and what becomes
+#: of the answers. ``c`` are the coefficients and ``k`` where the effect's own begin; ``m`` is the
+#: memory of all effects and ``j`` where its own begins.
+#:
+#: * ``inertia`` kg/m, added to the coefficient of lam'';
+#: * ``supply`` carries the voltage from ``start`` to ``end`` V over ``h`` s to the film, one effect
+#:   after another, each with its state in the memory; ``lam`` and ``rate`` are those amid that
+#:   time, and ``h`` = 0 asks for the voltage at the film now;
+#: * ``polarise`` gives what a slow dielectric adds to the voltage squared at start and end;
+#: * ``permittivity`` is a factor on the Maxwell stress, ``soften`` one on the network's stress;
+#: * ``stress`` Pa is added to the network's: at stretch ``lam`` and rate ``rate``, ``since`` s
+#:   after the step began at ``lam0``, the memory being that of the beginning; ``commit`` carries
+#:   the memory to the end of the step;
+#: * ``stiffness`` says what ``stress`` adds: (Pa, Pa s), for the length of steps;
+#: * ``felt`` is what a sample feels of the stress in it;
+#: * ``sense`` is what the sensor makes of displacement ``x`` m and velocity ``u`` m/s, ``dt`` s
+#:   after the reading before.
+#:
+#: ``t`` s is the time since the record began, ``warmth`` K the temperature above that of the start.
+HOOKS = MappingProxyType(
+    {
+        "inertia": ("", "sum"),
+        "supply": ("t, start, end, h, lam, rate", "start, end"),
+        "polarise": ("start, end, h", "sums"),
+        "permittivity": ("lam, field2", "product"),
+        "soften": ("lam, since, t, warmth", "product"),
+        "stress": ("lam, rate, lam0, since, t", "sum"),
+        "stiffness": ("lam", "sums"),
+        "commit": ("lam, rate, lam0, h, t", ""),
+        "felt": ("sigma", "sigma"),
+        "sense": ("t, dt, x, u", "x"),
+    }
+)
+#: ``acting(c)`` is the sum of these over the hooks of all effects that are not neutral.
+BITS = MappingProxyType({hook: 1 << i for i, hook in enumerate(HOOKS)})
+
+# how the answers of several effects are put together: what to begin with, what to do with each (an
+# answer is {}), what to return; any other word is an argument that goes from one to the next
+_TOGETHER = MappingProxyType(
+    {
+        "": ("", "{}", "0"),
+        "sum": ("total = 0.0", "total += {}", "total"),
+        "sums": ("a, b = 0.0, 0.0", "p, q = {}; a, b = a + p, b + q", "a, b"),
+        "product": ("total = 1.0", "total *= {}", "total"),
+    }
+)
+# along the signal path, where the order matters: a sensor is slow before it is wrong
+_ORDER = ("amplifier", "electrode", "dielectric", "film stress", "inertia", "load", "environment")
+_SENSOR_ORDER = ("sensor_lag", "sensor_nonlinearity", "drift", "interference", "unknown")
+
+
+def _rank(name: str) -> tuple[int, int, str]:
+    effect = EFFECTS[name]
+    where = _ORDER.index(effect.acts_on) if effect.acts_on in _ORDER else len(_ORDER)
+    sensor = _SENSOR_ORDER.index(effect.family) if effect.family in _SENSOR_ORDER else 0
+    return where, sensor, name
+
+
+def _active(name: str) -> str:
+    effect, at = EFFECTS[name], PLACES[name].at
+    tests = (
+        f"c[{at + i}] != {p.neutral!r}"
+        for i, p in enumerate(effect.parameters)
+        if p.neutral is not None
+    )
+    return " or ".join(tests)
+
+
+def _text() -> str:
+    """Source of the hooks."""
+    names = sorted(EFFECTS, key=_rank)
+    lines = ["from model.jit import jit"]
+    modules = {n: PLACES[n].module.__name__.rsplit(".", 1)[1] for n in names}
+    lines += [f"from model.effects import {m} as _{m}" for m in modules.values()]
+    for hook, (arguments, how) in HOOKS.items():
+        taking = f", {arguments}" if arguments else ""
+        first, each, last = _TOGETHER.get(how, ("", f"{how} = {{}}", how))
+        lines += ["", "", "@jit", f"def {hook}(c, m{taking}):", f"    {first}"]
+        for name in names:
+            place = PLACES[name]
+            if hasattr(place.module, hook):
+                call = f"_{modules[name]}.{hook}(c, {place.at}, m, {place.memory}{taking})"
+                lines += [f"    if {_active(name)}:", f"        {each.format(call)}"]
+        lines.append(f"    return {last}")
+    lines += ["", "", "@jit", "def acting(c):", "    found = 0"]
+    for name in names:
+        bits = sum(1 << i for i, hook in enumerate(HOOKS) if hasattr(PLACES[name].module, hook))
+        lines += [f"    if {_active(name)}:", f"        found |= {bits}"]
+    lines += ["    return found", ""]
+    return "\n".join(lines)
+
+
+def _load() -> ModuleType:
+    folder = cache_folder()
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "hooks.py"
+    text = _text()
+    # written once and whole: its time of change is part of what the compiled kernels are known by
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        handle, partial = tempfile.mkstemp(dir=folder, suffix=".py")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        Path(partial).replace(path)
+    spec = importlib.util.spec_from_file_location("model.effects.hooks", path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path} cannot be loaded")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+_hooks: Any = _load()
+_Hook = Callable[..., Any]
+
+inertia: _Hook = _hooks.inertia
+supply: _Hook = _hooks.supply
+polarise: _Hook = _hooks.polarise
+permittivity: _Hook = _hooks.permittivity
+soften: _Hook = _hooks.soften
+stress: _Hook = _hooks.stress
+stiffness: _Hook = _hooks.stiffness
+commit: _Hook = _hooks.commit
+felt: _Hook = _hooks.felt
+sense: _Hook = _hooks.sense
+acting: _Hook = _hooks.acting

@@ -1,0 +1,60 @@
+"""Something weakly damped that hangs on the film: a frame that rings, a load that swings.
+
+A mass hangs on the film's edge by a spring: its own position w, counted as strain, obeys
+w'' = -2 z om w' - om^2 (w - e) with e = lam - lam_rest, and the spring pulls the film back by the
+stress s (e - w). No family of its own.
+"""
+
+from __future__ import annotations
+
+import math
+
+from model.coefficients import REST
+from model.effects.description import Effect, Parameter
+from model.filters import swung
+from model.jit import jit
+
+__all__ = ["EFFECT", "commit", "stiffness", "stress"]
+
+EFFECT = Effect(
+    name="attached mode",
+    family="unknown",
+    acts_on="load",
+    words="something rings on its own frequency after every edge",
+    parameters=(
+        Parameter(
+            "stiffness", "Pa", (0.0, 1e6), "of what holds it, as stress per stretch", 5e3, 0.0
+        ),
+        Parameter(
+            "frequency",
+            "Hz",
+            (0.3, 40.0),
+            "of its own ringing",
+            5.0,
+            starts=(4.0, 2.0, 8.0, 15.0),
+            part_of="spectrum",
+            logarithmic=True,
+        ),
+        Parameter("damping", "", (1e-3, 1.0), "ratio", 0.05, starts=(0.05,), logarithmic=True),
+    ),
+    memory=2,
+)
+
+
+@jit
+def stress(c, k, m, j, lam, rate, lam0, since, t):
+    # within a step it moves on with its own rate: exact to the second order in the step
+    return c[k] * (lam - c[REST] - m[j] - since * m[j + 1])
+
+
+@jit
+def stiffness(c, k, m, j, lam):
+    return c[k], 0.0
+
+
+@jit
+def commit(c, k, m, j, lam, rate, lam0, h, t):
+    e0, e1 = lam0 - c[REST], lam - c[REST]
+    omega = 2.0 * math.pi * c[k + 1]
+    m[j], m[j + 1] = swung(m[j], m[j + 1], e0, e1, h, omega, c[k + 2])
+    return 0

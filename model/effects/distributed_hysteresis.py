@@ -1,0 +1,60 @@
+"""Rate-independent hysteresis as a distribution of yielding elements (Prandtl and Ishlinskii).
+
+Eight elements in parallel, each a spring that slips when it is strained beyond its own threshold;
+thresholds lie evenly up to the reach r. Small loops are parabolic, as Rayleigh found for iron.
+"""
+
+from __future__ import annotations
+
+from model.effects.description import Effect, Parameter
+from model.jit import jit
+
+__all__ = ["EFFECT", "commit", "stiffness", "stress"]
+
+EFFECT = Effect(
+    name="distributed hysteresis",
+    family="rate_independent_hysteresis",
+    acts_on="film stress",
+    words="loops that do not depend on the speed, narrow for small strokes and wide for large ones",
+    parameters=(
+        Parameter(
+            "stiffness", "Pa", (0.0, 1e6), "of all elements together before any slips", 3e3, 0.0
+        ),
+        Parameter(
+            "reach",
+            "",
+            (1e-3, 2.0),
+            "change of stretch at which the last element slips",
+            2e-2,
+            starts=(2e-2, 5e-3, 0.5),
+            logarithmic=True,
+        ),
+    ),
+    memory=8,
+    drives=("voltage", "stretch"),
+)
+
+
+_ELEMENTS = 8
+
+
+@jit
+def stress(c, k, m, j, lam, rate, lam0, since, t):
+    total, travel = 0.0, lam - lam0
+    for i in range(_ELEMENTS):
+        threshold = c[k + 1] * (i + 0.5) / _ELEMENTS
+        total += min(max(m[j + i] + travel, -threshold), threshold)
+    return c[k] * total / _ELEMENTS
+
+
+@jit
+def stiffness(c, k, m, j, lam):
+    return c[k], 0.0
+
+
+@jit
+def commit(c, k, m, j, lam, rate, lam0, h, t):
+    for i in range(_ELEMENTS):
+        threshold = c[k + 1] * (i + 0.5) / _ELEMENTS
+        m[j + i] = min(max(m[j + i] + lam - lam0, -threshold), threshold)
+    return 0

@@ -1,0 +1,32 @@
+"""A part of the film that the field no longer reaches from one moment on: an electrode that cracks.
+
+From the time t_0 on the voltage counts 1 - s of what it did, over 20 ms so that a fit can find it.
+"""
+
+from __future__ import annotations
+
+from model.effects.description import Effect, Parameter
+from model.filters import switched
+from model.jit import jit
+
+__all__ = ["EFFECT", "supply"]
+
+EFFECT = Effect(
+    name="sudden loss of field",
+    family="unknown",
+    acts_on="electrode",
+    words="the voltage pulls less from one moment on",
+    parameters=(
+        Parameter("loss", "", (-0.5, 0.5), "part of the voltage that is lost", 5e-3, 0.0),
+        Parameter(
+            "moment", "s", (0.0, 1e5), "at which it comes", 0.5, starts=(0.5,), part_of="duration"
+        ),
+    ),
+)
+
+
+@jit
+def supply(c, k, m, j, t, start, end, h, lam, rate):
+    a = 1.0 - c[k] * switched(t - c[k + 1])
+    b = 1.0 - c[k] * switched(t + h - c[k + 1])
+    return start * a, end * b

@@ -1,0 +1,33 @@
+"""Drag in proportion to the rate: air around the load, a viscous guide, losses in the frame.
+
+The nominal stress d lam' acts against the motion. A Maxwell branch that relaxes much faster than
+anything the record shows does the same, so the two are one and the same to slow data.
+"""
+
+from __future__ import annotations
+
+from model.effects.description import Effect, Parameter
+from model.jit import jit
+
+__all__ = ["EFFECT", "stiffness", "stress"]
+
+EFFECT = Effect(
+    name="linear drag",
+    family="drag",
+    acts_on="load",
+    words="a force against the motion, in proportion to its rate",
+    parameters=(
+        Parameter("drag", "Pa s", (0.0, 1e5), "nominal stress per rate of stretch", 300.0, 0.0),
+    ),
+    drives=("voltage", "stretch"),
+)
+
+
+@jit
+def stress(c, k, m, j, lam, rate, lam0, since, t):
+    return c[k] * rate
+
+
+@jit
+def stiffness(c, k, m, j, lam):
+    return 0.0, c[k]

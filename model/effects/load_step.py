@@ -1,0 +1,30 @@
+"""A force that changes at one moment: a load that slips, a hook that settles.
+
+The stress p is taken from the load from the time t_0 on, over 20 ms so that a fit can find it.
+"""
+
+from __future__ import annotations
+
+from model.effects.description import Effect, Parameter
+from model.filters import switched
+from model.jit import jit
+
+__all__ = ["EFFECT", "stress"]
+
+EFFECT = Effect(
+    name="sudden change of force",
+    family="unknown",
+    acts_on="load",
+    words="a stress that is there from one moment on",
+    parameters=(
+        Parameter("stress", "Pa", (-2e4, 2e4), "taken from the load", 30.0, 0.0),
+        Parameter(
+            "moment", "s", (0.0, 1e5), "at which it comes", 0.5, starts=(0.5,), part_of="duration"
+        ),
+    ),
+)
+
+
+@jit
+def stress(c, k, m, j, lam, rate, lam0, since, t):
+    return c[k] * switched(t + since - c[k + 1])

@@ -1,0 +1,36 @@
+"""A sensor that gives less and less beyond some displacement, down to nothing: clipping.
+
+Beyond the knee the reading has 1 - s of its slope.
+"""
+
+from __future__ import annotations
+
+from model.effects.description import Effect, Parameter
+from model.jit import jit
+
+__all__ = ["EFFECT", "sense"]
+
+EFFECT = Effect(
+    name="sensor clipping",
+    family="sensor_nonlinearity",
+    acts_on="sensor",
+    words="the reading flattens beyond one displacement, at any speed",
+    parameters=(
+        Parameter("flattening", "", (0.0, 1.0), "part of the slope lost beyond the knee", 0.1, 0.0),
+        Parameter(
+            "knee",
+            "m",
+            (1e-5, 2e-2),
+            "displacement beyond which it flattens",
+            1e-3,
+            starts=(0.5, 0.3, 0.7, 0.85),
+            part_of="displacement",
+            logarithmic=True,
+        ),
+    ),
+)
+
+
+@jit
+def sense(c, k, m, j, t, dt, x, u):
+    return x - c[k] * max(x - c[k + 1], 0.0)

@@ -1,0 +1,30 @@
+"""A reading that jumps at one moment: a mount that slips, a target that is knocked.
+
+The reading is moved by d from the time t_0 on, over 20 ms so that a fit can find it.
+"""
+
+from __future__ import annotations
+
+from model.effects.description import Effect, Parameter
+from model.filters import switched
+from model.jit import jit
+
+__all__ = ["EFFECT", "sense"]
+
+EFFECT = Effect(
+    name="sudden change of reading",
+    family="unknown",
+    acts_on="sensor",
+    words="the reading jumps at one moment and stays there",
+    parameters=(
+        Parameter("jump", "m", (-5e-3, 5e-3), "of the reading", 3e-6, 0.0),
+        Parameter(
+            "moment", "s", (0.0, 1e5), "at which it comes", 0.5, starts=(0.5,), part_of="duration"
+        ),
+    ),
+)
+
+
+@jit
+def sense(c, k, m, j, t, dt, x, u):
+    return x + c[k] * switched(t - c[k + 1])

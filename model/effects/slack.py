@@ -1,0 +1,29 @@
+"""A strip that hangs slack: it cannot push.
+
+Where the network would push (a film unloaded faster than it recovers), a strip buckles and what is
+measured is nothing: the stress felt is (1 - s) of it, and s = 1 is a strip without any stiffness in
+bending. Only a film pulled by its ends can do this.
+"""
+
+from __future__ import annotations
+
+from model.effects.description import Effect, Parameter
+from model.jit import jit
+
+__all__ = ["EFFECT", "felt"]
+
+EFFECT = Effect(
+    name="slack",
+    family="slack",
+    acts_on="film stress",
+    words="the strip buckles where the springs would push: no stress on the way back",
+    parameters=(
+        Parameter("looseness", "", (0.0, 1.0), "part of a push that is not felt", 0.5, 0.0),
+    ),
+    drives=("stretch",),
+)
+
+
+@jit
+def felt(c, k, m, j, sigma):
+    return sigma if sigma > 0.0 else (1.0 - c[k]) * sigma

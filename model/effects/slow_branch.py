@@ -1,0 +1,50 @@
+"""Creep by one more slow branch: a spring in series with a dashpot, beside the network.
+
+Stress mu (e - q), q' = (e - q)/T for the strain e = lam - lam_rest.
+"""
+
+from __future__ import annotations
+
+from model.coefficients import REST
+from model.effects.description import Effect, Parameter
+from model.filters import lagged
+from model.jit import jit
+
+__all__ = ["EFFECT", "commit", "stiffness", "stress"]
+
+EFFECT = Effect(
+    name="slow branch",
+    family="creep",
+    acts_on="film stress",
+    words="the film goes on creeping after everything else has relaxed",
+    parameters=(
+        Parameter("modulus", "Pa", (0.0, 1e7), "of the branch", 2e3, 0.0),
+        Parameter(
+            "relaxation_time",
+            "s",
+            (1.0, 3e4),
+            "of the branch",
+            30.0,
+            starts=(20.0, 4.0, 200.0),
+            logarithmic=True,
+        ),
+    ),
+    memory=1,
+    drives=("voltage", "stretch"),
+)
+
+
+@jit
+def stress(c, k, m, j, lam, rate, lam0, since, t):
+    return c[k] * (lam - c[REST] - lagged(m[j], lam0 - c[REST], lam - c[REST], since, c[k + 1]))
+
+
+@jit
+def stiffness(c, k, m, j, lam):
+    return c[k], 0.0
+
+
+@jit
+def commit(c, k, m, j, lam, rate, lam0, h, t):
+    m[j] = lagged(m[j], lam0 - c[REST], lam - c[REST], h, c[k + 1])
+    return 0

@@ -1,0 +1,110 @@
+"""Least squares with few simulations: the Jacobian is carried along by secants (Broyden).
+
+Trying dozens of effects needs to know how low each can get, not where exactly: a Jacobian that is
+known nearby (that of the model without the effect) is a good start, each step taken corrects it for
+the direction gone, and it is computed anew only where it has led astray or nothing is left to gain.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import eigh
+
+from model.fitting.levenberg import LocalFit
+from model.fitting.problem import Problem
+
+__all__ = ["descend_by_secants"]
+
+_DAMPINGS = np.array([3e-3, 1.0])  # tried at once, times the present damping
+_DAMPING_MAX = 1e7
+_FLAT = 1e-9  # of the scaled curvature: flatter directions are not seen by the data
+_CARRIED = 5  # steps by secants, then the Jacobian is computed anew
+_ASTRAY = 0.25  # of the gain that was promised: less, and the Jacobian is computed anew
+
+
+def descend_by_secants(
+    problem: Problem,
+    start: np.ndarray,
+    fixed: np.ndarray,
+    jacobian: np.ndarray | None = None,
+    iterations: int = 30,
+    gain: float = 1.0,
+    sure: bool = True,
+) -> LocalFit:
+    """From ``start`` (d,) down, the numbers ``fixed`` (d,) held, inside the layout's bounds.
+
+    ``jacobian`` (N, f) is one known near the start, None to compute it; columns of NaN in it are
+    computed. Ends where the quadratic
+    model promises less than ``gain`` in chi-square: with ``sure`` only by a Jacobian of that place.
+    """
+    layout = problem.layout
+    free = ~fixed
+    x = np.clip(start, layout.lower, layout.upper)
+    costs, residuals = problem.evaluate(x[None])
+    r, chi2 = residuals[0], float(costs[0]) * problem.samples
+    jac, fresh = jacobian, False
+    if jac is not None and not np.isfinite(jac[0]).all():
+        unknown = np.isnan(jac[0])
+        which = free.copy()
+        which[free] = unknown
+        jac = jac.copy()
+        jac[:, unknown] = problem.jacobian(x, which, r)
+    damping, done, converged, carried = 1e-2, 0, False, 0
+    while done < iterations:
+        if jac is None:
+            jac, fresh, carried = problem.jacobian(x, free, r), True, 0
+        done += 1
+        gradient = jac.T @ r
+        scale = np.linalg.norm(jac, axis=0)
+        part, reach = x[free], layout.reach(x)[free]
+        stuck = ((part <= layout.lower[free]) & (gradient > 0.0)) | (
+            (part >= layout.upper[free]) & (gradient < 0.0)
+        )
+        move = ~stuck & (scale > 0.0)
+        moving = jac[:, move] / scale[move]
+        w, q = eigh(moving.T @ moving)
+        target = q.T @ (gradient[move] / scale[move])
+        if float(np.sum(target**2 / np.maximum(w, _FLAT))) < gain:
+            if fresh or not sure:
+                converged = True
+                break
+            jac = None
+            continue
+        dampings = damping * _DAMPINGS
+        inverse = 1.0 / (np.maximum(w, 0.0) + dampings[:, None])
+        steps = np.zeros((dampings.size, part.size))
+        steps[:, move] = -((inverse * target) @ q.T) / scale[move]
+        steps /= np.maximum(1.0, np.max(np.abs(steps) / reach, axis=1))[:, None]
+        trials = np.tile(x, (dampings.size, 1))
+        trials[:, free] = np.clip(part + steps, layout.lower[free], layout.upper[free])
+        costs, residuals = problem.evaluate(trials)
+        best = int(np.argmin(costs))
+        better = float(costs[best]) * problem.samples
+        if not better < chi2:
+            if not fresh:
+                jac = None
+                continue
+            damping *= 1e2
+            if damping > _DAMPING_MAX:
+                converged = True
+                break
+            continue
+        step = trials[best][free] - part
+        bent = residuals[best] - r - jac @ step
+        straight = r + jac @ step
+        promised = chi2 - float(straight @ straight)
+        length2 = float(np.sum((step * np.maximum(scale, 1e-300)) ** 2))
+        astray = chi2 - better < _ASTRAY * promised
+        x, r, chi2 = trials[best], residuals[best], better
+        damping = max(dampings[best], 1e-9)
+        carried += 1
+        if (astray and not fresh) or carried > _CARRIED:
+            jac = None
+            continue
+        # the secant: what the step showed, in the direction gone
+        jac = jac + np.outer(bent, step * scale**2 / max(length2, 1e-300))
+        fresh = False
+    if jac is None:
+        # given up just after it led astray: whoever goes on from here computes it
+        jac = np.full((r.size, int(free.sum())), np.nan)
+    return LocalFit(x, chi2 / problem.samples, r, jac, done, converged)

@@ -1,0 +1,79 @@
+"""The amplifier does not put out what its monitor says.
+
+``offset``: so many volts more or less, of its output stage. ``saturation``: the algebraic sigmoid
+v/(1 + (v/v_s)^n)^(1/n). ``slew``: a straight line where the command is faster. ``second_order``:
+y'' + 2 d w y' + w^2 (y - v) = 0, a loop that is slow because its supply is weak.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from model.material import Load
+from sim_backend.truth import loops
+from sim_backend.truth.chance import either_sign, log_uniform
+from sim_backend.truth.effect import Stage, TruthEffect
+
+__all__ = ["offset", "saturation", "second_order", "slew"]
+
+_OFFSET = (12.0, 500.0)  # V
+_LOST = (0.005, 0.15)  # share lost at 8 kV
+_LOBE = 25e3  # V/s, fastest rise of 8 kV at 1 Hz
+_SHORT = (0.09, 0.62)  # of that
+_DELAY = (3.5e-3, 120e-3)  # s behind a steady rise
+
+
+def _stage(stage: Stage, words: str) -> TruthEffect:
+    return TruthEffect(family="amplifier", acts_on="amplifier", description=words, on_voltage=stage)
+
+
+def offset(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """A constant voltage more or less."""
+    volts = either_sign(generator) * log_uniform(generator, *_OFFSET)
+
+    def stage(time: np.ndarray, v: np.ndarray, carry: object) -> tuple[np.ndarray, object]:  # noqa: ARG001
+        return v + volts, carry
+
+    return _stage(stage, f"the output stands {volts:.3g} V off")
+
+
+def saturation(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """An output that falls behind at high voltage."""
+    lost = log_uniform(generator, *_LOST)
+    exponent = generator.uniform(2.5, 8.0)
+    at = 8000.0 / ((1.0 - lost) ** -exponent - 1.0) ** (1.0 / exponent)
+
+    def stage(time: np.ndarray, v: np.ndarray, carry: object) -> tuple[np.ndarray, object]:  # noqa: ARG001
+        return v / (1.0 + np.abs(v / at) ** exponent) ** (1.0 / exponent), carry
+
+    return _stage(stage, f"the output falls {lost:.2%} behind at 8 kV (exponent {exponent:.2g})")
+
+
+def slew(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """An output that cannot rise as fast as it should."""
+    fastest = _LOBE * (1.0 - log_uniform(generator, *_SHORT))
+
+    def stage(time: np.ndarray, v: np.ndarray, carry: object) -> tuple[np.ndarray, object]:
+        effective = np.empty_like(v)
+        output = float(np.asarray(0.0 if carry is None else carry))
+        return effective, loops.limit_slew(time, v, fastest, output, effective)
+
+    return _stage(stage, f"the output changes by no more than {fastest / 1e3:.3g} kV/s")
+
+
+def second_order(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """An output that follows late and swings over a little."""
+    delay = log_uniform(generator, *_DELAY)
+    damping = generator.uniform(0.5, 0.95)
+    frequency = 2.0 * damping / delay
+
+    def stage(time: np.ndarray, v: np.ndarray, carry: object) -> tuple[np.ndarray, object]:
+        effective = np.empty_like(v)
+        state = np.zeros(2) if carry is None else np.array(carry)
+        loops.lag_voltage(time, v, frequency, damping, state, effective)
+        return effective, state
+
+    hertz = frequency / (2.0 * math.pi)
+    return _stage(stage, f"the output follows at {hertz:.3g} Hz (damping ratio {damping:.2f})")

@@ -1,0 +1,61 @@
+"""Part of the polarisation follows the field late, so the pull rises after the voltage.
+
+The pull goes with the voltage times the polarisation, in which each part w obeys
+w' = (v - w)/T; parts add up to the permittivity written in the film's data, which is that of rest.
+``three_terms``: three Debye terms drawn one by one. ``cole_cole``: the broad spectrum of Cole and
+Cole, J. Chem. Phys. 9 (1941), in eight terms.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from model.material import Load
+from sim_backend.truth import loops
+from sim_backend.truth.chance import log_uniform
+from sim_backend.truth.effect import TruthEffect
+
+__all__ = ["cole_cole", "three_terms"]
+
+_LEAST, _MOST = 0.028, 0.4  # of the permittivity
+
+
+def _relaxing(shares: np.ndarray, times: np.ndarray, words: str) -> TruthEffect:
+    def on_voltage(
+        time: np.ndarray, voltage: np.ndarray, carry: object
+    ) -> tuple[np.ndarray, object]:
+        slow = np.zeros(times.size) if carry is None else np.array(carry)
+        effective = np.empty_like(voltage)
+        loops.polarise(time, voltage, shares, times, slow, effective)
+        return effective, slow
+
+    return TruthEffect(
+        family="dielectric_relaxation",
+        acts_on="dielectric",
+        description=f"{shares.sum():.2%} of the permittivity comes late, {words}",
+        on_voltage=on_voltage,
+    )
+
+
+def three_terms(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """Three Debye terms a decade or so apart."""
+    times = np.array([0.02, 0.2, 2.0]) * np.exp(generator.uniform(-0.8, 0.8, 3))
+    shares = log_uniform(generator, _LEAST, _MOST) * generator.dirichlet((3.0, 3.0, 3.0))
+    late = ", ".join(f"{time:.2g}" for time in times)
+    return _relaxing(shares, times, f"with time constants of {late} s")
+
+
+def cole_cole(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """A broad spectrum about one time."""
+    share = log_uniform(generator, _LEAST, _MOST)
+    centre = log_uniform(generator, 0.05, 0.8)
+    alpha = generator.uniform(0.25, 0.55)
+    x = np.linspace(-4.0, 4.0, 8)  # ln(T/T_0)
+    density = math.sin(alpha * math.pi) / (np.cosh((1.0 - alpha) * x) - math.cos(alpha * math.pi))
+    return _relaxing(
+        share * density / density.sum(),
+        centre * np.exp(x),
+        f"spread about {centre:.2g} s (Cole-Cole, alpha {alpha:.2f})",
+    )

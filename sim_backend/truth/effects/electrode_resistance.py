@@ -1,0 +1,66 @@
+"""Carbon electrodes take time to charge the film through their own resistance.
+
+``ladder``: the electrode as a line of two sections, each of half the film's present capacitance
+C = C0 lam^2; the sections lie side by side, so the mean of their squared voltages pulls.
+``percolating``: one section whose resistance grows as exp(g (lam - lam_rest)), as that of carbon
+particles which lose contact.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from model.material import Load
+from sim_backend.truth.chance import log_uniform
+from sim_backend.truth.effect import TruthEffect
+from sim_backend.truth.film import FilmNumbers
+
+__all__ = ["ladder", "percolating"]
+
+_LADDER = (20e6, 4.5e8)  # ohm from end to end
+_PERCOLATING = (11e6, 2.6e8)  # ohm
+_RATIO = (0.4, 2.5)  # of the sections' resistances
+_GAUGE = (8.0, 30.0)
+
+
+def ladder(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """A line of two sections."""
+    whole = log_uniform(generator, *_LADDER)
+    ratio = log_uniform(generator, *_RATIO)
+    first, second = whole / (1.0 + ratio), whole * ratio / (1.0 + ratio)
+
+    def on_film(numbers: FilmNumbers) -> FilmNumbers:
+        # the faster of the two charging rates; a stretched film is slower
+        a, b = 1.0 / first, 1.0 / second
+        fastest = (a + 2.0 * b + math.sqrt(a * a + 4.0 * b * b)) / numbers.capacitance
+        return numbers.stepping(2.0 / fastest).hiding(ladder_1=first, ladder_2=second)
+
+    return TruthEffect(
+        family="electrode_resistance",
+        acts_on="electrode",
+        description=f"electrode of two sections, {first / 1e6:.3g} and {second / 1e6:.3g} Mohm",
+        on_film=on_film,
+    )
+
+
+def percolating(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """One section that loses contact as it is stretched."""
+    resistance = log_uniform(generator, *_PERCOLATING)
+    gauge = log_uniform(generator, *_GAUGE)
+
+    def on_film(numbers: FilmNumbers) -> FilmNumbers:
+        return numbers.stepping(resistance * numbers.capacitance).hiding(
+            ladder_1=resistance, ladder_gauge=gauge
+        )
+
+    return TruthEffect(
+        family="electrode_resistance",
+        acts_on="electrode",
+        description=(
+            f"electrode of {resistance / 1e6:.3g} Mohm that grows by {gauge:.3g} % for each per "
+            f"cent of stretch"
+        ),
+        on_film=on_film,
+    )

@@ -1,0 +1,67 @@
+"""The load rubs against its guide: bristles bend before they slip, and slip easier when fast.
+
+``lugre``: Canudas de Wit, Olsson, Astrom and Lischinsky, IEEE Trans. Autom. Control 40 (1995):
+x' = v - |v| x / x_s(v), force s0 x + s1 x', with x_s = (Fc + (Fs - Fc) exp(-(v/vs)^2))/s0 after
+Stribeck. ``elasto_plastic``: Dupont, Hayward, Armstrong and Altpeter, same Trans. 47 (2002): up to
+a share of x_s the bristles only bend, so the load does not creep under a swinging force.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from model.material import Load
+from sim_backend.truth.chance import log_uniform
+from sim_backend.truth.effect import TruthEffect
+from sim_backend.truth.film import FilmNumbers
+
+__all__ = ["elasto_plastic", "lugre"]
+
+_LEAST, _MOST = 0.4e-3, 18e-3  # N
+_REACH = (4e-6, 30e-6)  # m
+_RATIO = (1.05, 1.6)  # static over Coulomb
+_STRIBECK = (0.5e-3, 5e-3)  # m/s
+_DAMPING = 0.3  # of critical, on the film's own mass
+
+
+def _friction(generator: np.random.Generator, elastic: float, words: str) -> TruthEffect:
+    force = log_uniform(generator, _LEAST, _MOST)
+    reach = log_uniform(generator, *_REACH)
+    ratio = generator.uniform(*_RATIO)
+    stribeck = log_uniform(generator, *_STRIBECK)
+
+    def on_film(numbers: FilmNumbers) -> FilmNumbers:
+        stress = force / numbers.section
+        stiffness = stress * numbers.length / reach
+        fastest = math.sqrt(stiffness / numbers.inertia)
+        return numbers.stepping(0.25 / fastest).hiding(
+            friction=stress,
+            friction_static=ratio * stress,
+            friction_stribeck=stribeck / numbers.length,
+            friction_reach=reach / numbers.length,
+            friction_damping=2.0 * _DAMPING * math.sqrt(stiffness * numbers.inertia),
+            friction_elastic=elastic,
+        )
+
+    return TruthEffect(
+        family="friction",
+        acts_on="load",
+        description=(
+            f"{words} of {force * 1e3:.3g} mN, {ratio:.2f} times that below {stribeck * 1e3:.2g} "
+            f"mm/s, bending over {reach * 1e6:.3g} um"
+        ),
+        on_film=on_film,
+    )
+
+
+def lugre(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """Bristles that slip a little at once."""
+    return _friction(generator, 0.0, "friction (LuGre)")
+
+
+def elasto_plastic(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """Bristles that only bend at first."""
+    share = generator.uniform(0.4, 0.8)
+    return _friction(generator, share, f"friction (elastic up to {share:.2f} of slip)")

@@ -1,0 +1,42 @@
+"""The mains are in the reading, with their third harmonic.
+
+A (sin(w t + a) + r sin(3 w t + b)); the mains run a little off 50 or 60 Hz, as mains do.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from model.material import Load
+from sim_backend.truth.chance import log_uniform
+from sim_backend.truth.effect import TruthEffect
+
+__all__ = ["mains"]
+
+_LEAST, _MOST = 3.5e-6, 60e-6  # m
+
+
+def mains(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """Mains hum of any phase."""
+    size = log_uniform(generator, _LEAST, _MOST)
+    hertz = float(generator.choice((50.0, 60.0)) + generator.uniform(-0.05, 0.05))
+    third = generator.uniform(0.05, 0.5)
+    phases = generator.uniform(0.0, 2.0 * math.pi, 2)
+
+    def on_motion(t: np.ndarray, rows: np.ndarray, carry: object) -> tuple[np.ndarray, object]:
+        for amplitude, times, phase in ((size, 1.0, phases[0]), (third * size, 3.0, phases[1])):
+            omega = 2.0 * math.pi * hertz * times
+            rows[0] += amplitude * np.sin(omega * t + phase)
+            rows[1] += amplitude * omega * np.cos(omega * t + phase)
+        return rows, carry
+
+    return TruthEffect(
+        family="interference",
+        acts_on="sensor",
+        description=(
+            f"mains of {size * 1e6:.3g} um at {hertz:.2f} Hz, {third:.2f} of that at three times"
+        ),
+        on_motion=on_motion,
+    )

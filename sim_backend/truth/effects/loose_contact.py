@@ -1,0 +1,44 @@
+"""The lead touches the electrode only when the voltage is high enough: in no family.
+
+The contact closes above one voltage, opens below another; open, it passes nothing and the film
+discharges at once. Between the two it stays as it was.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from model.material import Load
+from sim_backend.truth.chance import log_uniform
+from sim_backend.truth.effect import TruthEffect
+
+__all__ = ["loose_contact"]
+
+_CLOSES = (1100.0, 4200.0)  # V
+_OPENS = (0.3, 0.9)  # of that
+
+
+def loose_contact(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """A contact that arcs over."""
+    closes = log_uniform(generator, *_CLOSES)
+    opens = closes * generator.uniform(*_OPENS)
+
+    def on_voltage(
+        time: np.ndarray,  # noqa: ARG001
+        voltage: np.ndarray,
+        carry: object,
+    ) -> tuple[np.ndarray, object]:
+        size = np.abs(voltage)
+        decided = (size >= closes) | (size < opens)
+        # each node as the last decided one before it; the contact before node 0 comes first
+        last = np.maximum.accumulate(np.where(decided, np.arange(1, size.size + 1), 0))
+        closed = np.append(bool(carry), size >= closes)[last]
+        # the last node's voltage is not there yet: the state is that of the interval before it
+        return np.where(closed, voltage, 0.0), bool(closed[-2] if closed.size > 1 else carry)
+
+    return TruthEffect(
+        family="unknown",
+        acts_on="electrode",
+        description=f"a contact closes above {closes:.4g} V and opens below {opens:.4g} V",
+        on_voltage=on_voltage,
+    )

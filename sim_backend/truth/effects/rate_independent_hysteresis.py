@@ -1,0 +1,76 @@
+"""Filler clusters in the film stick and slide: a loop that does not shrink when it is run slowly.
+
+``bouc_wen``: stress K b with b' = lam'/a (1 - |b|^n (1 - s + s sign(lam' b))) (Wen, J. Eng. Mech.
+Div. ASCE 102, 1976), n off 1. ``iwan``: many stops in parallel whose reaches follow a power law
+(Iwan, J. Appl. Mech. 33, 1966; density as in Segalman, J. Appl. Mech. 72, 2005), so that the loss
+in a small loop goes with a power of its width.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from model.material import Load
+from sim_backend.truth.chance import log_uniform
+from sim_backend.truth.effect import TruthEffect
+from sim_backend.truth.film import FilmNumbers
+
+__all__ = ["bouc_wen", "iwan"]
+
+_LEAST, _MOST = 5.0, 350.0  # Pa, nominal, fully slid
+_REACH = (30e-6, 400e-6)  # m
+_ELEMENTS = 12
+
+
+def bouc_wen(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """A smooth loop of Bouc and Wen."""
+    stress = log_uniform(generator, _LEAST, _MOST)
+    reach = log_uniform(generator, *_REACH)
+    exponent = generator.uniform(1.3, 3.0)
+    share = generator.uniform(0.5, 0.9)
+
+    def on_film(numbers: FilmNumbers) -> FilmNumbers:
+        return numbers.hiding(
+            bouc=stress,
+            bouc_reach=reach / numbers.length,
+            bouc_exponent=exponent,
+            bouc_share=share,
+        )
+
+    return TruthEffect(
+        family="rate_independent_hysteresis",
+        acts_on="film stress",
+        description=(
+            f"a rate-independent loop (Bouc-Wen, exponent {exponent:.2f}) of {stress:.3g} Pa over "
+            f"{reach * 1e6:.3g} um"
+        ),
+        on_film=on_film,
+    )
+
+
+def iwan(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """Twelve stops whose reaches follow a power law."""
+    stress = log_uniform(generator, _LEAST, _MOST)
+    longest = log_uniform(generator, 4.0 * _REACH[0], 3.0 * _REACH[1])
+    power = generator.uniform(-0.7, 0.3)
+    reaches = longest * np.geomspace(0.01, 1.0, _ELEMENTS)
+    # yield stress of each: density r^power over a logarithmic grid, times its own reach
+    yields = reaches ** (power + 2.0)
+    yields *= stress / yields.sum()
+
+    def on_film(numbers: FilmNumbers) -> FilmNumbers:
+        strains = reaches / numbers.length
+        elements = zip(strains.tolist(), (yields / strains).tolist(), strict=True)
+        return replace(numbers, stops=(*numbers.stops, *elements))
+
+    return TruthEffect(
+        family="rate_independent_hysteresis",
+        acts_on="film stress",
+        description=(
+            f"a rate-independent loop (Iwan, power {power:.2f}) of {stress:.3g} Pa over up to "
+            f"{longest * 1e6:.3g} um"
+        ),
+        on_film=on_film,
+    )

@@ -1,0 +1,68 @@
+"""The controller filters more than the rig file says.
+
+``moving_average``: the mean of the position over a window. ``low_pass``: two equal first-order lags
+in a row, the controller's low-pass filter.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from model.material import Load
+from sim_backend.truth import loops
+from sim_backend.truth.chance import log_uniform
+from sim_backend.truth.effect import TruthEffect
+
+__all__ = ["low_pass", "moving_average"]
+
+_LEAST, _MOST = 3.5e-3, 120e-3  # s, mean age of a reading
+
+
+def moving_average(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """A window of equal weights."""
+    window = 2.0 * log_uniform(generator, _LEAST, _MOST)
+
+    def on_motion(time: np.ndarray, rows: np.ndarray, carry: object) -> tuple[np.ndarray, object]:
+        if carry is None:
+            past, seen = time[:1], rows[:, :1]
+        else:
+            past, seen = cast(tuple[np.ndarray, np.ndarray], carry)
+        times = np.concatenate((past, time[1:]))
+        motion = np.concatenate((seen, rows[:, 1:]), axis=1)
+        loops.moving_average(times, motion, past.size - 1, window, rows)
+        # the next call looks back by the window from this call's last node
+        keep = max(0, int(np.searchsorted(times, time[-1] - window, side="right")) - 1)
+        return rows, (times[keep:].copy(), motion[:, keep:].copy())
+
+    return TruthEffect(
+        family="sensor_lag",
+        acts_on="sensor",
+        description=f"the reading is the mean over the last {window * 1e3:.3g} ms",
+        on_motion=on_motion,
+    )
+
+
+def low_pass(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """Two lags in a row."""
+    tau = 0.5 * log_uniform(generator, _LEAST, _MOST)
+
+    def on_motion(time: np.ndarray, rows: np.ndarray, carry: object) -> tuple[np.ndarray, object]:
+        before, lags = (
+            (rows[0, 0], np.full(2, rows[0, 0]))
+            if carry is None
+            else cast(tuple[float, np.ndarray], carry)
+        )
+        last = float(rows[0, -1])
+        rows[0, 0] = before
+        lags = lags.copy()
+        loops.low_pass(time, rows, tau, lags)
+        return rows, (last, lags)
+
+    return TruthEffect(
+        family="sensor_lag",
+        acts_on="sensor",
+        description=f"the reading passes two lags of {tau * 1e3:.3g} ms each",
+        on_motion=on_motion,
+    )

@@ -1,0 +1,81 @@
+"""The reading is a curve over the true position, not a line.
+
+``cubic``: A (x/1 mm)^3, of a tilted target on a curved characteristic. ``ripple``: A (sin(2 pi x/p
++ phase) - sin(phase)), a periodic error of the sensor's detector. ``soft_clip``: beyond x_0 travel
+y counts as y/(1 + y/s), a spot that leaves the detector.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from model.material import Load
+from sim_backend.truth.chance import either_sign, log_uniform
+from sim_backend.truth.effect import TruthEffect
+
+__all__ = ["cubic", "ripple", "soft_clip"]
+
+_CUBIC = (4e-6, 60e-6)  # m at 1 mm
+_RIPPLE = (4e-6, 60e-6)  # m
+_PERIOD = (0.25e-3, 1.2e-3)  # m
+_CLIP = (6e-6, 350e-6)  # m lost 1 mm beyond the corner
+_CORNER = (0.2e-3, 0.6e-3)  # m
+
+_Curve = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+def _bent(curve: _Curve, words: str) -> TruthEffect:
+    """``curve`` (x) gives reading and slope."""
+
+    def on_motion(t: np.ndarray, rows: np.ndarray, carry: object) -> tuple[np.ndarray, object]:  # noqa: ARG001
+        reading, slope = curve(rows[0])
+        return np.stack((reading, slope * rows[1])), carry
+
+    return TruthEffect(
+        family="sensor_nonlinearity", acts_on="sensor", description=words, on_motion=on_motion
+    )
+
+
+def cubic(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """A cubic characteristic."""
+    size = either_sign(generator) * log_uniform(generator, *_CUBIC)
+
+    def curve(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        u = x * 1e3
+        return x + size * u**3, 1.0 + 3e3 * size * u**2
+
+    return _bent(curve, f"the reading has a cubic error of {size * 1e6:.3g} um at 1 mm")
+
+
+def ripple(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """A periodic error."""
+    size = log_uniform(generator, *_RIPPLE)
+    wave = 2.0 * math.pi / log_uniform(generator, *_PERIOD)
+    phase = generator.uniform(0.0, 2.0 * math.pi)
+
+    def curve(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        angle = wave * x + phase
+        return (
+            x + size * (np.sin(angle) - math.sin(phase)),
+            1.0 + size * wave * np.cos(angle),
+        )
+
+    words = f"the reading has a periodic error of {size * 1e6:.3g} um, again every "
+    return _bent(curve, words + f"{2e3 * math.pi / wave:.2g} mm")
+
+
+def soft_clip(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """A reading that falls behind beyond some travel."""
+    lost = log_uniform(generator, *_CLIP)
+    corner = log_uniform(generator, *_CORNER)
+    scale = 1e-3 * (1e-3 - lost) / lost  # so that 1 mm beyond the corner counts for 1 mm - lost
+
+    def curve(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        beyond = np.maximum(x - corner, 0.0)
+        return x - beyond + beyond / (1.0 + beyond / scale), 1.0 / (1.0 + beyond / scale) ** 2
+
+    words = f"beyond {corner * 1e3:.2g} mm the reading falls behind, "
+    return _bent(curve, words + f"by {lost * 1e6:.3g} um after another mm")

@@ -1,0 +1,187 @@
+"""One blind case: record it on the simulated rig, diagnose it by the public command, keep the JSON.
+
+Nothing but the seed goes to the rig, nothing but recordings to the diagnosis, and nothing but its
+JSON is read. What the rig hides is looked up afterwards, for the score.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.errors import DearigError
+from app.recording import open_recording
+from app.rigfile import load_rig_file
+from app.run import record
+from app.sequencefile import load_sequence
+from app.toml_input import read_text
+from tests.blind.seeds import drawn
+
+__all__ = ["MODES", "VALIDATION", "Bench", "Case", "sources_digest"]
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+
+#: Training sequences of each mode.
+MODES = {"thesis": ("thesis",), "rich": ("thesis", "rich")}
+#: Other amplitudes, other frequencies, and steps.
+VALIDATION = ("validation-a-0.6", "validation-b-7.0", str(HERE / "ramped-steps.toml"))
+
+_TIMEOUT = 900.0  # s: far beyond what any case may take; a hang must not end the row
+_INTERRUPTED = 130
+
+
+def sources_digest() -> str:
+    """What results depend on: the sources of the model, the hidden effects and this test's rig."""
+    digest = hashlib.sha256()
+    paths = [
+        *(p for folder in ("model", "sim_backend") for p in (ROOT / folder).rglob("*.py")),
+        *HERE.glob("*.toml"),
+        ROOT / "app" / "presets.py",
+    ]
+    for path in sorted(paths):
+        digest.update(path.relative_to(ROOT).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One seed in one mode."""
+
+    seed: int
+    mode: str
+
+
+class Bench:
+    """A folder of results at one sample rate, with the rig file that made them."""
+
+    def __init__(self, folder: Path, rate: float) -> None:
+        self.folder = folder / f"{rate:g}Hz"
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.rig_path = self.folder / "rig.toml"
+        text = read_text(HERE / "rig.toml", "rig file")
+        self.rig_path.write_text(
+            f"{text}\n[card]\nsample_rate_Hz = {rate:.1f}\n", encoding="utf-8", newline="\n"
+        )
+        self._rig = load_rig_file(self.rig_path)
+        self._floor: float | None = None
+
+    def floor_um(self) -> float:
+        """RMS in um of what the rig's laser and card add, read from a film that hangs still."""
+        if self._floor is None:
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / "quiet.h5"
+                self._record(str(HERE / "quiet.toml"), "sim", path, seed=0)
+                still = open_recording(path).signal
+            self._floor = float(np.std(still)) * 1e6
+        return self._floor
+
+    def record(self, case: Case, folder: Path) -> tuple[list[Path], list[Path]]:
+        """Training and validation recordings of ``case`` in ``folder``, each with its own noise."""
+        names = [*MODES[case.mode], *VALIDATION]
+        paths = [folder / f"{Path(name).name.removesuffix('.toml')}.h5" for name in names]
+        for i, (name, path) in enumerate(zip(names, paths, strict=True)):
+            self._record(name, f"sim:{case.seed}", path, seed=i)
+        split = len(MODES[case.mode])
+        return paths[:split], paths[split:]
+
+    def play(self, case: Case) -> dict[str, Any]:
+        """Record and diagnose ``case``; the result as it is kept."""
+        sources = sources_digest()
+        with tempfile.TemporaryDirectory(prefix="dearig-blind-") as name:
+            folder = Path(name)
+            try:
+                train, validation = self.record(case, folder)
+            except DearigError as fault:
+                return self._kept(case, sources, None, f"not recorded: {fault}", 0.0)
+            answer, error, seconds = diagnose(train, validation, folder / "out.json")
+        return self._kept(case, sources, answer, error, seconds)
+
+    def _kept(
+        self, case: Case, sources: str, answer: dict[str, Any] | None, error: str, seconds: float
+    ) -> dict[str, Any]:
+        truth = drawn(case.seed)
+        time, voltage = load_sequence("thesis").sample(float(self._rig.card.sample_rate_Hz))
+        result = {
+            "seed": case.seed,
+            "mode": case.mode,
+            "sources": sources,
+            "floor_um": self.floor_um(),
+            "truth": {
+                "families": list(truth.families),
+                "description": truth.description,
+                "hidden_um": truth.size(time, voltage) * 1e6,
+            },
+            "wall_s": seconds,
+            "error": error,
+            "diagnosis": answer,
+        }
+        self._path(case).write_text(json.dumps(result, indent=1), encoding="utf-8")
+        return result
+
+    def kept(self, case: Case, any_sources: bool) -> dict[str, Any] | None:
+        """The result of ``case``, unless there is none or it is of other sources."""
+        path = self._path(case)
+        if not path.exists():
+            return None
+        result: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        return result if any_sources or self.is_fresh(result) else None
+
+    def is_fresh(self, result: Mapping[str, Any]) -> bool:
+        """Whether ``result`` is of the sources as they are now."""
+        return bool(result["sources"] == sources_digest())
+
+    def all_kept(self) -> list[dict[str, Any]]:
+        """Every result in the folder, of whatever sources, by seed and mode."""
+        found = [json.loads(p.read_text(encoding="utf-8")) for p in self.folder.glob("*-*.json")]
+        return sorted(found, key=lambda r: (r["seed"], list(MODES).index(r["mode"])))
+
+    def again(self) -> str:
+        """How to play a case by hand, in words."""
+        return (
+            f"To look at one: dearig record SEQUENCE --rig sim:SEED --seed N --rig-file "
+            f"{self.rig_path} --out FILE.h5 with N = 0, 1, .. for the training sequences and then "
+            f"{', '.join(Path(name).name for name in VALIDATION)}; and dearig diagnose."
+        )
+
+    def _path(self, case: Case) -> Path:
+        return self.folder / f"{case.mode}-{case.seed}.json"
+
+    def _record(self, sequence: str, rig: str, out: Path, seed: int) -> None:
+        text = read_text(self.rig_path, "rig file")
+        record(load_sequence(sequence), rig, self._rig, text, out, seed=seed)
+
+
+def diagnose(
+    train: Sequence[Path], validation: Sequence[Path], out: Path
+) -> tuple[dict[str, Any] | None, str, float]:
+    """Run ``dearig diagnose``: its JSON, or None and what went wrong, and the seconds it took."""
+    command = [sys.executable, "-m", "app", "diagnose", *map(str, train)]
+    for path in validation:
+        command += ["--validate", str(path)]
+    command += ["--json", str(out)]
+    started = time.perf_counter()
+    try:
+        ended = subprocess.run(
+            command, cwd=ROOT, capture_output=True, text=True, timeout=_TIMEOUT, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return None, f"no answer within {_TIMEOUT:g} s", time.perf_counter() - started
+    seconds = time.perf_counter() - started
+    if ended.returncode == _INTERRUPTED:
+        raise KeyboardInterrupt  # no result: ctrl-C goes to every process of the terminal
+    if ended.returncode != 0 or not out.exists():
+        said = ended.stderr.strip().splitlines() or ["nothing was said"]
+        return None, f"exit code {ended.returncode}: {said[-1]}", seconds
+    return json.loads(out.read_text(encoding="utf-8")), "", seconds

@@ -1,0 +1,60 @@
+"""Which seeds are played: a row of them, and the first ones that hide what is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import count
+
+from app.rigfile import RigFile
+from sim_backend.truth import cases
+from sim_backend.truth.cases import FORMS, UNKNOWN, TruthCase
+
+__all__ = ["CLEAN_FROM", "FAMILY_FROM", "chosen", "clean_seeds", "drawn", "family_seeds"]
+
+#: Extra clean films and extra cases of one family are looked for from these seeds on.
+CLEAN_FROM, FAMILY_FROM = 1000, 2000
+
+_RIG = RigFile()
+
+
+def drawn(seed: int) -> TruthCase:
+    """What the rig ``sim:seed`` hides."""
+    return cases.draw(seed, _RIG.as_film(), _RIG.as_load())
+
+
+def clean_seeds(number: int) -> list[int]:
+    """The first ``number`` seeds from ``CLEAN_FROM`` on whose rig hides nothing."""
+    return _first(number, ())
+
+
+def family_seeds(family: str, number: int) -> list[int]:
+    """The first ``number`` seeds from ``FAMILY_FROM`` on whose rig hides this family alone."""
+    return _first(number, (family,))
+
+
+def chosen(first: int, any_kind: int, clean: int, per_family: int) -> list[int]:
+    """Every seed to be played once, in the order of playing."""
+    seeds = [*range(first, first + any_kind)]
+    if per_family:
+        for family in FORMS:
+            seeds += family_seeds(family, per_family)
+    return list(dict.fromkeys([*seeds, *clean_seeds(clean)]))
+
+
+def kind_of(families: tuple[str, ...]) -> str:
+    """``clean``, ``covered``, ``pair`` or ``unknown``."""
+    if not families:
+        return "clean"
+    if UNKNOWN in families:
+        return UNKNOWN
+    return "covered" if len(families) == 1 else "pair"
+
+
+def _first(number: int, families: tuple[str, ...]) -> list[int]:
+    start = FAMILY_FROM if families else CLEAN_FROM
+    hits = _hiding(start, families)
+    return [next(hits) for _ in range(number)]
+
+
+def _hiding(start: int, families: tuple[str, ...]) -> Iterator[int]:
+    return (seed for seed in count(start) if drawn(seed).families == families)

@@ -1,0 +1,308 @@
+"""The effects of ``model.effects`` written once more, for SciPy: what their tests compare with.
+
+The thesis's film (width held, Gent springs) with one effect in it, in the plainest differential
+form, with no step splitting and no closed forms. Nothing here comes from kernels or effects.
+"""
+# ruff: noqa: ARG005 (the parts of an effect have one signature, as its hooks do)
+
+import math
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from model.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY
+
+
+def pull(limit, e):
+    """Nominal stress over the modulus of a Gent spring held in width, at its own stretch."""
+    return (e - e**-3) / (1.0 - (e**2 + e**-2 - 2.0) / limit)
+
+
+def same(value):
+    return lambda *_: value
+
+
+@dataclass
+class Film:
+    """Eq. 48 in numbers."""
+
+    actuator: object
+    rest: float = field(init=False)
+
+    def __post_init__(self):
+        film, network = self.actuator.film, self.actuator.network
+        self.length = film.length
+        self.thickness = film.thickness
+        self.section = film.width * film.thickness
+        self.inertia = film.density * film.length**2 / 3.0
+        self.load = self.actuator.load.mass * STANDARD_GRAVITY / self.section
+        permittivity = VACUUM_PERMITTIVITY * film.permittivity
+        self.electric = permittivity / film.thickness**2
+        self.capacitance = permittivity * film.length * film.width / film.thickness
+        self.first = (network.equilibrium.modulus, network.equilibrium.limit)
+        self.branches = tuple(
+            (b.spring.modulus, b.spring.limit, b.relaxation_time) for b in network.branches
+        )
+        mu, limit = self.first
+        self.rest = brentq(lambda e: mu * pull(limit, e) - self.load, 1.0, 2.0, xtol=1e-15)
+
+    def strain(self, lam):
+        """I1 above that at rest."""
+        return lam**2 + lam**-2 - self.rest**2 - self.rest**-2
+
+
+@dataclass
+class Extra:
+    """What an effect adds; each is a function of ``(t, lam, u, z, v)``, ``z`` the effect's state.
+
+    ``voltage`` is that at the film, ``square`` the voltage squared, ``electric`` and ``soften``
+    factors on the Maxwell and the network's stress, ``stress`` Pa against the motion, ``slopes``
+    dz/dt. ``commit`` of a film with a kink gives the state after a step, and then short fixed steps
+    are taken; there ``stress`` and ``soften`` also get the stretch at the beginning of the step.
+    """
+
+    states: int = 0
+    mass: float = 0.0
+    voltage: object = lambda t, lam, u, z, v: v
+    square: object = lambda t, lam, u, z, v: v * v
+    electric: object = same(1.0)
+    soften: object = same(1.0)
+    stress: object = same(0.0)
+    slopes: object = same(())
+    commit: object = None
+
+
+def limited(value, low, high):
+    return min(max(value, low), high)
+
+
+def ramped(since):
+    """The 20 ms in which a sudden change comes."""
+    return limited(since / 0.02 + 0.5, 0.0, 1.0)
+
+
+def extra(name, p, film, drive):
+    """``Extra`` of the effect ``name`` with the numbers ``p`` on ``film``; ``drive`` is v(t)."""
+    rest = film.rest
+
+    def amplifier_slew():
+        fine = 1e-5
+        most = fine / p["inverse_slew"]
+        asked = [drive(i * fine) for i in range(round(drive.end / fine) + 2)]
+        out = [asked[0]]
+        for v in asked[1:]:
+            out.append(out[-1] + limited(v - out[-1], -most, most))
+
+        def voltage(t, lam, u, z, v):
+            i = int(t / fine)
+            return out[i] + (out[i + 1] - out[i]) * (t / fine - i)
+
+        return Extra(voltage=voltage)
+
+    def hysteresis(size, reach):
+        # the differential form of Dahl: towards +-reach against every reversal
+        return Extra(
+            states=1,
+            stress=lambda t, lam, u, z, v: size * z[0] / reach,
+            slopes=lambda t, lam, u, z, v: (u - abs(u) * z[0] / reach,),
+        )
+
+    def distributed():
+        k, reach, count = p["stiffness"], p["reach"], 8
+        ends = [reach * (i + 0.5) / count for i in range(count)]
+
+        def moved(z, travel):
+            return [limited(a + travel, -e, e) for a, e in zip(z, ends, strict=True)]
+
+        return Extra(
+            states=count,
+            stress=lambda t, lam, u, z, v, lam0: k * sum(moved(z, lam - lam0)) / count,
+            commit=lambda z, lam0, lam: moved(z, lam - lam0),
+        )
+
+    def mullins():
+        s, w = p["softening"], p["width"]
+
+        def soften(t, lam, u, z, v, lam0):
+            now = film.strain(lam)
+            most = max(z[0], now)
+            return 1.0 - s * math.tanh((most - now) / (w * (most + 1e-3)))
+
+        return Extra(
+            states=1, soften=soften, commit=lambda z, lam0, lam: [max(z[0], film.strain(lam))]
+        )
+
+    def branches(moduli, times):
+        return Extra(
+            states=len(times),
+            stress=lambda t, lam, u, z, v: sum(
+                m * (lam - rest - q) for m, q in zip(moduli, z, strict=True)
+            ),
+            slopes=lambda t, lam, u, z, v: tuple(
+                (lam - rest - q) / tau for tau, q in zip(times, z, strict=True)
+            ),
+        )
+
+    def power_law():
+        a = p["exponent"]
+        times = [0.03, 0.3, 3.0, 30.0, 300.0, 3000.0]
+        moduli = [p["modulus"] * math.log(10.0) / math.gamma(a) * tau**-a for tau in times]
+        return branches(moduli, times)
+
+    def attached():
+        om, damping = 2.0 * math.pi * p["frequency"], p["damping"]
+        return Extra(
+            states=2,
+            stress=lambda t, lam, u, z, v: p["stiffness"] * (lam - rest - z[0]),
+            slopes=lambda t, lam, u, z, v: (
+                z[1],
+                -2.0 * damping * om * z[1] - om**2 * (z[0] - (lam - rest)),
+            ),
+        )
+
+    def charging():
+        return Extra(
+            states=1,
+            voltage=lambda t, lam, u, z, v: z[0],
+            slopes=lambda t, lam, u, z, v: (
+                (v - z[0]) / (p["resistance"] * film.capacitance * lam**2) - 2.0 * u / lam * z[0],
+            ),
+        )
+
+    known = {
+        "ageing": lambda: Extra(
+            states=1,
+            soften=lambda t, lam, u, z, v: (
+                1.0 - p["softening"] * (1.0 - math.exp(-z[0] / p["path"]))
+            ),
+            slopes=lambda t, lam, u, z, v: (abs(u),),
+        ),
+        "amplifier lag": lambda: Extra(
+            states=1,
+            voltage=lambda t, lam, u, z, v: z[0],
+            slopes=lambda t, lam, u, z, v: ((v - z[0]) / p["time_constant"],),
+        ),
+        "amplifier limit": lambda: Extra(
+            voltage=lambda t, lam, u, z, v: (
+                v if v < p["knee"] else p["knee"] + (1.0 - p["flattening"]) * (v - p["knee"])
+            )
+        ),
+        "amplifier offset": lambda: Extra(voltage=lambda t, lam, u, z, v: v + p["offset"]),
+        "amplifier saturation": lambda: Extra(
+            voltage=lambda t, lam, u, z, v: math.tanh(v * p["inverse_limit"]) / p["inverse_limit"]
+        ),
+        "amplifier slew": amplifier_slew,
+        "attached mode": attached,
+        "dielectric relaxation": lambda: Extra(
+            states=1,
+            square=lambda t, lam, u, z, v: v * (v + p["strength"] * z[0]),
+            slopes=lambda t, lam, u, z, v: ((v - z[0]) / p["relaxation_time"],),
+        ),
+        "distributed hysteresis": distributed,
+        "dry friction": lambda: hysteresis(p["friction"], p["presliding"]),
+        "elastoplastic hysteresis": lambda: hysteresis(p["yield_stress"], p["reach"]),
+        "electrode resistance": charging,
+        "stress beyond a displacement": lambda: Extra(
+            stress=lambda t, lam, u, z, v: (
+                p["stiffness"] * max(lam - rest - p["onset"] / film.length, 0.0)
+            )
+        ),
+        "field-dependent permittivity": lambda: Extra(
+            electric=lambda t, lam, u, z, v: (
+                1.0 / (1.0 - p["field_coefficient"] * (v * lam / film.thickness / 8e6) ** 2)
+            )
+        ),
+        "sudden loss of field": lambda: Extra(
+            voltage=lambda t, lam, u, z, v: v * (1.0 - p["loss"] * ramped(t - p["moment"]))
+        ),
+        "leakage": lambda: Extra(
+            voltage=lambda t, lam, u, z, v: v * (1.0 - p["loss"] * (v / 8e3) ** p["exponent"])
+        ),
+        "linear drag": lambda: Extra(stress=lambda t, lam, u, z, v: p["drag"] * u),
+        "quadratic drag": lambda: Extra(stress=lambda t, lam, u, z, v: p["drag"] * u * abs(u)),
+        "load inertia": lambda: Extra(mass=p["moving_mass"] * film.length / film.section),
+        "sudden change of force": lambda: Extra(
+            stress=lambda t, lam, u, z, v: p["stress"] * ramped(t - p["moment"])
+        ),
+        "Mullins softening": mullins,
+        "power-law creep": power_law,
+        "slow branch": lambda: branches([p["modulus"]], [p["relaxation_time"]]),
+        "strain-dependent permittivity": lambda: Extra(
+            electric=lambda t, lam, u, z, v: 1.0 + p["strain_coefficient"] * (lam - rest)
+        ),
+        "temperature": lambda: Extra(
+            soften=lambda t, lam, u, z, v: 1.0 + p["stiffening"] * drive.warmth(t)
+        ),
+        "warm-up": lambda: Extra(
+            soften=lambda t, lam, u, z, v: (
+                1.0 + p["stiffening"] * (1.0 - math.exp(-t / p["time_constant"]))
+            )
+        ),
+    }
+    return known[name]()
+
+
+def follow(film, drive, time, effect, tolerance=1e-9, step=1e-4):
+    """Stretch (N,) at ``time`` under ``drive`` (v(t), with ``breaks`` where it has corners)."""
+    mu0, limit0 = film.first
+    n = len(film.branches)
+    inertia = film.inertia + effect.mass
+    more = effect.commit is not None
+
+    def rates(t, y, lam0=0.0):
+        lam, u = y[0], y[1]
+        z = y[2 + n :]
+        last = (lam0,) if more else ()
+        v = drive(t)
+        slopes = effect.slopes(t, lam, u, z, v)
+        v = effect.voltage(t, lam, u, z, v)
+        held = mu0 * pull(limit0, lam)
+        flows = []
+        for (mu, limit, tau), xi in zip(film.branches, y[2 : 2 + n], strict=True):
+            unit = pull(limit, lam / xi)
+            held += mu * unit / xi
+            flows.append(unit * lam / xi / tau)
+        field = film.electric * effect.square(t, lam, u, z, v) * lam
+        field *= effect.electric(t, lam, u, z, v)
+        left = film.load + field - held * effect.soften(t, lam, u, z, v, *last)
+        left -= effect.stress(t, lam, u, z, v, *last)
+        return [u, left / inertia, *flows, *(slopes or [0.0] * effect.states)]
+
+    y = [film.rest, 0.0, *([film.rest] * n), *([0.0] * effect.states)]
+    if more:
+        return _in_short_steps(rates, effect, time, y, n, step)
+    out = np.empty(time.size)
+    edges = [b for b in drive.breaks if b < time[-1]] + [time[-1]]
+    for start, end in pairwise(edges):
+        inside = (time >= start - 1e-12) & (time <= end + 1e-12)
+        done = solve_ivp(
+            lambda t, y: rates(t, y.tolist()), (start, end), y, method="DOP853",
+            t_eval=np.clip(time[inside], start, end), rtol=tolerance, atol=1e-12, max_step=2e-3,
+        )  # fmt: skip
+        out[inside] = done.y[0, : inside.sum()]
+        y = done.y[:, -1]
+    return out
+
+
+def _in_short_steps(rates, effect, time, y, n, step):
+    """Runge-Kutta steps of no more than ``step`` s, with the kink's memory carried in between."""
+    out = [y[0]]
+    for t0, t1 in pairwise(time):
+        count = max(round((t1 - t0) / step), 1)
+        h = (t1 - t0) / count
+        for m in range(count):
+            t, lam0 = t0 + m * h, y[0]
+            k1 = rates(t, y, lam0)
+            k2 = rates(t + 0.5 * h, [a + 0.5 * h * b for a, b in zip(y, k1, strict=True)], lam0)
+            k3 = rates(t + 0.5 * h, [a + 0.5 * h * b for a, b in zip(y, k2, strict=True)], lam0)
+            k4 = rates(t + h, [a + h * b for a, b in zip(y, k3, strict=True)], lam0)
+            y = [
+                a + h / 6.0 * (b + 2.0 * (c + d) + e)
+                for a, b, c, d, e in zip(y, k1, k2, k3, k4, strict=True)
+            ]
+            y[2 + n :] = effect.commit(y[2 + n :], lam0, y[0])
+        out.append(y[0])
+    return np.array(out)

@@ -1,0 +1,182 @@
+"""Responses in closed form, against the exponential of the whole linear system."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+from model.filters import averaged, lagged, low_pass, slewed, slid, switched, swung
+
+RATIOS = 10.0 ** np.arange(-6.0, 3.5, 0.5)  # of the step to the filter's own time
+TAU = 0.02
+
+
+def driven(system, before, h, powers):
+    """State of z' = A z + B x after ``h``, x(t) = sum of ``powers``[k] t^k, by one exponential.
+
+    ``system`` is (A, B); x and its derivatives join the state as a chain of integrators.
+    """
+    a, b = system
+    n, m = len(b), len(powers)
+    full = np.zeros((n + m, n + m))
+    full[:n, :n] = a
+    full[:n, n] = b
+    full[n : n + m - 1, n + 1 :] = np.eye(m - 1)
+    derivatives = [math.factorial(k) * p for k, p in enumerate(powers)]
+    # in units of the step, so that the exponential is of numbers of one size
+    scale = h ** np.arange(m)
+    scaled = full * h
+    for k in range(m - 1):
+        scaled[n + k, n + k + 1] = 1.0
+    return (expm(scaled) @ np.concatenate([before, derivatives * scale]))[:n]
+
+
+def cubic(rng, h, tau):
+    """Coefficients of a cubic that moves by about 1 in the longer of ``h`` and ``tau``."""
+    return rng.uniform(-1.0, 1.0, 4) / max(h, tau) ** np.arange(4)
+
+
+def ends(powers, h):
+    value = np.polynomial.Polynomial(powers)
+    rate = value.deriv()
+    return value(0.0), rate(0.0), value(h), rate(h)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_lagged(ratio):
+    rng = np.random.default_rng(1)
+    h = ratio * TAU
+    for _ in range(5):
+        before, start, end = rng.uniform(-1.0, 1.0, 3)
+        expected = driven(([[-1.0 / TAU]], [1.0 / TAU]), [before], h, [start, (end - start) / h])
+        # short steps take Pade's approximation: 1.4e-7 of the change of input at its end
+        assert lagged(before, start, end, h, TAU) == pytest.approx(expected[0], abs=2e-7)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_low_pass(ratio):
+    rng = np.random.default_rng(2)
+    h = ratio * TAU
+    for _ in range(5):
+        before, powers = rng.uniform(-1.0, 1.0), cubic(rng, h, TAU)
+        expected = driven(([[-1.0 / TAU]], [1.0 / TAU]), [before], h, powers)
+        x0, u0, x1, u1 = ends(powers, h)
+        found = low_pass(before, x0, u0, x1, u1, h, TAU)
+        assert found == pytest.approx(expected[0], abs=1e-9)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_averaged(ratio):
+    rng = np.random.default_rng(3)
+    h, w = ratio * TAU, TAU
+    system = ([[0.0, 1.0], [-12.0 / w**2, -6.0 / w]], [0.0, 12.0 / w**2])
+    for _ in range(5):
+        before, powers = rng.uniform(-1.0, 1.0, 2) / [1.0, TAU], cubic(rng, h, w)
+        expected = driven(system, before, h, powers)
+        x0, u0, x1, u1 = ends(powers, h)
+        found = averaged(*before, x0, u0, x1, u1, h, w)
+        assert found[0] == pytest.approx(expected[0], abs=1e-9)
+        assert found[1] * w == pytest.approx(expected[1] * w, abs=1e-8)
+
+
+@pytest.mark.parametrize("damping", [1e-3, 0.05, 0.7, 1.0])
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_swung(ratio, damping):
+    rng = np.random.default_rng(4)
+    h, omega = ratio * TAU, 1.0 / TAU
+    system = ([[0.0, 1.0], [-(omega**2), -2.0 * damping * omega]], [0.0, omega**2])
+    for _ in range(5):
+        before, (e0, rise) = rng.uniform(-1.0, 1.0, 2) / [1.0, TAU], rng.uniform(-1.0, 1.0, 2)
+        e1 = e0 + rise * min(ratio, 1.0)
+        expected = driven(system, before, h, [e0, (e1 - e0) / h])
+        found = swung(*before, e0, e1, h, omega, damping)
+        # critical damping is stood in for by one just below
+        error = 4e-6 if damping == 1.0 else 1e-9
+        assert found[0] == pytest.approx(expected[0], abs=error)
+        assert found[1] * TAU == pytest.approx(expected[1] * TAU, abs=error)
+
+
+def test_the_average_is_that_over_the_window():
+    # x = sin: its mean over the last w, against the filter with its three right derivatives
+    w, h, om = 0.01, 1e-3, 2.0 * math.pi * 3.0
+    t = np.arange(3000) * h
+    x, u = np.sin(om * t), om * np.cos(om * t)
+    r, rate, shown = 0.0, 0.0, [0.0]
+    for k in range(1, t.size):
+        r, rate = averaged(r, rate, x[k - 1], u[k - 1], x[k], u[k], h, w)
+        shown.append(r)
+    mean = (np.cos(om * (t - w)) - np.cos(om * t)) / (om * w)
+    settled = t > 0.1
+    # (om w)^4/720, the first term in which they differ
+    assert np.abs(np.array(shown) - mean)[settled].max() < 1.2 * (om * w) ** 4 / 720.0
+
+
+@pytest.mark.parametrize("travel", [1e-9, 1e-3, 0.4, 3.0, 500.0])
+@pytest.mark.parametrize("z", [-1.0, -0.3, 0.0, 0.9])
+def test_slid(z, travel):
+    for way in (1.0, -1.0):
+        far = min(travel, 30.0)  # beyond, there is nothing left to integrate
+        done = solve_ivp(
+            lambda _, y, way=way: [way - y[0]], (0.0, far), [z], rtol=1e-11, atol=1e-13
+        )
+        assert slid(z * 2e-4, way * travel * 2e-4, 2e-4) == pytest.approx(
+            done.y[0, -1] * 2e-4, rel=1e-8, abs=1e-15
+        )
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_slewed_is_what_tiny_steps_come_to(seed):
+    rng = np.random.default_rng(seed)
+    before, start, end = rng.uniform(-1.0, 1.0, 3)
+    most = rng.uniform(0.2, 3.0)
+    steps = 20000
+    out = before
+    for x in np.linspace(start, end, steps + 1)[1:]:
+        out += min(max(x - out, -most / steps), most / steps)
+    assert slewed(before, start, end, 1.0, most) == pytest.approx(out, abs=3.0 * most / steps)
+
+
+def test_switched():
+    assert [switched(s) for s in (-1.0, -0.01, 0.0, 0.005, 0.01, 9.0)] == pytest.approx(
+        [0.0, 0.0, 0.5, 0.75, 1.0, 1.0]
+    )
+
+
+VALUE = st.floats(-1e4, 1e4)
+STEP = st.floats(1e-9, 1e4)
+TIME = st.floats(1e-12, 1e4)
+
+
+@given(before=VALUE, start=VALUE, end=VALUE, h=STEP, tau=TIME, part=st.floats(0.01, 0.99))
+def test_two_steps_are_one(before, start, end, h, tau, part):
+    middle = start + (end - start) * part
+    for step, scale in ((lagged, 2e-7), (slewed, 1e-9)):
+        whole = step(before, start, end, h, tau)
+        half = step(before, start, middle, h * part, tau)
+        joined = step(half, middle, end, h * (1.0 - part), tau)
+        size = max(abs(before), abs(start), abs(end), 1.0)
+        assert joined == pytest.approx(whole, abs=2.0 * scale * size)
+
+
+@given(before=VALUE, start=VALUE, end=VALUE, h=STEP, tau=TIME)
+def test_outputs_stay_between_what_they_come_from_and_go_to(before, start, end, h, tau):
+    low, high = min(before, start, end), max(before, start, end)
+    room = 1e-6 * max(abs(low), abs(high))
+    for step in (lagged, slewed):
+        assert low - room <= step(before, start, end, h, tau) <= high + room
+
+
+@given(
+    before=VALUE, rate=VALUE, x0=VALUE, u0=VALUE, x1=VALUE, u1=VALUE,
+    h=st.floats(1e-9, 1e4), tau=st.floats(1e-12, 2.0), damping=st.floats(1e-3, 1.0),
+)  # fmt: skip
+def test_everything_is_finite(before, rate, x0, u0, x1, u1, h, tau, damping):
+    assert math.isfinite(low_pass(before, x0, u0, x1, u1, h, tau))
+    assert np.isfinite(averaged(before, rate, x0, u0, x1, u1, h, tau)).all()
+    omega = 2.0 * math.pi * min(max(1.0 / tau, 0.3), 40.0)
+    assert np.isfinite(swung(before, rate, x0, x1, h, omega, damping)).all()
+    assert abs(slid(x0, x1 - x0, tau)) <= max(abs(x0), tau) * (1.0 + 1e-12)
