@@ -221,6 +221,9 @@ def _outcome(
     clock: Callable[[], float],
     performed: Sequence[str] = (),
 ) -> DiagnoseOutcome:
+    if finding.held:
+        recordings = [replace(r, hold=True) for r in recordings]
+        others = [replace(r, hold=True) for r in others]
     failed: list[str] = []
     models = [finding.baseline, *(s.stage for s in finding.steps[:-1]), finding.final]
     if not finding.steps:

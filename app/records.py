@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from app.errors import InputError
 from app.outcomes import Comparison, Published
@@ -18,6 +19,7 @@ from app.recording.reader import open_recording
 from app.recording.recording import Recording
 from app.sequencefile import parse_sequence
 from model.actuator import Actuator, Drive
+from model.denoise import quieted, reading_noise
 from model.errors import ModelError
 from model.excitation import Lobes
 from model.film import Strip
@@ -74,6 +76,8 @@ def open_all(paths: Sequence[str | Path]) -> list[Recording]:
     return recordings
 
 
+_THERMOMETER = 1.0  # s, over which a temperature is the mean: films do not warm faster
+
 _KIND_WORDS = {"actuator": "an actuator (voltage)", "film": "a film (stretch)"}
 
 
@@ -122,15 +126,22 @@ def _bridged(time: np.ndarray, values: np.ndarray, valid: np.ndarray | None) -> 
 def recording_drive(recording: Recording, drive: str) -> Drive:
     """The voltage of a recording: what was commanded, or what the monitor read.
 
-    With a thermometer, the temperature above that of the first second comes along.
+    A voltage that was read, not commanded, is freed of the reading's noise. With a thermometer, the
+    temperature above that of the first second comes along, as a mean over a second.
     """
     voltage = driven_by(recording, drive)
     warmth = None
     if recording.temperature is not None:
-        start = recording.time < recording.time[0] + 1.0
-        warmth = recording.temperature - float(recording.temperature[start].mean())
+        start = recording.time < recording.time[0] + _THERMOMETER
+        samples = max(int(np.count_nonzero(start)), 1)
+        warmth = uniform_filter1d(recording.temperature, samples, mode="nearest")
+        warmth -= float(recording.temperature[start].mean())
     try:
-        return Drive(recording.time, _present(voltage), recording.hold, warmth)
+        volts = _present(voltage)
+        noise = reading_noise(volts)
+        if noise > 0.0:
+            volts = quieted(volts, noise)
+        return Drive(recording.time, volts, recording.hold, warmth)
     except ModelError as error:
         raise InputError(f"{recording.path}: {error}") from error
 

@@ -79,8 +79,9 @@ class Response:
     """What the film did: arrays (N,) on the drive's time, and how the computation ended.
 
     ``stretch`` lam, ``rate`` dlam/dt in 1/s, ``displacement`` in m what the sensor reads, which is
-    (lam - lam_rest) L1 unless an effect acts on it, ``field`` the true field phi/z in V/m. ``status`` is one of ``model.kernel``'s; beyond sample ``reached``
-    the arrays repeat the last stretch that was computed.
+    (lam - lam_rest) L1 unless an effect acts on it, ``field`` the true field phi/z in V/m.
+    ``status`` is one of ``model.kernel``'s; beyond sample ``reached`` the arrays repeat the last
+    stretch that was computed.
     """
 
     time: np.ndarray

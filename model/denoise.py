@@ -1,4 +1,4 @@
-"""A voltage that was read back carries the reading's noise; a model driven by it would ring with it.
+"""A voltage that was read back carries its reading's noise, and a model would ring with that.
 
 The film under its load rings at some 70 Hz with hardly any damping, so a few volts of noise on the
 drive become a micrometre of displacement that nothing measured. The smoothest course that the
@@ -45,7 +45,9 @@ def quieted(voltage: np.ndarray, noise: float) -> np.ndarray:
         smooth = savgol_filter(voltage, window, 2, mode="interp")
         away = voltage - smooth
         # about the window, so that an edge beside it is not smoothed over either
-        local = np.sqrt(uniform_filter1d(away**2, window, mode="nearest"))
+        # (a running sum, which rounding may leave just below 0)
+        square = uniform_filter1d(away**2, window, mode="nearest")
+        local = np.sqrt(np.maximum(square, 0.0))
         good = open_ & (local < _AGREES * noise) & (np.abs(away) < 4.5 * noise)
         out[good] = smooth[good]
         open_ &= ~good

@@ -191,6 +191,14 @@ def extra(name, p, film, drive):
             )
         ),
         "amplifier offset": lambda: Extra(voltage=lambda t, lam, u, z, v: v + p["offset"]),
+        "amplifier resonance": lambda: Extra(
+            states=2,
+            voltage=lambda t, lam, u, z, v: z[0],
+            slopes=lambda t, lam, u, z, v: (
+                z[1],
+                ((v - z[0]) / p["time_constant"] - 2.0 * p["damping"] * z[1]) / p["time_constant"],
+            ),
+        ),
         "amplifier saturation": lambda: Extra(
             voltage=lambda t, lam, u, z, v: math.tanh(v * p["inverse_limit"]) / p["inverse_limit"]
         ),
@@ -222,7 +230,11 @@ def extra(name, p, film, drive):
             voltage=lambda t, lam, u, z, v: v * (1.0 - p["loss"] * (v / 8e3) ** p["exponent"])
         ),
         "linear drag": lambda: Extra(stress=lambda t, lam, u, z, v: p["drag"] * u),
-        "quadratic drag": lambda: Extra(stress=lambda t, lam, u, z, v: p["drag"] * u * abs(u)),
+        "power-law drag": lambda: Extra(
+            stress=lambda t, lam, u, z, v: (
+                p["drag"] * math.copysign((abs(u) / 0.1) ** p["exponent"], u)
+            )
+        ),
         "load inertia": lambda: Extra(mass=p["moving_mass"] * film.length / film.section),
         "sudden change of force": lambda: Extra(
             stress=lambda t, lam, u, z, v: p["stress"] * ramped(t - p["moment"])

@@ -232,7 +232,8 @@ def test_against_the_oracle(name, size):
     film = Film(THESIS)
     values = numbers(name, size)
     drive = COURSE.drive(1000.0)
-    expected = follow(film, COURSE, drive.time, extra(name, values, film, COURSE))
+    effect = extra(name, values, film, COURSE)
+    expected = follow(film, COURSE, drive.time, effect)
     found = with_effect(THESIS, name, values).simulate(drive)
     assert found.ok, found.in_words
     error = np.abs(found.stretch - expected).max() * LENGTH

@@ -308,7 +308,7 @@ class TestThermometer:
         values = lobes()
         values["temperature"] = 21.0 + 0.1 * np.maximum(values["time"] - 1.0, 0.0)
         drive = recording_drive(keep(values), "command")
-        assert np.abs(drive.warmth[:250]).max() < 1e-12
+        assert np.abs(drive.warmth[:120]).max() < 1e-12  # a mean over a second
         assert drive.warmth[-1] == pytest.approx(0.1 * (values["time"][-1] - 1.0))
 
     def test_without_one_there_is_none(self, keep):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from model.diagnosis.search import diagnose
 from model.diagnosis.findings import Diagnosis
+from model.diagnosis.search import diagnose
 
 __all__ = ["Diagnosis", "diagnose"]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,9 +20,10 @@ from model.film import Strip
 from model.fitting.identify import fit_globally, is_determined
 from model.fitting.intervals import correlation_time, covariance
 from model.fitting.levenberg import LocalFit, descend
-from model.fitting.secant import descend_by_secants
 from model.fitting.parameters import Estimate, Layout
 from model.fitting.problem import Problem
+from model.fitting.search import voltage_starts
+from model.fitting.secant import descend_by_secants
 from model.records import ActuatorRecord, FilmRecord, Record
 
 __all__ = ["Bench", "Trial", "information"]
@@ -32,8 +34,15 @@ _FILM_MODEL_ERROR = 5e-3  # of the largest stress: no model of a rubber is bette
 #: s; a branch that relaxes faster than the excitation shows is a drag, and is sought as one
 FASTEST_BRANCH = 0.1
 _LONGER_THAN_RECORD = 3.0  # a branch slower than so many records is another equilibrium spring
+_STARTS = 5  # of the baseline, from the global search
+_BASELINE = 20  # iterations of its descents
 _SCOUTING = 3  # iterations from each start
 _NOT_WORTH = 0.02  # of what a fit lies behind: promising less, it is left where it is
+_ENDING = 25  # iterations of a fit that others build on
+_ALIKE = 0.5  # of the logarithm of relaxation times: a factor of 1.6
+_ELSEWHERE = (1.0, 4.0, 16.0)  # s, where a branch that is spare may be of use
+_WORTH = 1e-4  # of chi-square: a descent that promises less has ended
+_RIDGE = 1e-3  # of a number's own curvature, so that no segment alone sets it free
 _SEGMENTS = 10  # of time, each predicted by a fit to the others
 
 
@@ -77,9 +86,9 @@ class Trial:
         """How many numbers were fitted."""
         return int(np.count_nonzero(~self.fixed))
 
-    def jacobian(self) -> np.ndarray:
-        """d(residuals)/dx (N, f) over the free numbers."""
-        return self.problem.jacobian(self.x, ~self.fixed)
+    def jacobian(self, quick: bool = False) -> np.ndarray:
+        """d(residuals)/dx (N, f) over the free numbers; ``quick`` by one-sided differences."""
+        return self.problem.jacobian(self.x, ~self.fixed, self.residuals if quick else None)
 
 
 class Bench:
@@ -114,9 +123,26 @@ class Bench:
         return Problem(self.full if full else self.records, layout, self.workers)
 
     def baseline(self, base: Actuator | Strip, progress: Callable[[str, float], None]) -> Trial:
-        """``base`` fitted from a global search."""
+        """``base`` fitted from a global search.
+
+        The locking limits of an actuator stay where no spring stiffens: at a few per cent of strain
+        they could only imitate what is missing.
+        """
         problem = self.problem(replace(base, effects=()))
-        fit, fixed = fit_globally(problem, None, progress)
+        if isinstance(base, Strip):
+            fit, fixed = fit_globally(problem, None, progress)
+        else:
+            fixed = np.zeros(problem.layout.size, dtype=bool)
+            fixed[problem.layout.column("J")] = True
+            fits = []
+            for n, start in enumerate(voltage_starts(problem, progress, _STARTS)):
+                fits.append(descend_by_secants(problem, start, fixed, iterations=8, sure=False))
+                progress("descents", 0.5 * (n + 1) / _STARTS)
+            # two, because the one that leads after a few steps is not always the one that gets down
+            leaders = sorted(fits, key=lambda f: f.cost)[:2]
+            fits = [descend(problem, f.x, fixed, iterations=_BASELINE) for f in leaders]
+            fit = min(fits, key=lambda f: f.cost)
+        progress("descents", 1.0)
         self.simulations += problem.simulations
         return _trial(problem, fit, fixed)
 
@@ -140,26 +166,57 @@ class Bench:
         best = min(scouts, key=lambda f: f.cost)
         behind = max(best.cost - leader, 0.0) * problem.samples
         best = descend_by_secants(
-            problem, best.x, fixed, best.jacobian, gain=max(0.5, _NOT_WORTH * behind)
+            problem,
+            best.x,
+            fixed,
+            best.jacobian,
+            gain=max(0.5, _NOT_WORTH * behind, _WORTH * best.cost * problem.samples),
         )
         self.simulations += problem.simulations
         return _trial(problem, best, fixed)
 
     def settled(self, trial: Trial, iterations: int = 10) -> Trial:
         """``trial`` followed to the end of its valley, on the thinned records."""
-        fit = descend(trial.problem, trial.x, trial.fixed, iterations=iterations, damping=1e-3)
+        # a part of what is left, whatever is left: more would only polish a misfit
+        gain = max(0.5, _WORTH * trial.cost * trial.problem.samples)
+        fit = descend(
+            trial.problem, trial.x, trial.fixed, iterations=iterations, gain=gain, damping=1e-3
+        )
         return _trial(trial.problem, fit, trial.fixed)
+
+    def ended(self, trial: Trial) -> Trial:
+        """``trial`` at the bottom of its valley, or of a better one that a spare branch opens.
+
+        While something was missing, branches gathered where they could imitate it; two that relax
+        alike are one, and the other is of use elsewhere. What others build on must not lack it.
+        """
+        best = self.settled(trial, _ENDING)
+        layout = best.problem.layout
+        starts = _reseeded(layout, best.x)
+        if not starts:
+            return best
+        fits = [
+            descend_by_secants(best.problem, x, best.fixed, iterations=12, sure=False)
+            for x in starts
+        ]
+        other = min(fits, key=lambda f: f.cost)
+        # a few steps do not reach the bottom: nearly as good is promising
+        if other.cost < best.cost * 1.02:
+            again = self.settled(_trial(best.problem, other, best.fixed), _ENDING)
+            return min(best, again, key=lambda t: t.cost)
+        return best
 
     def polished(self, trial: Trial) -> Trial:
         """``trial`` fitted to every sample, to the end."""
         problem = self.problem(trial.model, full=True)
-        fit = descend(problem, trial.x, trial.fixed, iterations=8, gain=0.5, damping=1e-4)
+        gain = max(0.5, _WORTH * trial.cost * problem.samples)
+        fit = descend(problem, trial.x, trial.fixed, iterations=8, gain=gain, damping=1e-4)
         self.simulations += problem.simulations
         return _trial(problem, fit, trial.fixed)
 
     def stage(self, trial: Trial, correlation: float, estimates: bool = False) -> Stage:
         """What the trial comes to, with the correlation time by which samples count."""
-        jac = trial.jacobian()
+        jac = trial.jacobian(quick=not estimates)
         predicted = _left_out(trial, jac)
         scale = trial.problem.sigma
         good = np.isfinite(scale)
@@ -213,6 +270,27 @@ class Bench:
         return tuple(found)
 
 
+def _reseeded(layout: Layout, x: np.ndarray) -> list[np.ndarray]:
+    """Coordinates with one of two branches that relax alike sent to other relaxation times."""
+    values = layout.values(x)
+    times, moduli = layout.column("T"), layout.column("mu")
+    offset = moduli.size - times.size  # without mu_0 where the rest length gives it
+    order = np.argsort(values[times])
+    ratios = np.diff(np.log(values[times][order]))
+    if times.size < 2 or ratios.min() > _ALIKE:
+        return []
+    pair = int(np.argmin(ratios))
+    spare, twin = int(order[pair]), int(order[pair + 1])
+    starts = []
+    for time in _ELSEWHERE:
+        moved = values.copy()
+        moved[moduli[offset + twin]] += moved[moduli[offset + spare]]
+        moved[moduli[offset + spare]] = 0.01 * float(values[moduli].sum())
+        moved[times[spare]] = time
+        starts.append(np.clip(layout.coordinates(moved), layout.lower, layout.upper))
+    return starts
+
+
 def _trial(problem: Problem, fit: LocalFit, fixed: np.ndarray) -> Trial:
     return Trial(problem, fit.x, fixed, fit.residuals, fit.cost, _correlation(problem, fit))
 
@@ -237,6 +315,8 @@ def _thinned(record: Record) -> Record:
         return record
     moving = np.flatnonzero(thin.drive.voltage)
     quiet = thin.displacement[: moving[0] - 1] if moving.size and moving[0] > 100 else np.empty(0)
+    if thin.valid is not None:
+        quiet = quiet[thin.valid[: quiet.size]]
     # a sensor that averages makes noise that thinning does not average away
     return replace(thin, noise=max(thin.noise, float(quiet.std(ddof=1)))) if quiet.size else thin
 
@@ -244,7 +324,8 @@ def _thinned(record: Record) -> Record:
 def _with_model_error(record: Record) -> Record:
     if isinstance(record, ActuatorRecord):
         return record
-    error = _FILM_MODEL_ERROR * float(np.max(np.abs(record.stress)))
+    stress = record.stress if record.valid is None else record.stress[record.valid]
+    error = _FILM_MODEL_ERROR * float(np.max(np.abs(stress)))
     return replace(record, noise=math.hypot(record.noise, error))
 
 
@@ -258,13 +339,14 @@ def _left_out(trial: Trial, jac: np.ndarray) -> np.ndarray:
     edges = np.linspace(0, n, _SEGMENTS + 1).astype(int)
     out = trial.residuals.copy()
     normal = jac.T @ jac
+    reach = trial.problem.layout.reach(trial.x)[~trial.fixed]
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         part, r = jac[low:high], trial.residuals[low:high]
         rest = (normal - part.T @ part) / np.outer(scale, scale)
         w, q = np.linalg.eigh(rest)
-        inverse = (q / np.maximum(w, 1e-8)) @ q.T
+        inverse = (q / (np.maximum(w, 0.0) + _RIDGE)) @ q.T
         # at the optimum the gradient of the others is minus that of the segment
-        step = inverse @ ((part.T @ r) / scale) / scale
+        step = np.clip(inverse @ ((part.T @ r) / scale) / scale, -reach, reach)
         out[low:high] = r + part @ step
     return out

@@ -106,9 +106,9 @@ class Stage:
     """A fitted model and how well it does: ``cost`` is the mean square of residual over noise.
 
     ``train_rms``, and ``selection_rms`` and ``selection_max`` (each segment of time predicted by a
-    fit to the others), are pooled over the training records, in the measured unit. ``criterion`` is the Bayesian
-    information criterion, counting correlated residuals as what they are worth; only differences
-    mean something. ``estimates`` are the model's numbers (with intervals on a step's final form).
+    fit to the others), are pooled over the training records, in the measured unit. ``criterion`` is
+    the Bayesian information criterion, counting correlated residuals as what they are worth; only
+    differences mean something. ``estimates`` are the model's numbers with their intervals.
     """
 
     model: Actuator | Strip

@@ -30,13 +30,14 @@ def signatures(records: Sequence[Record], trial: Trial) -> tuple[Signature, ...]
         part = slice(start, start + record.measured.size)
         start = part.stop
         sigma = trial.problem.sigma[part]
-        # what must not be used counts as nothing
-        residual = np.where(np.isfinite(sigma), -trial.residuals[part] * record.noise, 0.0)
-        found.append(_signature(record, residual))
+        good = np.isfinite(sigma)
+        # what must not be used is shown as nothing, and does not count
+        residual = np.where(good, -trial.residuals[part] * record.noise, 0.0)
+        found.append(_signature(record, residual, good))
     return tuple(found)
 
 
-def _signature(record: Record, residual: np.ndarray) -> Signature:
+def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signature:
     time, noise = record.time, record.noise
     step = float(np.median(np.diff(time)))
     model = record.measured - residual
@@ -62,15 +63,20 @@ def _signature(record: Record, residual: np.ndarray) -> Signature:
         ]
     # standing still is neither loading nor unloading
     moving = np.abs(up) > 0.02 * float(np.max(np.abs(up)) or 1.0)
-    dependences = tuple(_dependence(n, u, q, residual, up, moving) for n, u, q in quantities)
+    used = residual[good]
+    dependences = tuple(
+        _dependence(n, u, q[good], used, up[good], moving[good]) for n, u, q in quantities
+    )
     frequency, density = welch(
         residual, 1.0 / step, nperseg=min(max(time.size // 6, 64), 4096, time.size)
     )
-    rms = float(np.sqrt(np.mean(residual**2)))
+    # masked stretches have no power
+    density = density / float(np.mean(good))
+    rms = float(np.sqrt(np.mean(used**2)))
     along = dependences[1] if isinstance(record, ActuatorRecord) else dependences[0]
     difference = along.loading - along.unloading
     loops = float(np.nanmean(difference)) if np.isfinite(difference).any() else 0.0
-    repeats = _first_less_repeats(record, residual)
+    repeats = _first_less_repeats(record, residual, good)
     is_noise = rms < _NOISE * noise and all(d.explained < _SHARE for d in dependences)
     return Signature(
         record=record.name,
@@ -78,9 +84,9 @@ def _signature(record: Record, residual: np.ndarray) -> Signature:
         residual=residual,
         noise=noise,
         rms=rms,
-        ljung_box_p=_ljung_box(residual),
-        runs_p=_runs(residual),
-        correlation_time=correlation_time(residual) * step,
+        ljung_box_p=_ljung_box(used),
+        runs_p=_runs(used),
+        correlation_time=correlation_time(used) * step,
         frequency=frequency[1:],
         density=density[1:],
         floor_density=2.0 * noise**2 * step,
@@ -153,7 +159,7 @@ def _means(index: np.ndarray, residual: np.ndarray, which: np.ndarray) -> np.nda
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
-def _first_less_repeats(record: Record, residual: np.ndarray) -> float:
+def _first_less_repeats(record: Record, residual: np.ndarray, good: np.ndarray) -> float:
     """RMS of the residual's change from the first period of the drive to the second.
 
     Less what noise gives; NaN where the drive does not repeat itself.
@@ -165,13 +171,17 @@ def _first_less_repeats(record: Record, residual: np.ndarray) -> float:
     first, last = int(active[0]), int(active[-1])
     x = drive[first : last + 1]
     n = x.size
-    spectrum = np.abs(np.fft.rfft(x - x.mean(), 2 * n)) ** 2
-    match = np.fft.irfft(spectrum)[:n] / np.arange(n, 0, -1)
     lags = np.arange(n // 5, n // 2 + 2)
     lags = lags[lags < n]
-    for lag in (int(lags[np.argmax(match[lags])]) + d for d in (0, -1, 1)):
-        if lag < n and np.max(np.abs(x[lag:] - x[:-lag])) < 0.02 * np.max(np.abs(x)):
-            change = residual[first + lag : last + 1] - residual[first : last + 1 - lag]
+    # mean square of x(t + lag) - x(t): a correlation alone would be led astray by the ends
+    energy = np.concatenate([[0.0], np.cumsum(x**2)])
+    match = np.fft.irfft(np.abs(np.fft.rfft(x, 2 * n)) ** 2)[lags]
+    apart = (energy[n] - energy[lags] + energy[n - lags] - 2.0 * match) / (n - lags)
+    lag = int(lags[np.argmin(apart)])
+    if np.max(np.abs(x[lag:] - x[:-lag])) < 0.02 * np.max(np.abs(x)):
+        late, early = slice(first + lag, last + 1), slice(first, last + 1 - lag)
+        change = (residual[late] - residual[early])[good[late] & good[early]]
+        if change.size:
             return math.sqrt(max(float(np.mean(change**2)) - 2.0 * record.noise**2, 0.0))
     return math.nan
 
@@ -195,8 +205,10 @@ def _words(
     if is_noise:
         return tuple(words)
     telling = [d for d in dependences if d.explained > _TELLING]
-    for d in sorted(telling, key=lambda d: -d.explained):
-        words.append(f"{100 * d.explained:.0f} % of it goes with {d.quantity} alone")
+    words += [
+        f"{100 * d.explained:.0f} % of it goes with {d.quantity} alone"
+        for d in sorted(telling, key=lambda d: -d.explained)
+    ]
     if abs(loops) > 0.3 * rms:
         higher = "higher" if loops > 0.0 else "lower"
         words.append(

@@ -26,7 +26,6 @@ __all__ = ["Promise", "Screen", "with_effect"]
 
 _MOMENTS = 40  # sought along the longest record
 _LINES = 400  # frequencies within an effect's bounds
-_SHAPES_MAX = 12
 
 
 @dataclass(frozen=True)
@@ -34,8 +33,8 @@ class Promise:
     """What one effect, in one shape, promises on top of a fitted model.
 
     ``model`` has the effect in it, ``start`` (d,) are the base model's coordinates with the effect
-    at the size that the residual asks for, ``columns`` (N, sizes) the sensitivities to its sizes, ``share`` is the part of the residual's mean square
-    that would go to first order.
+    at the size that the residual asks for, ``columns`` (N, sizes) the sensitivities to its sizes,
+    ``share`` is the part of the residual's mean square that would go to first order.
     """
 
     model: Actuator | Strip
@@ -61,12 +60,16 @@ class Screen:
         self.jacobian = trial.jacobian()
         self._q, _ = np.linalg.qr(self.jacobian)
         self._residual = trial.residuals - self._q @ (self._q.T @ trial.residuals)
-        self._base = trial.residuals * trial.problem.sigma
+        # what must not be used has no residual: 0 times inf would be no number
+        sigma = trial.problem.sigma
+        self._base = np.where(
+            np.isfinite(sigma), trial.residuals * np.where(np.isfinite(sigma), sigma, 0.0), 0.0
+        )
         self._weight = 1.0 / trial.problem.sigma
 
     def promises(self, effect: Effect) -> list[Promise]:
         """Promises of ``effect``, best first: one for each shape on its grid."""
-        shapes = list(product(*(self._starts(p) for p in effect.shapes)))[: _SHAPES_MAX * 8]
+        shapes = list(product(*(self._starts(p) for p in effect.shapes)))
         found = self._scored(effect, shapes)
         if any(p.part_of == "duration" for p in effect.shapes):
             best = max(found, key=lambda p: p.share)
@@ -84,7 +87,10 @@ class Screen:
         records = self.bench.records
         starts = list(parameter.starts)
         if parameter.part_of == "displacement":
-            largest = max(float(np.max(r.measured)) for r in records)
+            largest = max(
+                float(np.max(r.measured if r.valid is None else r.measured[r.valid]))
+                for r in records
+            )
             starts = [s * largest for s in starts]
         elif parameter.part_of == "voltage":
             largest = max(
@@ -152,11 +158,9 @@ class Screen:
             columns = (there[part] * self._weight).T / probes
             across = columns - self._q @ (self._q.T @ columns)
             size, share = self._solve(across, columns, total)
-            size = np.array(
-                [min(max(s, p.bounds[0]), p.bounds[1]) for s, p in zip(size, sizes, strict=True)]
-            )
-            values = np.concatenate([base_values, size, shape])
-            start = np.clip(layout.coordinates(values), layout.lower, layout.upper)
+            size = np.clip(size, [p.bounds[0] for p in sizes], [p.bounds[1] for p in sizes])
+            there_too = np.concatenate([base_values, size, shape])
+            start = np.clip(layout.coordinates(there_too), layout.lower, layout.upper)
             found.append(Promise(models[n * per], start, columns, share))
         return found
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -24,7 +23,7 @@ from model.diagnosis.residual import signatures
 from model.diagnosis.screening import Promise, Screen, is_of
 from model.diagnosis.stress import missing_stress
 from model.diagnosis.unnamed import describe_unnamed
-from model.effects import EFFECTS
+from model.effects import EFFECTS, Effect
 from model.film import Strip
 from model.records import ActuatorRecord, Record
 
@@ -36,13 +35,13 @@ _EFFECTS_MAX = 3  # more at once no record of this kind tells apart
 _DECISIVE = 12.0  # of the information criterion: odds of e^6, over some forty candidates
 _ALIKE = 10.0  # of the same: candidates nearer than that are not told apart
 _MATTERS = 0.01  # of the noise's mean square: less is not worth an effect
-_BEAM = 3  # how many explanations are followed on
+_BEAM = 2  # how many explanations are followed on
 _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed on
 _SETTLED = 4  # leading candidates that are fitted to the end of their valleys
 _UNNAMED_MARGIN = (
     20.0  # of the criterion, by which an unnamed effect must be better than named ones
 )
-_FOLLOWED = 7  # candidates refitted in later rounds, the most promising ones
+_FOLLOWED = 6  # candidates refitted in later rounds, the most promising ones
 _NOISE_RMS = (
     1.08  # residual over noise that still is noise: the noise itself is known to some per cent
 )
@@ -64,7 +63,7 @@ class _Tried:
 
     name: str
     parent: Trial
-    trial: Trial | None
+    trial: Trial
     promised: float
 
 
@@ -107,6 +106,7 @@ class _Search:
         self.rounds: list[Round] = []
         self.found: dict[frozenset[str], Trial] = {}
         self.settled: set[frozenset[str]] = set()
+        self.ended: set[frozenset[str]] = set()
         self.interrupted = False
         self.held = False
 
@@ -114,17 +114,19 @@ class _Search:
 
     def run(self) -> Diagnosis:
         self.report("baseline", 0.0)
-        baseline = self.bench.baseline(self.base, lambda _, f: self.report("baseline", 0.1 * f))
+        baseline = self.bench.baseline(
+            self.base,
+            lambda s, f: self.report("baseline", 0.05 * (f + (s == "descents"))),
+        )
         baseline = self._timed(baseline)
         self.found[frozenset()] = baseline
-        best, tried = baseline, []
+        best = baseline
         try:
-            best, tried = self._search(baseline)
-            best = self._pruned(best)
+            best = self._pruned(self._search(baseline))
         except _Interrupted:
             self.interrupted = True
             best = self._leading()
-        return self._finding(baseline, best, tried)
+        return self._finding(baseline, best)
 
     def _timed(self, baseline: Trial) -> Trial:
         """The baseline of a voltage that stands between samples, where that is all that is missing.
@@ -143,7 +145,7 @@ class _Search:
             if isinstance(r, ActuatorRecord)
         ]
         bench = Bench(held, self.bench.workers)
-        trial = bench.baseline(self.base, lambda _, f: self.report("baseline", 0.1))
+        trial = bench.baseline(self.base, lambda *_: self.report("baseline", 0.1))
         self.bench.simulations += bench.simulations
         if not self._is_noise(trial) or trial.cost > baseline.cost - _MATTERS:
             return baseline
@@ -151,32 +153,42 @@ class _Search:
         self.bench, self.held = bench, True
         return trial
 
-    def _search(self, baseline: Trial) -> tuple[Trial, list[_Tried]]:
+    def _search(self, baseline: Trial) -> Trial:
         best, beam = baseline, [baseline]
-        deciding: list[_Tried] = []
         for depth in range(_EFFECTS_MAX):
             tried: list[_Tried] = []
             for i, parent in enumerate(beam):
                 span = (0.1 + 0.28 * (depth + i / len(beam)), 0.28 / len(beam))
                 tried += self._round(parent, depth, span)
-            fitted = [t for t in tried if t.trial is not None]
-            if not fitted:
+            if not tried:
                 break
-            fitted, correlation = self._settled(best, fitted)
+            fitted, correlation = self._settled(best, tried)
             leader = fitted[0].trial
             gain = self._criterion(best, correlation) - self._criterion(leader, correlation)
             matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
-            taken = gain > _DECISIVE and matters
-            unfitted = [t for t in tried if t.trial is None]
-            chosen = fitted[0] if taken else None
-            self._record(best, [*fitted, *unfitted], correlation, chosen, gain)
+            taken = gain > self._asked(fitted[0].name) and matters
+            self._record(best, fitted, correlation, fitted[0] if taken else None, gain)
             if not taken:
                 break
-            best, deciding = leader, fitted
-            beam = self._beam(fitted)
+            best = self._ended(leader)
             if self._is_noise(best):
                 break
-        return best, deciding
+            beam = [self._ended(t) for t in self._beam(fitted)]
+        return best
+
+    def _ended(self, trial: Trial) -> Trial:
+        """``trial`` at the bottom of its valley: what is built on it must not make up for it."""
+        key = frozenset(trial.effects)
+        if key not in self.ended:
+            self.ended.add(key)
+            self.settled.add(key)
+            self.found[key] = self.bench.ended(trial)
+        return self.found[key]
+
+    @staticmethod
+    def _asked(name: str) -> float:
+        """Gain of the criterion that is asked for: more of an effect that names no cause."""
+        return _DECISIVE + (_UNNAMED_MARGIN if EFFECTS[name].family == "unknown" else 0.0)
 
     def _round(self, parent: Trial, depth: int, span: tuple[float, float]) -> list[_Tried]:
         """All effects on top of ``parent``: promises of all, refits of all or the best of them."""
@@ -191,7 +203,9 @@ class _Search:
             )
         order = sorted((n for n, p in promises.items() if p), key=lambda n: -promises[n][0].share)
         refitted = order if depth == 0 else order[:_FOLLOWED]
-        tried = [_Tried(n, parent, None, promises[n][0].share) for n in order if n not in refitted]
+        # the simpler of a family first: the others start from it too
+        refitted = sorted(refitted, key=lambda n: len(EFFECTS[n].parameters))
+        tried = []
         for n, name in enumerate(refitted):
             self._check()
             key = frozenset((*parent.effects, name))
@@ -216,7 +230,7 @@ class _Search:
         # of shapes, and far from the base model, the sensitivities are not known yet
         shapes = np.full((jacobian.shape[0], len(effect.shapes)), np.nan)
         sizes = np.full((jacobian.shape[0], len(effect.sizes)), np.nan)
-        starts = []
+        starts: list[tuple[np.ndarray, np.ndarray | None]] = []
         for promise in promises[: 2 if effect.shapes else 1]:
             # from nothing: the first step, which all numbers take together, is the linear guess
             start = promise.start.copy()
@@ -229,6 +243,9 @@ class _Search:
             sign = -1.0 if larger[j] < neutral else 1.0
             larger[j] = np.clip(neutral + 3.0 * sign * reach, *p.bounds)
         starts.append((larger, np.column_stack([jacobian, sizes, shapes])))
+        simpler = self._simpler(parent, effect, promises[0].start)
+        if simpler is not None:
+            starts.append((simpler, None))
         fixed = np.concatenate([parent.fixed, np.zeros(len(effect.parameters), dtype=bool)])
         leader = min(t.cost for t in self.found.values())
         return self.bench.fit(model, starts, fixed, leader)
@@ -241,20 +258,15 @@ class _Search:
         """
 
         def rank(tried: _Tried) -> float:
-            trial = tried.trial
-            if trial is None:
-                return math.inf
             unnamed = EFFECTS[tried.name].family == "unknown"
-            return self._criterion(trial, correlation) + (_UNNAMED_MARGIN if unnamed else 0.0)
+            margin = _UNNAMED_MARGIN if unnamed else 0.0
+            return self._criterion(tried.trial, correlation) + margin
 
-        trials = [t.trial for t in fitted if t.trial is not None]
-        correlation = self._correlation([best, *trials])
+        correlation = self._correlation([best, *(t.trial for t in fitted)])
         order = sorted(fitted, key=rank)
         settled: dict[frozenset[str], Trial] = {}
-        for n, tried in enumerate(order):
+        for tried in order[:_SETTLED]:
             self._check()
-            if n >= _SETTLED or tried.trial is None:
-                continue
             key = frozenset(tried.trial.effects)
             if key not in settled and key not in self.settled:
                 settled[key] = self.bench.settled(tried.trial)
@@ -267,13 +279,39 @@ class _Search:
         correlation = self._correlation([best, *(t.trial for t in order if t.trial is not None)])
         return sorted(order, key=rank), correlation
 
+    def _simpler(self, parent: Trial, effect: Effect, start: np.ndarray) -> np.ndarray | None:
+        """Coordinates of the best fit of a simpler effect of the family, as a start for this one.
+
+        Numbers that both have (by name and unit) are taken over, the others are as in ``start``.
+        """
+        best: Trial | None = None
+        for name in {n for key in self.found for n in key} - set(parent.effects):
+            other = EFFECTS[name]
+            trial = self.found.get(frozenset((*parent.effects, name)))
+            simpler = len(other.parameters) < len(effect.parameters)
+            if other.family != effect.family or not simpler or trial is None:
+                continue
+            if trial.effects[:-1] == parent.effects and (best is None or trial.cost < best.cost):
+                best = trial
+        if best is None:
+            return None
+        first = start.size - len(effect.parameters)
+        known = EFFECTS[best.effects[-1]].parameters
+        taken = start.copy()
+        taken[:first] = best.x[:first]
+        for j, p in enumerate(effect.parameters, start=first):
+            for i, q in enumerate(known, start=first):
+                if (p.name, p.unit, p.logarithmic) == (q.name, q.unit, q.logarithmic):
+                    taken[j] = best.x[i]
+        return taken
+
     def _beam(self, fitted: list[_Tried]) -> list[Trial]:
         """The explanations to follow on: the best of different families."""
         beam: list[Trial] = []
         seen: set[frozenset[str]] = set()
         for tried in fitted:
             trial = tried.trial
-            if trial is None or trial.cost > _BEAM_COST * fitted[0].trial.cost:
+            if trial.cost > _BEAM_COST * fitted[0].trial.cost:
                 continue
             families = frozenset(EFFECTS[n].family for n in trial.effects)
             if families not in seen:
@@ -287,27 +325,31 @@ class _Search:
         """``best`` without what it does not need."""
         while len(best.effects) > 1:
             self._check()
-            smaller = [self._without(best, name) for name in best.effects]
-            correlation = self._correlation([best, *smaller])
-            least = min(smaller, key=lambda t: self._criterion(t, correlation))
-            loss = self._criterion(least, correlation) - self._criterion(best, correlation)
-            if loss > _DECISIVE:
+            smaller = {name: self._ended(self._without(best, name)) for name in best.effects}
+            correlation = self._correlation([best, *smaller.values()])
+            mark = self._criterion(best, correlation)
+            spare = {
+                name: self._criterion(t, correlation) - mark - self._asked(name)
+                for name, t in smaller.items()
+            }
+            least = min(spare, key=lambda n: spare[n])
+            if spare[least] > 0.0:
                 break
-            best = least
+            best = smaller[least]
         return best
 
     def _without(self, trial: Trial, name: str) -> Trial:
         key = frozenset(trial.effects) - {name}
-        if key not in self.found:
+        if key not in self.ended:
             model = replace(
                 trial.model, effects=tuple(e for e in trial.model.effects if e[0] != name)
             )
             layout = self.bench.problem(model).layout
             fixed = self.found[frozenset()].fixed
             fixed = np.concatenate([fixed, np.zeros(layout.size - fixed.size, dtype=bool)])
-            self.found[key] = self.bench.fit(
-                model, [(layout.coordinates(layout.initial()), None)], fixed
-            )
+            fresh = self.bench.fit(model, [(layout.coordinates(layout.initial()), None)], fixed)
+            known = self.found.get(key, fresh)
+            self.found[key] = min(known, fresh, key=lambda t: t.cost)
         return self.found[key]
 
     # -- judgement
@@ -349,13 +391,11 @@ class _Search:
         of_parent = [t for t in tried if t.parent is parent]
         base_criterion = self._criterion(parent, correlation)
         best = min(
-            (self._criterion(t.trial, correlation) for t in of_parent if t.trial is not None),
+            (self._criterion(t.trial, correlation) for t in of_parent),
             default=base_criterion,
         )
         candidates = []
         for t in of_parent:
-            if t.trial is None:
-                continue
             effect = EFFECTS[t.name]
             criterion = self._criterion(t.trial, correlation)
             behind = criterion - best
@@ -395,14 +435,14 @@ class _Search:
             Round(parent.effects, tuple(candidates), chosen.name if chosen else None, reason)
         )
 
-    def _finding(self, baseline: Trial, best: Trial, tried: list[_Tried]) -> Diagnosis:
+    def _finding(self, baseline: Trial, best: Trial) -> Diagnosis:
         self.report("final fits", 0.94)
         first = self.bench.polished(baseline)
         last = self.bench.polished(best) if best.effects else first
         correlation = max(1.0, last.correlation)
         stage0 = self.bench.stage(first, correlation, estimates=True)
         final = self.bench.stage(last, correlation, estimates=True)
-        steps, rivals = self._steps(best, last, final, correlation)
+        steps, rivals = self._steps(best, last, correlation)
         before = signatures(self.bench.full, first)
         after = signatures(self.bench.full, last)
         missing_before = missing_stress(self.bench.full, first.model)
@@ -448,7 +488,7 @@ class _Search:
         )
 
     def _steps(
-        self, best: Trial, last: Trial, final: object, correlation: float
+        self, best: Trial, last: Trial, correlation: float
     ) -> tuple[list[Step], list[tuple[str, Actuator | Strip]]]:
         """The effects of ``best``, the one that explains most first, each with its evidence."""
         names = best.effects
@@ -529,10 +569,7 @@ def _stage(parent: Trial, what: str) -> str:
 
 
 def _note(tried: _Tried, parent: Trial) -> str:
-    trial = tried.trial
-    if trial is None:
-        return ""
-    gained = 1.0 - trial.cost / parent.cost
+    gained = 1.0 - tried.trial.cost / parent.cost
     if tried.promised < 0.1 < gained:
         return "the baseline's own numbers hide it: it shows only when all are fitted anew"
     return ""

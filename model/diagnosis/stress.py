@@ -15,7 +15,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from model.actuator import Actuator, at_rest
-from model.coefficients import ELECTRIC, EFFECTS_AT, INERTIA, MODULUS, WIDTH
+from model.coefficients import EFFECTS_AT, ELECTRIC, INERTIA, MODULUS, WIDTH
 from model.diagnosis.findings import MissingStress
 from model.effects import MEMORY, NEUTRAL, SLOTS, assembly
 from model.film import Strip, unit_stresses
@@ -44,6 +44,13 @@ def missing_stress(records: Sequence[Record], model: Actuator | Strip) -> tuple[
     return tuple(found)
 
 
+def _bridged(record: Record, residual: np.ndarray) -> np.ndarray:
+    """``residual`` (N,) straight across readings that must not be used."""
+    if record.valid is None or not record.valid.any():
+        return residual
+    return np.interp(record.time, record.time[record.valid], residual[record.valid])
+
+
 def _of_film(record: FilmRecord, model: Strip) -> MissingStress | None:
     answer = model.simulate(record.time, record.stretch)
     if not answer.ok:
@@ -52,7 +59,7 @@ def _of_film(record: FilmRecord, model: Strip) -> MissingStress | None:
     return MissingStress(
         record=record.name,
         time=record.time,
-        stress=record.stress - answer.stress,
+        stress=_bridged(record, record.stress - answer.stress),
         stretch=record.stretch,
         rate=np.gradient(record.stretch, record.time),
         voltage=np.zeros_like(record.time),
@@ -84,7 +91,8 @@ def _of_actuator(record: ActuatorRecord, model: Actuator) -> MissingStress | Non
         network = c[HEAD + MODULUS :: WIDTH] @ parts
         return network + c[INERTIA] * bend, stretch, rate
 
-    measured, stretch, rate = lacking(record.displacement)
+    residual = _bridged(record, record.displacement - response.displacement)
+    measured, stretch, rate = lacking(response.displacement + residual)
     predicted, there, _ = lacking(response.displacement)
     late = np.interp(time - record.lag, time, record.drive.voltage)
     maxwell = c[ELECTRIC] * gaussian_filter1d(late**2, width, mode="nearest")

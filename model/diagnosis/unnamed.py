@@ -33,10 +33,7 @@ def describe_unnamed(
     own = [s for s in steps if s.family == "unknown"]
     look = "; ".join(f"{s.record}: {', '.join(s.words)}" for s in after)
     if own:
-        numbers = "; ".join(
-            f"{s.effect} ({', '.join(f'{e.name} = {e.value:.4g} {e.unit}'.strip() for e in s.estimates)})"
-            for s in own
-        )
+        numbers = "; ".join(f"{s.effect} ({_values(s)})" for s in own)
         words = "; ".join(EFFECTS[s.effect].words for s in own)
         return Unnamed(own[0].acts_on, numbers, f"{words}. What is left: {look}")
     if not missing:
@@ -52,6 +49,10 @@ def describe_unnamed(
         f"the formula explains {100 * share:.0f} % of the missing stress in stretches of time that "
         f"it was not fitted to. {look}",
     )
+
+
+def _values(step: Step) -> str:
+    return ", ".join(f"{e.name} = {e.value:.4g} {e.unit}".strip() for e in step.estimates)
 
 
 def _where(after: Sequence[Signature]) -> str:

@@ -85,10 +85,10 @@ def identify(
 
     ``base`` is an ``Actuator`` for records driven by voltage (its film and load are kept), a
     ``Strip`` for films driven by stretch. The values of its springs are not used as a start, only
-    the number of branches and the kinds of spring; the numbers of its effects are. ``seed`` matters to "de"
-    only. ``nested`` is a fit with fewer branches, from which one more descent starts, so that more
-    branches never fit worse. ``progress(stage, fraction)`` is called often. Raises ``ModelError``
-    for records and models that do not fit together.
+    the number of branches and the kinds of spring; the numbers of its effects are. ``seed`` matters
+    to "de" only. ``nested`` is a fit with fewer branches, from which one more descent starts, so
+    that more branches never fit worse. ``progress(stage, fraction)`` is called often. Raises
+    ``ModelError`` for records and models that do not fit together.
     """
     if method not in METHODS:
         raise ModelError(f"method {method!r} is not one of {', '.join(METHODS)}")

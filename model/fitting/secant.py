@@ -8,7 +8,6 @@ the direction gone, and it is computed anew only where it has led astray or noth
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import eigh
 
 from model.fitting.levenberg import LocalFit
 from model.fitting.problem import Problem
@@ -22,6 +21,28 @@ _CARRIED = 5  # steps by secants, then the Jacobian is computed anew
 _ASTRAY = 0.25  # of the gain that was promised: less, and the Jacobian is computed anew
 
 
+def _boxed(
+    normal: np.ndarray, gradient: np.ndarray, damping: float, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Damped least-squares step (f,) within a box: what would leave it goes to its side.
+
+    The others then know: clipped afterwards, a step along a narrow valley would leave the valley.
+    """
+    n = gradient.size
+    step = np.zeros(n)
+    inside = np.ones(n, dtype=bool)
+    for _ in range(n):
+        a = normal[np.ix_(inside, inside)] + damping * np.eye(int(inside.sum()))
+        aside = normal[np.ix_(inside, ~inside)] @ step[~inside]
+        step[inside] = -np.linalg.solve(a, gradient[inside] + aside)
+        out = inside & ((step < low) | (step > high))
+        if not out.any():
+            break
+        step[out] = np.clip(step[out], low[out], high[out])
+        inside &= ~out
+    return step
+
+
 def descend_by_secants(
     problem: Problem,
     start: np.ndarray,
@@ -33,9 +54,9 @@ def descend_by_secants(
 ) -> LocalFit:
     """From ``start`` (d,) down, the numbers ``fixed`` (d,) held, inside the layout's bounds.
 
-    ``jacobian`` (N, f) is one known near the start, None to compute it; columns of NaN in it are
-    computed. Ends where the quadratic
-    model promises less than ``gain`` in chi-square: with ``sure`` only by a Jacobian of that place.
+    ``jacobian`` (N, f) is one known near the start, None to compute it; columns of it that are not
+    finite are computed. Ends where the quadratic model promises less than ``gain`` in chi-square:
+    with ``sure`` only by a Jacobian of that place.
     """
     layout = problem.layout
     free = ~fixed
@@ -43,8 +64,8 @@ def descend_by_secants(
     costs, residuals = problem.evaluate(x[None])
     r, chi2 = residuals[0], float(costs[0]) * problem.samples
     jac, fresh = jacobian, False
-    if jac is not None and not np.isfinite(jac[0]).all():
-        unknown = np.isnan(jac[0])
+    if jac is not None and not np.isfinite(jac).all():
+        unknown = ~np.isfinite(jac).all(axis=0)
         which = free.copy()
         which[free] = unknown
         jac = jac.copy()
@@ -54,27 +75,22 @@ def descend_by_secants(
         if jac is None:
             jac, fresh, carried = problem.jacobian(x, free, r), True, 0
         done += 1
-        gradient = jac.T @ r
         scale = np.linalg.norm(jac, axis=0)
+        scale = np.where(scale > 0.0, scale, np.inf)  # what is not seen does not move
+        normal, gradient = (jac / scale).T @ (jac / scale), (jac / scale).T @ r
         part, reach = x[free], layout.reach(x)[free]
-        stuck = ((part <= layout.lower[free]) & (gradient > 0.0)) | (
-            (part >= layout.upper[free]) & (gradient < 0.0)
-        )
-        move = ~stuck & (scale > 0.0)
-        moving = jac[:, move] / scale[move]
-        w, q = eigh(moving.T @ moving)
-        target = q.T @ (gradient[move] / scale[move])
-        if float(np.sum(target**2 / np.maximum(w, _FLAT))) < gain:
+        finite = np.where(np.isfinite(scale), scale, 0.0)
+        low = np.maximum(layout.lower[free] - part, -reach) * finite
+        high = np.minimum(layout.upper[free] - part, reach) * finite
+        best_step = _boxed(normal, gradient, _FLAT, low, high)
+        if -float(best_step @ (2.0 * gradient + normal @ best_step)) < gain:
             if fresh or not sure:
                 converged = True
                 break
             jac = None
             continue
         dampings = damping * _DAMPINGS
-        inverse = 1.0 / (np.maximum(w, 0.0) + dampings[:, None])
-        steps = np.zeros((dampings.size, part.size))
-        steps[:, move] = -((inverse * target) @ q.T) / scale[move]
-        steps /= np.maximum(1.0, np.max(np.abs(steps) / reach, axis=1))[:, None]
+        steps = np.array([_boxed(normal, gradient, d, low, high) for d in dampings]) / scale
         trials = np.tile(x, (dampings.size, 1))
         trials[:, free] = np.clip(part + steps, layout.lower[free], layout.upper[free])
         costs, residuals = problem.evaluate(trials)
@@ -93,7 +109,7 @@ def descend_by_secants(
         bent = residuals[best] - r - jac @ step
         straight = r + jac @ step
         promised = chi2 - float(straight @ straight)
-        length2 = float(np.sum((step * np.maximum(scale, 1e-300)) ** 2))
+        length2 = float(np.sum((step * finite) ** 2))
         astray = chi2 - better < _ASTRAY * promised
         x, r, chi2 = trials[best], residuals[best], better
         damping = max(dampings[best], 1e-9)
@@ -102,7 +118,7 @@ def descend_by_secants(
             jac = None
             continue
         # the secant: what the step showed, in the direction gone
-        jac = jac + np.outer(bent, step * scale**2 / max(length2, 1e-300))
+        jac = jac + np.outer(bent, step * finite**2 / max(length2, 1e-300))
         fresh = False
     if jac is None:
         # given up just after it led astray: whoever goes on from here computes it

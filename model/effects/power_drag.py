@@ -1,0 +1,40 @@
+"""Drag that grows with a power of the rate: a plate moving through air or oil.
+
+The nominal stress d |lam'/r|^n sign(lam'), r = 0.1/s, acts against the motion: n is 2 where inertia
+of the fluid rules, as rho C_d A (L1 lam')^2/2, 1 where its viscosity does, and between in between.
+"""
+
+from __future__ import annotations
+
+import math
+
+from model.effects.description import Effect, Parameter
+from model.jit import jit
+
+__all__ = ["EFFECT", "stiffness", "stress"]
+
+EFFECT = Effect(
+    name="power-law drag",
+    family="drag",
+    acts_on="load",
+    words="a force against the motion that grows with a power of its rate",
+    parameters=(
+        Parameter("drag", "Pa", (0.0, 1e4), "nominal stress at a rate of 0.1/s", 50.0, 0.0),
+        Parameter("exponent", "", (1.0, 3.0), "of the rate", 0.3, starts=(2.0, 1.5)),
+    ),
+)
+
+_REFERENCE = 0.1  # 1/s
+_DRIVE = 3e3  # Pa: a Maxwell stress of 8 MV/m
+
+
+@jit
+def stress(c, k, m, j, lam, rate, lam0, since, t):
+    return math.copysign(c[k] * (abs(rate) / _REFERENCE) ** c[k + 1], rate)
+
+
+@jit
+def stiffness(c, k, m, j, lam):
+    # at the greatest rate: that of a fast edge, or the one at which drag alone holds the drive
+    greatest = min(0.5, _REFERENCE * (_DRIVE / max(c[k], 1e-3)) ** (1.0 / c[k + 1]))
+    return 0.0, c[k] * c[k + 1] / _REFERENCE * (greatest / _REFERENCE) ** (c[k + 1] - 1.0)

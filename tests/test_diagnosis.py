@@ -1,0 +1,349 @@
+"""Whole diagnoses of made data: what was hidden is found, and where nothing is, nothing is."""
+
+from __future__ import annotations
+
+import builtins
+import functools
+import io
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from model.actuator import Actuator, Drive
+from model.diagnosis import Diagnosis, diagnose
+from model.diagnosis.findings import (
+    EXPLAINED,
+    NOTHING_MISSING,
+    PARTLY_EXPLAINED,
+    UNEXPLAINED,
+)
+from model.effects import EFFECTS
+from model.errors import ModelError
+from model.excitation import Sequence
+from model.material import TABLE_3
+from model.records import ActuatorRecord
+from tests.engine_tools import (
+    NOISE,
+    PLAIN,
+    STRIP,
+    effect,
+    film_record_of,
+    masked,
+    record_of,
+    thesis_drive,
+)
+
+HIDDEN = {
+    "load inertia": {"moving_mass": 0.2},
+    "dry friction": {"friction": 50.0, "presliding": 1e-4},
+    "sensor curvature": {"quadratic": 15.0},
+    "mains interference": {
+        "cosine": 3e-6, "sine": 2e-6, "third_cosine": 1e-6, "third_sine": 0.0, "frequency": 49.97,
+    },
+}  # fmt: skip
+# what a rate of 100 Hz tells of 50 Hz and its harmonic: their sines lie between the samples
+HARDLY_SEEN = {"sine", "third_sine"}
+
+
+def plant(name: str) -> Actuator:
+    return replace(PLAIN, effects=effect(name, **HIDDEN[name]))
+
+
+@functools.cache
+def of_hidden(name: str) -> Diagnosis:
+    return diagnose([record_of(plant(name))], PLAIN, workers=1)
+
+
+@functools.cache
+def of_clean() -> Diagnosis:
+    return diagnose([record_of(PLAIN)], PLAIN, workers=1)
+
+
+@functools.cache
+def of_slack() -> Diagnosis:
+    strip = replace(STRIP, effects=effect("slack", looseness=1.0))
+    return diagnose([film_record_of(strip)], STRIP, workers=1)
+
+
+def require_nothing(found: Diagnosis) -> None:
+    assert found.verdict == NOTHING_MISSING
+    assert found.steps == ()
+    assert found.unnamed is None
+    assert found.rivals == ()
+    assert found.final.model.effects == ()
+    assert found.final.cost == pytest.approx(1.0, abs=0.1)
+    assert all(s.is_noise for s in found.after)
+    assert not found.interrupted
+    assert all(r.chosen is None for r in found.rounds)
+
+
+def require_consistent(found: Diagnosis) -> None:
+    """What holds of every diagnosis."""
+    assert found.verdict in (NOTHING_MISSING, EXPLAINED, PARTLY_EXPLAINED, UNEXPLAINED)
+    assert found.simulations > 0
+    assert found.baseline.model.effects == ()
+    assert {n for n, _ in found.final.model.effects} == {s.effect for s in found.steps}
+    assert found.final.cost <= found.baseline.cost * (1.0 + 1e-6)
+    costs = [found.baseline.cost, *(s.stage.cost for s in found.steps)]
+    assert all(b < a for a, b in pairwise(costs))
+    assert {f for f, _ in found.rivals} == {
+        f for s in found.steps for f in s.indistinguishable_from
+    }
+    for step in found.steps:
+        e = EFFECTS[step.effect]
+        assert (step.family, step.acts_on) == (e.family, e.acts_on)
+        assert [x.name for x in step.estimates] == [p.name for p in e.parameters]
+        values = dict(dict(found.final.model.effects)[step.effect])
+        for x in step.estimates:
+            assert x.low <= x.value <= x.high
+            assert x.value == pytest.approx(values[x.name])
+        assert step.family not in step.indistinguishable_from
+        assert step.evidence
+    for one in found.rounds:
+        behind = [c.behind for c in one.candidates]
+        assert behind == sorted(behind)
+        chosen = [c.effect for c in one.candidates if c.verdict == "chosen"]
+        assert chosen == ([one.chosen] if one.chosen else [])
+        assert one.reason
+
+
+# --- nothing is missing
+
+
+def test_clean_data_lack_nothing():
+    found = of_clean()
+    require_nothing(found)
+    require_consistent(found)
+    assert not found.held
+    assert found.final.train_rms == pytest.approx(NOISE, rel=0.05)
+    (moduli,) = ([e for e in found.final.estimates if e.name == f"mu_{i}"] for i in (1,))
+    assert moduli[0].value == pytest.approx(60e3, rel=0.01)
+
+
+def test_clean_data_of_the_thesiss_own_network_lack_nothing():
+    thesis = replace(PLAIN, network=TABLE_3)
+    require_nothing(diagnose([record_of(thesis)], thesis, workers=1))
+
+
+def test_clean_films_lack_nothing():
+    found = diagnose([film_record_of(STRIP)], STRIP, workers=1)
+    require_consistent(found)
+    assert found.verdict == NOTHING_MISSING
+    assert found.steps == ()
+
+
+# --- one effect is
+
+
+@pytest.mark.parametrize("name", HIDDEN)
+def test_what_was_hidden_is_found(name):
+    found = of_hidden(name)
+    require_consistent(found)
+    assert found.verdict == EXPLAINED
+    (step,) = found.steps
+    assert step.family == EFFECTS[name].family
+    assert step.effect == name
+    assert found.rounds[0].chosen == name
+    assert found.rounds[0].candidates[0].effect == name
+    # the springs alone leave more than noise, with it nothing is left but noise
+    assert not found.before[0].is_noise
+    assert found.after[0].is_noise
+    assert found.baseline.cost > 4.0
+    assert found.final.cost == pytest.approx(1.0, abs=0.1)
+    assert found.unnamed is None
+
+
+@pytest.mark.parametrize("name", HIDDEN)
+def test_its_numbers_are_the_true_ones(name):
+    (step,) = of_hidden(name).steps
+    for e in step.estimates:
+        true = HIDDEN[name][e.name]
+        # intervals are of 95 %: the truth may be a little outside
+        low, high = (e.value + 1.6 * (end - e.value) for end in (e.low, e.high))
+        assert low <= true <= high, e.name
+        if e.name not in HARDLY_SEEN:
+            assert e.determined
+            assert e.value == pytest.approx(true, rel=0.05), e.name
+
+
+@pytest.mark.parametrize("name", HIDDEN)
+def test_its_model_predicts_what_it_has_not_seen(name):
+    # the thesis's own validation, another noise, at the same rate: mains keep their phase
+    drive = Drive(*Sequence.thesis(frequencies=(0.6,) * 5, periods=1).sample(100.0))
+    other = record_of(plant(name), drive, seed=99)
+    errors = [
+        np.sqrt(np.mean((s.model.simulate(drive).displacement - other.displacement) ** 2))
+        for s in (of_hidden(name).baseline, of_hidden(name).final)
+    ]
+    assert errors[0] > 1.8 * NOISE
+    assert errors[1] < 1.1 * NOISE
+
+
+@pytest.mark.parametrize("name", HIDDEN)
+def test_every_family_was_tried(name):
+    first = of_hidden(name).rounds[0]
+    assert first.base == ()
+    tried = {c.family for c in first.candidates}
+    wanted = {e.family for e in EFFECTS.values() if "voltage" in e.drives} - {"thermal"}
+    assert wanted <= tried
+    chosen = first.candidates[0]
+    assert chosen.gained > 0.7
+    assert chosen.gain > 100.0
+    # none that would do as well was passed over
+    for c in first.candidates[1:]:
+        assert c.verdict != "indistinguishable"
+        assert c.stage.cost >= chosen.stage.cost * 0.999
+
+
+def test_missing_stress_is_there_before_and_gone_after():
+    found = of_hidden("dry friction")
+    before, after = found.missing_before[0], found.missing_after[0]
+    # friction of 50 Pa one way or the other, most of which the springs could not play
+    assert 10.0 < np.sqrt(np.mean(before.stress**2)) < 50.0
+    assert np.sqrt(np.mean(after.stress**2)) < 3.0
+
+
+def test_effects_that_look_the_same_are_named_as_such():
+    truth = replace(PLAIN, effects=effect("linear drag", drag=400.0))
+    found = diagnose([record_of(truth)], PLAIN, workers=1)
+    require_consistent(found)
+    assert found.verdict == EXPLAINED
+    (step,) = found.steps
+    assert "drag" in (step.family, *step.indistinguishable_from)
+    # a slow film under slow lobes: a drag, a sensor and an amplifier that are late are one
+    assert {step.family, *step.indistinguishable_from} >= {"drag", "sensor_lag", "amplifier"}
+    record = record_of(truth)
+    for _, rival in found.rivals:
+        left = rival.simulate(record.drive).displacement - record.displacement
+        assert np.sqrt(np.mean(left**2)) < 1.1 * NOISE
+        assert rival.effects != found.final.model.effects
+
+
+def test_what_no_family_covers_is_described():
+    truth = replace(PLAIN, effects=effect("sudden change of force", stress=30.0, moment=6.3))
+    found = diagnose([record_of(truth)], PLAIN, workers=1)
+    require_consistent(found)
+    (step,) = found.steps
+    assert step.family == "unknown"
+    numbers = {e.name: e.value for e in step.estimates}
+    assert numbers["moment"] == pytest.approx(6.3, abs=0.02)
+    assert numbers["stress"] == pytest.approx(30.0, rel=0.03)
+    assert "sudden change of force" in found.unnamed.expression
+    assert found.unnamed.acts_on == "load"
+
+
+def test_a_slack_strip_is_found():
+    found = of_slack()
+    require_consistent(found)
+    assert found.verdict == EXPLAINED
+    (step,) = found.steps
+    assert (step.effect, step.family) == ("slack", "slack")
+    (looseness,) = step.estimates
+    assert looseness.value == pytest.approx(1.0, abs=0.02)
+    assert found.final.cost < 0.01 * found.baseline.cost
+    springs = found.final.model.network.springs
+    assert [s.modulus for s in springs] == pytest.approx([40e3, 30e3], rel=0.03)
+
+
+# --- how records were made
+
+
+def test_a_voltage_that_stands_between_samples_is_recognised():
+    drive = thesis_drive()
+    record = record_of(PLAIN, replace(drive, hold=True))
+    found = diagnose([replace(record, drive=drive)], PLAIN, workers=1)
+    require_nothing(found)
+    assert found.held
+    assert any("stands between samples" in n for n in found.notes)
+    # and where it is known, there is nothing to recognise
+    assert not diagnose([record], PLAIN, workers=1).held
+
+
+def test_rubbish_that_is_masked_is_not_seen():
+    # two effects: the second is refitted only if its sensitivity promises something
+    both = (*plant("sensor curvature").effects, *plant("mains interference").effects)
+    record = record_of(replace(PLAIN, effects=both))
+    bad = (record.time > 5.0) & (record.time < 5.1)
+    found = diagnose([masked(record, bad)], PLAIN, workers=1)
+    require_consistent(found)
+    assert found.verdict == EXPLAINED
+    assert {s.effect for s in found.steps} == {"sensor curvature", "mains interference"}
+    assert found.final.cost == pytest.approx(1.0, abs=0.1)
+    assert found.after[0].is_noise
+    assert all(one.candidates[0].promised > 0.4 for one in found.rounds if one.chosen)
+
+
+# --- its manners
+
+
+def test_it_ends_when_it_is_asked_to():
+    record = record_of(plant("load inertia"))
+    asked = []
+
+    def stop():
+        asked.append(None)
+        return len(asked) > 60
+
+    found = diagnose([record], PLAIN, workers=1, stop=stop)
+    require_consistent(found)
+    assert found.interrupted
+    assert len(asked) == 61
+    assert found.simulations < of_hidden("load inertia").simulations
+    # at once: the baseline is there, with all that is told of it
+    found = diagnose([record], PLAIN, workers=1, stop=lambda: True)
+    require_consistent(found)
+    assert found.interrupted
+    assert found.steps == ()
+    assert found.final.cost == pytest.approx(of_hidden("load inertia").baseline.cost, rel=1e-3)
+    assert found.before[0].rms == found.after[0].rms > 3.0 * NOISE
+
+
+def test_progress_goes_from_nothing_to_all():
+    told = []
+    diagnose(
+        [film_record_of(STRIP)], STRIP, workers=1, progress=lambda *step: told.append(step)
+    )  # fmt: skip
+    stages, fractions = zip(*told, strict=True)
+    assert fractions[0] == 0.0
+    assert fractions[-1] == 1.0
+    assert all(0.0 <= f <= 1.0 for f in fractions)
+    assert list(fractions) == sorted(fractions)
+    assert all(stages)
+
+
+def test_the_same_records_give_the_same_answer():
+    strip = replace(STRIP, effects=effect("slack", looseness=1.0))
+    again = diagnose([film_record_of(strip)], STRIP, workers=2)
+    first = of_slack()
+    assert again.final.model == first.final.model
+    assert again.final.cost == first.final.cost
+    assert again.simulations == first.simulations
+    assert [r.chosen for r in again.rounds] == [r.chosen for r in first.rounds]
+
+
+def test_nothing_but_the_records_is_looked_at(monkeypatch):
+    expected = of_slack()
+    strip = replace(STRIP, effects=effect("slack", looseness=1.0))
+    record = film_record_of(strip)
+    kept = [a.copy() for a in (record.time, record.stretch, record.stress)]
+
+    def refused(path, *_, **__):
+        raise AssertionError(f"{path} was opened")
+
+    monkeypatch.setattr(builtins, "open", refused)
+    monkeypatch.setattr(io, "open", refused)
+    found = diagnose([record], STRIP, workers=1)
+    monkeypatch.undo()
+    assert found.final.model == expected.final.model
+    for values, before in zip((record.time, record.stretch, record.stress), kept, strict=True):
+        np.testing.assert_array_equal(values, before)
+
+
+def test_records_of_two_kinds_are_refused():
+    with pytest.raises(ModelError, match="one kind"):
+        diagnose([record_of(PLAIN)], STRIP, workers=1)
+    both: list[ActuatorRecord] = [record_of(PLAIN), film_record_of(STRIP)]
+    with pytest.raises(ModelError, match="together"):
+        diagnose(both, PLAIN, workers=1)

@@ -1,0 +1,237 @@
+"""The bench: thinning, prediction of time left out, intervals, and readings that must not count."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from model.diagnosis.bench import Bench, information
+from model.fitting import identify
+from model.fitting.parameters import Layout
+from tests.engine_tools import (
+    NOISE,
+    PLAIN,
+    STRIP,
+    effect,
+    film_record_of,
+    fitted,
+    masked,
+    record_of,
+    thesis_drive,
+)
+
+DRAGGED = replace(PLAIN, effects=effect("linear drag", drag=400.0))
+SEEDS = 60
+
+
+def bench_of(*records):
+    return Bench(records, workers=1)
+
+
+# --- thinning
+
+
+@pytest.mark.parametrize("rate", [100.0, 200.0, 1000.0, 2000.0])
+def test_thinning_keeps_the_noise(rate):
+    drive = thesis_drive(rate)
+    record = record_of(PLAIN, drive)
+    (thin,) = bench_of(record).records
+    step = float(np.median(np.diff(thin.time)))
+    # fast enough for mains and a load's ringing, and no faster than was measured
+    assert 150.0 < 1.0 / step < 450.0 or 1.0 / step == pytest.approx(rate)
+    left = thin.displacement - PLAIN.simulate(thin.drive).displacement
+    assert np.sqrt(np.mean(left**2)) == pytest.approx(thin.noise, rel=0.05)
+    # as many means of so many readings: what is known in all stays what it was
+    assert thin.noise / math.sqrt(thin.time.size) == pytest.approx(
+        record.noise / math.sqrt(record.time.size), rel=0.01
+    )
+
+
+def test_thinning_reads_the_noise_of_a_sensor_that_averages():
+    # each reading is the mean of the last eight: neighbours share most of their noise
+    drive = thesis_drive(1000.0)
+    white = NOISE * math.sqrt(8.0) * np.random.default_rng(0).standard_normal(drive.time.size + 7)
+    smooth = np.convolve(white, np.full(8, 1.0 / 8.0), "valid")
+    made = record_of(PLAIN, drive)
+    record = replace(made, displacement=PLAIN.simulate(drive).displacement + smooth)
+    (thin,) = bench_of(record).records
+    left = thin.displacement - PLAIN.simulate(thin.drive).displacement
+    assert thin.noise > 1.5 * bench_of(made).records[0].noise
+    assert thin.noise == pytest.approx(np.std(left), rel=0.1)
+
+
+def test_what_thinning_took_is_put_back_where_errors_are_told():
+    record = record_of(DRAGGED, thesis_drive(1000.0))
+    bench = bench_of(record)
+    trial = fitted(bench, DRAGGED)
+    rough = bench.stage(trial, 1.0)
+    full = bench.stage(bench.polished(trial), 1.0)
+    assert rough.train_rms == pytest.approx(NOISE, rel=0.04)
+    assert rough.train_rms == pytest.approx(full.train_rms, rel=0.04)
+    assert rough.selection_rms == pytest.approx(full.selection_rms, rel=0.04)
+
+
+# --- time that is left out
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [(), effect("linear drift", drift=2e-7), effect("sensor curvature", quadratic=15.0)],
+    ids=["nothing", "drift", "curvature"],
+)
+def test_segments_are_predicted_as_by_a_fit_to_the_others(effects):
+    record = record_of(replace(PLAIN, effects=effects))
+    bench = bench_of(record)
+    stage = bench.stage(fitted(bench, PLAIN), 1.0)
+    n = record.time.size
+    left_out = np.empty(n)
+    for low, high in pairwise(np.linspace(0, n, 11).astype(int)):
+        valid = np.ones(n, dtype=bool)
+        valid[low:high] = False
+        others = fitted(bench_of(replace(record, valid=valid)), PLAIN)
+        answer = others.model.simulate(record.drive).displacement
+        left_out[low:high] = (answer - record.displacement)[low:high]
+    assert stage.selection_rms == pytest.approx(np.sqrt(np.mean(left_out**2)), rel=2e-3)
+    assert stage.selection_max == pytest.approx(np.abs(left_out).max(), rel=1e-2)
+    # worse than what was fitted, the more the model is wrong
+    assert stage.selection_rms > (1.06 if effects else 1.002) * stage.train_rms
+
+
+# --- intervals
+
+
+@functools.cache
+def many():
+    """Estimates of the same truth under other noise."""
+    found = []
+    for seed in range(SEEDS):
+        bench = bench_of(record_of(DRAGGED, seed=seed))
+        trial = fitted(bench, DRAGGED)
+        found.append(bench.estimates(trial, trial.jacobian()))
+    return found
+
+
+def test_intervals_are_as_wide_as_estimates_spread():
+    truth = dict(zip(Layout(DRAGGED).names, Layout(DRAGGED).initial(), strict=True))
+    for several in zip(*many(), strict=True):
+        name = several[0].name
+        if name.startswith("J"):
+            assert all((e.determined, e.note) == (False, "held") for e in several)
+            continue
+        assert all(e.determined for e in several)
+        spread = np.std([e.value for e in several], ddof=1)
+        width = np.mean([e.high - e.low for e in several]) / (2.0 * 1.96)
+        # a spread of sixty is known to 9 %
+        assert width == pytest.approx(spread, rel=0.25), name
+        inside = sum(e.low <= truth[name] <= e.high for e in several)
+        # 57 of them should be; fewer than 52 in one of a hundred
+        assert inside >= 52, name
+
+
+def test_intervals_agree_with_those_of_the_fit():
+    record = record_of(PLAIN)
+    bench = bench_of(record)
+    trial = fitted(bench, PLAIN)
+    here = {e.name: e for e in bench.estimates(trial, trial.jacobian())}
+    # there by profiles of the likelihood
+    for there in identify([record], PLAIN, workers=1).estimates:
+        if not there.name.startswith("J"):
+            e = here[there.name]
+            assert e.value == pytest.approx(there.value, rel=1e-3)
+            assert e.low == pytest.approx(there.low, rel=1e-2)
+            assert e.high == pytest.approx(there.high, rel=1e-2)
+            assert e.high - e.low == pytest.approx(there.high - there.low, rel=0.2)
+
+
+def test_what_is_not_explained_widens_them():
+    noisy = record_of(DRAGGED, noise=3e-6)
+    said = replace(noisy, noise=NOISE)
+    widths = []
+    for record in (noisy, said):
+        bench = bench_of(record)
+        trial = fitted(bench, DRAGGED)
+        widths.append([e.high - e.low for e in bench.estimates(trial, trial.jacobian())])
+    finite = np.isfinite(widths[0])
+    np.testing.assert_allclose(
+        np.array(widths[1])[finite], np.array(widths[0])[finite], rtol=0.1
+    )  # fmt: skip
+
+
+# --- readings that must not be used
+
+
+def bad_readings(record, *spans):
+    bad = np.zeros(record.time.size, dtype=bool)
+    for start, end in spans:
+        bad[(record.time >= start) & (record.time < end)] = True
+    return bad
+
+
+@pytest.mark.parametrize("rate", [100.0, 1000.0])
+def test_rubbish_changes_no_fit(rate):
+    record = record_of(DRAGGED, thesis_drive(rate))
+    bad = bad_readings(record, (5.0, 5.3), (9.0, 9.1))
+    spoilt = bench_of(masked(record, bad))
+    marked = bench_of(replace(record, valid=~bad))
+    assert spoilt.samples == marked.samples < bench_of(record).samples
+    trials = [fitted(b, DRAGGED) for b in (spoilt, marked)]
+    np.testing.assert_allclose(trials[0].x, trials[1].x, rtol=1e-9)
+    assert trials[0].cost == pytest.approx(trials[1].cost, rel=1e-9)
+    assert trials[0].cost == pytest.approx(1.0, abs=0.12)
+    stages = [b.stage(t, 1.0) for b, t in zip((spoilt, marked), trials, strict=True)]
+    for name in ("train_rms", "selection_rms", "selection_max", "criterion"):
+        assert getattr(stages[0], name) == pytest.approx(getattr(stages[1], name), rel=1e-6)
+    assert stages[0].selection_max < 6e-6
+
+
+def test_rubbish_in_the_lead_in_is_not_taken_for_noise():
+    record = record_of(PLAIN, thesis_drive(1000.0))
+    bad = bad_readings(record, (0.5, 0.51))
+    (thin,) = bench_of(masked(record, bad)).records
+    (clean,) = bench_of(record).records
+    assert thin.noise == pytest.approx(clean.noise, rel=0.1)
+
+
+def test_rubbish_is_not_taken_for_the_size_of_a_films_stress():
+    record = film_record_of(STRIP)
+    valid = np.ones(record.time.size, dtype=bool)
+    valid[300:310] = False
+    spoilt = replace(record, stress=np.where(valid, record.stress, -1e6), valid=valid)
+    (found,) = bench_of(spoilt).records
+    (clean,) = bench_of(record).records
+    assert found.noise == pytest.approx(clean.noise, rel=0.02)
+
+
+# --- what models are compared by
+
+
+def test_the_criterion_asks_what_an_effect_explains():
+    # a number that explains nothing costs log N; one that halves what is left gains N log 2
+    n = 1000.0
+    assert information(1.0, 5, n) - information(1.0, 4, n) == pytest.approx(math.log(n))
+    gain = information(1.0, 4, n) - information(0.5, 5, n)
+    assert gain == pytest.approx(n * math.log(2.0) - math.log(n))
+    assert information(2.0, 4, n) - information(1.0, 5, n) == pytest.approx(gain)
+
+
+def test_it_counts_correlated_residuals_as_what_they_are_worth():
+    bench = bench_of(record_of(PLAIN))
+    trial = fitted(bench, PLAIN)
+    one, ten = (bench.stage(trial, c).criterion for c in (1.0, 10.0))
+    assert one == pytest.approx(information(trial.cost, trial.free, bench.samples))
+    assert ten == pytest.approx(information(trial.cost, trial.free, bench.samples / 10.0))
+
+
+def test_records_are_fitted_together():
+    a, b = record_of(PLAIN), record_of(PLAIN, seed=1, noise=3e-6)
+    trial = fitted(bench_of(a, b), PLAIN)
+    assert trial.cost == pytest.approx(1.0, abs=0.1)
+    assert trial.residuals.size == a.time.size + b.time.size
+    assert trial.effects == ()
+    stage = bench_of(a, b).stage(trial, 1.0)
+    assert stage.train_rms == pytest.approx(math.sqrt(5.0) * 1e-6, rel=0.05)
