@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer.core import TyperCommand
 from typer.exceptions import TyperException
 
 from app.errors import DearigError, InputError
@@ -108,6 +109,25 @@ def _options(
     # other packages' own news is not the operator's
     logging.getLogger("numba").setLevel(logging.WARNING)
     logging.getLogger("matplotlib").setLevel(logging.WARNING)
+
+
+class _ManyToValidate(TyperCommand):
+    """A command whose ``--validate`` takes all names up to the next option, as a shell's * gives.
+
+    Otherwise the second of them would be one more recording to fit, and nobody would be told.
+    """
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
+        spread: list[str] = []
+        taking = False
+        for argument in args:
+            option = argument.startswith("-") and argument != "-"
+            if taking and not option and spread[-1] != "--validate":
+                spread.append("--validate")
+            if option:
+                taking = argument == "--validate"
+            spread.append(argument)
+        return super().parse_args(ctx, spread)
 
 
 @app.command()
@@ -372,7 +392,7 @@ def recover(
         write_json({**describe(recording), "recovered": mended}, json)
 
 
-@app.command()
+@app.command(cls=_ManyToValidate)
 def identify(
     train: Annotated[list[Path], typer.Argument(metavar="TRAIN.h5...", help="Recordings to fit.")],
     out: Annotated[Path, typer.Option("--out", metavar="MODEL.toml", help="The model.")],
@@ -383,8 +403,8 @@ def identify(
         list[Path] | None,
         typer.Option(
             "--validate",
-            metavar="FILE.h5",
-            help="Untouched recordings, read once at the end; may be repeated.",
+            metavar="FILE.h5...",
+            help="Untouched recordings, read once at the end; one or several.",
         ),
     ] = None,
     branches: Annotated[
@@ -476,7 +496,7 @@ def validate(
         write_json(outcome_json(outcome), json)
 
 
-@app.command()
+@app.command(cls=_ManyToValidate)
 def diagnose(
     train: Annotated[
         list[Path] | None,
@@ -486,8 +506,8 @@ def diagnose(
         list[Path] | None,
         typer.Option(
             "--validate",
-            metavar="VAL.h5",
-            help="Untouched recordings, read once at the end; may be repeated.",
+            metavar="VAL.h5...",
+            help="Untouched recordings, read once at the end; one or several.",
         ),
     ] = None,
     report: Annotated[

@@ -463,6 +463,10 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
         ["give recordings to diagnose, or a rig to record on with --rig"],
     ),
     "diagnosed twice": ("diagnose {s}/run.h5 {s}/run.h5", ["is named twice"]),
+    "several after one --validate": (
+        "diagnose {s}/run.h5 --validate {s}/film.h5 {s}/run.h5 --json o.json",
+        ["run.h5 is given both to fit and to validate", "proves nothing"],
+    ),
     "diagnosed and validated": (
         "diagnose {s}/run.h5 --validate {s}/run.h5",
         ["given both to fit and to validate", "proves nothing"],

@@ -35,6 +35,7 @@ _EFFECTS_MAX = 3  # more at once no record of this kind tells apart
 _DECISIVE = 12.0  # of the information criterion: odds of e^6, over some forty candidates
 _ALIKE = 10.0  # of the same: candidates nearer than that are not told apart
 _MATTERS = 0.01  # of the noise's mean square: less is not worth an effect
+_HOPE = 0.95  # of the cost: who explains less than the rest of it is not followed on
 _BEAM = 2  # how many explanations are followed on
 _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed on
 _SETTLED = 4  # leading candidates that are fitted to the end of their valleys
@@ -154,7 +155,13 @@ class _Search:
         return trial
 
     def _search(self, baseline: Trial) -> Trial:
+        """The best explanation of up to ``_EFFECTS_MAX`` effects.
+
+        Where none alone explains enough to be believed, the leading ones are followed on once: of
+        two effects each may leave so much of the other that only both are a finding.
+        """
         best, beam = baseline, [baseline]
+        looking_on = False
         for depth in range(_EFFECTS_MAX):
             tried: list[_Tried] = []
             for i, parent in enumerate(beam):
@@ -167,12 +174,28 @@ class _Search:
             gain = self._criterion(best, correlation) - self._criterion(leader, correlation)
             matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
             taken = gain > self._asked(fitted[0].name) and matters
-            self._record(best, fitted, correlation, fitted[0] if taken else None, gain)
-            if not taken:
+            if taken:
+                reason = f"gains {gain:.0f} of the information criterion"
+            elif gain > self._asked(fitted[0].name):
+                reason = "what the best effect explains is too little to matter"
+            else:
+                reason = (
+                    f"no effect explains significantly more (the best gains {gain:.1f} of the "
+                    f"information criterion, {self._asked(fitted[0].name):g} are asked for)"
+                )
+            hopeless = self._is_noise(best) or leader.cost > _HOPE * best.cost
+            last = depth + 1 == _EFFECTS_MAX
+            if not taken and not (looking_on or hopeless or last):
+                reason += "; the leading ones are tried together with others"
+            self._record(fitted, correlation, fitted[0] if taken else None, reason)
+            if taken:
+                best, looking_on = self._ended(leader), False
+                if self._is_noise(best):
+                    break
+            elif looking_on or hopeless:
                 break
-            best = self._ended(leader)
-            if self._is_noise(best):
-                break
+            else:
+                looking_on = True
             beam = [self._ended(t) for t in self._beam(fitted)]
         return best
 
@@ -379,15 +402,10 @@ class _Search:
     # -- what is handed back
 
     def _record(
-        self,
-        base: Trial,
-        tried: list[_Tried],
-        correlation: float,
-        chosen: _Tried | None,
-        gain: float,
+        self, tried: list[_Tried], correlation: float, chosen: _Tried | None, reason: str
     ) -> None:
         """Keep the round: the candidates on top of the base that the choice was made from."""
-        parent = base if chosen is None else chosen.parent
+        parent = tried[0].parent
         of_parent = [t for t in tried if t.parent is parent]
         base_criterion = self._criterion(parent, correlation)
         best = min(
@@ -422,17 +440,13 @@ class _Search:
                 )
             )
         candidates.sort(key=lambda c: c.behind)
-        if chosen is None:
-            reason = (
-                f"no effect explains significantly more (the best gains {gain:.1f} of the "
-                f"information criterion, {_DECISIVE:g} are asked for)"
-                if gain <= _DECISIVE
-                else "what the best effect explains is too little to matter"
-            )
-        else:
-            reason = f"{chosen.name} gains {gain:.0f} of the information criterion"
         self.rounds.append(
-            Round(parent.effects, tuple(candidates), chosen.name if chosen else None, reason)
+            Round(
+                parent.effects,
+                tuple(candidates),
+                chosen.name if chosen else None,
+                f"{chosen.name} {reason}" if chosen else reason,
+            )
         )
 
     def _finding(self, baseline: Trial, best: Trial) -> Diagnosis:
