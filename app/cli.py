@@ -742,7 +742,7 @@ def _tell_of_compiling() -> None:
     from model.jit import is_compiled
 
     if not is_compiled():
-        sys.stderr.write("Compiling the numerical kernels, once: this takes some ten seconds.\n")
+        sys.stderr.write("Compiling the numerical kernels, once: this takes some twenty seconds.\n")
 
 
 def main() -> None:

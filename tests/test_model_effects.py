@@ -212,7 +212,7 @@ def test_the_typical_size_would_be_noticed(name, driven):
     found = measured(with_effect(base_of(driven), name, numbers(name)))
     # a micrometre is the sensor's noise; one pascal is nothing, films need larger sizes
     least = 1e-6 if driven == "voltage" else 1.0
-    if name in ("linear drift", "settling drift", "temperature"):
+    if name in ("linear drift", "settling drift", "wandering drift", "temperature"):
         least = 0.2e-6  # these take more than two seconds
     assert np.abs(found - baseline(driven)).max() >= least
 
@@ -305,6 +305,9 @@ SHOWN = {
     "sensor lag": shown_by_lag,
     "settling drift": lambda p, t: (
         moved(t)[0] + p["drift"] * (1.0 - np.exp(-t / p["time_constant"]))
+    ),
+    "wandering drift": lambda p, t: (
+        moved(t)[0] + np.polyval([p["cubic"], p["quadratic"], p["linear"], 0.0], t / 30.0)
     ),
     "sudden change of reading": lambda p, t: (
         moved(t)[0] + p["jump"] * np.clip((t - p["moment"]) / 0.02 + 0.5, 0.0, 1.0)
@@ -484,6 +487,7 @@ LARGER = {
     "warm-up": 3.0,
     "linear drift": 3.0,
     "settling drift": 3.0,
+    "wandering drift": 3.0,
     "mains interference": 2.0,
     "sensor curvature": 3.0,
     "sensor bend": 3.0,
