@@ -92,10 +92,7 @@ class Trial:
 
 
 class Bench:
-    """Training records of one kind, and the fits made to them.
-
-    ``progress`` and ``stop`` are handed on by the diagnosis.
-    """
+    """Training records of one kind, ``full`` and thinned, and the fits made to them."""
 
     def __init__(self, records: Sequence[Record], workers: int) -> None:
         self.full = tuple(_with_model_error(r) for r in records)

@@ -71,7 +71,7 @@ class Screen:
         """Promises of ``effect``, best first: one for each shape on its grid."""
         shapes = list(product(*(self._starts(p) for p in effect.shapes)))
         found = self._scored(effect, shapes)
-        if any(p.part_of == "duration" for p in effect.shapes):
+        if found and any(p.part_of == "duration" for p in effect.shapes):
             best = max(found, key=lambda p: p.share)
             moment = best.model.effects[-1][1][-1][1]
             step = self._duration() / _MOMENTS

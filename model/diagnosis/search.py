@@ -25,6 +25,7 @@ from model.diagnosis.stress import missing_stress
 from model.diagnosis.unnamed import describe_unnamed
 from model.effects import EFFECTS, Effect
 from model.film import Strip
+from model.fitting import Estimate
 from model.records import ActuatorRecord, Record
 
 __all__ = ["diagnose"]
@@ -121,7 +122,6 @@ class _Search:
         )
         baseline = self._timed(baseline)
         self.found[frozenset()] = baseline
-        best = baseline
         try:
             best = self._pruned(self._search(baseline))
         except _Interrupted:
@@ -287,19 +287,14 @@ class _Search:
 
         correlation = self._correlation([best, *(t.trial for t in fitted)])
         order = sorted(fitted, key=rank)
-        settled: dict[frozenset[str], Trial] = {}
         for tried in order[:_SETTLED]:
             self._check()
             key = frozenset(tried.trial.effects)
-            if key not in settled and key not in self.settled:
-                settled[key] = self.bench.settled(tried.trial)
-        self.found.update(settled)
-        self.settled |= settled.keys()
-        order = [
-            replace(t, trial=self.found[frozenset(t.trial.effects)]) if t.trial else t
-            for t in order
-        ]
-        correlation = self._correlation([best, *(t.trial for t in order if t.trial is not None)])
+            if key not in self.settled:
+                self.settled.add(key)
+                self.found[key] = self.bench.settled(tried.trial)
+        order = [replace(t, trial=self.found[frozenset(t.trial.effects)]) for t in order]
+        correlation = self._correlation([best, *(t.trial for t in order)])
         return sorted(order, key=rank), correlation
 
     def _simpler(self, parent: Trial, effect: Effect, start: np.ndarray) -> np.ndarray | None:
@@ -408,10 +403,7 @@ class _Search:
         parent = tried[0].parent
         of_parent = [t for t in tried if t.parent is parent]
         base_criterion = self._criterion(parent, correlation)
-        best = min(
-            (self._criterion(t.trial, correlation) for t in of_parent),
-            default=base_criterion,
-        )
+        best = min(self._criterion(t.trial, correlation) for t in of_parent)
         candidates = []
         for t in of_parent:
             effect = EFFECTS[t.name]
@@ -456,7 +448,7 @@ class _Search:
         correlation = max(1.0, last.correlation)
         stage0 = self.bench.stage(first, correlation, estimates=True)
         final = self.bench.stage(last, correlation, estimates=True)
-        steps, rivals = self._steps(best, last, correlation)
+        steps, rivals = self._steps(best, last, final.estimates, correlation)
         before = signatures(self.bench.full, first)
         after = signatures(self.bench.full, last)
         missing_before = missing_stress(self.bench.full, first.model)
@@ -502,9 +494,12 @@ class _Search:
         )
 
     def _steps(
-        self, best: Trial, last: Trial, correlation: float
+        self, best: Trial, last: Trial, numbers: Sequence[Estimate], correlation: float
     ) -> tuple[list[Step], list[tuple[str, Actuator | Strip]]]:
-        """The effects of ``best``, the one that explains most first, each with its evidence."""
+        """The effects of ``best``, the one that explains most first, each with its evidence.
+
+        ``last`` is ``best`` fitted to every sample, ``numbers`` are those of ``last``.
+        """
         names = best.effects
         if not names:
             return [], []
@@ -514,7 +509,6 @@ class _Search:
             rest = [n for n in names if n not in order]
             trials = {n: self._with_only(best, [*order, n]) for n in rest}
             order.append(min(rest, key=lambda n: trials[n].cost))
-        numbers = self.bench.estimates(last, last.jacobian())
         steps, rivals = [], []
         correlation_thin = self._correlation([best])
         for i, name in enumerate(order):

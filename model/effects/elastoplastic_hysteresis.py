@@ -8,8 +8,9 @@ those of dry friction open within a few micrometres.
 from __future__ import annotations
 
 from model.effects.description import Effect, Parameter
-from model.filters import slid
-from model.jit import jit
+
+# one law, on another scale of stretch: the same functions, with numbers of their own
+from model.effects.dry_friction import commit, stiffness, stress
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 
@@ -35,19 +36,3 @@ EFFECT = Effect(
     memory=1,
     drives=("voltage", "stretch"),
 )
-
-
-@jit
-def stress(c, k, m, j, lam, rate, lam0, since, t):
-    return c[k] * slid(m[j], lam - lam0, c[k + 1]) / c[k + 1]
-
-
-@jit
-def stiffness(c, k, m, j, lam):
-    return c[k] / c[k + 1], 0.0
-
-
-@jit
-def commit(c, k, m, j, lam, rate, lam0, h, t):
-    m[j] = slid(m[j], lam - lam0, c[k + 1])
-    return 0
