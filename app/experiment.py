@@ -14,9 +14,9 @@ import tomli_w
 
 from app.errors import InputError
 from app.outcomes import SeparatingExperiment
+from app.plan import plan
 from app.presets import PRESETS
 from app.rigfile import RigFile
-from app.run import gate_sequence
 from app.sequencefile import LoadedSequence, parse_sequence
 from drivers.gate import GatedWaveform
 from model.actuator import Actuator, Drive
@@ -153,7 +153,7 @@ def _admitted(
     for scale in _SCALES:
         try:
             loaded = parse_sequence(_scaled(text, scale), name, Path())
-            return loaded, gate_sequence(loaded, rig_file)
+            return loaded, plan(loaded, rig_file).admitted()
         except InputError:
             continue
     return None

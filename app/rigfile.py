@@ -23,6 +23,12 @@ __all__ = ["FilmSection", "LoadSection", "RigFile", "load_rig_file", "write_defa
 class FilmSection(Section):
     """The film before it is loaded."""
 
+    name: str = Field(
+        default="",
+        max_length=200,
+        description="which film the limits are for; a run on real instruments needs it, and one "
+        "that names another film is refused",
+    )
     length_mm: float = Field(default=75.0, gt=0.0, le=1e4, description="L1, along the motion")
     width_mm: float = Field(default=72.0, gt=0.0, le=1e4, description="L2, across the motion")
     thickness_mm: float = Field(default=1.0, ge=1e-4, le=100.0, description="Z")
@@ -71,7 +77,7 @@ class RigFile(RigSettings):
 
     def gate_limits(self) -> Limits:
         """The limits as the gate takes them, in SI units."""
-        return self.limits.gate_limits()
+        return self.limits.gate_limits(self.film.name)
 
     @model_validator(mode="after")
     def _load_stretches_film(self) -> RigFile:

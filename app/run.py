@@ -6,26 +6,21 @@ import logging
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from app.errors import DearigError, InputError, InstrumentFault, Interrupted
 from app.interrupts import Interrupts
+from app.plan import plan
 from app.progress import Progress, quiet
 from app.recording.files import check_output
 from app.recording.writer import RecordingWriter
 from app.rigfile import RigFile
 from app.sequencefile import LoadedSequence
 from drivers.errors import AddressError, RefusedWaveform, RigError
-from drivers.gate import GatedWaveform, Margin, admit
+from drivers.gate import Margin
 from drivers.rig import Rig
-from model.actuator import Actuator, Drive
-from model.errors import ModelError
-from model.kernel import PULL_IN
-from model.kinematics import thinning
-from model.material import TABLE_3
+from model.actuator import Actuator
 from sim_backend.factory import is_simulated, open_simulated_rig
 
-__all__ = ["RunResult", "gate_sequence", "open_rig", "record"]
+__all__ = ["RunResult", "open_rig", "record"]
 
 log = logging.getLogger(__name__)
 
@@ -80,49 +75,6 @@ def open_rig(
     raise InputError(f"rig {address!r} is not known: write sim, or sim:SEED such as sim:7")
 
 
-def gate_sequence(
-    loaded: LoadedSequence, rig_file: RigFile, model: Actuator | None = None
-) -> GatedWaveform:
-    """The sequence sampled on the rig's clock and passed through the gate.
-
-    The true field is predicted with ``model``, by default that of the rig file's film with Table
-    3's network: a stretched film is thinner. Raises ``InputError`` with a sentence for every limit
-    it breaks.
-    """
-    rate, limits = float(rig_file.card.sample_rate_Hz), rig_file.gate_limits()
-    name = loaded.sequence.name
-    try:
-        time, voltage = loaded.sample(rate)
-        actuator = model or Actuator(rig_file.as_film(), rig_file.as_load(), TABLE_3)
-        # the film at its thickest: what is refused here needs no prediction, and what a voltage far
-        # beyond every limit would do to the model is not the operator's question
-        thick = np.full(voltage.size, 1.0 / actuator.film.thickness)
-        admit(voltage, rate, limits, thick)
-        response = actuator.simulate(Drive(time, voltage, hold=True))
-    except RefusedWaveform as error:
-        raise _refusal(name, error) from error
-    except ModelError as error:
-        raise InputError(f"sequence {name!r} with this rig file: {error}") from error
-    if response.status == PULL_IN:
-        raise InputError(f"sequence {name!r} is refused: the model predicts {response.in_words}")
-    if not response.ok:
-        raise InputError(
-            f"sequence {name!r} is refused: the film's thickness could not be predicted "
-            f"({response.in_words})"
-        )
-    thin = thinning(actuator.film.held, response.stretch) / actuator.film.thickness
-    try:
-        return admit(voltage, rate, limits, thin)
-    except RefusedWaveform as error:
-        raise _refusal(name, error) from error
-
-
-def _refusal(name: str, error: RefusedWaveform) -> InputError:
-    return InputError(
-        f"sequence {name!r} is refused: {'; '.join(error.reasons)} (limits of the rig file)"
-    )
-
-
 def record(
     loaded: LoadedSequence,
     address: str,
@@ -148,7 +100,7 @@ def record(
     the operator ended it: the first ctrl-C ramps down in the set time, the second is 0 V at once.
     """
     out = check_output(out, overwrite)
-    waveform = gate_sequence(loaded, rig_file, actuator)
+    waveform = plan(loaded, rig_file, actuator).admitted()
     rig = open_rig(address, rig_file, seed=seed, paced=paced, actuator=actuator)
     try:
         with Interrupts() as interrupts:

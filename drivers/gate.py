@@ -14,7 +14,7 @@ import numpy as np
 
 from drivers.errors import RefusedWaveform
 
-__all__ = ["GatedWaveform", "Limits", "Margin", "admit", "ramp_down"]
+__all__ = ["GatedWaveform", "Limits", "Margin", "Prediction", "admit", "ramp_down"]
 
 _KEY = object()
 
@@ -24,13 +24,48 @@ class Limits:
     """What the film and the amplifier may see, in SI units.
 
     ``voltage_min`` and ``voltage_max`` in V bound the voltage at the film (their signs are the
-    polarity that is allowed), ``slew`` in V/s its rate, ``field`` in V/m the true electric field.
+    polarity that is allowed), ``slew`` in V/s its rate, ``field`` in V/m the true electric field,
+    ``energy`` in J what the amplifier charges into the film over all rises of a run, and
+    ``time_at_voltage`` in s how long it may stand at ``at_voltage`` V or more without a pause.
+    ``film`` names the film they are for; empty, they are for any.
     """
 
     voltage_min: float
     voltage_max: float
     slew: float
     field: float
+    energy: float
+    at_voltage: float
+    time_at_voltage: float
+    film: str = ""
+
+    def within(self, other: Limits) -> bool:
+        """True where nothing passes these limits that ``other`` would refuse."""
+        return (
+            self.voltage_max <= other.voltage_max
+            and self.voltage_min >= other.voltage_min
+            and self.slew <= other.slew
+            and self.field <= other.field
+            and self.energy <= other.energy
+            and self.at_voltage <= other.at_voltage
+            and self.time_at_voltage <= other.time_at_voltage
+            and (self.film == other.film or not other.film)
+        )
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a model foresees of the film under a waveform of N samples; this layer has no model.
+
+    ``field_per_volt`` (N,) 1/m is the reciprocal of the film's thickness, so that the true field is
+    its product with the voltage; ``capacitance`` (N,) F. ``pull_in`` says in words that the film
+    would collapse, and is empty where it would not. ``film`` names the film that was asked for.
+    """
+
+    field_per_volt: np.ndarray
+    capacitance: np.ndarray
+    pull_in: str = ""
+    film: str = ""
 
 
 @dataclass(frozen=True)
@@ -111,76 +146,101 @@ class GatedWaveform:
 
 
 def admit(
-    voltage: np.ndarray,
-    rate: float,
-    limits: Limits,
-    field_per_volt: np.ndarray,
+    voltage: np.ndarray, rate: float, limits: Limits, prediction: Prediction
 ) -> GatedWaveform:
     """Let a waveform pass, or raise ``RefusedWaveform`` with a sentence for every limit it breaks.
 
-    ``voltage`` is (N,) V at the film, ``rate`` Hz. ``field_per_volt`` (N,) 1/m is the reciprocal of
-    the film's predicted thickness at each sample, so that the true field is their product; it comes
-    from the model, which this layer does not know.
+    ``voltage`` is (N,) V at the film, ``rate`` Hz, ``prediction`` what the film will do under it.
 
     Slew is judged sample to sample, as the converter steps; the steps from and to the 0 V before
     and after the run are none, because the waveform must start and end at 0 V.
     """
     # a copy: what is judged is what goes out, whatever the caller does to its array meanwhile
     voltage = np.array(voltage, dtype=np.float64)
-    field_per_volt = np.asarray(field_per_volt, dtype=np.float64)
+    field_per_volt = np.asarray(prediction.field_per_volt, dtype=np.float64)
+    capacitance = np.asarray(prediction.capacitance, dtype=np.float64)
+    for name, limit in vars(limits).items():
+        if isinstance(limit, float) and math.isnan(limit):
+            raise RefusedWaveform((f"the limit {name} is nan, and lets nothing pass",))
     if not (math.isfinite(rate) and rate > 0.0):
         raise RefusedWaveform((f"the sample rate {rate!r} Hz is not a finite number above 0",))
-    if voltage.ndim != 1 or voltage.size < 2 or field_per_volt.shape != voltage.shape:
+    shapes = {voltage.shape, field_per_volt.shape, capacitance.shape}
+    if voltage.ndim != 1 or voltage.size < 2 or len(shapes) > 1:
         raise RefusedWaveform(
             (
-                f"a waveform is one row of at least 2 samples with as many field factors, "
-                f"not {voltage.shape} and {field_per_volt.shape}",
+                f"a waveform is one row of at least 2 samples with as many predictions, not "
+                f"{voltage.shape}, {field_per_volt.shape} and {capacitance.shape}",
             )
         )
-    finite = np.isfinite(voltage) & np.isfinite(field_per_volt)
+    finite = np.isfinite(voltage) & np.isfinite(field_per_volt) & np.isfinite(capacitance)
     if not finite.all():
         at = int(np.argmin(finite))
         raise RefusedWaveform((f"sample {at} (at {at / rate:.4g} s) is not a finite number",))
-    if not (field_per_volt > 0.0).all():
-        at = int(np.argmin(field_per_volt))
-        raise RefusedWaveform(
-            (
-                f"the field factor at sample {at} is {field_per_volt[at]:.4g} 1/m: "
-                "it is one over a thickness, and above 0",
+    for quantity, values, unit in (
+        ("one over the thickness", field_per_volt, "1/m"),
+        ("the capacitance", capacitance, "F"),
+    ):
+        if not (values > 0.0).all():
+            at = int(np.argmin(values))
+            raise RefusedWaveform(
+                (f"{quantity} is predicted as {values[at]:.4g} {unit} at sample {at}, not above 0",)
             )
-        )
 
     reasons: list[str] = []
 
-    def check(quantity: str, values: np.ndarray, allowed: float, unit: str, scale: float) -> Margin:
-        at = int(np.argmax(values))
-        reached = float(values[at])
-        # not (<=), so that a limit of NaN refuses everything
+    def check(
+        quantity: str, reached: float, allowed: float, unit: str, scale: float, where: str = ""
+    ) -> Margin:
+        # not (<=), so that what is not a number is refused
         if not reached <= allowed:
             reasons.append(
-                f"{quantity} reaches {reached * scale:.6g} {unit} at {at / rate:.4g} s, "
+                f"{quantity} reaches {reached * scale:.6g} {unit}{where}, "
                 f"{allowed * scale:.6g} {unit} is allowed"
             )
         # + 0.0: a waveform that never goes negative reaches 0, not -0
         return Margin(quantity, reached * scale + 0.0, allowed * scale + 0.0, unit)
 
-    with np.errstate(over="ignore"):  # what overflows is inf, and beyond every limit
+    def peak(quantity: str, values: np.ndarray, allowed: float, unit: str, scale: float) -> Margin:
+        at = int(np.argmax(values))
+        where = f" at {at / rate:.4g} s"
+        return check(quantity, float(values[at]), allowed, unit, scale, where)
+
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is beyond every limit
         slew = np.abs(np.diff(voltage)) * rate
         field = np.abs(voltage) * field_per_volt
+        rises = 0.5 * (voltage[1:] + voltage[:-1]) * np.diff(capacitance * voltage)
+        energy = float(np.sum(np.maximum(rises, 0.0)))  # a NaN stays one, and is refused
+    standing = _longest(~(np.abs(voltage) < limits.at_voltage)) / rate
     margins = (
-        check("voltage", voltage, limits.voltage_max, "kV", 1e-3),
-        check("negative voltage", -voltage, 0.0 - limits.voltage_min, "kV", 1e-3),
-        check("slew", slew, limits.slew, "kV/s", 1e-3),
-        check("true field", field, limits.field, "MV/m", 1e-6),
-    )
+        peak("voltage", voltage, limits.voltage_max, "kV", 1e-3),
+        peak("negative voltage", -voltage, 0.0 - limits.voltage_min, "kV", 1e-3),
+        peak("slew", slew, limits.slew, "kV/s", 1e-3),
+        peak("true field", field, limits.field, "MV/m", 1e-6),
+        check("energy", energy, limits.energy, "J", 1.0),
+        check(
+            f"time at {limits.at_voltage * 1e-3:.4g} kV or more", standing,
+            limits.time_at_voltage, "s", 1.0,
+        ),
+    )  # fmt: skip
     reasons.extend(
         f"the waveform {'starts' if i == 0 else 'ends'} at {voltage[i] * 1e-3:.6g} kV, not at 0"
         for i in (0, -1)
         if voltage[i] != 0.0
     )
+    if prediction.pull_in:
+        reasons.append(f"the model predicts {prediction.pull_in}")
+    if limits.film and prediction.film != limits.film:
+        asked = f"film {prediction.film!r}" if prediction.film else "a film without a name"
+        reasons.append(f"the limits are declared for film {limits.film!r}, not for {asked}")
     if reasons:
         raise RefusedWaveform(tuple(reasons))
     return GatedWaveform(voltage, rate, limits, margins, _KEY)
+
+
+def _longest(true: np.ndarray) -> int:
+    """Most samples of ``true`` (N,) in a row."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], true, [False]))))
+    return int(np.max(edges[1::2] - edges[::2], initial=0))
 
 
 def ramp_down(waveform: GatedWaveform, last: int, duration: float) -> np.ndarray:

@@ -18,6 +18,8 @@ from drivers.gate import Limits
 __all__ = [
     "AmplifierSettings",
     "CardSettings",
+    "GuardianSettings",
+    "InterlockSettings",
     "LaserSettings",
     "LimitsSettings",
     "RigSettings",
@@ -28,8 +30,11 @@ __all__ = [
 _ZERO_CELSIUS = 273.15  # K
 
 AnalogInput = Annotated[str, Field(pattern=r"^ai[0-9]{1,2}$")]
+DigitalLine = Annotated[str, Field(pattern=r"^port[0-9]/line[0-9]{1,2}$")]
 AnalogOutput = Annotated[str, Field(pattern=r"^ao[0-9]{1,2}$")]
 InputRange = Annotated[float, Field(ge=0.1, le=10.0)]
+Terminals = Literal["DIFF", "RSE", "NRSE"]
+Action = Literal["ramp", "at once"]
 
 
 class Section(BaseModel):
@@ -108,6 +113,15 @@ class LaserSettings(Section):
     averaging: int = Field(
         default=16, ge=1, le=262144, description="samples in the moving average: a power of 4"
     )
+    port: str = Field(
+        default="",
+        description="serial port of the controller, such as COM3 or /dev/ttyUSB0; left empty, its "
+        "settings are not compared with the ones here",
+    )
+    baud_rate: Literal[9600, 19200, 38400, 57600, 115200] = Field(
+        default=115200, description="of the serial port"
+    )
+    output: Literal[1, 2] = Field(default=1, description="OUT of the controller: which head")
     resolution_um: float = Field(
         default=0.01, ge=0.0, le=100.0, description="simulated rig only: smallest step of a reading"
     )
@@ -184,6 +198,24 @@ class CardSettings(Section):
         default=10.0, description="input range, plus and minus"
     )
     range_temperature_V: InputRange = Field(default=10.0, description="input range, plus and minus")
+    terminals_voltage_monitor: Terminals = Field(
+        default="DIFF", description="how the input is wired: differential, (non-)referenced single"
+    )
+    terminals_current_monitor: Terminals = Field(default="DIFF", description="as above")
+    terminals_displacement: Terminals = Field(default="DIFF", description="as above")
+    terminals_temperature: Terminals = Field(default="DIFF", description="as above")
+    do_hv_enable: DigitalLine | None = Field(
+        default=None,
+        description="line that enables the amplifier's high voltage, such as port0/line0; left "
+        "out, it is not wired",
+    )
+    hv_enable_watchdog_s: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=60.0,
+        description="the card's own watchdog takes do_hv_enable low when the program is silent for "
+        "so long; 0 means none",
+    )
     first_convert_us: float = Field(
         default=50.0,
         ge=0.0,
@@ -201,6 +233,12 @@ class CardSettings(Section):
     )
     ao_fifo_samples: int = Field(
         default=8191, ge=1, le=100_000_000, description="output FIFO of the card"
+    )
+    ao_buffer_s: float = Field(
+        default=4.0,
+        ge=0.5,
+        le=60.0,
+        description="a waveform longer than this is streamed, and written so far ahead",
     )
     ao_rate_max_kHz: float = Field(
         default=2860.0, gt=0.0, le=1e5, description="fastest output, one channel"
@@ -257,18 +295,124 @@ class LimitsSettings(Section):
     true_field_max_MV_per_m: float = Field(
         default=15.0, gt=0.0, le=1000.0, description="highest true field in the stretched film"
     )
+    energy_max_J: float = Field(
+        default=1000.0,
+        gt=0.0,
+        le=1e9,
+        description="most energy that a run may charge into the film, over all its rises",
+    )
+    at_voltage_kV: float = Field(
+        default=1.0, gt=0.0, le=100.0, description="what counts as standing at voltage"
+    )
+    time_at_voltage_max_s: float = Field(
+        default=600.0, gt=0.0, le=1e7, description="longest time at voltage without a pause"
+    )
     ramp_down_s: float = Field(
         default=0.5, ge=0.0, le=60.0, description="time to ramp to 0 V when a run is ended early"
     )
+    zero_tolerance_kV: float = Field(
+        default=0.1,
+        gt=0.0,
+        le=1.0,
+        description="the voltage monitor must read less than this once the rig is safe",
+    )
 
-    def gate_limits(self) -> Limits:
-        """The limits as the gate takes them, in SI units."""
+    def gate_limits(self, film: str = "") -> Limits:
+        """The limits as the gate takes them, in SI units, for the film of that name."""
         return Limits(
             voltage_min=self.voltage_min_kV * 1e3,
             voltage_max=self.voltage_max_kV * 1e3,
             slew=self.slew_max_kV_per_s * 1e3,
             field=self.true_field_max_MV_per_m * 1e6,
+            energy=self.energy_max_J,
+            at_voltage=self.at_voltage_kV * 1e3,
+            time_at_voltage=self.time_at_voltage_max_s,
+            film=film,
         )
+
+
+class InterlockSettings(Section):
+    """What ends a run while it goes on: thresholds, how long each must be broken, what is done."""
+
+    monitor_tolerance_kV: float = Field(
+        default=2.5, gt=0.0, le=100.0, description="voltage monitor against command"
+    )
+    monitor_debounce_ms: float = Field(default=50.0, ge=0.0, le=1e4, description="for so long")
+    monitor_action: Action = Field(default="ramp", description="what is done")
+    breakdown_fraction: float = Field(
+        default=0.4,
+        ge=0.0,
+        le=1.0,
+        description="a monitor below this part of a command above breakdown_above_kV is a "
+        "breakdown, or an amplifier that tripped; 0 switches it off",
+    )
+    breakdown_above_kV: float = Field(default=0.5, gt=0.0, le=100.0, description="see above")
+    breakdown_debounce_ms: float = Field(default=2.0, ge=0.0, le=1e4, description="for so long")
+    breakdown_action: Action = Field(default="at once", description="what is done")
+    current_max_mA: float = Field(
+        default=20.0, gt=0.0, le=1000.0, description="current monitor, either sign"
+    )
+    current_debounce_ms: float = Field(default=2.0, ge=0.0, le=1e4, description="for so long")
+    current_action: Action = Field(default="at once", description="what is done")
+    laser_debounce_ms: float = Field(
+        default=50.0, ge=0.0, le=1e4, description="reading out of the laser's range for so long"
+    )
+    laser_stuck_s: float = Field(
+        default=0.5,
+        ge=0.0,
+        le=1e4,
+        description="reading that does not change by one count for so long while the film is "
+        "driven; 0 switches it off",
+    )
+    laser_action: Action = Field(default="ramp", description="what is done")
+    displacement_min_mm: float = Field(
+        default=-5.0, ge=-1e4, le=0.0, description="from the loaded rest state"
+    )
+    displacement_max_mm: float = Field(
+        default=20.0, gt=0.0, le=1e4, description="from the loaded rest state"
+    )
+    displacement_jump_mm: float = Field(
+        default=2.0, gt=0.0, le=1e4, description="change within 2 ms, or from sample to sample"
+    )
+    displacement_debounce_ms: float = Field(
+        default=5.0, ge=0.0, le=1e4, description="out of bounds for so long; a jump counts at once"
+    )
+    displacement_action: Action = Field(default="ramp", description="what is done")
+    following_fraction: float = Field(
+        default=0.2,
+        ge=0.0,
+        le=1.0,
+        description="a film that moves less than this part of a predicted displacement above "
+        "following_above_mm does not follow (an open electrode); 0 switches it off",
+    )
+    following_above_mm: float = Field(default=0.3, gt=0.0, le=1e4, description="see above")
+    following_debounce_ms: float = Field(default=200.0, ge=0.0, le=1e4, description="for so long")
+    following_action: Action = Field(default="ramp", description="what is done")
+    late_s: float = Field(
+        default=1.0, gt=0.0, le=60.0, description="samples that wait for so long for the program"
+    )
+    late_action: Action = Field(default="ramp", description="what is done")
+    disk_free_min_MB: float = Field(
+        default=100.0, ge=0.0, le=1e6, description="room on the disk that must stay free"
+    )
+    disk_action: Action = Field(default="ramp", description="what is done")
+
+
+class GuardianSettings(Section):
+    """The process beside a run on real instruments that takes over when the run dies or freezes."""
+
+    timeout_s: float = Field(
+        default=1.0,
+        ge=0.3,
+        le=10.0,
+        description="a run that is silent for so long is taken for frozen",
+    )
+    link_timeout_s: float = Field(
+        default=2.0,
+        ge=0.2,
+        le=60.0,
+        description="a server that does not answer for so long is taken for gone",
+    )
 
 
 class RigSettings(Section):
@@ -281,6 +425,8 @@ class RigSettings(Section):
         default=None, description="leave the table out when there is none"
     )
     limits: LimitsSettings = LimitsSettings()
+    interlocks: InterlockSettings = InterlockSettings()
+    guardian: GuardianSettings = GuardianSettings()
 
     @property
     def channel_names(self) -> tuple[str, ...]:
@@ -348,6 +494,17 @@ class RigSettings(Section):
         }
         return {name: ranges[name] for name in self.channel_names}
 
+    def wiring(self) -> dict[str, str]:
+        """Terminal configuration of each input channel: ``{"voltage_monitor": "DIFF", ...}``."""
+        card = self.card
+        wiring = {
+            "voltage_monitor": card.terminals_voltage_monitor,
+            "current_monitor": card.terminals_current_monitor,
+            "displacement": card.terminals_displacement,
+            "temperature": card.terminals_temperature,
+        }
+        return {name: wiring[name] for name in self.channel_names if name in wiring}
+
     @model_validator(mode="after")
     def _instruments_agree(self) -> RigSettings:
         amplifier, laser, card, limits = self.amplifier, self.laser, self.card, self.limits
@@ -404,6 +561,17 @@ class RigSettings(Section):
         for terminal in inputs:
             if inputs.count(terminal) > 1:
                 raise ValueError(f"card: input {terminal} is wired to two channels, one is allowed")
+        for name, how in self.wiring().items():
+            number = int(self.terminals()[name].removeprefix("ai"))
+            if how == "DIFF" and number % 16 >= 8:
+                raise ValueError(
+                    f'card.ai_{name} = "ai{number}" with card.terminals_{name} = "DIFF": '
+                    f"differential inputs are ai0 to ai7, whose other wire is 8 higher"
+                )
+        if card.hv_enable_watchdog_s > 0.0 and card.do_hv_enable is None:
+            raise ValueError(
+                "card.hv_enable_watchdog_s is set, but no card.do_hv_enable that it could take low"
+            )
         most(
             "card.first_convert_us and card.convert_interval_us: the scan, in us,",
             self.skew(len(inputs) - 1) * 1e6 + card.convert_interval_us,

@@ -11,7 +11,7 @@ import numpy as np
 from model import coefficients as at
 from model.effects import NEUTRAL, SLOTS
 from model.errors import ModelError
-from model.kinematics import KINEMATICS
+from model.kinematics import KINEMATICS, thinning
 from model.network import HEAD
 from model.springs import SPRINGS, locking_strain
 
@@ -76,6 +76,11 @@ class Film:
     def inertia(self) -> float:
         """Coefficient of lam'' in the motion equation, rho L1^2/3, in kg/m (eq. 43)."""
         return self.density * self.length**2 / 3.0
+
+    def capacitance(self, stretch: np.ndarray) -> np.ndarray:
+        """F, of ``stretch`` (N,): the volume stays, so the area gains what the thickness loses."""
+        before = VACUUM_PERMITTIVITY * self.permittivity * self.length * self.width / self.thickness
+        return before * thinning(self.held, stretch) ** 2
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,6 @@ import numpy as np
 from model import kernel
 from model.actuator import STATUS_WORDS, Actuator, at_rest, initial_state
 from model.effects import MEMORY
-from model.kinematics import thinning
-from model.material import VACUUM_PERMITTIVITY
 from sim_backend.plant import Motion
 
 __all__ = ["ModelPlant"]
@@ -40,7 +38,7 @@ class ModelPlant:
     @property
     def capacitance(self) -> float:
         """Present capacitance in F."""
-        return float(self._capacitance(self.state[:1])[0])
+        return float(self.actuator.film.capacitance(self.state[:1])[0])
 
     def advance(
         self, time: np.ndarray, voltage: np.ndarray, hold: bool
@@ -67,18 +65,10 @@ class ModelPlant:
         motion = Motion(
             displacement=displacement,
             velocity=velocity,
-            capacitance=self._capacitance(stretch),
+            capacitance=self.actuator.film.capacitance(stretch),
             leakage=nothing,
             heating=nothing,
             fault=fault,
             fault_at=fault_at,
         )
         return motion, after
-
-    def _capacitance(self, stretch: np.ndarray) -> np.ndarray:
-        film = self.actuator.film
-        at_rest = (
-            VACUUM_PERMITTIVITY * film.permittivity * film.length * film.width / film.thickness
-        )
-        # the volume stays: what the thickness loses the area gains
-        return at_rest * thinning(film.held, stretch) ** 2

@@ -275,12 +275,7 @@ class SimulatedRig:
 def _check_limits(waveform: GatedWaveform, settings: RigSettings) -> None:
     """Refuse a waveform that was admitted under wider limits than the rig's own."""
     passed, own = waveform.limits, settings.limits.gate_limits()
-    if not (
-        passed.voltage_max <= own.voltage_max
-        and passed.voltage_min >= own.voltage_min
-        and passed.slew <= own.slew
-        and passed.field <= own.field
-    ):
+    if not passed.within(own):
         raise RigError(
             f"the waveform passed the gate under wider limits ({passed}) than this rig's ({own}); "
             f"admit it under the rig's own"

@@ -6,20 +6,25 @@ Derive a class ``Test...`` from ``RigContract`` and say in ``open_rig`` how the 
 import itertools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from drivers.channels import CHANNEL_NAMES
 from drivers.errors import RigError, RigStateError
-from drivers.gate import GatedWaveform, Limits, admit
+from drivers.gate import GatedWaveform, Limits, Prediction, admit
 from drivers.rig import Block, Event, Rig, RigState
 from drivers.settings import LimitsSettings
 
 LIMITS = LimitsSettings().gate_limits()
 RATE = 1000.0
 FIELD_PER_VOLT = 1.25e3  # 1/m: a film of 1 mm, stretched
+
+
+def foreseen(samples: int) -> Prediction:
+    """A film that stays as it is."""
+    return Prediction(np.full(samples, FIELD_PER_VOLT), np.full(samples, 2e-10))
 
 
 def lobes(
@@ -34,7 +39,7 @@ def lobes(
     lobe = np.sin(np.pi * time / seconds)
     still = np.zeros(round(quiet * rate))
     voltage = np.concatenate((still, *(peak * lobe for peak in peaks), still))
-    return admit(voltage, rate, limits, np.full(voltage.size, FIELD_PER_VOLT))
+    return admit(voltage, rate, limits, foreseen(voltage.size))
 
 
 @dataclass(frozen=True)
@@ -182,7 +187,7 @@ class RigContract:
         assert rig.state is RigState.SAFE
 
     def test_refuses_a_waveform_admitted_under_wider_limits(self, rig):
-        wide = Limits(LIMITS.voltage_min, 2.0 * LIMITS.voltage_max, LIMITS.slew, LIMITS.field)
+        wide = replace(LIMITS, voltage_max=2.0 * LIMITS.voltage_max)
         with pytest.raises(RigError, match="wider limits"):
             rig.load(lobes(limits=wide))
         assert rig.state is RigState.SAFE

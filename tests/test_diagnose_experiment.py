@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from app.experiment import SEPARATES, candidates, separating_experiment
+from app.plan import plan
 from app.rigfile import RigFile
-from app.run import gate_sequence
 from app.sequencefile import parse_sequence
 from app.together import of_rig
 from drivers.settings import CardSettings
@@ -32,7 +32,7 @@ RIVALS = [("sensor lag", "sensor_lag", LAG), ("linear drag", "drag", DRAG)]
 
 
 def predicted(model: Actuator, sequence: str) -> np.ndarray:
-    waveform = gate_sequence(parse_sequence(sequence, "x", Path()), SLOW)
+    waveform = plan(parse_sequence(sequence, "x", Path()), SLOW).admitted()
     time = np.arange(waveform.voltage.size) / waveform.rate
     return model.simulate(Drive(time, waveform.voltage, hold=True)).displacement
 
@@ -81,13 +81,13 @@ def test_limits_lower_every_candidate():
     low = SLOW.model_copy(update={"limits": SLOW.limits.model_copy(update={"voltage_max_kV": 3.0})})
     found, _ = separating_experiment(RIVALS, low, 1e-9)
     assert len(found.tried) == len(candidates(3.0))
-    waveform = gate_sequence(parse_sequence(found.sequence, "x", Path()), low)
+    waveform = plan(parse_sequence(found.sequence, "x", Path()), low).admitted()
     assert 2e3 < waveform.voltage.max() <= 3e3
 
 
 def test_every_candidate_passes_the_gate_of_the_thesis_rig():
     for name, text in candidates(8.0).items():
-        waveform = gate_sequence(parse_sequence(text, name, Path()), SLOW)
+        waveform = plan(parse_sequence(text, name, Path()), SLOW).admitted()
         assert waveform.voltage.max() > 5e3, name
 
 

@@ -3,6 +3,7 @@
 import copy
 import math
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,11 +12,21 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from drivers.errors import RefusedWaveform
-from drivers.gate import GatedWaveform, Limits, admit, ramp_down
+from drivers.gate import GatedWaveform, Limits, Prediction, admit, ramp_down
 
-LIMITS = Limits(voltage_min=-1000.0, voltage_max=8000.0, slew=4.0e5, field=1.0e7)
+LIMITS = Limits(
+    voltage_min=-1000.0,
+    voltage_max=8000.0,
+    slew=4.0e5,
+    field=1.0e7,
+    energy=0.02,
+    at_voltage=5000.0,
+    time_at_voltage=0.004,
+    film="F7",
+)
 RATE = 1000.0
 FIELD = 1.0e3
+CAPACITANCE = 5.0e-10
 
 any_float = st.floats(allow_nan=True, allow_infinity=True)
 near_limits = st.floats(min_value=-2000.0, max_value=9000.0)
@@ -23,12 +34,17 @@ near_limits = st.floats(min_value=-2000.0, max_value=9000.0)
 
 def gate(voltage, rate=RATE, limits=LIMITS, field=FIELD):
     voltage = np.asarray(voltage, dtype=float)
-    return admit(voltage, rate, limits, np.full(voltage.shape, field))
+    return admit(voltage, rate, limits, foreseen(voltage.shape, field))
+
+
+def foreseen(shape, field=FIELD, capacitance=CAPACITANCE, pull_in="", film="F7"):
+    return Prediction(np.full(shape, field), np.full(shape, capacitance), pull_in, film)
 
 
 def within(voltage, field_per_volt, limits=LIMITS, rate=RATE):
     """The same limits, said another way."""
     voltage, field_per_volt = voltage.tolist(), field_per_volt.tolist()
+    energy, standing = 0.0, 0
     if not all(math.isfinite(v) for v in voltage) or voltage[0] != 0.0 or voltage[-1] != 0.0:
         return False
     if not all(math.isfinite(f) and f > 0.0 for f in field_per_volt):
@@ -40,7 +56,12 @@ def within(voltage, field_per_volt, limits=LIMITS, rate=RATE):
             return False
         if i and abs(v - voltage[i - 1]) * rate > limits.slew:
             return False
-    return True
+        before = voltage[i - 1] if i else 0.0
+        energy += max(0.0, 0.5 * CAPACITANCE * (v * v - before * before))
+        standing = standing + 1 if abs(v) >= limits.at_voltage else 0
+        if standing > limits.time_at_voltage * rate:
+            return False
+    return energy <= limits.energy * (1.0 + 1e-12)
 
 
 @settings(deadline=None, max_examples=150)
@@ -50,12 +71,11 @@ def within(voltage, field_per_volt, limits=LIMITS, rate=RATE):
 )
 def test_what_passes_is_within_every_limit_and_what_is_refused_is_not(inside, field):
     voltage = np.array([0.0, *inside, 0.0])
-    factors = np.full(voltage.size, field)
-    if within(voltage, factors):
-        np.testing.assert_array_equal(admit(voltage, RATE, LIMITS, factors).voltage, voltage)
+    if within(voltage, np.full(voltage.size, field)):
+        np.testing.assert_array_equal(gate(voltage, field=field).voltage, voltage)
     else:
         with pytest.raises(RefusedWaveform):
-            admit(voltage, RATE, LIMITS, factors)
+            gate(voltage, field=field)
 
 
 @settings(deadline=None, max_examples=50)
@@ -92,7 +112,7 @@ def test_refusals_say_what_when_and_how_much(voltage, message):
 def test_a_refusal_names_every_limit_that_is_broken():
     with pytest.raises(RefusedWaveform) as caught:
         gate([0.0, 9000.0, 500.0], field=2.0e3)
-    assert len(caught.value.reasons) == 4  # voltage, slew, field, end
+    assert len(caught.value.reasons) == 5  # voltage, slew, field, energy, end
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, math.nan, math.inf])
@@ -103,16 +123,53 @@ def test_rates_that_are_none(rate):
 
 @pytest.mark.parametrize("field", [0.0, -1.0])
 def test_field_factors_that_are_none(field):
-    with pytest.raises(RefusedWaveform, match="field factor"):
+    with pytest.raises(RefusedWaveform, match="one over the thickness is predicted as"):
         gate([0.0, 0.0], field=field)
 
 
-def test_field_factors_must_be_as_many_as_samples():
-    with pytest.raises(RefusedWaveform, match="as many field factors"):
-        admit(np.zeros(3), RATE, LIMITS, np.ones(2))
+def test_predictions_must_be_as_many_as_samples():
+    with pytest.raises(RefusedWaveform, match="as many predictions"):
+        admit(np.zeros(3), RATE, LIMITS, foreseen(2))
 
 
-@pytest.mark.parametrize("name", ["voltage_min", "voltage_max", "slew", "field"])
+@pytest.mark.parametrize("capacitance", [0.0, -1e-10, math.nan])
+def test_capacitances_that_are_none(capacitance):
+    with pytest.raises(RefusedWaveform, match=r"capacitance|finite"):
+        admit(np.zeros(3), RATE, LIMITS, foreseen(3, capacitance=capacitance))
+
+
+def test_a_predicted_pull_in_is_refused():
+    with pytest.raises(RefusedWaveform, match="the model predicts pull-in"):
+        admit(np.zeros(3), RATE, LIMITS, foreseen(3, pull_in="pull-in (at 1 s)"))
+
+
+@pytest.mark.parametrize(("film", "said"), [("F8", "for film 'F8'"), ("", "without a name")])
+def test_limits_hold_for_the_film_they_are_declared_for(film, said):
+    with pytest.raises(RefusedWaveform, match=f"declared for film 'F7', not .*{said}"):
+        admit(np.zeros(3), RATE, LIMITS, foreseen(3, film=film))
+
+
+def test_energy_counts_every_rise_and_no_fall():
+    step = [0.0, 300.0, 0.0]
+    rises = gate([*step * 10]).margins[4]
+    assert rises.quantity == "energy"
+    assert rises.reached == pytest.approx(10 * 0.5 * CAPACITANCE * 300.0**2)
+    with pytest.raises(RefusedWaveform, match=r"energy reaches 0\.0\d+ J, 0\.02 J is allowed"):
+        gate([*step * 1000])
+
+
+def test_time_at_voltage_is_what_stands_without_a_pause():
+    rise = np.linspace(0.0, 4900.0, 20)
+    high, low = [5000.0] * 4, [4999.0]
+    gate([*rise, *high, *low, *high, *rise[::-1]])
+    with pytest.raises(RefusedWaveform, match=r"time at 5 kV or more reaches 0\.005 s, 0\.004 s"):
+        gate([*rise, *high, 5000.0, *rise[::-1]])
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["voltage_min", "voltage_max", "slew", "field", "energy", "at_voltage", "time_at_voltage"],
+)
 def test_a_limit_that_is_no_number_lets_nothing_pass(name):
     limits = Limits(**{**vars(LIMITS), name: math.nan})
     with pytest.raises(RefusedWaveform, match="nan"):
@@ -161,7 +218,7 @@ def test_unchangeable_afterwards():
 )
 def test_ramp_down_goes_straight_to_zero_within_the_slew(peak, duration, steps):
     rise = np.linspace(0.0, peak, 10)
-    limits = Limits(-2000.0, 2000.0, LIMITS.slew, LIMITS.field)
+    limits = replace(LIMITS, voltage_min=-2000.0, voltage_max=2000.0)
     passed = gate([*rise, *rise[::-1]], limits=limits)
     ramp = ramp_down(passed, 9, duration)
     assert ramp.size == steps

@@ -9,6 +9,7 @@ from app.rigfile import RigFile, load_rig_file, write_default
 from drivers.gate import admit
 from drivers.settings import LaserSettings, RigSettings, ThermometerSettings
 from model.material import THESIS_FILM, THESIS_LOAD
+from tests.rig_contract import foreseen
 
 
 @pytest.fixture
@@ -190,4 +191,4 @@ def rounded_steps():
 )
 def test_default_limits_let_the_thesis_and_fast_steps_pass(waveform):
     # a film of 1 mm at the greatest stretch of the thesis, 1.25
-    admit(waveform, 1000.0, RigFile().gate_limits(), np.full(waveform.size, 1.25e3))
+    admit(waveform, 1000.0, RigFile().gate_limits(), foreseen(waveform.size))

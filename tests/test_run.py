@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from app.errors import DearigError, DiskFault, InputError, InstrumentFault, Interrupted
+from app.plan import plan
 from app.recording import open_recording
 from app.recording.writer import RecordingWriter
 from app.rigfile import RigFile
-from app.run import gate_sequence, open_rig, record
+from app.run import open_rig, record
 from app.sequencefile import parse_sequence
 from drivers.errors import RigError
 from drivers.gate import GatedWaveform
@@ -134,7 +135,7 @@ def test_the_first_ctrl_c_ramps_down(command, tmp_path: Path) -> None:
     assert run.voltage_command is not None
     assert run.voltage_command[-1] == pytest.approx(0.0, abs=0.2)
     # not a sample is lost or torn around the moment: what was planned goes on until the ramp
-    planned = gate_sequence(LOADED, RIG_FILE).voltage[: run.samples]
+    planned = plan(LOADED, RIG_FILE).admitted().voltage[: run.samples]
     same = int(np.argmax(np.abs(run.voltage_command - planned) > 1.0))
     assert same >= 700
     assert np.abs(np.diff(run.voltage_command)).max() < 20.0
@@ -319,8 +320,8 @@ def test_the_gate_judges_the_stretched_film() -> None:
     rig = RigFile.model_validate({"limits": {"true_field_max_MV_per_m": 9.0}})
     loaded = parse_sequence(LOBE.replace("3.0", "8.3"), "high lobe", Path())
     with pytest.raises(InputError, match=r"true field reaches 1[01]\.\d+ MV/m at .*9 MV/m"):
-        gate_sequence(loaded, rig)
-    assert gate_sequence(loaded, RIG_FILE).voltage.max() == pytest.approx(8300.0)
+        plan(loaded, rig).admitted()
+    assert plan(loaded, RIG_FILE).admitted().voltage.max() == pytest.approx(8300.0)
 
 
 def test_a_rig_that_cannot_hang_is_refused(tmp_path: Path) -> None:
@@ -335,5 +336,5 @@ def test_a_rig_that_cannot_hang_is_refused(tmp_path: Path) -> None:
 
 def test_a_run_knows_its_rate() -> None:
     rig = RigFile(card=CardSettings(sample_rate_Hz=250.0))
-    waveform = gate_sequence(LOADED, rig)
+    waveform = plan(LOADED, rig).admitted()
     assert (waveform.rate, waveform.voltage.size) == (250.0, 376)

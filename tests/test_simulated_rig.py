@@ -19,7 +19,7 @@ from sim_backend.card import INPUT_OVERWRITTEN
 from sim_backend.clock import ManualClock, PacedClock
 from sim_backend.factory import is_simulated, open_simulated_rig
 from sim_backend.signal_path import CHUNK
-from tests.rig_contract import FIELD_PER_VOLT, LIMITS, RATE, RigContract, begin, drain, lobes, play
+from tests.rig_contract import LIMITS, RATE, RigContract, begin, drain, foreseen, lobes, play
 
 
 def open_rig(address="sim", settings=None, **options):
@@ -201,7 +201,7 @@ def test_a_film_that_runs_away_is_a_fault_and_stays_where_it_was():
     ],
 )
 def test_rates_that_the_card_cannot_do_are_refused(rate, message):
-    waveform = admit(np.zeros(100), rate, LIMITS, np.full(100, FIELD_PER_VOLT))
+    waveform = admit(np.zeros(100), rate, LIMITS, foreseen(100))
     with pytest.raises(RigError, match=message):
         open_rig().load(waveform)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers.gate import GatedWaveform, admit
+from drivers.gate import GatedWaveform, Prediction, admit
 from drivers.settings import RigSettings, ThermometerSettings
 from model.material import THESIS_FILM, THESIS_LOAD
 from sim_backend.amplifier import Amplifier
@@ -43,8 +43,9 @@ def thesis_record(settings: RigSettings) -> GatedWaveform:
         elapsed = np.arange(round(RATE / frequency)) / RATE
         lobes.append(amplitude * 1e3 * np.sin(np.pi * frequency * elapsed))
     voltage = np.concatenate((np.zeros(2000), *lobes, *lobes, np.zeros(1000)))
-    field_per_volt = np.full(voltage.size, 1.25 / THESIS_FILM.thickness)
-    return admit(voltage, RATE, settings.limits.gate_limits(), field_per_volt)
+    stretch = np.full(voltage.size, 1.25)
+    foreseen = Prediction(stretch / THESIS_FILM.thickness, THESIS_FILM.capacitance(stretch))
+    return admit(voltage, RATE, settings.limits.gate_limits(), foreseen)
 
 
 def play(rig: SimulatedRig, waveform: GatedWaveform) -> None:
