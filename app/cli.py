@@ -179,7 +179,11 @@ def record(
     sequence: Annotated[str, typer.Argument(metavar="SEQUENCE", help="A TOML file or a preset.")],
     out: Annotated[Path, typer.Option("--out", metavar="FILE.h5", help="The recording.")],
     rig: Annotated[
-        str, typer.Option(help="sim, or sim:SEED for a rig that hides an effect.")
+        str,
+        typer.Option(
+            help="sim, sim:SEED for a rig that hides an effect, daqmx:Dev1 for a card, or "
+            "daqmx:Dev1@HOST:PORT for one behind a server."
+        ),
     ] = "sim",
     rig_file: RigFileOption = None,
     model: Annotated[
@@ -187,6 +191,13 @@ def record(
         typer.Option(metavar="MODEL.toml", help="What the simulated rig sim is made of."),
     ] = None,
     paced: Annotated[bool, typer.Option("--paced", help="Simulate in real time.")] = False,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND@SECONDS",
+            help="What goes wrong in a simulated rig, and when, such as arc@3.2; may be repeated.",
+        ),
+    ] = None,
     seed: Seed = 0,
     operator: Annotated[str, typer.Option(help="Who runs it; kept in the recording.")] = "",
     film: Annotated[str, typer.Option(help="Which film; kept in the recording.")] = "",
@@ -202,6 +213,7 @@ def record(
     from app.terminal import write_json
     from app.together import of_rig
     from app.toml_input import read_text
+    from sim_backend.faults import FaultPlan
 
     _check_files(force, (sequence, rig_file, model), out, json=json, recording=out)
     settings = load_rig_file(rig_file)
@@ -210,11 +222,15 @@ def record(
     if model is not None:
         actuator = load_actuator(model)
         settings = of_rig(settings, actuator.film, actuator.load)
+    try:
+        faults = FaultPlan.parse(fault or ())
+    except ValueError as error:
+        raise InputError(str(error)) from error
     with _working(json) as (console, progress):
         result = run(
             load_sequence(sequence), rig, settings, text, out, seed=seed, paced=paced,
-            actuator=actuator, operator=operator, film_id=film, notes=notes, overwrite=force,
-            progress=progress,
+            actuator=actuator, faults=faults, operator=operator, film_id=film, notes=notes,
+            overwrite=force, progress=progress,
         )  # fmt: skip
     seconds = result.samples / result.rate_Hz
     _print(

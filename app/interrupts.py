@@ -33,6 +33,10 @@ class Interrupts:
         """True once the run is to end."""
         return self._asked
 
+    def ask(self) -> None:
+        """End the run, as the first ctrl-C does; may be called from any thread."""
+        self._asked = True
+
     def close(self) -> None:
         """Raise no more: the rig is being made safe, and nothing is quicker than that."""
         self._raises = False

@@ -1,14 +1,17 @@
-"""One run: sequence -> gate -> rig -> recording, and 0 V at the end whatever happens."""
+"""One run: sequence -> gate -> rig -> recording, watched all the way, and 0 V at its end."""
 
 from __future__ import annotations
 
 import logging
+import shutil
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.errors import DearigError, InputError, InstrumentFault, Interrupted
+from app.errors import DearigError, DiskFault, InputError, InstrumentFault, Interrupted, SafetyStop
 from app.interrupts import Interrupts
-from app.plan import plan
+from app.plan import Plan, plan
 from app.progress import Progress, quiet
 from app.recording.files import check_output
 from app.recording.writer import RecordingWriter
@@ -16,13 +19,17 @@ from app.rigfile import RigFile
 from app.sequencefile import LoadedSequence
 from drivers.errors import AddressError, RefusedWaveform, RigError
 from drivers.gate import Margin
-from drivers.rig import Rig
+from drivers.interlocks import Interlocks, Trip
+from drivers.rig import Block, Event, Rig, RigIdentity
 from model.actuator import Actuator
 from sim_backend.factory import is_simulated, open_simulated_rig
+from sim_backend.faults import FaultPlan
 
-__all__ = ["RunResult", "open_rig", "record"]
+__all__ = ["Onlooker", "RunResult", "open_rig", "record"]
 
 log = logging.getLogger(__name__)
+
+_DISK_INTERVAL = 1.0  # s between two looks at the room on the disk
 
 
 @dataclass(frozen=True)
@@ -40,6 +47,23 @@ class RunResult:
     margins: tuple[Margin, ...]
 
 
+class Onlooker:
+    """Is told of a run while it goes on; this one does not care.
+
+    Called from the thread that runs the rig, which waits: whoever draws or computes must take the
+    samples elsewhere and return at once.
+    """
+
+    def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:
+        """The sample clock of ``rate`` Hz is about to start."""
+
+    def block(self, block: Block) -> None:
+        """The next samples, as they were recorded."""
+
+    def event(self, event: Event) -> None:
+        """Something happened; it is in the recording."""
+
+
 class _NotSafe(InstrumentFault):
     """The voltage may still be up."""
 
@@ -51,10 +75,12 @@ def open_rig(
     seed: int,
     paced: bool,
     actuator: Actuator | None = None,
+    faults: FaultPlan | None = None,
 ) -> Rig:
     """The rig at ``address``. Raises ``InputError`` for an address that names none.
 
-    ``actuator`` takes the place of the film that ``sim`` has by default.
+    ``actuator`` takes the place of the film that ``sim`` has by default, ``faults`` go wrong in a
+    simulated rig. Raises ``InstrumentFault`` where the instruments are not there.
     """
     if actuator is not None and address != "sim":
         raise InputError(f"rig {address!r} has a film of its own; only sim takes a model")
@@ -62,17 +88,32 @@ def open_rig(
         if is_simulated(address):
             return open_simulated_rig(
                 address, rig_file, rig_file.as_film(), rig_file.as_load(), seed=seed, paced=paced,
-                actuator=actuator,
+                actuator=actuator, faults=faults or FaultPlan(),
             )  # fmt: skip
     except AddressError as error:
         raise InputError(str(error)) from error
     except ValueError as error:  # a film that cannot hang at rest
         raise InputError(f"rig {address!r} with this rig file: {error}") from error
-    if address.startswith("daqmx:"):
+    if faults is not None and faults.faults:
+        raise InputError(f"rig {address!r} is not simulated; faults are for simulated rigs")
+    if not address.startswith("daqmx:"):
         raise InputError(
-            f"rig {address!r}: this version drives simulated rigs only; write sim or sim:SEED"
+            f"rig {address!r} is not known: write sim, sim:SEED such as sim:7, daqmx:Dev1 or "
+            f"daqmx:Dev1@HOST:PORT"
         )
-    raise InputError(f"rig {address!r} is not known: write sim, or sim:SEED such as sim:7")
+    if not rig_file.film.name:
+        raise InputError(
+            f"rig {address!r}: no film is declared; give a --rig-file whose [film] has a name, so "
+            f"that its limits are those of the film that hangs there"
+        )
+    from drivers.daqmx import open_daqmx_rig
+
+    try:
+        return open_daqmx_rig(address, rig_file)
+    except AddressError as error:
+        raise InputError(str(error)) from error
+    except RigError as error:
+        raise InstrumentFault(str(error)) from error
 
 
 def record(
@@ -85,25 +126,33 @@ def record(
     seed: int = 0,
     paced: bool = False,
     actuator: Actuator | None = None,
+    faults: FaultPlan | None = None,
     operator: str = "",
     film_id: str = "",
     notes: str = "",
     overwrite: bool = False,
     progress: Progress = quiet,
+    onlooker: Onlooker | None = None,
+    interrupts: Interrupts | None = None,
+    clock: Callable[[], float] = time.monotonic,
 ) -> RunResult:
     """Play ``loaded`` on the rig at ``address`` and record it to ``out``.
 
     ``configuration`` is the text of the rig file, kept with the recording; ``actuator`` is what the
-    simulated rig ``sim`` is made of, where it is not Table 3's film. Raises ``InputError``
-    before anything is touched; after the rig was made safe and the recording was closed,
-    ``InstrumentFault`` or ``DiskFault`` for what failed during the run, and ``Interrupted`` where
-    the operator ended it: the first ctrl-C ramps down in the set time, the second is 0 V at once.
+    simulated rig ``sim`` is made of, where it is not Table 3's film. ``interrupts`` is how another
+    thread ends the run; by default ctrl-C does.
+
+    Raises ``InputError`` before anything is touched; after the rig was made safe and the recording
+    was closed, ``SafetyStop`` where an interlock ended it, ``InstrumentFault`` or ``DiskFault`` for
+    what failed, and ``Interrupted`` where the operator ended it: the first ctrl-C ramps down in the
+    set time, the second is 0 V at once.
     """
     out = check_output(out, overwrite)
-    waveform = plan(loaded, rig_file, actuator).admitted()
-    rig = open_rig(address, rig_file, seed=seed, paced=paced, actuator=actuator)
+    planned = plan(loaded, rig_file, actuator, film_id)
+    waveform = planned.admitted()
+    rig = open_rig(address, rig_file, seed=seed, paced=paced, actuator=actuator, faults=faults)
     try:
-        with Interrupts() as interrupts:
+        with interrupts or Interrupts() as interrupts:
             try:
                 rate = rig.load(waveform)
                 identity = rig.identify()
@@ -113,80 +162,162 @@ def record(
                 raise InstrumentFault(str(error)) from error
             writer = RecordingWriter(
                 out, identity, rate, waveform.voltage.size, loaded.toml, rig_file.as_film(),
-                rig_file.as_load(), configuration, operator=operator, film_id=film_id,
-                notes=notes, seed=seed, overwrite=overwrite,
+                rig_file.as_load(), configuration, operator=operator,
+                film_id=film_id or rig_file.film.name, notes=notes, seed=seed, overwrite=overwrite,
             )  # fmt: skip
-            events = _follow(rig, writer, waveform.voltage.size, interrupts, progress)
+            onlooker = onlooker or Onlooker()
+            onlooker.started(planned, identity, rate)
+            interlocks = Interlocks(
+                rig_file, identity.channels, rate, planned.displacement, planned.voltage
+            )
+            run = _Run(rig, writer, interlocks, interrupts, onlooker, clock)
+            events = run.follow(waveform.voltage.size, progress)
         return RunResult(out, writer.samples, rate, "finished", events, waveform.margins)
     finally:
         _close(rig)
 
 
-def _follow(
-    rig: Rig, writer: RecordingWriter, samples: int, interrupts: Interrupts, progress: Progress
-) -> tuple[str, ...]:
-    """Play what is loaded and record it; whatever happens, 0 V comes first, then the file's end."""
-    events: list[str] = []
-    try:
+class _Run:
+    """A loaded rig being played, watched and recorded."""
+
+    def __init__(
+        self,
+        rig: Rig,
+        writer: RecordingWriter,
+        interlocks: Interlocks,
+        interrupts: Interrupts,
+        onlooker: Onlooker,
+        clock: Callable[[], float],
+    ) -> None:
+        self._rig = rig
+        self._writer = writer
+        self._interlocks = interlocks
+        self._interrupts = interrupts
+        self._onlooker = onlooker
+        self._clock = clock
+        self._looked = clock()  # at the disk
+        self._events: list[str] = []
+        self._trip: Trip | None = None  # the first one: what came after it follows from it
+
+    def follow(self, samples: int, progress: Progress) -> tuple[str, ...]:
+        """Play and record; whatever happens, 0 V comes first, then the file's end."""
+        writer = self._writer
         try:
-            _play(rig, writer, samples, interrupts, events, progress)
-        finally:
-            # 0 V first: a disk that is slow or full must not keep the voltage up
-            interrupts.close()
-            _make_safe(rig)
-        if interrupts.asked():
-            kept = _end(writer, "interrupted by the operator; ramped down to 0 V")
-            raise Interrupted(f"interrupted: the voltage was ramped down to 0 V, and {kept}")
-        if writer.samples == 0:
-            raise InstrumentFault(f"the rig gave no samples; {_end(writer, 'no samples')}")
-        writer.close("finished")
-    except KeyboardInterrupt as error:
-        kept = _end(
-            writer, "interrupted by the operator", "interrupted by the operator: 0 V at once"
-        )
-        raise Interrupted(
-            f"interrupted: the output was taken to 0 V at once, and {kept}"
-        ) from error
-    except RigError as error:
-        kept = _end(writer, f"instrument fault: {error}", f"instrument fault: {error}", "fault")
-        raise InstrumentFault(f"{error}; the rig was made safe, and {kept}") from error
-    except DearigError as error:
-        if writer.closed:
-            raise
-        kept = _end(writer, f"ended early: {error}", f"ended early: {error}", "fault")
-        safe = "" if isinstance(error, _NotSafe) else "the rig was made safe, and "
-        raise type(error)(f"{error}; {safe}{kept}") from error
-    finally:
-        # only what nobody foresaw comes here with an open file
-        _end(writer, "ended early by a fault of the program")
-    return tuple(events)
-
-
-def _play(
-    rig: Rig,
-    writer: RecordingWriter,
-    samples: int,
-    interrupts: Interrupts,
-    events: list[str],
-    progress: Progress,
-) -> None:
-    rig.arm()
-    if interrupts.asked():
-        return
-    rig.start()
-    stopping = False
-    while (block := rig.read()) is not None:
-        writer.append(block)
-        for event in block.events:
-            events.append(f"{event.level}: {event.message}")
-            log.log(_LEVELS.get(event.level, logging.INFO), "%s", event.message)
-        progress("recording", writer.samples / samples)
-        if interrupts.asked() and not stopping:
-            stopping = True
-            writer.event(
-                writer.samples, "warning", "interrupted by the operator: ramping down to 0 V"
+            try:
+                self._play(samples, progress)
+            finally:
+                # 0 V first: a disk that is slow or full must not keep the voltage up
+                self._interrupts.close()
+                _make_safe(self._rig)
+            if self._trip is not None:
+                kept = _end(writer, f"stopped by an interlock: {self._trip.message}")
+                raise SafetyStop(
+                    f"{self._trip.message}; {_DONE[self._trip.action]} to 0 V, and {kept}"
+                )
+            if self._interrupts.asked():
+                kept = _end(writer, "interrupted by the operator; ramped down to 0 V")
+                raise Interrupted(f"interrupted: the voltage was ramped down to 0 V, and {kept}")
+            if writer.samples == 0:
+                raise InstrumentFault(f"the rig gave no samples; {_end(writer, 'no samples')}")
+            writer.close("finished")
+        except KeyboardInterrupt as error:
+            kept = _end(
+                writer, "interrupted by the operator", "interrupted by the operator: 0 V at once"
             )
-            rig.stop()
+            raise Interrupted(
+                f"interrupted: the output was taken to 0 V at once, and {kept}"
+            ) from error
+        except RigError as error:
+            kept = _end(writer, f"instrument fault: {error}", f"instrument fault: {error}", "fault")
+            raise InstrumentFault(f"{error}; the rig was made safe, and {kept}") from error
+        except DearigError as error:
+            if writer.closed:
+                raise
+            kept = _end(writer, f"ended early: {error}", f"ended early: {error}", "fault")
+            safe = "" if isinstance(error, _NotSafe) else "the rig was made safe, and "
+            raise type(error)(f"{error}; {safe}{kept}") from error
+        finally:
+            # only what nobody foresaw comes here with an open file
+            _end(writer, "ended early by a fault of the program")
+        return tuple(self._events)
+
+    def _play(self, samples: int, progress: Progress) -> None:
+        rig, interrupts = self._rig, self._interrupts
+        rig.arm()
+        if interrupts.asked():
+            return
+        rig.start()
+        try:
+            stopping = False
+            while (block := rig.read()) is not None:
+                self._take(block)
+                progress("recording", self._writer.samples / samples)
+                trip = self._watch(block)
+                if trip is not None and trip.action == "at once":
+                    return
+                if (trip is not None or interrupts.asked()) and not stopping:
+                    stopping = True
+                    if trip is None:
+                        self._note("warning", "interrupted by the operator: ramping down to 0 V")
+                    rig.stop()
+        except (RigError, KeyboardInterrupt):
+            raise
+        except BaseException:
+            # the instruments are well: a disk or a fault of ours is no reason for a jolt
+            _ramp_down(rig)
+            raise
+
+    def _take(self, block: Block) -> None:
+        self._writer.append(block)
+        self._onlooker.block(block)
+        for event in block.events:
+            self._tell(event)
+
+    def _watch(self, block: Block) -> Trip | None:
+        """What trips an interlock now; noted, each one."""
+        trips = self._interlocks.watch(block)
+        trips += [trip for trip in (self._interlocks.late(self._rig.waiting), self._disk()) if trip]
+        for trip in trips:
+            self._note("fault", f"interlock {trip.interlock}: {trip.message}")
+            self._trip = self._trip or trip
+        if not trips:
+            return None
+        # the stronger action counts
+        return next((trip for trip in trips if trip.action == "at once"), trips[0])
+
+    def _disk(self) -> Trip | None:
+        now = self._clock()
+        if now - self._looked < _DISK_INTERVAL:
+            return None
+        self._looked = now
+        folder = self._writer.path.parent
+        try:
+            free = shutil.disk_usage(folder).free
+        except OSError as error:
+            raise DiskFault(
+                f"{folder} is gone: {error.strerror}; see that the drive is there"
+            ) from error
+        return self._interlocks.disk(free)
+
+    def _note(self, level: str, message: str) -> None:
+        event = Event(self._writer.samples, level, message)
+        self._writer.event(event.sample, level, message)
+        self._tell(event)
+
+    def _tell(self, event: Event) -> None:
+        self._events.append(f"{event.level}: {event.message}")
+        log.log(_LEVELS.get(event.level, logging.INFO), "%s", event.message)
+        self._onlooker.event(event)
+
+
+def _ramp_down(rig: Rig) -> None:
+    """Down to 0 V in the set time; what is read meanwhile has nowhere to go."""
+    try:
+        rig.stop()
+        while rig.read() is not None:
+            pass
+    except RigError as error:
+        log.warning("the ramp down failed (%s); the output is taken to 0 V at once", error)
 
 
 def _make_safe(rig: Rig) -> None:
@@ -233,3 +364,4 @@ def _end(writer: RecordingWriter, outcome: str, event: str = "", level: str = "w
 
 
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "fault": logging.ERROR}
+_DONE = {"ramp": "the voltage was ramped down", "at once": "the output was taken at once"}

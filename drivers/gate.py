@@ -12,7 +12,7 @@ from typing import NoReturn, final
 
 import numpy as np
 
-from drivers.errors import RefusedWaveform
+from drivers.errors import RefusedWaveform, RigError
 
 __all__ = ["GatedWaveform", "Limits", "Margin", "Prediction", "admit", "ramp_down"]
 
@@ -138,6 +138,14 @@ class GatedWaveform:
     def margins(self) -> tuple[Margin, ...]:
         """How near it comes to each limit."""
         return self._margins
+
+    def check_within(self, limits: Limits) -> None:
+        """Raise ``RigError`` where it passed the gate under wider limits than ``limits``."""
+        if not self._limits.within(limits):
+            raise RigError(
+                f"the waveform passed the gate under wider limits ({self._limits}) than this "
+                f"rig's ({limits}); admit it under the rig's own"
+            )
 
     @property
     def duration(self) -> float:

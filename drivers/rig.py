@@ -9,9 +9,10 @@ from typing import Protocol
 import numpy as np
 
 from drivers.channels import Channel
+from drivers.errors import RigStateError
 from drivers.gate import GatedWaveform
 
-__all__ = ["Block", "Event", "Instrument", "Rig", "RigIdentity", "RigState"]
+__all__ = ["Block", "Event", "Instrument", "Rig", "RigIdentity", "RigState", "expect"]
 
 
 class RigState(Enum):
@@ -23,6 +24,13 @@ class RigState(Enum):
     RUNNING = "running"
     DONE = "done"
     CLOSED = "closed"
+
+
+def expect(state: RigState, call: str, *allowed: RigState) -> None:
+    """Raise ``RigStateError`` unless a rig in ``state`` can take ``call``."""
+    if state not in allowed:
+        wanted = " or ".join(one.value for one in allowed)
+        raise RigStateError(f"{call}: the rig is {state.value}, it must be {wanted}")
 
 
 @dataclass(frozen=True)
@@ -94,6 +102,11 @@ class Rig(Protocol):
 
     def read(self) -> Block | None:
         """Next block, waiting for it if need be; None when the waveform has been played."""
+        ...
+
+    @property
+    def waiting(self) -> float:
+        """How late the reader is: samples that were acquired and not read, in s."""
         ...
 
     def stop(self) -> None:

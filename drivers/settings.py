@@ -7,7 +7,7 @@ how an instrument misbehaves; a real one needs no telling.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -335,7 +335,10 @@ class InterlockSettings(Section):
     """What ends a run while it goes on: thresholds, how long each must be broken, what is done."""
 
     monitor_tolerance_kV: float = Field(
-        default=2.5, gt=0.0, le=100.0, description="voltage monitor against command"
+        default=1.5,
+        gt=0.0,
+        le=100.0,
+        description="voltage monitor against command; an amplifier that loses 15 % at 8 kV passes",
     )
     monitor_debounce_ms: float = Field(default=50.0, ge=0.0, le=1e4, description="for so long")
     monitor_action: Action = Field(default="ramp", description="what is done")
@@ -361,18 +364,23 @@ class InterlockSettings(Section):
         default=0.5,
         ge=0.0,
         le=1e4,
-        description="reading that does not change by one count for so long while the film is "
-        "driven; 0 switches it off",
+        description="reading that does not change by one count for so long while the command "
+        "moves by laser_stuck_swing_kV; 0 switches it off",
     )
+    laser_stuck_swing_kV: float = Field(default=1.0, gt=0.0, le=100.0, description="see above")
     laser_action: Action = Field(default="ramp", description="what is done")
     displacement_min_mm: float = Field(
-        default=-5.0, ge=-1e4, le=0.0, description="from the loaded rest state"
+        default=-20.0, ge=-1e4, le=0.0, description="from the loaded rest state"
     )
     displacement_max_mm: float = Field(
-        default=20.0, gt=0.0, le=1e4, description="from the loaded rest state"
+        default=25.0, gt=0.0, le=1e4, description="from the loaded rest state"
     )
     displacement_jump_mm: float = Field(
-        default=2.0, gt=0.0, le=1e4, description="change within 2 ms, or from sample to sample"
+        default=2.0,
+        gt=0.0,
+        le=1e4,
+        description="reading beside the straight line through those 2 ms and 4 ms before (or one "
+        "and two samples); grows with the square of a sample interval above 5 ms",
     )
     displacement_debounce_ms: float = Field(
         default=5.0, ge=0.0, le=1e4, description="out of bounds for so long; a jump counts at once"
@@ -435,12 +443,19 @@ class RigSettings(Section):
             name for name in CHANNEL_NAMES if name != "temperature" or self.thermometer is not None
         )
 
-    def channels(self, coefficients: Mapping[str, tuple[float, ...]]) -> tuple[Channel, ...]:
+    def channels(
+        self,
+        coefficients: Mapping[str, tuple[float, ...]],
+        skews: Sequence[float] | None = None,
+    ) -> tuple[Channel, ...]:
         """The rig's channels in the order of blocks.
 
         ``coefficients`` maps each of ``channel_names`` to the scaling polynomial of its converter,
-        V over counts, lowest power first.
+        V over counts, lowest power first. ``skews`` in s are those that a card really has, input by
+        input, where it did not take exactly the ones asked for.
         """
+        if skews is None:
+            skews = [self.skew(place) for place in range(len(self.channel_names) - 1)]
         amplifier, laser = self.amplifier, self.laser
         units = {
             "voltage_command": ("V", amplifier.gain_V_per_V, amplifier.offset_V),
@@ -460,7 +475,7 @@ class RigSettings(Section):
                     unit=unit,
                     scaling=Scaling(tuple(coefficients[name]), gain, offset),
                     # the command is put out on the tick itself; the inputs follow one by one
-                    skew=self.skew(place - 1) if place else 0.0,
+                    skew=skews[place - 1] if place else 0.0,
                     delay=laser.delay if name == "displacement" else 0.0,
                 )
             )

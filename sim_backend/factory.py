@@ -9,6 +9,7 @@ from drivers.settings import RigSettings
 from model.actuator import Actuator
 from model.material import TABLE_3, Film, Load
 from sim_backend.clock import Clock, ManualClock, PacedClock
+from sim_backend.faults import FaultPlan
 from sim_backend.model_plant import ModelPlant
 from sim_backend.plant import Plant
 from sim_backend.rig import SimulatedRig
@@ -33,6 +34,7 @@ def open_simulated_rig(
     actuator: Actuator | None = None,
     clock: Clock | None = None,
     block_samples: int | None = None,
+    faults: FaultPlan | None = None,
 ) -> SimulatedRig:
     """Open the rig at ``address``.
 
@@ -40,10 +42,10 @@ def open_simulated_rig(
     thesis's Table 3. ``sim:SEED`` is a film of that make with something hidden, or nothing: SEED
     decides. The instruments' noise follows SEED and ``seed`` together, so that another ``seed``
     records the same rig again. ``paced`` runs in real time, else as fast as it is read; ``clock``
-    replaces either.
+    replaces either. ``faults`` go wrong in every run.
 
     Raises ``AddressError`` for an address that is neither, ``ModelError`` or ``ValueError`` for a
-    film that cannot hang at rest.
+    film that cannot hang at rest, ``ValueError`` for faults that this rig cannot have.
     """
     found = re.fullmatch(r"sim(?::(\d{1,18}))?", address)
     if not found:
@@ -68,4 +70,5 @@ def open_simulated_rig(
         noise_seed=(seed,) if hidden is None else (seed, hidden),
         identity_seed=hidden,
         block_samples=block_samples,
+        faults=faults,
     )

@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+import numpy as np
+
 __all__ = ["Fault", "FaultKind", "FaultPlan"]
 
 
@@ -44,18 +46,44 @@ _LASTS = {
 }
 
 
+#: What does not become whole again by itself.
+_FOR_GOOD = {FaultKind.FILM_RUPTURE, FaultKind.AMPLIFIER_TRIP}
+
+_NEVER = 2**62  # samples
+
+
 @dataclass(frozen=True)
 class Fault:
-    """``kind`` sets in ``at`` s after the start of a run's sample clock and lasts ``duration`` s."""
+    """``kind`` sets in ``at`` s after the start of a run's sample clock, for ``duration`` s.
+
+    Raises ``ValueError`` for times that are none, and for a duration of what lasts for good.
+    """
 
     kind: FaultKind
     at: float
     duration: float = math.inf
 
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.at) and self.at >= 0.0 and self.duration >= 0.0):
+            raise ValueError(
+                f"fault {self.kind} at {self.at!r} s for {self.duration!r} s: write times from 0 up"
+            )
+        if self.kind in _FOR_GOOD and math.isfinite(self.duration):
+            raise ValueError(f"fault {self.kind} lasts for good: leave its duration away")
+
     @property
     def end(self) -> float:
-        """S after the start of the run."""
+        """When it is over, in s after the start of the run."""
         return self.at + self.duration
+
+    def samples(self, rate: float) -> tuple[int, int]:
+        """The first sample of the fault and the first one after it, on a clock of ``rate`` Hz."""
+        return _sample(self.at, rate), _sample(self.end, rate)
+
+
+def _sample(time: float, rate: float) -> int:
+    """First sample at or after ``time`` s, but for rounding."""
+    return math.ceil(time * rate - 1e-6) if math.isfinite(time) else _NEVER
 
 
 @dataclass(frozen=True)
@@ -86,3 +114,11 @@ class FaultPlan:
     def of(self, *kinds: FaultKind) -> tuple[Fault, ...]:
         """The faults that are of one of ``kinds``."""
         return tuple(fault for fault in self.faults if fault.kind in kinds)
+
+    def active(self, first: int, samples: int, rate: float, *kinds: FaultKind) -> np.ndarray:
+        """Whether one of ``kinds`` is there, (samples,) from sample ``first`` on at ``rate`` Hz."""
+        there = np.zeros(samples, dtype=bool)
+        for fault in self.of(*kinds):
+            begin, end = (min(max(0, s - first), samples) for s in fault.samples(rate))
+            there[begin:end] = True
+        return there

@@ -2,24 +2,45 @@
 
 from __future__ import annotations
 
+import math
 import threading
 
 import numpy as np
 
 from drivers.errors import RigError, RigStateError
 from drivers.gate import GatedWaveform, ramp_down
-from drivers.rig import Block, Event, Instrument, RigIdentity, RigState
+from drivers.identity import instruments
+from drivers.rig import Block, Event, RigIdentity, RigState
 from drivers.settings import RigSettings
-from sim_backend.card import Card
+from sim_backend.card import INPUT_OVERWRITTEN, Card
 from sim_backend.clock import Clock
+from sim_backend.faults import Fault, FaultKind, FaultPlan
 from sim_backend.plant import Plant
 from sim_backend.signal_path import CHUNK, PathState, SignalPath
 from sim_backend.streams import Streams
 
-__all__ = ["SimulatedRig"]
+__all__ = ["OUTPUT_STARVED", "SimulatedRig"]
+
+OUTPUT_STARVED = -200290  #: DAQmx: the output came to the end of what was written
 
 # a tick that the clock has reached but for rounding has been reached
 _TICK_TOLERANCE = 1e-6
+
+# faults that only a card behind a server, or a laser at a serial port, can have
+_ELSEWHERE = (FaultKind.SERVER_FROZEN, FaultKind.SERVER_GONE, FaultKind.SERIAL_GARBAGE)
+
+_CARD_ERRORS = {
+    FaultKind.AI_OVERFLOW: (
+        INPUT_OVERWRITTEN,
+        "samples were overwritten before they were read; read more often or enlarge "
+        "card.ai_buffer_samples",
+    ),
+    FaultKind.AO_UNDERFLOW: (
+        OUTPUT_STARVED,
+        "the output came to the end of what was written to it; enlarge card.ao_buffer_s, or leave "
+        "the computer to the rig alone",
+    ),
+}
 
 
 class _Run:
@@ -33,6 +54,8 @@ class _Run:
         self.started = 0.0  # s on the rig's clock
         self.delivered = 0  # samples handed to the reader
         self.stopped = False
+        self.replied: set[Fault] = set()  # late replies that have been waited for
+        self.silent_until = 0.0  # s on the rig's clock
         self.events: list[Event] = []
         self._path = path
         self._state = state  # after the newest chunk
@@ -84,7 +107,8 @@ class SimulatedRig:
 
     ``plant`` is the film at rest: every run starts from it, as if the operator had waited for it to
     relax. Blocks hold ``block_samples`` samples, or a tenth of a second when that is None; their
-    length changes nothing in the data. All calls may come from any thread.
+    length changes nothing in the data. ``faults`` go wrong in every run. All calls may come from
+    any thread.
     """
 
     def __init__(
@@ -97,9 +121,16 @@ class SimulatedRig:
         noise_seed: tuple[int, ...] = (0,),
         identity_seed: int | None = None,
         block_samples: int | None = None,
+        faults: FaultPlan | None = None,
     ) -> None:
         if block_samples is not None and block_samples < 1:
             raise ValueError(f"block_samples = {block_samples} must be 1 or more, or None")
+        self._faults = faults or FaultPlan()
+        for fault in self._faults.of(*_ELSEWHERE):
+            raise ValueError(
+                f"fault {fault.kind} needs a server or a serial port in between: an in-process rig "
+                f"cannot have it"
+            )
         self._settings = settings
         self._plant = plant
         self._clock = clock
@@ -137,7 +168,12 @@ class SimulatedRig:
         return RigIdentity(
             address=self._address,
             simulated=True,
-            instruments=_instruments(self._settings),
+            instruments=instruments(
+                self._settings,
+                card_model=self._settings.card.model,
+                card_serial="simulated",
+                unnamed="simulated",
+            ),
             channels=self._card.channels,
             seed=self._identity_seed,
         )
@@ -157,7 +193,9 @@ class SimulatedRig:
             self._expect("load", RigState.SAFE, RigState.DONE)
             _check_limits(waveform, self._settings)
             rate = self._card.actual_rate(waveform.rate)
-            path = SignalPath(self._settings, self._card, self._streams, self._runs, rate)
+            path = SignalPath(
+                self._settings, self._card, self._streams, self._runs, rate, self._faults
+            )
             counts = self._card.command_counts(waveform.voltage)
             self._run = _Run(waveform, counts, path, path.start(self._plant))
             self._runs += 1
@@ -182,7 +220,8 @@ class SimulatedRig:
         """Next block, waiting for it if need be; None when the waveform has been played.
 
         Raises ``RigError`` with DAQmx's code -200279 when the reader came so late that samples were
-        overwritten; the output is at 0 V then. Raises ``RigStateError`` when the rig was made safe.
+        overwritten, or for a planned fault of the card; the output is at 0 V then. Raises
+        ``RigStateError`` when the rig was made safe.
         """
         while True:
             with self._lock:
@@ -193,19 +232,29 @@ class SimulatedRig:
                 if run.delivered == run.total:
                     self._state = RigState.DONE
                     return None
-                size = self._block_samples or max(1, round(0.1 * self._rate))
-                end = min(run.delivered + size, run.total)
+                end = min(run.delivered + self._block_size(run), run.total)
                 acquired = min(self._ticks(run), run.total)
                 try:
                     self._card.check_buffer(acquired - run.delivered)
+                    self._card_fails(run)
                 except RigError:
                     self.make_safe()
                     raise
-                if acquired >= end:
+                silent = self._silent(run)
+                if acquired >= end and not silent:
                     return self._deliver(run, end)
-                due = run.started + end / self._rate
+                due = run.silent_until if silent else self._due(run, end)
                 self._wake.clear()
             self._clock.wait(due, self._wake)
+
+    @property
+    def waiting(self) -> float:
+        """How late the reader is: s of samples that were acquired and not read."""
+        with self._lock:
+            run = self._run
+            if self._state is not RigState.RUNNING or run is None:
+                return 0.0
+            return (min(self._ticks(run), run.total) - run.delivered) / self._rate
 
     def stop(self) -> None:
         """End the run early: ramp down to 0 V in the set time; what was acquired stays readable."""
@@ -257,6 +306,37 @@ class SimulatedRig:
             due, run.events = due + run.events, []
         return Block(start, counts, tuple(due))
 
+    def _block_size(self, run: _Run) -> int:
+        """Samples of the next block: half as many where a short read is due."""
+        size = self._block_samples or max(1, round(0.1 * self._rate))
+        for fault in self._faults.of(FaultKind.SHORT_READ):
+            first, end = fault.samples(self._rate)
+            if run.delivered <= first < run.delivered + size or first <= run.delivered < end:
+                return max(1, size // 2)
+        return size
+
+    def _card_fails(self, run: _Run) -> None:
+        for fault in self._faults.of(*_CARD_ERRORS):
+            # the same sum as in _due: who waited until then finds it has come
+            if self._clock.now() >= run.started + fault.at:
+                code, words = _CARD_ERRORS[fault.kind]
+                raise RigError(f"card {self._settings.card.device}: {words}", code)
+
+    def _silent(self, run: _Run) -> bool:
+        """Whether the reader is kept waiting by a late reply."""
+        now = self._clock.now()
+        for fault in self._faults.of(FaultKind.LATE_REPLY):
+            if fault not in run.replied and now >= run.started + fault.at:
+                run.replied.add(fault)
+                run.silent_until = max(run.silent_until, now + fault.duration)
+        return now < run.silent_until
+
+    def _due(self, run: _Run, end: int) -> float:
+        """When, in s on the clock, something next happens before sample ``end`` is there."""
+        events = self._faults.of(*_CARD_ERRORS, FaultKind.LATE_REPLY)
+        times = (run.started + fault.at for fault in events if fault not in run.replied)
+        return min(run.started + end / self._rate, *times, math.inf)
+
     def _ticks(self, run: _Run) -> int:
         """Whole sample intervals that have passed since the start."""
         return int((self._clock.now() - run.started) * self._rate + _TICK_TOLERANCE)
@@ -280,59 +360,3 @@ def _check_limits(waveform: GatedWaveform, settings: RigSettings) -> None:
             f"the waveform passed the gate under wider limits ({passed}) than this rig's ({own}); "
             f"admit it under the rig's own"
         )
-
-
-def _instruments(settings: RigSettings) -> tuple[Instrument, ...]:
-    """The instruments as they would identify themselves."""
-    amplifier, laser, card = settings.amplifier, settings.laser, settings.card
-    instruments = [
-        Instrument(
-            "card",
-            card.model,
-            "simulated",
-            (
-                ("device", card.device),
-                *((f"terminal of {n}", t) for n, t in settings.terminals().items()),
-                *((f"range of {n}", f"+-{r:g} V") for n, r in settings.ranges().items()),
-                ("first conversion", f"{card.first_convert_us:g} us after the tick"),
-                ("conversion interval", f"{card.convert_interval_us:g} us"),
-            ),
-        ),
-        Instrument(
-            "amplifier",
-            amplifier.model,
-            amplifier.serial or "simulated",
-            (
-                ("gain", f"{amplifier.gain_V_per_V:g} V/V"),
-                ("range", f"+-{amplifier.range_kV:g} kV"),
-                ("current limit", f"{amplifier.current_limit_mA:g} mA"),
-                ("slew rate", f"{amplifier.slew_V_per_us:g} V/us"),
-                ("bandwidth", f"{amplifier.bandwidth_kHz:g} kHz"),
-                ("voltage monitor", f"{amplifier.monitor_V_per_kV:g} V/kV"),
-                ("current monitor", f"{amplifier.current_monitor_V_per_mA:g} V/mA"),
-            ),
-        ),
-        Instrument(
-            "laser",
-            laser.model,
-            laser.serial or "simulated",
-            (
-                ("reference distance", f"{laser.reference_distance_mm:g} mm"),
-                ("range", f"+-{laser.range_mm:g} mm"),
-                ("analog scaling", f"{laser.mm_per_V:g} mm/V"),
-                ("sampling", f"{laser.sampling_us:g} us"),
-                ("averaging", f"{laser.averaging} samples"),
-            ),
-        ),
-    ]
-    if settings.thermometer is not None:
-        thermometer = settings.thermometer
-        instruments.append(
-            Instrument(
-                "thermometer",
-                thermometer.model,
-                thermometer.serial or "simulated",
-                (("scaling", f"{thermometer.celsius_per_V:g} C/V"),),
-            )
-        )
-    return tuple(instruments)

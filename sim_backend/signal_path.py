@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivers.rig import Event
 from drivers.settings import RigSettings, ThermometerSettings
-from sim_backend.amplifier import Amplifier, AmplifierState
+from sim_backend.amplifier import Amplifier, AmplifierRows, AmplifierState
 from sim_backend.card import Card
+from sim_backend.faults import FaultKind, FaultPlan
 from sim_backend.laser import Laser, LaserRows, LaserState
 from sim_backend.plant import Motion, Plant
 from sim_backend.streams import Streams
@@ -23,24 +25,46 @@ CHUNK = 4096
 
 _NODE_SPACING = 1e-3  # s; a cubic follows the film's ringing over that to 1e-4 of its amplitude
 
+_GRAVITY = 9.81  # m/s^2
+_FLOOR = 0.2  # m below its rest the load lies when the film has ruptured
+_NO_VOLTAGE = 10.0  # V; a command below this drives no current to speak of into a short
+_BURST = 4e-3  # m, RMS of a sensor's noise burst
+
+_SHORTED = (FaultKind.ARC, FaultKind.FILM_RUPTURE)
+_DEAD = (*_SHORTED, FaultKind.AMPLIFIER_TRIP)
+
 
 @dataclass(frozen=True)
 class PathState:
-    """All that the rig remembers between two chunks."""
+    """All that the rig remembers between two chunks.
+
+    ``torn`` is where the load was in m, and how fast it was in m/s, when the film ruptured;
+    ``stuck`` the count at which the laser got stuck. Either is None while that has not happened.
+    """
 
     plant: Plant
     amplifier: AmplifierState
     laser: LaserState
     settled: bool = True
+    torn: tuple[float, float] | None = None
+    stuck: int | None = None
 
 
 class SignalPath:
-    """The rig during one run at ``rate`` Hz; holds no state of its own."""
+    """The rig during one run at ``rate`` Hz with ``faults``; holds no state of its own."""
 
     def __init__(
-        self, settings: RigSettings, card: Card, streams: Streams, run: int, rate: float
+        self,
+        settings: RigSettings,
+        card: Card,
+        streams: Streams,
+        run: int,
+        rate: float,
+        faults: FaultPlan | None = None,
     ) -> None:
         self._settings = settings
+        self._rate = rate
+        self._faults = faults or FaultPlan()
         self._card = card
         self._streams = streams
         self._run = run
@@ -64,22 +88,24 @@ class SignalPath:
         Returns counts (channels, n) int16, events, and the state after it.
         """
         first, samples, nodes = chunk * CHUNK, command.size, self._nodes
-        volts = self._card.put_out(command)
-        if nodes > 1:
-            volts = np.repeat(volts, nodes)
-        rows, amplifier = self._amplifier.advance(
-            volts, self._spacing, state.plant.capacitance, state.amplifier
-        )
+        dead = self._active(first, samples, *_DEAD)
+        rows, amplifier = self._amplify(command, dead, state)
         time = np.arange(first * nodes, (first + samples) * nodes + 1) * self._spacing
-        held = np.append(rows.effective, rows.effective[-1])
-        motion, plant = state.plant.advance(time, held, True)
+        pulling = rows.effective
+        broken_lead = self._active(first, samples, FaultKind.ELECTRODE_OPEN)
+        if broken_lead.any():
+            pulling = np.where(np.repeat(broken_lead, nodes), 0.0, pulling)
+        motion, plant = state.plant.advance(time, np.append(pulling, pulling[-1]), True)
+        motion, torn = self._fall(motion, time, first, state.torn)
 
         monitors = self._settings.amplifier
-        noise = self._streams.of_chunk("amplifier", self._run, chunk).standard_normal((2, CHUNK))
+        generator = self._streams.of_chunk("amplifier", self._run, chunk)
+        noise = generator.standard_normal((2, CHUNK))
         noise = noise[:, :samples] * (monitors.monitor_noise_mV * 1e-3)
 
         at, into = self._converted("voltage_monitor", samples)
         voltage, _ = self._amplifier.outputs(rows, at, into)
+        voltage[self._active(first, samples, FaultKind.MONITOR_WIRE_OFF)] = 0.0
         counts = np.empty((len(self._names), samples), dtype=np.int16)
         counts[0] = command
         counts[1] = self._card.convert(
@@ -88,6 +114,9 @@ class SignalPath:
         at, into = self._converted("current_monitor", samples)
         voltage, slope = self._amplifier.outputs(rows, at, into)
         current = self._current(motion, at, voltage, slope)
+        current[dead | broken_lead] = 0.0
+        shorted = self._active(first, samples, *_SHORTED)
+        current[shorted] = self._into_short(command[shorted])
         counts[2] = self._card.convert(
             "current_monitor", current * 1e3 * monitors.current_monitor_V_per_mA + noise[1]
         )
@@ -95,7 +124,12 @@ class SignalPath:
         reading, laser = self._laser.read(
             motion.displacement, motion.velocity, time[at] + into, chunk, CHUNK, state.laser
         )
-        counts[3] = self._card.convert("displacement", reading.volts)
+        # the burst takes the next numbers of this generator: no other noise shifts
+        reading = self._disturb(reading, first, generator)
+        laser = replace(laser, alarm=bool(reading.alarm[-1]))
+        counts[3], stuck = self._stick(
+            self._card.convert("displacement", reading.volts), first, state.stuck
+        )
         if self._settings.thermometer is not None:
             at, _ = self._converted("temperature", samples)
             counts[4] = self._temperature(self._settings.thermometer, motion.heating[at], chunk)
@@ -107,7 +141,95 @@ class SignalPath:
         if motion.fault is not None:
             events.append(Event(first + motion.fault_at // nodes, "fault", f"film: {motion.fault}"))
         events.sort(key=lambda event: event.sample)
-        return counts, events, PathState(plant, amplifier, laser, bool(rows.settled[-1]))
+        after = PathState(plant, amplifier, laser, bool(rows.settled[-1]), torn, stuck)
+        return counts, events, after
+
+    def _active(self, first: int, samples: int, *kinds: FaultKind) -> np.ndarray:
+        return self._faults.active(first, samples, self._rate, *kinds)
+
+    def _amplify(
+        self, command: np.ndarray, dead: np.ndarray, state: PathState
+    ) -> tuple[AmplifierRows, AmplifierState]:
+        """The amplifier's output under ``command`` (n,) counts, 0 V where it is ``dead`` (n,)."""
+        nodes, capacitance = self._nodes, state.plant.capacitance
+        volts = np.repeat(self._card.put_out(command), nodes)
+        edges = [0, *(np.flatnonzero(np.diff(dead)) + 1), command.size]
+        now, pieces = state.amplifier, []
+        for begin, end in itertools.pairwise(edges):
+            part = slice(begin * nodes, end * nodes)
+            rows, now = self._amplifier.advance(volts[part], self._spacing, capacitance, now)
+            if dead[begin]:
+                nothing, now = np.zeros_like(rows.start), AmplifierState()
+                idle = np.repeat(np.abs(self._wanted(command[begin:end])) < _NO_VOLTAGE, nodes)
+                rows = AmplifierRows(nothing, nothing, nothing, idle, rows.slew)
+            pieces.append(rows)
+        if len(pieces) == 1:
+            return pieces[0], now
+        start, target, effective, settled = (
+            np.concatenate([getattr(rows, name) for rows in pieces])
+            for name in ("start", "target", "effective", "settled")
+        )
+        return AmplifierRows(start, target, effective, settled, pieces[0].slew), now
+
+    def _wanted(self, command: np.ndarray) -> np.ndarray:
+        """Voltage (n,) V that ``command`` (n,) counts ask for at the film."""
+        return self._card.channels[0].scaling.physical(command)
+
+    def _into_short(self, command: np.ndarray) -> np.ndarray:
+        """Current (n,) A into a short under ``command`` (n,) counts."""
+        wanted = self._wanted(command)
+        limit = self._settings.amplifier.current_limit_mA * 1e-3
+        return np.where(np.abs(wanted) < _NO_VOLTAGE, 0.0, np.copysign(limit, wanted))
+
+    def _fall(
+        self, motion: Motion, time: np.ndarray, first: int, torn: tuple[float, float] | None
+    ) -> tuple[Motion, tuple[float, float] | None]:
+        """``motion`` with the load falling from where it was when the film ruptured."""
+        nodes = self._nodes
+        for fault in self._faults.of(FaultKind.FILM_RUPTURE)[:1]:
+            node = (fault.samples(self._rate)[0] - first) * nodes
+            if node >= time.size - 1:
+                continue
+            if torn is None:
+                torn = float(motion.displacement[node]), float(motion.velocity[node])
+            begin = max(0, node)
+            elapsed = time[begin:] - (first * nodes + node) * self._spacing
+            position = torn[0] + torn[1] * elapsed + 0.5 * _GRAVITY * elapsed**2
+            velocity = torn[1] + _GRAVITY * elapsed
+            velocity[position > _FLOOR] = 0.0
+            motion = replace(
+                motion,
+                displacement=np.append(motion.displacement[:begin], np.minimum(position, _FLOOR)),
+                velocity=np.append(motion.velocity[:begin], velocity),
+            )
+        return motion, torn
+
+    def _disturb(self, reading: LaserRows, first: int, generator: np.random.Generator) -> LaserRows:
+        """What the laser's output becomes through faults of the sensor."""
+        laser, samples = self._settings.laser, reading.volts.size
+        burst = self._active(first, samples, FaultKind.SENSOR_NOISE_BURST)
+        lost = self._active(first, samples, FaultKind.SENSOR_OUT_OF_RANGE)
+        if not (burst | lost).any():
+            return reading
+        noise = generator.standard_normal(CHUNK)[:samples] * _BURST * 1e3 / laser.mm_per_V
+        rail = laser.analog_range_V
+        volts = np.clip(reading.volts + np.where(burst, noise, 0.0), -rail, rail)
+        return LaserRows(np.where(lost, rail, volts), reading.alarm | lost)
+
+    def _stick(
+        self, counts: np.ndarray, first: int, stuck: int | None
+    ) -> tuple[np.ndarray, int | None]:
+        """``counts`` (n,) of the laser with those held at which it is stuck."""
+        held = counts.copy()
+        for fault in self._faults.of(FaultKind.SENSOR_STUCK):
+            begin, end = (s - first for s in fault.samples(self._rate))
+            if begin >= counts.size or end <= 0:
+                continue
+            if begin >= 0:
+                stuck = int(counts[begin])
+            if stuck is not None:
+                held[max(0, begin) : min(end, counts.size)] = stuck
+        return held, stuck
 
     def _converted(self, channel: str, samples: int) -> tuple[slice, float]:
         """Intervals between nodes in which ``channel`` is converted, and how far into them in s."""

@@ -5,22 +5,32 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 
-from app.errors import DearigError, DiskFault, InputError, InstrumentFault, Interrupted
-from app.plan import plan
+from app.errors import (
+    DearigError,
+    DiskFault,
+    InputError,
+    InstrumentFault,
+    Interrupted,
+    SafetyStop,
+)
+from app.interrupts import Interrupts
+from app.plan import Plan, plan
 from app.recording import open_recording
 from app.recording.writer import RecordingWriter
 from app.rigfile import RigFile
-from app.run import open_rig, record
+from app.run import Onlooker, open_rig, record
 from app.sequencefile import parse_sequence
 from drivers.errors import RigError
 from drivers.gate import GatedWaveform
-from drivers.rig import Block, RigIdentity, RigState
+from drivers.rig import Block, Event, RigIdentity, RigState
 from drivers.settings import CardSettings
+from sim_backend.faults import FaultPlan
 from sim_backend.rig import SimulatedRig
 from tests.command import LOBE, dearig, names, write
 
@@ -31,19 +41,25 @@ RIG_FILE = RigFile()
 class Troubled:
     """The simulated rig with something that happens at one of its calls; keeps a diary."""
 
-    def __init__(self, call: str, trouble: Callable[[], None], block: int = 7) -> None:
+    def __init__(
+        self, call: str, trouble: Callable[[], None], block: int = 7, faults: tuple[str, ...] = ()
+    ) -> None:
         self.diary: list[str] = []
         self._call = call
         self._trouble = trouble
         self._block = block
         self._blocks = 0
-        rig = open_rig("sim", RIG_FILE, seed=0, paced=False)
+        rig = open_rig("sim", RIG_FILE, seed=0, paced=False, faults=FaultPlan.parse(faults))
         assert isinstance(rig, SimulatedRig)
         self.inner = rig
 
     @property
     def state(self) -> RigState:
         return self.inner.state
+
+    @property
+    def waiting(self) -> float:
+        return self.inner.waiting
 
     def identify(self) -> RigIdentity:
         return self.inner.identify()
@@ -235,6 +251,79 @@ def test_a_rig_that_cannot_be_made_safe_is_shouted_about(command, tmp_path: Path
     assert open_recording(tmp_path / "run.h5").samples == 1501
 
 
+@pytest.mark.parametrize(
+    ("what", "said", "done", "diary"),
+    [
+        ("amplifier-trip@0.7", "interlock breakdown: ", "the output was taken at once to 0 V",
+         ["read", "make safe", "close"]),
+        ("sensor-out-of-range@0.7", "interlock laser: ", "the voltage was ramped down to 0 V",
+         ["read", "read", "make safe", "close"]),
+    ],
+)  # fmt: skip
+def test_an_interlock_ends_the_run_at_zero_volts(
+    command, tmp_path: Path, what: str, said: str, done: str, diary: list[str]
+) -> None:
+    rig = Troubled("", lambda: None, faults=(what,))
+    answer = command(rig)
+    assert answer.code == 3
+    assert done in answer.err
+    assert "what was recorded is in" in answer.err
+    assert closed_at_zero(rig)
+    assert rig.diary[-len(diary) :] == diary
+    run = open_recording(tmp_path / "run.h5")
+    assert run.complete
+    assert run.outcome.startswith("stopped by an interlock: ")
+    assert any(e.level == "fault" and e.message.startswith(said) for e in run.events)
+    if "ramped" in done:
+        assert run.voltage_command is not None
+        assert run.voltage_command[-1] == pytest.approx(0.0, abs=0.2)
+
+
+def test_a_disk_that_gets_full_ends_the_run_before_it_is(
+    command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ticks = iter(np.arange(0.0, 100.0, 0.15))
+    monkeypatch.setattr("app.run.shutil.disk_usage", lambda _: SimpleNamespace(free=10))
+    rig = Troubled("", lambda: None)
+    monkeypatch.setattr("app.run.open_rig", lambda *_, **__: rig)
+    with pytest.raises(SafetyStop, match=r"free.*ramped down to 0 V"):
+        record(LOADED, "sim", RIG_FILE, "", tmp_path / "run.h5", clock=lambda: next(ticks))
+    assert closed_at_zero(rig)
+    assert any(line.startswith("stop at") for line in rig.diary)
+    assert open_recording(tmp_path / "run.h5").samples > 400
+
+
+def test_whoever_looks_on_is_told_of_every_sample_and_event(tmp_path: Path) -> None:
+    class Diary(Onlooker):
+        def __init__(self) -> None:
+            self.samples = 0
+            self.events: list[str] = []
+            self.planned: Plan | None = None
+
+        def started(self, planned: Plan, *_: object) -> None:
+            self.planned = planned
+
+        def block(self, block: Block) -> None:
+            assert block.start == self.samples
+            self.samples += block.counts.shape[1]
+
+        def event(self, event: Event) -> None:
+            self.events.append(f"{event.level}: {event.message}")
+
+    diary, interrupts = Diary(), Interrupts()
+    interrupts.ask()
+    with pytest.raises(Interrupted):
+        record(LOADED, "sim", RIG_FILE, "", tmp_path / "a.h5", interrupts=interrupts)
+    result = record(
+        LOADED, "sim:3", RIG_FILE, "", tmp_path / "b.h5", onlooker=diary,
+        faults=FaultPlan.parse(["late-reply@0.2+0.1"]),
+    )  # fmt: skip
+    assert diary.samples == result.samples
+    assert tuple(diary.events) == result.events
+    assert diary.planned is not None
+    assert diary.planned.voltage.size == result.samples
+
+
 def full_disk(*_: object) -> None:
     raise DiskFault("run.h5 cannot be written: No space left on device; see that it has room")
 
@@ -262,6 +351,8 @@ def test_a_full_disk_does_not_keep_the_voltage_up(
     assert "No space left on device" in answer.err
     assert "the rig was made safe, and what was recorded is in" in answer.err
     assert rig.diary[-3:] == ["make safe", "file closed with the rig safe", "close"]
+    # the instruments are well: down in a ramp, not in a jolt
+    assert any(line.startswith("stop at") for line in rig.diary)
     assert closed_at_zero(rig)
     run = open_recording(tmp_path / "run.h5")
     assert (run.complete, run.samples) == (True, 600)
@@ -293,6 +384,7 @@ def test_a_fault_of_the_program_itself_ends_at_0_volts_too(
     with pytest.raises(KeyError):
         record(LOADED, "sim", RIG_FILE, "", tmp_path / "run.h5")
     assert closed_at_zero(rig)
+    assert any(line.startswith("stop at") for line in rig.diary)
     assert open_recording(tmp_path / "run.h5").outcome == "ended early by a fault of the program"
 
 

@@ -1,0 +1,136 @@
+"""The guardian's own process: beats come in on standard input, and when they do not, 0 V goes out.
+
+Words in, one a line: ``arm``, ``beat``, ``disarm``, ``take over``, ``bye``. Words out: ``ready``,
+``safe`` after a take-over, or a sentence that says what does not work.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import queue
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from drivers.daqmx.link import Link
+from drivers.daqmx.outputs import Outputs
+from drivers.errors import RigError
+from drivers.settings import RigSettings
+
+__all__ = ["Guard", "main"]
+
+_GIVE_UP = 60.0  # s of trying to reach a card that does not answer
+
+
+@dataclass
+class Guard:
+    """What the guardian does with each word, or with silence; ``zero`` takes the output to 0 V.
+
+    ``say`` answers the run, ``tell`` the person at the terminal. After a take-over it is not armed
+    until it is told so again: a run that wakes up finds its tasks gone and makes itself safe.
+    """
+
+    zero: Callable[[], None]
+    say: Callable[[str], None]
+    tell: Callable[[str], None]
+    armed: bool = field(default=False)
+
+    def hear(self, word: str | None) -> bool:
+        """Act on ``word``, None being the end of the run's pipe; False when it is time to end."""
+        if word == "arm":
+            self.armed = True
+        elif word == "disarm":
+            self.armed = False
+        elif word == "take over":
+            self.take_over("the run could not bring the output to 0 V itself")
+        elif word is None or word == "bye":
+            if word is None and self.armed:
+                self.take_over("the run has died")
+            return False
+        return True
+
+    def silence(self) -> None:
+        """No word came in time."""
+        self.take_over("the run is frozen")
+
+    def take_over(self, why: str) -> None:
+        """0 V, and the enable line low."""
+        self.armed = False
+        try:
+            self.zero()
+        except RigError as error:
+            self.tell(f"guardian: {why}, and THE OUTPUT COULD NOT BE TAKEN TO 0 V ({error})")
+            self.say(f"the output could not be taken to 0 V: {error}")
+            return
+        self.tell(f"guardian: {why}; the output was taken to 0 V")
+        self.say("safe")
+
+
+def main() -> int:
+    """Guard until the run says ``bye`` or ends."""
+    # the run answers to ctrl-C; its guardian must outlive it
+    for name in ("SIGINT", "SIGHUP", "SIGBREAK"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    config = json.loads(sys.argv[1])
+    settings = RigSettings.model_validate(config["settings"])
+    try:
+        link = Link(config["server"], settings.guardian.link_timeout_s)
+        outputs = Outputs(link, config["device"], settings)
+        outputs.read("voltage_monitor")  # everything is loaded and connected before it is needed
+    except RigError as error:
+        _say(str(error))
+        return 1
+
+    guard = Guard(lambda: _insist(outputs), _say, _tell)
+    words: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(words,), daemon=True).start()
+    _say("ready")
+    while True:
+        try:
+            word = words.get(timeout=settings.guardian.timeout_s if guard.armed else None)
+        except queue.Empty:
+            guard.silence()
+            continue
+        if not guard.hear(word):
+            break
+    link.close()
+    return 0
+
+
+def _insist(outputs: Outputs) -> None:
+    """To 0 V, again and again while the card or its server does not answer."""
+    until = time.monotonic() + _GIVE_UP
+    while True:
+        try:
+            outputs.zero(force=True)
+        except RigError:
+            if time.monotonic() > until:
+                raise
+            time.sleep(0.05)
+        else:
+            return
+
+
+def _listen(words: queue.SimpleQueue[str | None]) -> None:
+    for line in sys.stdin:
+        words.put(line.strip())
+    words.put(None)
+
+
+def _say(word: str) -> None:
+    with contextlib.suppress(OSError):  # the run that would read it is gone
+        print(" ".join(word.split()), flush=True)
+
+
+def _tell(sentence: str) -> None:
+    with contextlib.suppress(OSError):  # nobody is at the terminal any more
+        print(sentence, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

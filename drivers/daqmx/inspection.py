@@ -1,0 +1,144 @@
+"""A look at the card and at what is wired to it, without putting out a volt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from drivers.daqmx.explain import instrument_errors
+from drivers.daqmx.link import Link
+from drivers.daqmx.outputs import Outputs
+from drivers.daqmx.tasks import ClockedTasks
+from drivers.errors import RigError
+from drivers.findings import Finding
+from drivers.settings import RigSettings
+from drivers.trek import Monitors
+
+__all__ = ["Inspection", "inspect"]
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What was found on the card and what its inputs read, None where that could not be asked.
+
+    ``displacement_volts`` is the laser's analog output.
+    """
+
+    findings: tuple[Finding, ...]
+    monitors: Monitors | None = None
+    displacement_volts: float | None = None
+
+
+def inspect(device: str, server: str | None, settings: RigSettings) -> Inspection:
+    """Look at the card ``device``, in this computer or behind ``server``, as ``settings`` need it.
+
+    Never raises ``RigError``: what cannot be reached is a finding.
+    """
+    name = f"card {device}"
+    try:
+        link = Link(server, settings.guardian.link_timeout_s)
+    except RigError as error:
+        return Inspection((Finding(name, "driver", str(error), verdict="wrong"),))
+    findings: list[Finding] = []
+    try:
+        with instrument_errors(device, server):
+            from nidaqmx.system import Device, System
+
+            system = System(link.session) if server else System.local()
+            version = system.driver_version
+            findings.append(
+                Finding(
+                    name, "driver",
+                    f"NI-DAQmx {version.major_version}.{version.minor_version}"
+                    f".{version.update_version}" + (f" behind {server}" if server else ""),
+                )
+            )  # fmt: skip
+            card = Device(device, grpc_options=link.session)
+            findings += _card(name, card, settings)
+        if any(finding.verdict == "wrong" for finding in findings):
+            return Inspection(tuple(findings))
+        findings.append(_timing(name, link, device, settings))
+        outputs = Outputs(link, device, settings)
+        monitors = Monitors.of_volts(
+            settings.amplifier, outputs.read("voltage_monitor"), outputs.read("current_monitor")
+        )
+        return Inspection(tuple(findings), monitors, outputs.read("displacement"))
+    except RigError as error:
+        findings.append(Finding(name, "state", str(error), verdict="wrong"))
+        return Inspection(tuple(findings))
+    finally:
+        link.close()
+
+
+def _card(name: str, card: Any, settings: RigSettings) -> list[Finding]:
+    """What the card itself says it has, against what the rig file wants of it."""
+    wanted = settings.card
+    model = card.product_type
+    same = model.split()[-1] == wanted.model.split()[-1]
+    found = [
+        Finding(
+            name, "type",
+            f"{model}, serial {card.serial_num:X}" + (", simulated" if card.is_simulated else ""),
+            wanted.model, "ok" if same else "wrong",
+            "" if same else "correct card.model, and compare every range in [card] with the manual",
+        )
+    ]  # fmt: skip
+    outputs = [terminal.split("/")[-1] for terminal in card.ao_physical_chans.channel_names]
+    inputs = [terminal.split("/")[-1] for terminal in card.ai_physical_chans.channel_names]
+    lines = ["/".join(line.split("/")[-2:]) for line in card.do_lines.channel_names]
+    for channel, terminal in settings.terminals().items():
+        there = outputs if channel == "voltage_command" else inputs
+        key = "card.ao_command" if channel == "voltage_command" else f"card.ai_{channel}"
+        found.append(_has(name, f"{key} = {terminal}", terminal in there, "the card's terminals"))
+    for channel, limit in settings.ranges().items():
+        pairs = card.ao_voltage_rngs if channel == "voltage_command" else card.ai_voltage_rngs
+        offered = sorted({high for low, high in zip(pairs[::2], pairs[1::2], strict=True)})
+        key = "card.ao_range_V" if channel == "voltage_command" else f"card.range_{channel}_V"
+        ranges = "one of " + ", ".join(f"{high:g}" for high in offered)
+        found.append(_has(name, f"{key} = {limit:g}", limit in offered, ranges))
+    if wanted.do_hv_enable is None:
+        found.append(
+            Finding(
+                name, "card.do_hv_enable", "not wired", verdict="not wired",
+                advice="with a line to the amplifier's enable input, the guardian and the card's "
+                "watchdog could switch the high voltage off",
+            )
+        )  # fmt: skip
+    else:
+        key = f"card.do_hv_enable = {wanted.do_hv_enable}"
+        found.append(_has(name, key, wanted.do_hv_enable in lines, "one of the card's lines"))
+    fastest = min(card.ao_max_rate, card.ai_max_multi_chan_rate / (len(settings.terminals()) - 1))
+    fast = wanted.sample_rate_Hz <= fastest
+    found.append(
+        Finding(
+            name, "card.sample_rate_Hz", f"{wanted.sample_rate_Hz:g}", f"{fastest:g} or less",
+            "ok" if fast else "wrong", "" if fast else "lower it",
+        )
+    )  # fmt: skip
+    return found
+
+
+def _has(name: str, item: str, there: bool, wanted: str) -> Finding:
+    return Finding(
+        name, item, "found" if there else "the card has no such thing", wanted,
+        "ok" if there else "wrong", "" if there else "correct the rig file",
+    )  # fmt: skip
+
+
+def _timing(name: str, link: Link, device: str, settings: RigSettings) -> Finding:
+    """Reserve the card as a run does, which fails where somebody uses it; nothing is put out."""
+    tasks = ClockedTasks(link, device, settings)
+    try:
+        skews = [channel.skew for channel in tasks.channels()[1:]]
+    finally:
+        tasks.close()
+    asked = [settings.skew(place) for place in range(len(skews))]
+    off = max(abs(one - other) for one, other in zip(skews, asked, strict=True))
+    near = off < 1e-6
+    return Finding(
+        name, "conversion times",
+        ", ".join(f"{skew * 1e6:.3g}" for skew in skews) + " us after the tick",
+        ", ".join(f"{skew * 1e6:.3g}" for skew in asked),
+        "ok" if near else "warning",
+        "" if near else "the times that the card really has are the ones that are recorded",
+    )  # fmt: skip

@@ -1,0 +1,85 @@
+"""The way to the driver: the library in this computer, or a server that answers in time or not."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from drivers.errors import RigError
+
+if TYPE_CHECKING:
+    import grpc
+    from nidaqmx import GrpcSessionOptions
+
+__all__ = ["Link"]
+
+# a lost connection is noticed although nothing is being asked
+_KEEPALIVE_MS = 500
+
+
+class Link:
+    """A connection to the DAQmx driver behind ``server``, or in this computer when that is None.
+
+    ``timeout`` in s is how long a server may take for an answer: without it, a call to a server
+    that froze would never end. Raises ``RigError`` where nidaqmx is not installed.
+    """
+
+    def __init__(self, server: str | None, timeout: float) -> None:
+        self.server = server
+        self._channel: grpc.Channel | None = None
+        try:
+            import nidaqmx  # noqa: F401
+        except ImportError as error:
+            raise RigError(
+                f"the Python package nidaqmx is not installed ({error}): install dearig with its "
+                f"extra 'rig'"
+            ) from error
+        if server is not None:
+            self._channel = _channel_with_deadline(server, timeout)
+
+    @property
+    def session(self) -> GrpcSessionOptions | None:
+        """What nidaqmx calls ``grpc_options``."""
+        if self._channel is None:
+            return None
+        from nidaqmx import GrpcSessionOptions
+
+        return GrpcSessionOptions(self._channel, "")
+
+    def close(self) -> None:
+        """Close the connection; what ran on the server stays there."""
+        if self._channel is not None:
+            self._channel.close()
+
+
+class _Details(NamedTuple):
+    method: str
+    timeout: float
+    metadata: Any
+    credentials: Any
+
+
+def _channel_with_deadline(server: str, timeout: float) -> grpc.Channel:
+    import grpc
+
+    class Details(_Details, grpc.ClientCallDetails):
+        pass
+
+    class Deadline(grpc.UnaryUnaryClientInterceptor):
+        def intercept_unary_unary(self, call: Any, details: Any, request: Any) -> Any:
+            timed = Details(details.method, timeout, details.metadata, details.credentials)
+            return call(timed, request)
+
+    unlimited = -1
+    channel = grpc.insecure_channel(
+        server,
+        options=(
+            ("grpc.max_receive_message_length", unlimited),
+            ("grpc.max_send_message_length", unlimited),
+            ("grpc.keepalive_time_ms", _KEEPALIVE_MS),
+            ("grpc.keepalive_timeout_ms", _KEEPALIVE_MS),
+            ("grpc.http2.max_pings_without_data", 0),
+            # a proxy of the surroundings has no business between a rig and its card
+            ("grpc.enable_http_proxy", 0),
+        ),
+    )
+    return grpc.intercept_channel(channel, Deadline())

@@ -1,0 +1,300 @@
+"""A rig on a DAQmx card: output and inputs on one sample clock, with a guardian beside it."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from drivers.daqmx.address import Address
+from drivers.daqmx.explain import TIMEOUT, explained
+from drivers.daqmx.guardian import Guardian, GuardianProcess
+from drivers.daqmx.link import Link
+from drivers.daqmx.outputs import Outputs
+from drivers.daqmx.tasks import ClockedTasks, identify_card
+from drivers.errors import RigError
+from drivers.gate import GatedWaveform, ramp_down
+from drivers.identity import instruments
+from drivers.rig import Block, Event, RigIdentity, RigState, expect
+from drivers.settings import RigSettings
+
+__all__ = ["DaqmxRig", "open_daqmx_rig"]
+
+log = logging.getLogger(__name__)
+
+_BLOCK = 0.1  # s: reading ten times a second is what the library's users recommend
+_WAIT = 0.25  # s for samples, between two beats of the guardian
+_OVERDUE = 2.0  # s without a sample although the clock should run
+
+
+def open_daqmx_rig(
+    address: str, settings: RigSettings, *, block_samples: int | None = None
+) -> DaqmxRig:
+    """The rig at ``address``, its output at 0 V, with a guardian process beside it.
+
+    Raises ``AddressError`` for an address that is none, ``RigError`` where the card, its driver or
+    its server is not there.
+    """
+    where = Address.parse(address)
+    return DaqmxRig(where, settings, GuardianProcess(where, settings), block_samples=block_samples)
+
+
+class DaqmxRig:
+    """The card at ``address``; see ``drivers.rig.Rig`` for the calls, which any thread may make.
+
+    Blocks hold ``block_samples`` samples, or a tenth of a second when that is None. ``clock`` says
+    how long nothing came.
+    """
+
+    def __init__(
+        self,
+        address: Address,
+        settings: RigSettings,
+        guardian: Guardian,
+        *,
+        block_samples: int | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._address = address
+        self._settings = settings
+        self._guardian = guardian
+        self._block_samples = block_samples
+        self._clock = clock
+        self._lock = threading.RLock()
+        self._state = RigState.SAFE
+        self._tasks: ClockedTasks | None = None
+        self._run: _Run | None = None
+        self._link = Link(address.server, settings.guardian.link_timeout_s)
+        self._outputs = Outputs(self._link, address.device, settings)
+        try:
+            self._card = identify_card(self._link, address.device, settings)
+            # a program that died before this one may have left a voltage
+            self._outputs.zero(force=True)
+        except RigError:
+            self._guardian.close()
+            self._link.close()
+            raise
+
+    @property
+    def state(self) -> RigState:
+        """Where the rig stands."""
+        return self._state
+
+    @property
+    def waiting(self) -> float:
+        """How late the reader is: samples that were acquired and not read, in s."""
+        with self._lock:
+            if self._state is not RigState.RUNNING or self._run is None or self._tasks is None:
+                return 0.0
+            return self._tasks.waiting() / self._run.rate
+
+    def identify(self) -> RigIdentity:
+        """Say what is there; moves nothing."""
+        with self._lock:
+            expect(self._state, "identify", *(s for s in RigState if s is not RigState.CLOSED))
+        return RigIdentity(
+            address=str(self._address),
+            simulated=self._card.simulated,
+            instruments=instruments(
+                self._settings,
+                card_model=self._card.model,
+                card_serial=self._card.serial,
+                unnamed="not given",
+            ),
+            channels=self._card.channels,
+        )
+
+    def load(self, waveform: GatedWaveform) -> float:
+        """Take a waveform that has passed the gate; returns the actual sample rate in Hz.
+
+        Raises ``RigError`` for a waveform that passed under wider limits than this rig's, or that
+        the card cannot play.
+        """
+        if not isinstance(waveform, GatedWaveform):
+            raise TypeError(
+                f"a rig plays a GatedWaveform, which drivers.gate.admit makes, "
+                f"not {type(waveform).__name__}"
+            )
+        with self._lock:
+            expect(self._state, "load", RigState.SAFE, RigState.DONE)
+            waveform.check_within(self._settings.limits.gate_limits(waveform.limits.film))
+            self._drop_tasks()
+            tasks = ClockedTasks(self._link, self._address.device, self._settings)
+            try:
+                counts = self._card.channels[0].scaling.counts(waveform.voltage)
+                rate = tasks.prepare(counts, waveform.rate)
+            except BaseException:
+                tasks.close()
+                raise
+            self._tasks = tasks
+            self._run = _Run(waveform, counts, rate)
+            self._state = RigState.LOADED
+            return rate
+
+    def arm(self) -> None:
+        """Make ready to start at once; the output is still at 0 V, and from now on guarded."""
+        with self._lock:
+            expect(self._state, "arm", RigState.LOADED)
+            self._guardian.arm()
+            self._loaded()[0].arm()
+            self._state = RigState.ARMED
+
+    def start(self) -> None:
+        """Start the sample clock."""
+        with self._lock:
+            expect(self._state, "start", RigState.ARMED)
+            tasks, run = self._loaded()
+            self._guardian.beat()
+            tasks.start()
+            run.heard = self._clock()
+            self._state = RigState.RUNNING
+
+    def read(self) -> Block | None:
+        """Next block, waiting for it if need be; None when the waveform has been played.
+
+        Raises ``RigError`` where the card faults, where no sample comes, and, after a ramp to 0 V,
+        where the guardian process has died. Raises ``RigStateError`` when the rig was made safe.
+        """
+        while True:
+            # the lock is given up between two waits, so that others can make the rig safe
+            with self._lock:
+                if self._state is RigState.DONE:
+                    return None
+                expect(self._state, "read", RigState.RUNNING)
+                tasks, run = self._loaded()
+                guarded = self._guardian.beat()
+                if not guarded and not run.unguarded:
+                    run.unguarded = True
+                    run.events.append(
+                        Event(run.delivered, "fault", "the guardian process died: ramping to 0 V")
+                    )
+                    self._stop(tasks, run)
+                if run.delivered == run.total:
+                    self._finish(run)
+                    return None
+                tasks.refill(run.delivered)
+                block = self._fetch(tasks, run)
+            if block is not None:
+                return block
+
+    def stop(self) -> None:
+        """End the run early: ramp down to 0 V in the set time; what was acquired stays readable."""
+        with self._lock:
+            if self._state is RigState.DONE:
+                return  # it ended by itself in the same moment
+            expect(self._state, "stop", RigState.RUNNING)
+            self._stop(*self._loaded())
+
+    def make_safe(self) -> None:
+        """Take the output to 0 V, now, see it on the monitor, and forget the waveform.
+
+        Raises ``RigError`` where neither this program nor the guardian could.
+        """
+        with self._lock:
+            if self._state is RigState.CLOSED:
+                return
+            try:
+                self._drop_tasks()
+                self._outputs.zero(force=True)
+            except RigError as error:
+                log.warning("%s; the guardian is asked", error)
+                try:
+                    self._guardian.take_over()
+                except RigError as failed:
+                    raise RigError(f"{error}; {failed}", error.code) from error
+            self._guardian.disarm()
+            self._state = RigState.SAFE
+
+    def close(self) -> None:
+        """Make safe and release the instruments."""
+        with self._lock:
+            if self._state is RigState.CLOSED:
+                return
+            try:
+                self.make_safe()
+            finally:
+                self._state = RigState.CLOSED
+                self._guardian.close()
+                self._link.close()
+
+    def _fetch(self, tasks: ClockedTasks, run: _Run) -> Block | None:
+        """The samples that are due, or None after a short wait without any."""
+        size = self._block_samples or max(1, round(_BLOCK * run.rate))
+        size = min(size, run.total - run.delivered)
+        # a block that takes longer than a wait is put together from its parts
+        counts = tasks.read(size, _WAIT)
+        if counts.shape[1] == 0:
+            tasks.check_output()
+            silent = self._clock() - run.heard
+            if silent > _OVERDUE + size / run.rate:
+                raise RigError(explained(self._address.device, TIMEOUT, ""), TIMEOUT)
+            return None
+        run.heard = self._clock()
+        start, end = run.delivered, run.delivered + counts.shape[1]
+        run.delivered = end
+        due = tuple(e for e in run.events if e.sample < end or end == run.total)
+        run.events = [e for e in run.events if e not in due]
+        return Block(start, np.vstack((run.command[start:end], counts)), due)
+
+    def _stop(self, tasks: ClockedTasks, run: _Run) -> None:
+        """Leave the waveform where it is now, and go down to 0 V in a straight line."""
+        if run.stopped:
+            return
+        run.stopped = True
+        before = self._clock()
+        # at least the first sample, which is 0 V: a run without one could not be recorded
+        played = max(1, tasks.hold())
+        if played >= run.total:
+            return
+        ramp = ramp_down(run.waveform, played - 1, self._settings.limits.ramp_down_s)
+        counts = self._card.channels[0].scaling.counts(ramp)
+        run.command = np.concatenate((run.command[:played], counts))
+        tasks.continue_with(run.command, played)
+        run.events.append(
+            Event(
+                played,
+                "info",
+                f"stopped: ramping from {run.waveform.voltage[played - 1] * 1e-3:.4g} kV to 0 in "
+                f"{ramp.size / run.rate:.3g} s; the sample clock stood still for "
+                f"{(self._clock() - before) * 1e3:.0f} ms before",
+            )
+        )
+
+    def _finish(self, run: _Run) -> None:
+        self._state = RigState.DONE
+        if run.unguarded:
+            raise RigError(
+                "the guardian process died during the run, which was therefore ramped to 0 V; see "
+                "what ended it before the next run"
+            )
+
+    def _loaded(self) -> tuple[ClockedTasks, _Run]:
+        if self._tasks is None or self._run is None:
+            raise RigError("no waveform is loaded")
+        return self._tasks, self._run
+
+    def _drop_tasks(self) -> None:
+        tasks, self._tasks, self._run = self._tasks, None, None
+        if tasks is not None:
+            tasks.close()
+
+
+class _Run:
+    """One waveform on its way: ``command`` (total,) int16 is what goes out."""
+
+    def __init__(self, waveform: GatedWaveform, command: np.ndarray, rate: float) -> None:
+        self.waveform = waveform
+        self.command = command
+        self.rate = rate
+        self.delivered = 0  # samples handed to the reader
+        self.heard = 0.0  # when the last samples came, s
+        self.stopped = False
+        self.unguarded = False
+        self.events: list[Event] = []
+
+    @property
+    def total(self) -> int:
+        return self.command.size

@@ -1,0 +1,309 @@
+"""The card's tasks of one run: made, owned and cleared here and nowhere else.
+
+Inputs are converted on the ticks of the output's sample clock: two clocks would drift apart. So the
+inputs are started first and wait; they stand still whenever the output does, and the number of
+samples acquired is the number of samples put out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from drivers.channels import Channel
+from drivers.daqmx.explain import TIMEOUT, instrument_errors
+from drivers.daqmx.link import Link
+from drivers.errors import RigError
+from drivers.settings import RigSettings
+
+if TYPE_CHECKING:
+    import nidaqmx
+    from nidaqmx.system import WatchdogTask
+
+__all__ = ["Card", "ClockedTasks", "identify_card"]
+
+_ODD_BUFFER = 4095  # samples: an output buffer of exactly this size misbehaved on a 6361
+
+
+@dataclass(frozen=True)
+class Card:
+    """What a card says of itself.
+
+    ``channels`` in the order of blocks, with the card's own scaling and the timing it really has.
+    """
+
+    model: str
+    serial: str
+    simulated: bool
+    channels: tuple[Channel, ...]
+
+
+def identify_card(link: Link, device: str, settings: RigSettings) -> Card:
+    """Ask the card; nothing is put out. Raises ``RigError`` where it does not fit the settings."""
+    with instrument_errors(device, link.server):
+        from nidaqmx.system import Device
+
+        card = Device(device, grpc_options=link.session)
+        model, serial = card.product_type, f"{card.serial_num:X}"
+        simulated = card.is_simulated
+    tasks = ClockedTasks(link, device, settings)
+    try:
+        return Card(model, serial, simulated, tasks.channels())
+    finally:
+        tasks.close()
+
+
+class ClockedTasks:
+    """Output, inputs, enable line and watchdog of the card ``device`` behind ``link``.
+
+    Every method raises ``RigError`` in words where the card refuses.
+    """
+
+    def __init__(self, link: Link, device: str, settings: RigSettings) -> None:
+        self._link = link
+        self._device = device
+        self._settings = settings
+        self._ao: nidaqmx.Task | None = None
+        self._ai: nidaqmx.Task | None = None
+        self._enable: nidaqmx.Task | None = None
+        self._watchdog: WatchdogTask | None = None
+        self._command = np.empty(0, dtype=np.int16)
+        self._rate = 0.0
+        self._first = 0  # sample of the run with which the present output task began
+        self._written = 0  # samples of the command written so far
+        self._buffer = 0  # samples that the output buffer holds
+
+    def channels(self) -> tuple[Channel, ...]:
+        """The rig's channels with the card's own scaling and the skew it really has.
+
+        The inputs and the output are reserved for it: a card that somebody uses is noticed here.
+        """
+        from nidaqmx.constants import TaskMode
+
+        settings = self._settings
+        with self._errors():
+            self._make_output()
+            self._output().control(TaskMode.TASK_RESERVE)
+            ai = self._make_inputs(settings.card.sample_rate_Hz)
+            ai.control(TaskMode.TASK_RESERVE)
+            coefficients = {
+                channel.name: tuple(channel.ai_dev_scaling_coeff) for channel in ai.ai_channels
+            }
+            first = ai.timing.delay_from_samp_clk_delay
+            interval = 1.0 / ai.timing.ai_conv_rate
+        # the output is corrected by the card itself: nominal counts are what it puts out
+        step = settings.card.ao_range_V / 32768.0
+        coefficients["voltage_command"] = (0.0, step)
+        inputs = len(settings.channel_names) - 1
+        return settings.channels(coefficients, [first + i * interval for i in range(inputs)])
+
+    def prepare(self, command: np.ndarray, rate: float) -> float:
+        """Reserve the card for ``command`` (N,) counts at ``rate`` Hz; returns the actual rate."""
+        self._command = command
+        self._rate = rate
+        with self._errors():
+            ao = self._make_output()
+            self._time_output()
+            self._rate = ao.timing.samp_clk_rate
+            self._make_inputs(self._rate)
+        return self._rate
+
+    def arm(self) -> None:
+        """Inputs wait for the clock; the enable line goes high, with the watchdog on it."""
+        import nidaqmx
+        from nidaqmx.system import WatchdogTask
+        from nidaqmx.types import DOExpirationState
+
+        card, session = self._settings.card, self._link.session
+        with self._errors():
+            self._inputs().start()
+            if card.do_hv_enable is None:
+                return
+            line = f"{self._device}/{card.do_hv_enable}"
+            if card.hv_enable_watchdog_s > 0.0:
+                from nidaqmx.constants import Level
+
+                self._watchdog = WatchdogTask(
+                    self._device, timeout=card.hv_enable_watchdog_s, grpc_options=session
+                )
+                self._watchdog.cfg_watchdog_do_expir_states(
+                    [DOExpirationState(physical_channel=line, expiration_state=Level.LOW)]
+                )
+                self._watchdog.start()
+            self._enable = nidaqmx.Task(grpc_options=session)
+            self._enable.do_channels.add_do_chan(line)
+            self._enable.write(True, auto_start=True)
+
+    def start(self) -> None:
+        """Start the sample clock."""
+        with self._errors():
+            self._output().start()
+
+    def read(self, samples: int, wait: float) -> np.ndarray:
+        """Counts (inputs, n) int16 of the next samples: ``samples``, or fewer after ``wait`` s."""
+        import nidaqmx.errors
+        from nidaqmx.stream_readers import AnalogUnscaledReader
+
+        counts = np.empty((len(self._settings.channel_names) - 1, samples), dtype=np.int16)
+        ai = self._inputs()
+        with self._errors():
+            if self._watchdog is not None:
+                self._watchdog.reset_timer()
+            reader = AnalogUnscaledReader(ai.in_stream)
+            reader.verify_array_shape = False  # it is as it should be, and asking costs a call
+            try:
+                read = reader.read_int16(counts, samples, wait)
+            except nidaqmx.errors.DaqReadError as error:
+                if error.error_code != TIMEOUT:
+                    raise
+                read = error.samps_per_chan_read
+        if read == samples:
+            return counts
+        # rows come one after another, of the length that was read
+        return counts.reshape(-1)[: counts.shape[0] * read].reshape(counts.shape[0], read).copy()
+
+    def waiting(self) -> int:
+        """Samples of each input that were acquired and not read."""
+        with self._errors():
+            return int(self._inputs().in_stream.avail_samp_per_chan)
+
+    def refill(self, delivered: int) -> None:
+        """Write on where there is room: ``delivered`` samples at least have been put out."""
+        if self._written == self._command.size:
+            return
+        room = self._buffer - (self._written - max(delivered, self._first))
+        # in few large pieces
+        if room >= self._buffer // 4 or room >= self._command.size - self._written:
+            self._write(room)
+
+    def hold(self) -> int:
+        """Stop the clock, the output standing where it is; returns the samples put out so far."""
+        with self._errors():
+            self._output().stop()
+            return int(self._inputs().in_stream.total_samp_per_chan_acquired)
+
+    def continue_with(self, command: np.ndarray, played: int) -> None:
+        """Go on with ``command`` from sample ``played``, at the same rate, on the same inputs."""
+        self._command = command
+        self._first = self._written = played
+        if played == command.size:
+            return
+        with self._errors():
+            self._time_output()
+            self._output().start()
+
+    def check_output(self) -> None:
+        """Raise ``RigError`` where the output has failed, of which the inputs know nothing."""
+        with self._errors():
+            self._output().is_task_done()
+
+    def close(self) -> None:
+        """Clear every task, the enable line low first; the output keeps its last value.
+
+        Each is cleared although another one cannot be; raises ``RigError`` for the first that
+        could not.
+        """
+        enable, watchdog, ao, ai = self._enable, self._watchdog, self._ao, self._ai
+        self._enable = self._watchdog = self._ao = self._ai = None
+        calls: list[Callable[[], object]] = []
+        if enable is not None:
+            calls.append(lambda: enable.write(False, auto_start=True))
+        calls.extend(task.close for task in (enable, watchdog, ao, ai) if task is not None)
+        failed: RigError | None = None
+        for call in calls:
+            try:
+                with self._errors():
+                    call()
+            except RigError as error:
+                failed = failed or error
+        if failed is not None:
+            raise failed
+
+    def _make_output(self) -> nidaqmx.Task:
+        import nidaqmx
+
+        card = self._settings.card
+        self._ao = ao = nidaqmx.Task(grpc_options=self._link.session)
+        ao.ao_channels.add_ao_voltage_chan(
+            f"{self._device}/{card.ao_command}", min_val=-card.ao_range_V, max_val=card.ao_range_V
+        )
+        return ao
+
+    def _make_inputs(self, rate: float) -> nidaqmx.Task:
+        import nidaqmx
+        from nidaqmx.constants import AcquisitionType, DigitalWidthUnits, TerminalConfiguration
+
+        settings, card = self._settings, self._settings.card
+        terminals, ranges, wiring = settings.terminals(), settings.ranges(), settings.wiring()
+        self._ai = ai = nidaqmx.Task(grpc_options=self._link.session)
+        for name in settings.channel_names[1:]:
+            ai.ai_channels.add_ai_voltage_chan(
+                f"{self._device}/{terminals[name]}",
+                name_to_assign_to_channel=name,
+                terminal_config=TerminalConfiguration[wiring[name]],
+                min_val=-ranges[name],
+                max_val=ranges[name],
+            )
+        ai.timing.cfg_samp_clk_timing(
+            rate,
+            source=f"/{self._device}/ao/SampleClock",
+            sample_mode=AcquisitionType.CONTINUOUS,
+            samps_per_chan=card.ai_buffer_samples,
+        )
+        ai.in_stream.input_buf_size = card.ai_buffer_samples
+        ai.timing.ai_conv_rate = 1e6 / card.convert_interval_us
+        ai.timing.delay_from_samp_clk_delay_units = DigitalWidthUnits.SECONDS
+        ai.timing.delay_from_samp_clk_delay = card.first_convert_us * 1e-6
+        return ai
+
+    def _time_output(self) -> None:
+        """Give the output its clock and buffer for what is left of the command, and fill it."""
+        from nidaqmx.constants import AcquisitionType, RegenerationMode, TaskMode
+
+        ao = self._output()
+        # a finite generation has 2 samples or more: one more at 0 V, where the command ends anyway
+        left = max(2, self._command.size - self._first)
+        ao.timing.cfg_samp_clk_timing(
+            self._rate, sample_mode=AcquisitionType.FINITE, samps_per_chan=left
+        )
+        streamed = round(self._settings.card.ao_buffer_s * self._rate)
+        self._buffer = min(left, max(streamed, 2))
+        if self._buffer == _ODD_BUFFER:
+            self._buffer += 1
+        ao.out_stream.output_buf_size = self._buffer
+        ao.out_stream.regen_mode = RegenerationMode.DONT_ALLOW_REGENERATION
+        ao.control(TaskMode.TASK_RESERVE)
+        self._written = self._first
+        self._write(self._buffer)
+        ao.control(TaskMode.TASK_COMMIT)
+
+    def _write(self, room: int) -> None:
+        """Write up to ``room`` samples of the command."""
+        from nidaqmx.stream_writers import AnalogSingleChannelWriter
+
+        counts = self._command[self._written : self._written + room]
+        volts = counts * (self._settings.card.ao_range_V / 32768.0)
+        self._written += volts.size
+        if self._written == self._command.size and self._command.size - self._first == 1:
+            volts = np.append(volts, volts[-1:])
+        with self._errors():
+            writer = AnalogSingleChannelWriter(self._output().out_stream, auto_start=False)
+            writer.verify_array_shape = False
+            writer.write_many_sample(volts, timeout=self._settings.guardian.link_timeout_s / 2.0)
+
+    def _output(self) -> nidaqmx.Task:
+        if self._ao is None:
+            raise RigError(f"card {self._device}: no waveform is loaded")
+        return self._ao
+
+    def _inputs(self) -> nidaqmx.Task:
+        if self._ai is None:
+            raise RigError(f"card {self._device}: no waveform is loaded")
+        return self._ai
+
+    def _errors(self) -> AbstractContextManager[None]:
+        return instrument_errors(self._device, self._link.server)

@@ -1,0 +1,33 @@
+"""What a look at an instrument found, against what the rig file wants."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+__all__ = ["Finding", "Verdict"]
+
+Verdict = Literal["ok", "warning", "wrong", "not wired"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One ``item`` of one ``instrument``, in words: ``found``, ``wanted``, ``advice`` what to do.
+
+    ``wrong`` keeps a run from starting, ``warning`` does not. ``not wired`` is what the rig file
+    does not have and nobody has looked at.
+    """
+
+    instrument: str
+    item: str
+    found: str
+    wanted: str = ""
+    verdict: Verdict = "ok"
+    advice: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """The finding in one line."""
+        wanted = f", {self.wanted} is wanted" if self.wanted and self.verdict != "ok" else ""
+        advice = f"; {self.advice}" if self.advice else ""
+        return f"{self.instrument}, {self.item}: {self.found}{wanted}{advice}"

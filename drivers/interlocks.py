@@ -1,0 +1,444 @@
+"""Interlocks: what ends a run while it goes on, judged sample by sample from what the rig reads.
+
+They take blocks and answer with trips; they read no clock and move no output. What they remember
+from block to block makes the answer independent of where the samples are cut.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.channels import COUNT_MAX, COUNT_MIN, Channel, Scaling
+from drivers.rig import Block
+from drivers.settings import Action, RigSettings
+
+__all__ = ["Interlocks", "Trip"]
+
+_JUMP_WITHIN = 2e-3  # s
+# s; at longer sample intervals what a film can do between samples looks like a jump
+_JUMP_INTERVAL = 5e-3
+
+_AT_END = 0.999  # of the laser's range: where an alarm holds the analog output
+_FOLLOWS = 2  # counts between a command and the plan that it follows
+
+
+@dataclass(frozen=True)
+class Trip:
+    """``interlock`` tripped at ``sample`` of the run; ``action`` is due, ``message`` says why."""
+
+    interlock: str
+    sample: int
+    action: Action
+    message: str
+
+
+class Interlocks:
+    """The interlocks of one run on a rig with ``settings`` whose ``channels`` run at ``rate`` Hz.
+
+    ``predicted`` (N,) m is the displacement from the loaded rest state that a model foresees under
+    the voltage ``planned`` (N,) V, NaN where it foresees none: whether the film follows is judged
+    by it for as long as the command is the planned one. Without ``predicted`` that is not judged;
+    without ``planned`` the command is taken for the planned one to the end. Each interlock trips at
+    most once.
+
+    Raises ``ValueError`` for a prediction and a plan of different lengths.
+    """
+
+    def __init__(
+        self,
+        settings: RigSettings,
+        channels: tuple[Channel, ...],
+        rate: float,
+        predicted: np.ndarray | None,
+        planned: np.ndarray | None = None,
+    ) -> None:
+        if predicted is not None and planned is not None and predicted.shape != planned.shape:
+            raise ValueError(
+                f"{predicted.size} predicted displacements for {planned.size} planned voltages: "
+                f"one for each is needed"
+            )
+        scalings = {channel.name: channel.scaling for channel in channels}
+        self._rows = {channel.name: row for row, channel in enumerate(channels)}
+        self._command = scalings["voltage_command"]
+        self._monitor = scalings["voltage_monitor"]
+        self._current = scalings["current_monitor"]
+        self._laser = scalings["displacement"]
+        self._settings = settings
+        self._locks = locks = settings.interlocks
+        self._rate = rate
+        self._predicted = predicted
+        self._planned = None if planned is None else self._command.counts(planned)
+
+        # thresholds in counts, so that a sample that is in order costs next to nothing
+        limit = locks.current_max_mA * 1e-3
+        self._current_ends = _sorted(self._current.counts(np.array([-limit, limit])))
+        reach = settings.laser.range_mm * 1e-3 * _AT_END
+        self._laser_ends = _sorted(self._laser.counts(np.array([-reach, reach])))
+        self._zero = int(self._command.counts(np.zeros(1))[0])
+        self._swing = round(locks.laser_stuck_swing_kV * 1e3 / _step(self._command))
+        self._lag = max(1, round(_JUMP_WITHIN * rate))
+        slow = max(1.0, 1.0 / (rate * _JUMP_INTERVAL))
+        self._jump = locks.displacement_jump_mm * 1e-3 * slow**2  # m
+        self._jump_counts = max(1, math.ceil(self._jump / _step(self._laser)))
+
+        # what is remembered from block to block
+        self._tripped: set[str] = set()
+        self._watched = 0  # samples
+        self._last_command = self._zero
+        self._last_readings = np.empty(0, dtype=np.int32)
+        self._quiet_sum = self._quiet_samples = 0  # readings of the lead-in
+        self._rest: float | None = None  # m, what the laser reads at the loaded rest state
+        self._rest_from = 0  # sample
+        self._departed = False  # the command is not the planned one any more
+        self._still = _Still()
+        self._broken = {
+            name: _Debounce(self._samples(seconds))
+            for name, seconds in (
+                ("monitor", locks.monitor_debounce_ms * 1e-3),
+                ("breakdown", locks.breakdown_debounce_ms * 1e-3),
+                ("current", locks.current_debounce_ms * 1e-3),
+                ("laser", locks.laser_debounce_ms * 1e-3),
+                ("displacement", locks.displacement_debounce_ms * 1e-3),
+                ("jump", 0.0),
+                ("following", locks.following_debounce_ms * 1e-3),
+            )
+        }
+
+    def watch(self, block: Block) -> list[Trip]:
+        """The interlocks that trip within ``block``, in the order of their samples.
+
+        Raises ``ValueError`` for a block that does not follow the one before.
+        """
+        if block.start != self._watched:
+            raise ValueError(
+                f"the block begins with sample {block.start}, but sample {self._watched} is next"
+            )
+        if not block.counts.shape[1]:
+            return []
+        command = block.counts[self._rows["voltage_command"]]
+        monitor = block.counts[self._rows["voltage_monitor"]]
+        current = block.counts[self._rows["current_monitor"]]
+        reading = block.counts[self._rows["displacement"]]
+        self._find_rest(command, reading)
+        trips = [
+            *self._watch_voltage(command, monitor, current),
+            *self._watch_current(current),
+            *self._watch_laser(reading),
+            *self._watch_stuck(command, reading),
+            *self._watch_displacement(reading),
+            *self._watch_jump(reading),
+            *self._watch_following(command, reading),
+        ]
+        self._last_command = int(command[-1])
+        self._watched += command.size
+        return sorted(trips, key=lambda trip: (trip.sample, trip.action != "at once"))
+
+    def late(self, waiting_s: float) -> Trip | None:
+        """For samples that have waited ``waiting_s`` s for the program to read them."""
+        locks = self._locks
+        if "late" in self._tripped or waiting_s < locks.late_s:
+            return None
+        return self._trip(
+            "late",
+            0,
+            locks.late_action,
+            f"samples had waited {waiting_s:.3g} s for the program, {locks.late_s:.3g} s is "
+            f"allowed: the computer, or the link to the card, is too slow; close other programs",
+        )
+
+    def disk(self, free_bytes: int) -> Trip | None:
+        """For a disk that has ``free_bytes`` left for the recording."""
+        locks = self._locks
+        if "disk" in self._tripped or free_bytes >= locks.disk_free_min_MB * 1e6:
+            return None
+        return self._trip(
+            "disk",
+            0,
+            locks.disk_action,
+            f"the disk had {free_bytes * 1e-6:.4g} MB left, {locks.disk_free_min_MB:.4g} MB must "
+            f"stay free: it is nearly full; make room before the next run",
+        )
+
+    def _find_rest(self, command: np.ndarray, reading: np.ndarray) -> None:
+        """Take the mean reading of the lead-in, while the command is 0, for the rest state."""
+        if self._rest is not None:
+            return
+        driven = command != self._zero
+        quiet = int(np.argmax(driven)) if driven.any() else command.size
+        # whole numbers: their sum does not depend on how the samples are cut
+        self._quiet_sum += int(reading[:quiet].sum(dtype=np.int64))
+        self._quiet_samples += quiet
+        if quiet < command.size:
+            # driven from the first sample on, the film is still at rest there
+            samples = self._quiet_samples
+            mean = self._quiet_sum / samples if samples else float(reading[0])
+            self._rest = _physical(self._laser, mean)
+            self._rest_from = self._watched + quiet
+
+    def _watch_voltage(
+        self, command: np.ndarray, monitor: np.ndarray, current: np.ndarray
+    ) -> Iterator[Trip]:
+        locks = self._locks
+        watched = self._live("monitor"), self._live("breakdown") and locks.breakdown_fraction > 0.0
+        if not any(watched):
+            return
+        # while one is sampled the amplifier may be on its way from the command before to this one
+        now = self._command.physical(command)
+        before = np.append(_physical(self._command, self._last_command), now[:-1])
+        low, high = np.minimum(now, before), np.maximum(now, before)
+        shown = self._monitor.physical(monitor)
+        if watched[0]:
+            tolerance = locks.monitor_tolerance_kV * 1e3
+            at = self._broken["monitor"].first(
+                (shown < low - tolerance) | (shown > high + tolerance)
+            )
+            if at is not None:
+                yield self._trip(
+                    "monitor",
+                    at,
+                    locks.monitor_action,
+                    f"the voltage monitor read {shown[at] * 1e-3:.2f} kV with "
+                    f"{now[at] * 1e-3:.2f} kV commanded: {locks.monitor_tolerance_kV:.3g} kV "
+                    f"between them is allowed; the amplifier does not follow, or its monitor is "
+                    f"not wired and scaled as the rig file says",
+                )
+        if watched[1]:
+            # the smaller of both commands, below 0 where they differ in sign
+            asked = np.maximum(low, -high)
+            towards = np.where(low > 0.0, shown, -shown)
+            fraction = locks.breakdown_fraction
+            at = self._broken["breakdown"].first(
+                (asked > locks.breakdown_above_kV * 1e3) & (towards < fraction * asked)
+            )
+            if at is not None:
+                flowing = _physical(self._current, current[at])
+                cause = (
+                    "the film broke down or something arcs; look for a hole or a burn"
+                    if abs(flowing) > 0.5e-3 * locks.current_max_mA
+                    else "the amplifier tripped or is off, or the wire of its monitor is off"
+                )
+                yield self._trip(
+                    "breakdown",
+                    at,
+                    locks.breakdown_action,
+                    f"the voltage monitor read {shown[at] * 1e-3:.2f} kV with "
+                    f"{now[at] * 1e-3:.2f} kV commanded, less than {fraction:.0%} of it, while "
+                    f"{flowing * 1e3:.2f} mA flowed: {cause}",
+                )
+
+    def _watch_current(self, counts: np.ndarray) -> Iterator[Trip]:
+        if not self._live("current"):
+            return
+        low, high = self._current_ends
+        # at the end of what the input can read, it may be any current
+        at = self._broken["current"].first((counts <= low) | (counts >= high))
+        if at is not None:
+            locks = self._locks
+            yield self._trip(
+                "current",
+                at,
+                locks.current_action,
+                f"the current monitor read {_physical(self._current, counts[at]) * 1e3:.2f} mA, "
+                f"{locks.current_max_mA:.3g} mA is allowed: the film or a lead is shorted, or "
+                f"something arcs; look for a hole or a burn",
+            )
+
+    def _watch_laser(self, reading: np.ndarray) -> Iterator[Trip]:
+        if not self._live("laser"):
+            return
+        low, high = self._laser_ends
+        at = self._broken["laser"].first((reading <= low) | (reading >= high))
+        if at is not None:
+            yield self._trip(
+                "laser",
+                at,
+                self._locks.laser_action,
+                f"the laser read {_physical(self._laser, reading[at]) * 1e3:.4g} mm, the end of "
+                f"its range of +-{self._settings.laser.range_mm:.4g} mm: it has lost its target "
+                f"(alarm), or the load has fallen or swings",
+            )
+
+    def _watch_stuck(self, command: np.ndarray, reading: np.ndarray) -> Iterator[Trip]:
+        locks = self._locks
+        if locks.laser_stuck_s == 0.0 or not self._live("laser-stuck"):
+            return
+        at = self._still.first(reading, command, self._samples(locks.laser_stuck_s), self._swing)
+        if at is not None:
+            yield self._trip(
+                "laser-stuck",
+                at,
+                locks.laser_action,
+                f"the laser had read {_physical(self._laser, reading[at]) * 1e3:.5g} mm without "
+                f"any change for {locks.laser_stuck_s:.3g} s or longer, while the command moved "
+                f"by {locks.laser_stuck_swing_kV:.3g} kV or more: its output is held, or its wire "
+                f"is off",
+            )
+
+    def _watch_displacement(self, reading: np.ndarray) -> Iterator[Trip]:
+        if self._rest is None or not self._live("displacement"):
+            return
+        locks = self._locks
+        bounds = np.array([locks.displacement_min_mm, locks.displacement_max_mm]) * 1e-3
+        low, high = _sorted(self._laser.counts(self._rest + bounds))
+        broken = (reading < low) | (reading > high)
+        broken[: max(0, self._rest_from - self._watched)] = False
+        at = self._broken["displacement"].first(broken)
+        if at is not None:
+            moved = _physical(self._laser, reading[at]) - self._rest
+            yield self._trip(
+                "displacement",
+                at,
+                locks.displacement_action,
+                f"the film stood {moved * 1e3:.4g} mm from its rest state, "
+                f"{locks.displacement_min_mm:.4g} to {locks.displacement_max_mm:.4g} mm is "
+                f"allowed: it tore or came off, it is being pulled in, or the load swings",
+            )
+
+    def _watch_jump(self, reading: np.ndarray) -> Iterator[Trip]:
+        if not self._live("jump"):
+            return
+        lag = self._lag
+        readings = np.concatenate((self._last_readings, reading), dtype=np.int32)
+        if not self._watched:  # as if it had stood still before
+            readings = np.concatenate((np.full(2 * lag, readings[0]), readings))
+        self._last_readings = readings[-2 * lag :].copy()
+        # from the straight line through the readings before: a fast film is not a jump
+        beside = readings[2 * lag :] - 2 * readings[lag:-lag] + readings[: -2 * lag]
+        at = self._broken["jump"].first(np.abs(beside) >= self._jump_counts)
+        if at is not None:
+            jump = int(beside[at]) * _step(self._laser)
+            yield self._trip(
+                "jump",
+                at,
+                self._locks.displacement_action,
+                f"the laser's reading jumped by {abs(jump) * 1e3:.3g} mm within "
+                f"{lag / self._rate * 1e3:.3g} ms, {self._jump * 1e3:.3g} mm is allowed: the film "
+                f"or the load slipped, or the laser has lost its target",
+            )
+
+    def _watch_following(self, command: np.ndarray, reading: np.ndarray) -> Iterator[Trip]:
+        locks = self._locks
+        if (
+            self._predicted is None
+            or self._rest is None
+            or self._departed
+            or locks.following_fraction == 0.0
+            or not self._live("following")
+        ):
+            return
+        predicted = self._predicted[self._watched : self._watched + command.size]
+        planned = predicted.size
+        if self._planned is not None:
+            plan = self._planned[self._watched : self._watched + planned]
+            other = np.abs(np.subtract(command[:planned], plan, dtype=np.int32)) > _FOLLOWS
+            planned = int(np.argmax(other)) if other.any() else planned
+        self._departed = planned < command.size
+        predicted = predicted[:planned]
+        moved = self._laser.physical(reading[:planned]) - self._rest
+        far = np.abs(predicted)
+        broken = (far > locks.following_above_mm * 1e-3) & (
+            np.copysign(1.0, predicted) * moved < locks.following_fraction * far
+        )
+        broken[: max(0, self._rest_from - self._watched)] = False
+        at = self._broken["following"].first(broken)
+        if at is not None:
+            yield self._trip(
+                "following",
+                at,
+                locks.following_action,
+                f"the film had moved {moved[at] * 1e3:.2f} mm where the model foresees "
+                f"{predicted[at] * 1e3:.2f} mm, less than {locks.following_fraction:.0%} of it: an "
+                f"electrode or its lead is open, the laser is stuck, or it is another film than "
+                f"the rig file says",
+            )
+
+    def _live(self, name: str) -> bool:
+        return name not in self._tripped
+
+    def _samples(self, seconds: float) -> int:
+        """Samples that span ``seconds``, each standing for the interval that it begins."""
+        return max(1, math.ceil(seconds * self._rate * (1.0 - 1e-9)))
+
+    def _trip(self, name: str, at: int, action: Action, words: str) -> Trip:
+        """Trip ``name`` at place ``at`` in the block that is being watched."""
+        self._tripped.add(name)
+        sample = self._watched + at
+        return Trip(name, sample, action, f"at {sample / self._rate:.4g} s {words}")
+
+
+class _Debounce:
+    """Finds where a condition has held for ``needed`` samples in a row."""
+
+    def __init__(self, needed: int) -> None:
+        self._needed = needed
+        self._held = 0  # samples in a row up to now
+
+    def first(self, broken: np.ndarray) -> int | None:
+        """Place in ``broken`` (n,), which follows what came before, or None."""
+        if not broken.any():
+            self._held = 0
+            return None
+        starts = np.flatnonzero(broken & np.diff(broken, prepend=False))
+        ends = np.flatnonzero(broken & np.diff(broken, append=False)) + 1
+        if broken[0]:
+            starts[0] -= self._held
+        self._held = int(ends[-1] - starts[-1]) if broken[-1] else 0
+        long = np.flatnonzero(ends - starts >= self._needed)
+        return int(starts[long[0]]) + self._needed - 1 if long.size else None
+
+
+class _Still:
+    """Finds a reading that does not change while the command does."""
+
+    def __init__(self) -> None:
+        self._count: int | None = None  # of the newest reading
+        self._samples = 0  # for which it has stood
+        self._low, self._high = COUNT_MAX, COUNT_MIN  # of the command meanwhile
+
+    def first(
+        self, reading: np.ndarray, command: np.ndarray, needed: int, swing: int
+    ) -> int | None:
+        """Where a count has stood for ``needed`` samples, and the command moved by ``swing``."""
+        edges = np.concatenate(([0], np.flatnonzero(np.diff(reading)) + 1, [reading.size]))
+        if reading[0] != self._count:
+            self._forget()
+        lengths = np.diff(edges)
+        lengths[0] += self._samples
+        for row in np.flatnonzero(lengths >= needed):
+            part = command[edges[row] : edges[row + 1]].astype(np.int32)
+            low, high = np.minimum.accumulate(part), np.maximum.accumulate(part)
+            if row == 0:
+                low, high = np.minimum(low, self._low), np.maximum(high, self._high)
+            stood = np.arange(part.size) + (lengths[row] - part.size + 1)
+            found = (stood >= needed) & (high - low >= swing)
+            if found.any():
+                return int(edges[row] + np.argmax(found))
+        if edges.size > 2:
+            self._forget()
+        newest = command[edges[-2] :]
+        self._count, self._samples = int(reading[-1]), int(lengths[-1])
+        self._low = min(self._low, int(newest.min()))
+        self._high = max(self._high, int(newest.max()))
+        return None
+
+    def _forget(self) -> None:
+        self._samples = 0
+        self._low, self._high = COUNT_MAX, COUNT_MIN
+
+
+def _physical(scaling: Scaling, count: float | np.integer) -> float:
+    return float(scaling.physical(np.array(count)))
+
+
+def _step(scaling: Scaling) -> float:
+    """Physical value of one count, to first order."""
+    return abs(scaling.gain * scaling.coefficients[1])
+
+
+def _sorted(pair: np.ndarray) -> tuple[int, int]:
+    """Lower and upper of two counts: a gain below 0 turns them round."""
+    return int(pair.min()), int(pair.max())

@@ -1,0 +1,16 @@
+"""The Keyence LK-G5000 laser controller on its RS-232C port."""
+
+from drivers.keyence.compare import ControllerSettings, compare
+from drivers.keyence.controller import Keyence, LaserError, NoReading, Port, open_port
+from drivers.keyence.inspection import inspect
+
+__all__ = [
+    "ControllerSettings",
+    "Keyence",
+    "LaserError",
+    "NoReading",
+    "Port",
+    "compare",
+    "inspect",
+    "open_port",
+]

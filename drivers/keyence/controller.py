@@ -1,0 +1,406 @@
+"""A conversation with the laser controller: one command, one reply, and nothing hangs."""
+
+from __future__ import annotations
+
+import errno
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import Enum
+from types import TracebackType
+from typing import Protocol, TypeVar
+
+from drivers.errors import RigError
+from drivers.keyence.commands import (
+    AVERAGING,
+    CALCULATIONS,
+    COMMANDS,
+    DISPLAY_UNITS,
+    ERRORS,
+    FILTERS,
+    QUANTITIES,
+    SAMPLING_US,
+    STATUS_ERROR,
+    Command,
+)
+from drivers.keyence.compare import ControllerSettings
+from drivers.settings import LaserSettings
+
+__all__ = ["POLL", "Keyence", "LaserError", "NoReading", "Port", "open_port"]
+
+POLL = 0.05  #: s that one read of the port waits
+_ATTEMPTS = 3
+_LINE_MAX = 200  # bytes; the longest reply asked for here has 40
+_QUIET_MAX = 1.0  # s to wait for the end of what is no reply
+_SHOWN = 24  # bytes of what is no reply that a message shows
+_VOLTS_MAX = 11.0  # of the analog output
+
+T = TypeVar("T")
+
+
+class LaserError(RigError):
+    """The laser controller does not do what it is asked: ``what`` happened, ``advice`` what to do.
+
+    ``code`` is that of the controller's error reply.
+    """
+
+    def __init__(self, what: str, advice: str, code: int | None = None) -> None:
+        super().__init__(f"{what}; {advice}", code)
+        self.what = what
+        self.advice = advice
+
+
+class NoReading(Enum):
+    """What the controller says where it has no number."""
+
+    OVER_RANGE = "beyond the measuring range, on its positive side"
+    UNDER_RANGE = "beyond the measuring range, on its negative side"
+    WAITING = "waiting for a value"
+    INVALID = "no valid value: an alarm, or nothing was measured yet"
+
+
+_STATES = {
+    "+FFFFFFF": NoReading.OVER_RANGE,
+    "-FFFFFFF": NoReading.UNDER_RANGE,
+    "--------": NoReading.WAITING,
+    "XXXXXXXX": NoReading.INVALID,
+}
+
+
+class Port(Protocol):
+    """What is needed of a serial port; pyserial's has it. Faults are ``OSError``.
+
+    ``read`` gives what comes within ``POLL`` s, up to ``size`` bytes; nothing means that nothing
+    came.
+    """
+
+    @property
+    def in_waiting(self) -> int:
+        """Bytes that can be read at once."""
+        ...
+
+    def read(self, size: int = 1, /) -> bytes:
+        """Read."""
+        ...
+
+    def write(self, data: bytes, /) -> object:
+        """Write all of it."""
+        ...
+
+    def close(self) -> None:
+        """Release the port."""
+        ...
+
+
+def open_port(settings: LaserSettings) -> Port:
+    """Open ``settings.port``, a name such as COM3 or a URL that pyserial knows.
+
+    Raises ``LaserError`` where that does not work.
+    """
+    try:
+        import serial  # type: ignore[import-untyped]
+    except ModuleNotFoundError as error:
+        raise LaserError(
+            "pyserial, which speaks to serial ports, is not installed",
+            "install dearig with its extra `rig`: pip install 'dearig[rig]'",
+        ) from error
+    name = settings.port
+    try:
+        port: Port = serial.serial_for_url(
+            name, baudrate=settings.baud_rate, timeout=POLL, write_timeout=1.0, exclusive=True
+        )
+    except (OSError, ValueError) as error:
+        raise _cannot_open(name, error) from error
+    return port
+
+
+def _cannot_open(name: str, error: Exception) -> LaserError:
+    from serial.tools.list_ports import comports  # type: ignore[import-untyped]
+
+    # on Windows the cause stands in the text only
+    text, number = str(error), getattr(error, "errno", None)
+    denied = number == errno.EACCES or "PermissionError" in text
+    if number == errno.ENOENT or "FileNotFoundError" in text:
+        there = ", ".join(sorted(port.device for port in comports())) or "none"
+        return LaserError(
+            f"there is no serial port {name}",
+            f"set laser.port to where the controller is; serial ports here: {there}",
+        )
+    if number in (errno.EBUSY, errno.EAGAIN) or (denied and sys.platform == "win32"):
+        return LaserError(f"serial port {name} is in use", "close the program that uses it")
+    if denied:
+        return LaserError(
+            f"serial port {name} may not be opened by this user",
+            "become a member of the group that owns it, often dialout, and log in anew",
+        )
+    return LaserError(
+        f"serial port {name} cannot be opened: {text}",
+        "set laser.port to the name of a serial port, such as COM3 or /dev/ttyUSB0",
+    )
+
+
+class _Garbled(Exception):  # noqa: N818  (it is no error of the program)
+    """What came is no reply to what was asked."""
+
+    def __init__(self, data: bytes) -> None:
+        super().__init__()
+        self.data = data
+
+
+class Keyence:
+    """A controller at the other end of ``port``; ``settings`` say which OUT, and how it is reached.
+
+    Every method raises ``LaserError`` where the controller does not answer as it should, in bounded
+    time whatever the port delivers. The protocol has no checksum: a number that was falsified into
+    another number on its way is not noticed.
+    """
+
+    def __init__(
+        self, port: Port, settings: LaserSettings, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._port = port
+        self._settings = settings
+        self._clock = clock
+        self._held = b""  # came, not looked at yet
+        self._unit: float | None = None  # of a value, m; known once it was asked for
+
+    def __enter__(self) -> Keyence:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release the port."""
+        self._port.close()
+
+    def program(self) -> int:
+        """Number of the program that is active; ends a setting mode that somebody left behind."""
+        try:
+            return int(self._ask("program")[0])
+        except LaserError as error:
+            if error.code != STATUS_ERROR:
+                raise
+        self._change_mode("measuring mode")
+        return int(self._ask("program")[0])
+
+    def read(self) -> float | NoReading:
+        """The measured value in m, or why there is none.
+
+        The first call reads the unit too, for which the controller stops measuring for a moment.
+        """
+        if self._unit is None:
+            with self._setting_mode():
+                self._read_unit()
+        (text,) = self._ask("measured value")
+        if text in _STATES:
+            return _STATES[text]
+        return float(text) * self._known_unit()
+
+    def auto_zero(self, on: bool) -> None:
+        """Let values count from the present one (``on``), or from the reference again."""
+        self._ask("auto-zero on" if on else "auto-zero off")
+
+    def controller_settings(self) -> ControllerSettings:
+        """What is set in the controller; it does not measure while it is asked."""
+        program = self.program()
+        with self._setting_mode():
+            (heads,) = self._ask("heads")
+            sampling = self._choice("sampling cycle", SAMPLING_US)
+            kind, parameter = self._ask("filter")
+            calculation = self._choice("calculation", CALCULATIONS)
+            unit, step = self._read_unit()
+            into1, out1, into2, out2 = self._ask("measurement scaling")
+            at1, volts1, at2, volts2 = self._ask("analog scaling")
+        found = ControllerSettings(
+            program=program,
+            heads=int(heads),
+            sampling=sampling * 1e-6,
+            filter=self._known("filter", kind, FILTERS),
+            # the same digit is a number of averages or a cut-off frequency
+            averaging=self._known("filter", parameter, AVERAGING) if kind == "0" else None,
+            calculation=calculation,
+            measurement_points=(
+                (_scaled(into1, unit, step), _scaled(out1, unit, step)),
+                (_scaled(into2, unit, step), _scaled(out2, unit, step)),
+            ),
+            analog_points=(
+                (_scaled(at1, unit, step), _scaled(volts1, 1.0, 1e-3)),
+                (_scaled(at2, unit, step), _scaled(volts2, 1.0, 1e-3)),
+            ),
+        )
+        for name, points in (
+            ("measurement scaling", found.measurement_points),
+            ("analog scaling", found.analog_points),
+        ):
+            if points[0][0] == points[1][0] or points[0][1] == points[1][1]:
+                raise LaserError(
+                    f"the {name} of OUT{self._settings.output} has two points that are one",
+                    "set it in the controller",
+                )
+        if max(abs(volts) for _, volts in found.analog_points) > _VOLTS_MAX:
+            raise LaserError(
+                f"the analog scaling of OUT{self._settings.output} reads {volts1} and {volts2} "
+                f"as volts, which no analog output has",
+                "the letters may differ in this unit: compare drivers/keyence/commands.py with "
+                "its manual",
+            )
+        return found
+
+    # ------------------------------------------------------------ settings
+
+    @contextmanager
+    def _setting_mode(self) -> Iterator[None]:
+        """Settings can be asked for in the body; the controller measures again after it."""
+        try:
+            self._change_mode("setting mode")
+            yield
+        finally:
+            # always: a controller in its setting mode holds its output and measures nothing
+            try:
+                self._change_mode("measuring mode")
+            except LaserError as error:
+                raise LaserError(
+                    f"the laser controller may still be in its setting mode, in which it does not "
+                    f"measure: {error.what}",
+                    "switch it off and on",
+                    error.code,
+                ) from error
+
+    def _change_mode(self, mode: str) -> None:
+        try:
+            self._ask(mode)
+        except LaserError as error:
+            if error.code != STATUS_ERROR:  # it is in this mode already
+                raise
+
+    def _read_unit(self) -> tuple[float, float]:
+        quantity = self._choice("quantity", QUANTITIES)
+        if quantity != "displacement":
+            raise LaserError(
+                f"OUT{self._settings.output} of the controller puts out {quantity}",
+                "set it to displacement in the controller",
+            )
+        unit, step = self._choice("display unit", DISPLAY_UNITS)
+        self._unit = unit
+        return unit, step
+
+    def _known_unit(self) -> float:
+        if self._unit is None:
+            raise LaserError("the unit of the values is not known", "read it first")
+        return self._unit
+
+    def _choice(self, name: str, choices: tuple[T, ...]) -> T:
+        return self._known(name, self._ask(name)[0], choices)
+
+    def _known(self, name: str, digit: str, choices: tuple[T, ...]) -> T:
+        if int(digit) >= len(choices):
+            raise LaserError(
+                f"the controller's {name} has the number {digit}, which is not known here",
+                "compare drivers/keyence/commands.py with its manual",
+            )
+        return choices[int(digit)]
+
+    # ------------------------------------------------------------ one command, one reply
+
+    def _ask(self, name: str) -> list[str]:
+        """Values of the reply to the command called ``name``; what got lost is asked for again."""
+        command = COMMANDS[name]
+        text = command.text(self._settings.output)
+        seen: bytes = b""
+        try:
+            for _ in range(_ATTEMPTS):
+                self._drop()
+                self._port.write(text.encode("ascii") + b"\r")
+                try:
+                    return self._values(command, text, self._line(command.timeout))
+                except _Garbled as garbled:
+                    seen = garbled.data or seen
+                    if garbled.data:
+                        self._wait_for_quiet()
+        except OSError as error:
+            raise LaserError(
+                f"serial port {self._settings.port} fails: {error}",
+                "look at the cable and the adapter",
+            ) from error
+        raise self._unanswered(text, seen)
+
+    def _values(self, command: Command, text: str, line: bytes) -> list[str]:
+        asked = text.split(",")
+        fields = line.strip(b" \n").decode("ascii", "replace").upper().split(",")
+        if fields[0] == "ER" and len(fields) == 3 and fields[1] in asked and fields[2].isdecimal():
+            raise self._refused(text, int(fields[2]))
+        count = len(command.values)
+        header, values = fields[: len(fields) - count], fields[len(fields) - count :]
+        # a reply repeats the command, with its OUT or without it
+        named = 2 if asked[0] == "SR" else 1
+        if len(header) < named or header != asked[: len(header)] or len(values) != count:
+            raise _Garbled(line or b"\r")
+        if not all(p.fullmatch(v) for p, v in zip(command.values, values, strict=True)):
+            raise _Garbled(line)
+        return values
+
+    def _line(self, timeout: float) -> bytes:
+        """What comes up to the next CR."""
+        deadline = self._clock() + timeout
+        while b"\r" not in self._held:
+            if len(self._held) > _LINE_MAX or self._clock() >= deadline:
+                raise _Garbled(self._held)
+            self._held += self._take()
+        line, _, self._held = self._held.partition(b"\r")
+        return line
+
+    def _wait_for_quiet(self) -> None:
+        deadline = self._clock() + _QUIET_MAX
+        while self._take() and self._clock() < deadline:
+            pass
+
+    def _drop(self) -> None:
+        """Forget what has come unasked, such as a reply that was waited for in vain."""
+        self._held = b""
+        if self._port.in_waiting:
+            self._wait_for_quiet()
+
+    def _take(self) -> bytes:
+        return self._port.read(max(1, min(self._port.in_waiting, _LINE_MAX)))
+
+    # ------------------------------------------------------------ what to tell
+
+    def _refused(self, text: str, code: int) -> LaserError:
+        meaning, advice = ERRORS.get(
+            code, ("an error that is not known here", "look the code up in the unit's manual")
+        )
+        return LaserError(
+            f"the laser controller refuses {text} with code {code:02d}: {meaning}", advice, code
+        )
+
+    def _unanswered(self, text: str, seen: bytes) -> LaserError:
+        where = f"{self._settings.port} at {self._settings.baud_rate} Bd"
+        if not seen:
+            return LaserError(
+                f"nothing answers {text} on {where}",
+                "look whether the controller is on, the cable is the crossed one that belongs to "
+                "it, laser.port is its port, and laser.baud_rate as set in the controller",
+            )
+        shown = ascii(seen[:_SHOWN].decode("ascii", "backslashreplace")).replace("\\\\", "\\")
+        if all(byte in b"\r\n\t" or 32 <= byte < 127 for byte in seen):
+            return LaserError(
+                f"what answers {text} on {where} says {shown}, which no LK-G5000 does",
+                "look whether laser.port is the controller's port: another instrument may be there",
+            )
+        return LaserError(
+            f"what comes on {where} is no text: {shown}",
+            "set laser.baud_rate as in the controller; if it is, look at the cable and for "
+            "interference from the high voltage",
+        )
+
+
+def _scaled(text: str, unit: float, step: float) -> float:
+    """A setting in units where it has a decimal point, else in smallest steps."""
+    return float(text) * (unit if "." in text else step)

@@ -1,0 +1,178 @@
+"""One run of the card's inputs: which samples there are, and what the rig says at each of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim_backend.daqmx.output import TICK_TOLERANCE, Generation, Track
+from sim_backend.signal_path import CHUNK, PathState, SignalPath
+
+__all__ = ["OwnTicks", "Run", "SharedTicks", "Ticks"]
+
+
+class OwnTicks:
+    """Samples on a clock of ``rate`` Hz that starts at ``start`` s, or not before it is known."""
+
+    def __init__(self, rate: float, start: float | None) -> None:
+        self.rate = rate
+        self.start = start
+
+    def passed(self, now: float) -> int:
+        """Samples that are complete at ``now``."""
+        if self.start is None:
+            return 0
+        return max(0, math.floor((now - self.start) * self.rate + TICK_TOLERANCE))
+
+    def due(self, samples: int, now: float) -> float | None:  # noqa: ARG002
+        """When ``samples`` will be complete in s; None where nobody knows."""
+        return None if self.start is None else self.start + samples / self.rate
+
+    def times(self, first: int, last: int) -> np.ndarray:
+        """Times (n,) s of the samples ``first`` to before ``last``."""
+        return (self.start or 0.0) + np.arange(first, last) / self.rate
+
+    def commands(self, first: int, last: int, track: Track) -> np.ndarray:
+        """Counts (n,) on the output of ``track`` at these samples."""
+        return track.at(self.times(first, last))
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """From sample ``first`` on there is one at each tick of ``generation``, from ``tick`` on."""
+
+    first: int
+    generation: Generation
+    tick: int
+    row: int | None  # of the output that the rig hangs on
+
+
+class SharedTicks:
+    """Samples on the output's sample clock, which runs while an output task generates."""
+
+    def __init__(self) -> None:
+        self._pieces: list[_Piece] = []
+
+    def follow(self, generation: Generation, tick: int, row: int | None, now: float) -> None:
+        """Let the samples from now on come from ``generation``, the first at its ``tick``."""
+        self._pieces.append(_Piece(self.passed(now), generation, tick, row))
+
+    def passed(self, now: float) -> int:
+        """Samples that are complete at ``now``."""
+        if not self._pieces:
+            return 0
+        piece = self._pieces[-1]
+        return piece.first + max(0, piece.generation.ticks(now) - piece.tick)
+
+    def due(self, samples: int, now: float) -> float | None:
+        """When ``samples`` will be complete in s; None where nobody knows."""
+        if not self._pieces:
+            return None
+        piece = self._pieces[-1]
+        tick = piece.tick + samples - piece.first
+        generation = piece.generation
+        if generation.finished(now) or (generation.total is not None and tick > generation.total):
+            return None
+        # it may run out of samples before that: then this is when somebody should look again
+        return generation.due(tick)
+
+    def times(self, first: int, last: int) -> np.ndarray:
+        """Times (n,) s of the samples ``first`` to before ``last``."""
+        parts = [p.generation.start + t / p.generation.rate for p, t in self._split(first, last)]
+        return np.concatenate(parts)
+
+    def commands(self, first: int, last: int, track: Track) -> np.ndarray:
+        """Counts (n,) on the output of ``track`` at these samples."""
+        parts = []
+        for piece, ticks in self._split(first, last):
+            if piece.row is None:
+                start, rate = piece.generation.start, piece.generation.rate
+                parts.append(track.at(start + ticks / rate))
+            else:
+                parts.append(piece.generation.at_ticks(ticks)[piece.row])
+        return np.concatenate(parts)
+
+    def needs(self, generation: Generation, sample: int) -> int | None:
+        """First tick of ``generation`` that is asked for from ``sample`` on; None: none is."""
+        ticks = [
+            piece.tick + max(0, sample - piece.first)
+            for piece in self._pieces
+            if piece.generation is generation
+        ]
+        return min(ticks) if ticks else None
+
+    def _split(self, first: int, last: int) -> list[tuple[_Piece, np.ndarray]]:
+        parts = []
+        for i, piece in enumerate(self._pieces):
+            end = self._pieces[i + 1].first if i + 1 < len(self._pieces) else last
+            samples = np.arange(max(first, piece.first), min(last, end))
+            if samples.size:
+                parts.append((piece, piece.tick + samples - piece.first))
+        return parts
+
+
+Ticks = OwnTicks | SharedTicks
+
+
+class Run:
+    """The rig from rest on, sample by sample, as ``command`` says what the output gets.
+
+    ``command(first, last)`` gives the counts (n,) of these samples. Those whose time has come are
+    for good; later ones are what is to be expected. A chunk that was computed on an expectation
+    which did not come true is computed again from its start, so that how reads and writes were cut
+    changes nothing.
+    """
+
+    def __init__(
+        self, path: SignalPath, state: PathState, command: Callable[[int, int], np.ndarray]
+    ) -> None:
+        self._path = path
+        self._command = command
+        self._chunk = -1
+        self._before = state  # before the newest chunk
+        self._after = state  # after it
+        self._used = np.empty(0, dtype=np.int16)  # the commands it was computed from
+        self._checked = 0  # how many of them have been found to be true
+        self._counts = np.empty((0, 0), dtype=np.int16)
+
+    @property
+    def keeps(self) -> int:
+        """The first sample whose command may be asked for again."""
+        return max(0, self._chunk) * CHUNK
+
+    def read(self, first: int, last: int) -> np.ndarray:
+        """Counts (channels, n) int16 of the samples ``first`` to before ``last``, never backwards."""
+        parts = []
+        while first < last:
+            chunk = first // CHUNK
+            end = min(last, (chunk + 1) * CHUNK)
+            while self._chunk < chunk:
+                # what the next one starts from must have come true to its last sample
+                if self._chunk >= 0:
+                    self._confirm(CHUNK)
+                self._chunk += 1
+                self._before = self._after
+                self._compute()
+            self._confirm(end - chunk * CHUNK)
+            parts.append(self._counts[:, first - chunk * CHUNK : end - chunk * CHUNK])
+            first = end
+        return np.concatenate(parts, axis=1) if len(parts) != 1 else parts[0]
+
+    def _confirm(self, samples: int) -> None:
+        """Make sure that the first ``samples`` of the chunk were computed from the truth."""
+        if samples <= self._checked:
+            return
+        start = self._chunk * CHUNK
+        true = self._command(start + self._checked, start + samples)
+        if not np.array_equal(true, self._used[self._checked : samples]):
+            self._compute()
+        self._checked = samples
+
+    def _compute(self) -> None:
+        start = self._chunk * CHUNK
+        self._used = self._command(start, start + CHUNK)
+        self._checked = 0
+        self._counts, _, self._after = self._path.advance(self._chunk, self._used, self._before)

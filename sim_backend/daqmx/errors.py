@@ -1,0 +1,151 @@
+"""What the card refuses: NI-DAQmx's codes, each with the wording of the driver, short."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+__all__ = ["WORDS", "Code", "DaqmxError"]
+
+
+class Code(IntEnum):
+    """The codes of NI-DAQmx that the simulated card knows."""
+
+    RESOURCE_RESERVED = -50103
+    RUNTIME_ABORTED = -88709
+    ROUTE_NOT_SUPPORTED = -89136
+    INVALID_ROUTE_SOURCE = -89120
+    MIN_NOT_LESS_THAN_MAX = -200082
+    INVALID_SYNTAX = -200086
+    INVALID_TASK = -200088
+    DUPLICATE_TASK = -200089
+    INVALID_VALUE = -200077
+    UNKNOWN_CHANNEL = -200170
+    UNKNOWN_DEVICE = -200220
+    READ_BUFFER_TOO_SMALL = -200229
+    WRITE_BUFFER_TOO_SMALL = -200234
+    SAMPLES_NEVER_AVAILABLE = -200278
+    SAMPLES_OVERWRITTEN = -200279
+    SAMPLES_NOT_YET_AVAILABLE = -200284
+    SAMPLES_NEVER_GENERATED = -200288
+    OUTPUT_STARVED = -200290
+    SAMPLES_NOT_YET_WRITTEN = -200292
+    AI_CONVERT_RATE_TOO_HIGH = -200335
+    INVALID_CHANNEL_NAME = -200461
+    NOT_SUPPORTED_IN_TASK = -200452
+    NOT_AN_INPUT = -200460
+    NOT_AN_OUTPUT = -200459
+    OUTPUT_BUFFER_EMPTY = -200462
+    BUFFER_SIZE_FIXED = -200547
+    NOT_WITHOUT_CHANNELS = -200478
+    NOT_WHILE_RUNNING = -200479
+    CHANNEL_ALREADY_IN_TASK = -200489
+    MIXED_CHANNELS = -200559
+    PROPERTY_WHILE_RUNNING = -200557
+    SEVERAL_DEVICES = -200558
+    NOT_DONE_IN_TIME = -200560
+    INVALID_SAMPLE = -200561
+    OUTPUT_BUFFER_TOO_SMALL = -200609
+    WATCHDOG_ONLY = -200635
+    WATCHDOG_EXPIRED_NO_RESET = -200644
+    WATCHDOG_TIMEOUT = -200668
+    WRITE_AFTER_WATCHDOG = -200678
+    CONVERT_PERIOD = -200081
+    WRITE_WITHOUT_START = -200846
+    READ_WITHOUT_START = -200834
+    EVENT_REGISTERED = -200950
+    EVENT_WHILE_RUNNING = -200960
+    BEYOND_FINITE = -201132
+    PROPERTY_NOT_SUPPORTED = -200197
+    NO_BUFFER_ON_DEMAND = -200217
+
+
+WORDS: dict[int, str] = {
+    Code.RESOURCE_RESERVED: "The specified resource is reserved. The operation could not be "
+    "completed as specified.",
+    Code.RUNTIME_ABORTED: "The operation was aborted: the device was reset or the task aborted.",
+    Code.ROUTE_NOT_SUPPORTED: "Specified route cannot be satisfied, because the hardware does not "
+    "support it.",
+    Code.INVALID_ROUTE_SOURCE: "Source terminal to be routed could not be found on the device.",
+    Code.MIN_NOT_LESS_THAN_MAX: "Minimum value is not less than the maximum value.",
+    Code.INVALID_SYNTAX: "Syntax for a range of objects in the input string is invalid.",
+    Code.INVALID_TASK: "Task specified is invalid or does not exist.",
+    Code.DUPLICATE_TASK: "Task name specified conflicts with an existing task name.",
+    Code.INVALID_VALUE: "Requested value is not a supported value for this property.",
+    Code.UNKNOWN_CHANNEL: "Physical channel specified does not exist on this device.",
+    Code.UNKNOWN_DEVICE: "Device identifier is invalid.",
+    Code.READ_BUFFER_TOO_SMALL: "Read buffer is too small to fit the requested data.",
+    Code.WRITE_BUFFER_TOO_SMALL: "Buffer is too small to fit the written data.",
+    Code.SAMPLES_NEVER_AVAILABLE: "Cannot read the requested samples, because they will never be "
+    "available.",
+    Code.SAMPLES_OVERWRITTEN: "The application is not able to keep up with the hardware "
+    "acquisition: samples were overwritten in the buffer before they were read.",
+    Code.SAMPLES_NOT_YET_AVAILABLE: "Some or all of the samples requested have not yet been "
+    "acquired.",
+    Code.SAMPLES_NEVER_GENERATED: "Some or all of the samples to write will never be generated.",
+    Code.OUTPUT_STARVED: "The generation has stopped to prevent the regeneration of old samples. "
+    "Your application was unable to write samples to the background buffer fast enough.",
+    Code.SAMPLES_NOT_YET_WRITTEN: "Some or all of the samples to write could not be written to the "
+    "buffer yet. More space will free up as samples currently in the buffer are generated.",
+    Code.AI_CONVERT_RATE_TOO_HIGH: "Specified AI conversion rate exceeds the maximum.",
+    Code.INVALID_CHANNEL_NAME: "Channel specified is not in the task.",
+    Code.NOT_SUPPORTED_IN_TASK: "Specified property is not supported by the device or is not "
+    "applicable to the task.",
+    Code.NOT_AN_INPUT: "Read cannot be performed, because this task does not contain any "
+    "input channels.",
+    Code.NOT_AN_OUTPUT: "Write cannot be performed, because this task does not contain any "
+    "output channels.",
+    Code.OUTPUT_BUFFER_EMPTY: "Generation cannot be started, because the output buffer is empty.",
+    Code.BUFFER_SIZE_FIXED: "Write failed, because the buffer was configured from the first write "
+    "and is full; set its size to write more before the start.",
+    Code.NOT_WITHOUT_CHANNELS: "Specified operation cannot be performed when there are no channels "
+    "in the task.",
+    Code.NOT_WHILE_RUNNING: "Specified operation cannot be performed while the task is running.",
+    Code.CHANNEL_ALREADY_IN_TASK: "Specified channel cannot be added to the task, because a "
+    "channel with the same name is already in the task.",
+    Code.MIXED_CHANNELS: "Task contains channels of several types; one type is allowed.",
+    Code.PROPERTY_WHILE_RUNNING: "Specified property cannot be set while the task is running.",
+    Code.SEVERAL_DEVICES: "Task contains physical channels on one or more devices that do not "
+    "support multidevice tasks.",
+    Code.NOT_DONE_IN_TIME: "Wait Until Done did not indicate that the task was done within the "
+    "specified timeout.",
+    Code.INVALID_SAMPLE: "Attempted writing analog data that is too large or too small.",
+    Code.OUTPUT_BUFFER_TOO_SMALL: "Generation cannot be started because the selected buffer size "
+    "is too small.",
+    Code.WATCHDOG_ONLY: "Specified action is supported only by watchdog timer tasks.",
+    Code.WATCHDOG_EXPIRED_NO_RESET: "Watchdog timer cannot be reset after it has expired.",
+    Code.WATCHDOG_TIMEOUT: "Watchdog timeout is out of range and not the special value -1.",
+    Code.WRITE_AFTER_WATCHDOG: "Write failed, because the watchdog timer expired.",
+    Code.CONVERT_PERIOD: "Sample rate, number of channels and conversion period do not agree: "
+    "the conversions of one sample take longer than the sample period.",
+    Code.WRITE_WITHOUT_START: "Write cannot be performed when the auto start input is false and "
+    "the task is not running.",
+    Code.READ_WITHOUT_START: "Read cannot be performed when the auto start property is false and "
+    "the task is not running.",
+    Code.EVENT_REGISTERED: "Done event is already registered within this task.",
+    Code.EVENT_WHILE_RUNNING: "Software event cannot be registered while the task is running.",
+    Code.BEYOND_FINITE: "Samples cannot be written beyond the last sample of the finite "
+    "generation.",
+    Code.PROPERTY_NOT_SUPPORTED: "Specified property is not supported by the device.",
+    Code.NO_BUFFER_ON_DEMAND: "Buffered operations cannot use On Demand for the sample timing.",
+}
+
+
+class DaqmxError(Exception):
+    """A refusal with its ``code``; ``detail`` names values, ``read`` and ``written`` are samples.
+
+    ``read`` or ``written`` is given where the error is one of a read or a write.
+    """
+
+    def __init__(
+        self,
+        code: Code,
+        detail: str = "",
+        *,
+        read: int | None = None,
+        written: int | None = None,
+    ) -> None:
+        text = WORDS[code]
+        super().__init__(f"{text} {detail}" if detail else text)
+        self.code = int(code)
+        self.read = read
+        self.written = written

@@ -1,0 +1,230 @@
+"""The LK-G5000 laser controller on its serial line: bytes in, bytes out, time as an argument.
+
+It knows the commands that ``drivers.keyence`` sends and no others, and takes its letters from the
+same table: it shows that the driver copes, not that the table is right.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from enum import StrEnum
+from typing import Protocol
+
+from drivers.keyence.commands import AVERAGING, SAMPLING_US
+from drivers.keyence.controller import POLL
+from drivers.settings import LaserSettings
+from sim_backend.faults import FaultKind, FaultPlan
+
+__all__ = ["Conduct", "SimulatedController", "SimulatedLine"]
+
+_REPLY_DELAY = 0.003  # s
+_MODE_CHANGE_DELAY = 0.6  # s
+_COMMAND_MAX = 200  # bytes
+_UNIT = 1  # number of the display unit: 0.001 mm, which leaves room for +-999.999 mm
+
+
+class Conduct(StrEnum):
+    """What sits at the end of the line."""
+
+    CONTROLLER = "controller"
+    SILENT = "silent"
+    OTHER = "other"  # another instrument, which answers everything in its own way
+    BABBLING = "babbling"  # sends all the time, unasked, and never comes to an end
+
+
+class Answers(Protocol):
+    """Something at the end of a serial line; ``now`` is in s and does not go back."""
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Bytes have come."""
+        ...
+
+    def due(self, now: float) -> bytes:
+        """What has been sent by ``now``, once."""
+        ...
+
+    def next_due(self) -> float | None:
+        """When there is more to send, or None."""
+        ...
+
+
+class SimulatedController:
+    """A controller set as ``settings`` say, for the OUT that they name.
+
+    ``reading`` gives the measured value in m at a time, or None where the target is out of sight.
+    Faults of ``SERIAL_GARBAGE`` put noise in place of replies while they last; ``seed`` decides
+    which.
+    """
+
+    def __init__(
+        self,
+        settings: LaserSettings,
+        reading: Callable[[float], float | None],
+        *,
+        conduct: Conduct = Conduct.CONTROLLER,
+        faults: FaultPlan | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.setting_mode = False
+        self._settings = settings
+        self._reading = reading
+        self._conduct = conduct
+        self._faults = (faults or FaultPlan()).of(FaultKind.SERIAL_GARBAGE)
+        self._noise = random.Random(seed)  # noqa: S311  (noise on a line, no secret)
+        self._zero = 0.0
+        self._held = b""
+        self._pending: list[tuple[float, bytes]] = []
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Bytes have come; replies to whole commands become due."""
+        self._held += data
+        while b"\r" in self._held:
+            command, _, self._held = self._held.partition(b"\r")
+            reply, delay = self._reply(command.decode("ascii", "replace").upper(), now)
+            if self._garbled(now):
+                reply = self._noise.randbytes(self._noise.randrange(1, 40))
+            self._pending.append((now + delay, reply))
+        if len(self._held) > _COMMAND_MAX:
+            self._held = b""
+
+    def due(self, now: float) -> bytes:
+        """What has been sent by ``now``, once."""
+        sent = b"".join(reply for at, reply in self._pending if at <= now)
+        self._pending = [(at, reply) for at, reply in self._pending if at > now]
+        if self._conduct is Conduct.BABBLING:
+            sent += self._noise.randbytes(64).replace(b"\r", b"\n")
+        return sent
+
+    def next_due(self) -> float | None:
+        """When there is more to send, or None."""
+        return min((at for at, _ in self._pending), default=None)
+
+    def _garbled(self, now: float) -> bool:
+        return any(fault.at <= now < fault.end for fault in self._faults)
+
+    def _reply(self, command: str, now: float) -> tuple[bytes, float]:
+        """Reply to a command, and after how many s it comes."""
+        if self._conduct in (Conduct.SILENT, Conduct.BABBLING):
+            return b"", 0.0
+        if self._conduct is Conduct.OTHER:
+            return b"?SYNTAX\r\n", _REPLY_DELAY
+        delay = _MODE_CHANGE_DELAY if command in ("Q0", "R0") else _REPLY_DELAY
+        main, *parameters = command.split(",")
+        answer = self._answer(main, parameters, now)
+        if isinstance(answer, int):
+            return f"ER,{main},{answer:02d}\r".encode(), _REPLY_DELAY
+        return ",".join(answer).encode() + b"\r", delay
+
+    def _answer(self, main: str, parameters: list[str], now: float) -> list[str] | int:
+        """Fields of the reply, or the code of an error."""
+        if main in ("Q0", "R0"):
+            wanted = main == "Q0"
+            if parameters:
+                return 61
+            if self.setting_mode is wanted:
+                return 51
+            self.setting_mode = wanted
+            return [main]
+        if main not in ("PR", "MS", "VS", "WS", "SR"):
+            return 50
+        if self.setting_mode is not (main == "SR"):
+            return 51
+        if main == "SR":
+            return self._setting(parameters)
+        if main == "PR":
+            return 61 if parameters else ["PR", "0"]
+        if len(parameters) != 1:
+            return 61
+        if parameters[0] != f"{self._settings.output:02d}":
+            return 62
+        if main == "MS":
+            return ["MS", *parameters, self._value(now)]
+        seen = self._reading(now)
+        self._zero = seen if main == "VS" and seen is not None else 0.0
+        return [main]
+
+    def _value(self, now: float) -> str:
+        """The measured value as it is sent: a sign and seven characters."""
+        seen = self._reading(now)
+        if seen is None:
+            return "XXXXXXXX"
+        if abs(seen) > self._settings.range_mm * 1e-3:
+            return "+FFFFFFF" if seen > 0.0 else "-FFFFFFF"
+        return self._number(seen - self._zero)
+
+    def _number(self, metres: float) -> str:
+        return f"{metres * 1e3:+08.3f}"
+
+    def _setting(self, parameters: list[str]) -> list[str] | int:
+        settings = self._settings
+        # points at the ends of the range, as an operator would set them
+        far = settings.mm_per_V * 1e-3 * settings.analog_range_V
+        volts = settings.direction * settings.analog_range_V
+        of_out = {
+            "OB": ["+000.000", "+000.000", "+100.000", "+100.000"],
+            "OC": ["0", str(AVERAGING.index(settings.averaging))],
+            "OD": ["0"],
+            "OG": [str(_UNIT)],
+            "OH": [self._number(-far), f"{-volts:+08.4f}", self._number(far), f"{volts:+08.4f}"],
+            "OI": ["0"],
+        }
+        of_all = {"EE": ["1"], "CA": [str(self._sampling())]}
+        match parameters:
+            case [name] if name in of_all:
+                return ["SR", name, *of_all[name]]
+            case [name, out] if name in of_out:
+                if out != f"{settings.output:02d}":
+                    return 62
+                return ["SR", name, out, *of_out[name]]
+            case [name, *_] if name in of_all or name in of_out:
+                return 61
+            case _:
+                return 50
+
+    def _sampling(self) -> int:
+        """Number of the offered sampling cycle that is nearest to the one that is set."""
+        nearest = min(SAMPLING_US, key=lambda cycle: abs(cycle - self._settings.sampling_us))
+        return SAMPLING_US.index(nearest)
+
+
+class SimulatedLine:
+    """The driver's end of a line to ``answers``, in one process, on a time of its own.
+
+    Time passes only while the driver waits, and is read by ``now``.
+    """
+
+    def __init__(self, answers: Answers) -> None:
+        self._answers = answers
+        self._now = 0.0
+        self._came = b""
+        self.closed = False
+
+    def now(self) -> float:
+        """Present time in s."""
+        return self._now
+
+    @property
+    def in_waiting(self) -> int:
+        """Bytes that can be read at once."""
+        self._came += self._answers.due(self._now)
+        return len(self._came)
+
+    def read(self, size: int = 1, /) -> bytes:
+        """Up to ``size`` bytes; waits for them for as long as a port does."""
+        if not self.in_waiting:
+            until = self._now + POLL
+            due = self._answers.next_due()
+            self._now = until if due is None else min(until, max(due, self._now))
+            self._came += self._answers.due(self._now)
+        data, self._came = self._came[:size], self._came[size:]
+        return data
+
+    def write(self, data: bytes, /) -> int:
+        """Send."""
+        self._answers.receive(data, self._now)
+        return len(data)
+
+    def close(self) -> None:
+        """Release the line."""
+        self.closed = True

@@ -1,0 +1,147 @@
+"""A serial port that is not there: a pseudo-terminal where there are such, else a loopback port."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+from sim_backend.clock import Clock, PacedClock
+from sim_backend.keyence import Answers
+
+__all__ = ["serve_on_pty", "serve_on_socket"]
+
+_LONGEST_WAIT = 3600.0  # s
+
+
+@contextmanager
+def serve_on_socket(answers: Answers, clock: Clock | None = None) -> Iterator[str]:
+    """Let ``answers`` be reached at a loopback port while the body runs.
+
+    Gives its name as pyserial takes it, ``socket://127.0.0.1:PORT``. One caller after another.
+    """
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        address = f"socket://127.0.0.1:{listener.getsockname()[1]}"
+        with _thread(_Calls(answers, clock or PacedClock(), listener)):
+            yield address
+
+
+@contextmanager
+def serve_on_pty(answers: Answers, clock: Clock | None = None) -> Iterator[str]:
+    """Let ``answers`` be reached on a pseudo-terminal while the body runs; gives its name.
+
+    Raises ``OSError`` on Windows, which has none; ``serve_on_socket`` works everywhere.
+    """
+    if sys.platform == "win32":
+        raise OSError("Windows has no pseudo-terminals of this kind; use a loopback port")
+    import pty
+    import tty
+
+    # both ends stay open here: callers may come and go
+    ours, theirs = pty.openpty()
+    try:
+        os.set_blocking(ours, False)
+        tty.setraw(theirs)  # a line that echoes is none of an instrument
+        with _thread(_Line(answers, clock or PacedClock(), ours)):
+            yield os.ttyname(theirs)
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+class _Served:
+    """A loop in a thread that carries bytes until it is told to end."""
+
+    def __init__(self, answers: Answers, clock: Clock) -> None:
+        self._answers = answers
+        self._clock = clock
+        # select on Windows takes sockets only
+        self._told, self._tell = socket.socketpair()
+
+    def end(self) -> None:
+        """Tell the loop to end; from any thread."""
+        self._tell.send(b"x")
+
+    def close(self) -> None:
+        """Release what the loop used, after it has ended."""
+        self._told.close()
+        self._tell.close()
+
+    def run(self) -> None:
+        """Carry bytes until told to end."""
+        raise NotImplementedError
+
+    def _wait(self, *sources: socket.socket | int) -> list[socket.socket | int] | None:
+        """Sources that can be read, none when a reply is due; None when it is time to end."""
+        due = self._answers.next_due()
+        seconds = _LONGEST_WAIT if due is None else max(0.0, due - self._clock.now())
+        ready, _, _ = select.select([self._told, *sources], [], [], seconds)
+        return None if self._told in ready else ready
+
+
+class _Calls(_Served):
+    """Callers at a listening socket."""
+
+    def __init__(self, answers: Answers, clock: Clock, listener: socket.socket) -> None:
+        super().__init__(answers, clock)
+        self._listener = listener
+
+    def run(self) -> None:
+        """Serve one caller after another."""
+        while (ready := self._wait(self._listener)) is not None:
+            if not ready:  # a reply to somebody who has left
+                self._answers.due(self._clock.now())
+                continue
+            caller, _ = self._listener.accept()
+            with caller:
+                if not self._serve(caller):
+                    return
+
+    def _serve(self, caller: socket.socket) -> bool:
+        """Serve until the caller leaves; False when it is time to end."""
+        while (ready := self._wait(caller)) is not None:
+            try:
+                if ready:
+                    data = caller.recv(4096)
+                    if not data:
+                        return True
+                    self._answers.receive(data, self._clock.now())
+                caller.sendall(self._answers.due(self._clock.now()))
+            except ConnectionError:  # it left in the middle
+                return True
+        return False
+
+
+class _Line(_Served):
+    """The instrument's end of a pseudo-terminal."""
+
+    def __init__(self, answers: Answers, clock: Clock, line: int) -> None:
+        super().__init__(answers, clock)
+        self._line = line
+
+    def run(self) -> None:
+        """Serve whoever opens the other end."""
+        while (ready := self._wait(self._line)) is not None:
+            if ready:
+                self._answers.receive(os.read(self._line, 4096), self._clock.now())
+            data = self._answers.due(self._clock.now())
+            # what nobody takes from a serial line is lost
+            with suppress(BlockingIOError):
+                while data:
+                    data = data[os.write(self._line, data) :]
+
+
+@contextmanager
+def _thread(served: _Served) -> Iterator[None]:
+    thread = threading.Thread(target=served.run, name="simulated serial port", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        served.end()
+        thread.join()
+        served.close()
