@@ -260,6 +260,38 @@ def record(
         )
 
 
+@app.command()
+def check(
+    rig: Annotated[
+        str,
+        typer.Option(
+            help="sim, sim:SEED, daqmx:Dev1 for a card, or daqmx:Dev1@HOST:PORT for one behind a "
+            "server."
+        ),
+    ] = "sim",
+    rig_file: RigFileOption = None,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Say what is connected, what is wrong and which limits hold, without raising a volt."""
+    from app.check import check_json, check_rig, check_table
+    from app.errors import InstrumentFault
+    from app.rigfile import load_rig_file
+    from app.terminal import write_json
+    from sim_backend.factory import is_simulated
+
+    _check_files(force, (rig_file,), json=json)
+    settings = load_rig_file(rig_file)
+    with _working(json, computes=is_simulated(rig)) as (console, _):
+        outcome = check_rig(rig, settings)
+    console.print(check_table(outcome))
+    if json is not None:
+        write_json(check_json(outcome), json)
+    if outcome.wrong:
+        more = f" (and {len(outcome.wrong) - 1} more)" if len(outcome.wrong) > 1 else ""
+        raise InstrumentFault(f"{outcome.wrong[0].sentence}{more}")
+
+
 @app.command("import")
 def import_(
     source: Annotated[Path, typer.Argument(metavar="IN.csv|IN.mat|IN.tdms", help="Measured data.")],

@@ -20,7 +20,7 @@ __all__ = ["Interlocks", "Trip"]
 
 _JUMP_WITHIN = 2e-3  # s
 # s; at longer sample intervals what a film can do between samples looks like a jump
-_JUMP_INTERVAL = 5e-3
+_JUMP_INTERVAL = 4e-3
 
 _AT_END = 0.999  # of the laser's range: where an alarm holds the analog output
 _FOLLOWS = 2  # counts between a command and the plan that it follows

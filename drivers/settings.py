@@ -380,7 +380,7 @@ class InterlockSettings(Section):
         gt=0.0,
         le=1e4,
         description="reading beside the straight line through those 2 ms and 4 ms before (or one "
-        "and two samples); grows with the square of a sample interval above 5 ms",
+        "and two samples); grows with the square of a sample interval above 4 ms",
     )
     displacement_debounce_ms: float = Field(
         default=5.0, ge=0.0, le=1e4, description="out of bounds for so long; a jump counts at once"

@@ -79,7 +79,7 @@ def zero_findings(monitors: Monitors, settings: RigSettings) -> tuple[Finding, .
         zero = math.isfinite(value) and abs(value) < most
         findings.append(
             Finding(
-                name, item, f"{value + 0.0:.3g} {unit}", f"less than {most:g} {unit}",
+                name, item, f"{round(value, 3) + 0.0:.3f} {unit}", f"less than {most:g} {unit}",
                 "ok" if zero else "wrong", "" if zero else advice,
             )
         )  # fmt: skip

@@ -16,10 +16,9 @@ from drivers.keyence.controller import POLL
 from drivers.settings import LaserSettings
 from sim_backend.faults import FaultKind, FaultPlan
 
-__all__ = ["Conduct", "SimulatedController", "SimulatedLine"]
+__all__ = ["Answers", "Conduct", "SimulatedController", "SimulatedLine"]
 
 _REPLY_DELAY = 0.003  # s
-_MODE_CHANGE_DELAY = 0.6  # s
 _COMMAND_MAX = 200  # bytes
 _UNIT = 1  # number of the display unit: 0.001 mm, which leaves room for +-999.999 mm
 
@@ -54,7 +53,7 @@ class SimulatedController:
 
     ``reading`` gives the measured value in m at a time, or None where the target is out of sight.
     Faults of ``SERIAL_GARBAGE`` put noise in place of replies while they last; ``seed`` decides
-    which.
+    which. A change of mode takes ``mode_change`` s.
     """
 
     def __init__(
@@ -65,8 +64,10 @@ class SimulatedController:
         conduct: Conduct = Conduct.CONTROLLER,
         faults: FaultPlan | None = None,
         seed: int = 0,
+        mode_change: float = 0.6,
     ) -> None:
         self.setting_mode = False
+        self._mode_change = mode_change
         self._settings = settings
         self._reading = reading
         self._conduct = conduct
@@ -109,7 +110,7 @@ class SimulatedController:
             return b"", 0.0
         if self._conduct is Conduct.OTHER:
             return b"?SYNTAX\r\n", _REPLY_DELAY
-        delay = _MODE_CHANGE_DELAY if command in ("Q0", "R0") else _REPLY_DELAY
+        delay = self._mode_change if command in ("Q0", "R0") else _REPLY_DELAY
         main, *parameters = command.split(",")
         answer = self._answer(main, parameters, now)
         if isinstance(answer, int):
@@ -169,7 +170,7 @@ class SimulatedController:
             "OH": [self._number(-far), f"{-volts:+08.4f}", self._number(far), f"{volts:+08.4f}"],
             "OI": ["0"],
         }
-        of_all = {"EE": ["1"], "CA": [str(self._sampling())]}
+        of_all = {"CA": [str(self._sampling())]}
         match parameters:
             case [name] if name in of_all:
                 return ["SR", name, *of_all[name]]
@@ -194,8 +195,9 @@ class SimulatedLine:
     Time passes only while the driver waits, and is read by ``now``.
     """
 
-    def __init__(self, answers: Answers) -> None:
+    def __init__(self, answers: Answers, baud_rate: int = 115200) -> None:
         self._answers = answers
+        self._seconds_per_byte = 10.0 / baud_rate
         self._now = 0.0
         self._came = b""
         self.closed = False
@@ -218,6 +220,7 @@ class SimulatedLine:
             self._now = until if due is None else min(until, max(due, self._now))
             self._came += self._answers.due(self._now)
         data, self._came = self._came[:size], self._came[size:]
+        self._now += len(data) * self._seconds_per_byte
         return data
 
     def write(self, data: bytes, /) -> int:

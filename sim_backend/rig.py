@@ -307,11 +307,14 @@ class SimulatedRig:
         return Block(start, counts, tuple(due))
 
     def _block_size(self, run: _Run) -> int:
-        """Samples of the next block: half as many where a short read is due."""
+        """Samples of the next block: fewer where a short read is due."""
         size = self._block_samples or max(1, round(0.1 * self._rate))
         for fault in self._faults.of(FaultKind.SHORT_READ):
             first, end = fault.samples(self._rate)
-            if run.delivered <= first < run.delivered + size or first <= run.delivered < end:
+            wanted = first + 1 - run.delivered  # up to the moment of the fault
+            if 0 < wanted <= size:
+                return max(1, min(wanted, size - 1))
+            if first < run.delivered < end:
                 return max(1, size // 2)
         return size
 

@@ -7,7 +7,7 @@ import select
 import socket
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 from sim_backend.clock import Clock, PacedClock
@@ -31,14 +31,18 @@ def serve_on_socket(answers: Answers, clock: Clock | None = None) -> Iterator[st
 
 
 @contextmanager
-def serve_on_pty(answers: Answers, clock: Clock | None = None) -> Iterator[str]:
+def serve_on_pty(
+    answers: Answers, clock: Clock | None = None, baud_rate: int | None = None
+) -> Iterator[str]:
     """Let ``answers`` be reached on a pseudo-terminal while the body runs; gives its name.
 
-    Raises ``OSError`` on Windows, which has none; ``serve_on_socket`` works everywhere.
+    With ``baud_rate``, a caller who sets another one is not understood, as on a wire. Raises
+    ``OSError`` on Windows, which has none; ``serve_on_socket`` works everywhere.
     """
     if sys.platform == "win32":
         raise OSError("Windows has no pseudo-terminals of this kind; use a loopback port")
     import pty
+    import termios
     import tty
 
     # both ends stay open here: callers may come and go
@@ -46,7 +50,12 @@ def serve_on_pty(answers: Answers, clock: Clock | None = None) -> Iterator[str]:
     try:
         os.set_blocking(ours, False)
         tty.setraw(theirs)  # a line that echoes is none of an instrument
-        with _thread(_Line(answers, clock or PacedClock(), ours)):
+
+        def same_speed() -> bool:
+            set_by_caller = termios.tcgetattr(theirs)[5]
+            return baud_rate is None or set_by_caller == getattr(termios, f"B{baud_rate}")
+
+        with _thread(_Line(answers, clock or PacedClock(), ours, same_speed)):
             yield os.ttyname(theirs)
     finally:
         os.close(ours)
@@ -119,20 +128,27 @@ class _Calls(_Served):
 class _Line(_Served):
     """The instrument's end of a pseudo-terminal."""
 
-    def __init__(self, answers: Answers, clock: Clock, line: int) -> None:
+    def __init__(
+        self, answers: Answers, clock: Clock, line: int, same_speed: Callable[[], bool]
+    ) -> None:
         super().__init__(answers, clock)
         self._line = line
+        self._same_speed = same_speed
 
     def run(self) -> None:
         """Serve whoever opens the other end."""
         while (ready := self._wait(self._line)) is not None:
             if ready:
-                self._answers.receive(os.read(self._line, 4096), self._clock.now())
-            data = self._answers.due(self._clock.now())
+                self._answers.receive(self._heard(os.read(self._line, 4096)), self._clock.now())
+            data = self._heard(self._answers.due(self._clock.now()))
             # what nobody takes from a serial line is lost
             with suppress(BlockingIOError):
                 while data:
                     data = data[os.write(self._line, data) :]
+
+    def _heard(self, data: bytes) -> bytes:
+        """What arrives of ``data``: at another speed bits are taken for others."""
+        return data if self._same_speed() else bytes(byte ^ 0x55 | 0x80 for byte in data)
 
 
 @contextmanager

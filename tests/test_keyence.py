@@ -11,7 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import RigError
-from drivers.keyence import Keyence, LaserError, NoReading, compare, inspect, open_port
+from drivers.keyence import (
+    Keyence,
+    LaserError,
+    NoReading,
+    compare,
+    inspect,
+    open_port,
+    require_agreement,
+)
 from drivers.keyence.commands import AVERAGING, COMMANDS, ERRORS, SAMPLING_US
 from drivers.keyence.controller import POLL
 from drivers.settings import LaserSettings
@@ -182,8 +190,23 @@ def test_direction_is_the_rig_files_business() -> None:
 def test_without_a_port_nothing_is_compared() -> None:
     found = connected(set_to(mm_per_V=5.0))[0].controller_settings()
     assert compare(set_to(port=""), found) == []
-    (finding,) = inspect(set_to(port=""))
+    (finding,) = inspect(set_to(port="")).findings
     assert finding.verdict == "not wired"
+
+
+def test_a_run_is_refused_where_the_rig_file_contradicts() -> None:
+    def asked(**there: object) -> object:
+        line = SimulatedLine(SimulatedController(set_to(**there), at(0.0)))
+        try:
+            return require_agreement(SETTINGS, lambda _: line, line.now)
+        finally:
+            assert line.closed
+
+    assert asked() is not None
+    with pytest.raises(LaserError, match=r"averaging: 4 samples.*analog scaling: 5 mm/V") as error:
+        asked(mm_per_V=5.0, averaging=4)
+    assert isinstance(error.value, RigError)
+    assert require_agreement(set_to(port="")) is None
 
 
 class Set(Scripted):
@@ -192,7 +215,7 @@ class Set(Scripted):
     def __init__(self, **changed: bytes) -> None:
         super().__init__([])
         self.answers = {
-            b"PR": b"PR,3", b"Q0": b"Q0", b"SR,EE": b"SR,EE,02", b"SR,CA": b"SR,CA,3",
+            b"PR": b"PR,3", b"Q0": b"Q0", b"SR,CA": b"SR,CA,3",
             b"SR,OC,01": b"SR,OC,01,0,2", b"SR,OD,01": b"SR,OD,01,0", b"SR,OI,01": b"SR,OI,01,0",
             b"SR,OB,01": b"SR,OB,01" + 2 * b",+000.000" + 2 * b",+100.000",
             b"SR,OH,01": b"SR,OH,01,-040.000,-10.0000,+040.000,+10.0000",
@@ -288,6 +311,13 @@ def test_a_controller_that_stays_in_its_setting_mode_is_told() -> None:
         Keyence(port, SETTINGS, port.now).read()
 
 
+def test_silence_after_a_change_of_mode_is_waited_for_once() -> None:
+    port = Scripted([])
+    with pytest.raises(LaserError, match="still be in its setting mode"):
+        Keyence(port, SETTINGS, port.now).read()
+    assert port.written == [b"Q0\r", b"R0\r"]
+
+
 # ---------------------------------------------------------------- faults
 
 
@@ -354,7 +384,8 @@ PIECES = st.one_of(
     st.sampled_from(
         (
             b"MS,01,", b"+012.345", b"-FFFFFFF", b"XXXXXXXX", b"\r", b",", b"ER,MS,", b"51",
-            b"Q0\r", b"R0\r", b"SR,OI,01,0\r", b"SR,OG,01,1\r", b"SR,OG,01,9\r", b"MS,01,+012.345\r",
+            b"Q0\r", b"R0\r", b"SR,OI,01,0\r", b"SR,OG,01,1\r", b"SR,OG,01,9\r",
+            b"MS,01,+012.345\r",
         )
     ),
 )  # fmt: skip
@@ -377,7 +408,7 @@ def test_any_bytes_give_a_number_a_state_or_an_error(chunks: list[bytes], call: 
     else:
         assert call != "read" or isinstance(answer, (float, NoReading))
     assert port.reads < 3000
-    assert port.time < 150.0
+    assert port.time < 60.0
 
 
 @given(st.integers(min_value=0), st.sampled_from(list(Conduct)))
@@ -421,7 +452,7 @@ def port(request: pytest.FixtureRequest) -> str:
     if request.param == "pty" and sys.platform == "win32":
         pytest.skip("Windows has no pseudo-terminals")
     serve = serve_on_pty if request.param == "pty" else serve_on_socket
-    controller = SimulatedController(set_to(averaging=64), at(6.4e-3))
+    controller = SimulatedController(set_to(averaging=64), at(6.4e-3), mode_change=0.0)
     return request.getfixturevalue("held")(serve(controller))
 
 
@@ -435,7 +466,7 @@ def held():
 
 
 def test_the_driver_speaks_through_pyserial(port: str) -> None:
-    findings = {f.item: f for f in inspect(set_to(port=port))}
+    findings = {f.item: f for f in inspect(set_to(port=port)).findings}
     assert findings["serial port"].verdict == "ok"
     assert findings["averaging"].verdict == "wrong"
     assert findings["reading of OUT1"].found == "6.4 mm"
@@ -451,6 +482,18 @@ def test_a_port_in_use_is_told() -> None:
             open_port(set_to(port=name))
         first.close()
         open_port(set_to(port=name)).close()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
+def test_another_baud_rate_is_told() -> None:
+    controller = SimulatedController(SETTINGS, at(0.0), mode_change=0.0)
+    with serve_on_pty(controller, baud_rate=9600) as name:
+        (wrong,) = inspect(set_to(port=name)).findings
+        assert wrong.verdict == "wrong"
+        assert "115200 Bd" in wrong.found
+        assert "laser.baud_rate" in wrong.advice
+        found = inspect(set_to(port=name, baud_rate=9600)).findings
+        assert {f.verdict for f in found} == {"ok"}
 
 
 @pytest.mark.parametrize(
@@ -489,7 +532,7 @@ def test_a_server_that_hangs_up_is_told() -> None:
 
 def test_without_pyserial_it_is_said_where_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "serial", None)
-    (finding,) = inspect(SETTINGS)
+    (finding,) = inspect(SETTINGS).findings
     assert finding.verdict == "wrong"
     assert "pyserial" in finding.found
     assert "extra `rig`" in finding.advice

@@ -2,15 +2,23 @@
 
 from drivers.keyence.compare import ControllerSettings, compare
 from drivers.keyence.controller import Keyence, LaserError, NoReading, Port, open_port
-from drivers.keyence.inspection import inspect
+from drivers.keyence.inspection import (
+    LaserInspection,
+    analog_findings,
+    inspect,
+    require_agreement,
+)
 
 __all__ = [
     "ControllerSettings",
     "Keyence",
     "LaserError",
+    "LaserInspection",
     "NoReading",
     "Port",
+    "analog_findings",
     "compare",
     "inspect",
     "open_port",
+    "require_agreement",
 ]

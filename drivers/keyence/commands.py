@@ -7,7 +7,7 @@ together from what others publish; correct it here when the manual says otherwis
   user's manual of the older LK-G series (LK-G-M-NO5-E, pages 5-5, 5-6).
 - ``MS`` with two digits for OUT, ``Q0``, ``R0``, codes 50 to 99, times of mode changes: open-source
   programs for the LK-G5000, which use them. ``VS``, ``WS``, ``PR``, ``SR,CA``, ``SR,OC``: likewise.
-- ``SR,OB``, ``OD``, ``OG``, ``OI``, ``EE``: programs that read all settings of an LK-G5000, and one
+- ``SR,OB``, ``OD``, ``OG``, ``OI``: programs that read all settings of an LK-G5000, and one
   for each that names it. ``SR,OH`` as the analog scaling is the only one left over in that list,
   whose order is that of the functions in the maker's library: the least certain of all.
 - The numbers of the sampling cycles, filters and the like: header of the maker's library.
@@ -65,7 +65,6 @@ COMMANDS = {
     "setting mode": Command("Q0", timeout=_MODE_CHANGE),
     "measuring mode": Command("R0", timeout=_MODE_CHANGE),
     # from here on in the setting mode only
-    "heads": Command("SR,EE", (_NUMBER,)),
     "sampling cycle": Command("SR,CA", (_CHOICE,)),
     "measurement scaling": Command("SR,OB,{out:02d}", (_SETTING,) * 4),
     "filter": Command("SR,OC,{out:02d}", (_CHOICE,) * 2),

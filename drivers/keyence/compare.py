@@ -23,7 +23,6 @@ class ControllerSettings:
     """
 
     program: int
-    heads: int
     sampling: float
     filter: str
     averaging: int | None

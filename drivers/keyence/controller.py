@@ -31,8 +31,10 @@ __all__ = ["POLL", "Keyence", "LaserError", "NoReading", "Port", "open_port"]
 
 POLL = 0.05  #: s that one read of the port waits
 _ATTEMPTS = 3
+_PATIENCE = 1.0  # s; silence longer than this is not waited for again
 _LINE_MAX = 200  # bytes; the longest reply asked for here has 40
 _QUIET_MAX = 1.0  # s to wait for the end of what is no reply
+_NOISE_MAX = 20_000  # bytes to wait for it; 115200 Bd bring fewer in that time
 _SHOWN = 24  # bytes of what is no reply that a message shows
 _VOLTS_MAX = 11.0  # of the analog output
 
@@ -99,7 +101,7 @@ def open_port(settings: LaserSettings) -> Port:
     Raises ``LaserError`` where that does not work.
     """
     try:
-        import serial  # type: ignore[import-untyped]
+        import serial
     except ModuleNotFoundError as error:
         raise LaserError(
             "pyserial, which speaks to serial ports, is not installed",
@@ -116,7 +118,7 @@ def open_port(settings: LaserSettings) -> Port:
 
 
 def _cannot_open(name: str, error: Exception) -> LaserError:
-    from serial.tools.list_ports import comports  # type: ignore[import-untyped]
+    from serial.tools.list_ports import comports
 
     # on Windows the cause stands in the text only
     text, number = str(error), getattr(error, "errno", None)
@@ -211,7 +213,6 @@ class Keyence:
         """What is set in the controller; it does not measure while it is asked."""
         program = self.program()
         with self._setting_mode():
-            (heads,) = self._ask("heads")
             sampling = self._choice("sampling cycle", SAMPLING_US)
             kind, parameter = self._ask("filter")
             calculation = self._choice("calculation", CALCULATIONS)
@@ -220,7 +221,6 @@ class Keyence:
             at1, volts1, at2, volts2 = self._ask("analog scaling")
         found = ControllerSettings(
             program=program,
-            heads=int(heads),
             sampling=sampling * 1e-6,
             filter=self._known("filter", kind, FILTERS),
             # the same digit is a number of averages or a cut-off frequency
@@ -324,6 +324,8 @@ class Keyence:
                     seen = garbled.data or seen
                     if garbled.data:
                         self._wait_for_quiet()
+                    elif command.timeout > _PATIENCE:
+                        break
         except OSError as error:
             raise LaserError(
                 f"serial port {self._settings.port} fails: {error}",
@@ -358,8 +360,9 @@ class Keyence:
 
     def _wait_for_quiet(self) -> None:
         deadline = self._clock() + _QUIET_MAX
-        while self._take() and self._clock() < deadline:
-            pass
+        left = _NOISE_MAX
+        while (came := len(self._take())) and left > 0 and self._clock() < deadline:
+            left -= came
 
     def _drop(self) -> None:
         """Forget what has come unasked, such as a reply that was waited for in vain."""

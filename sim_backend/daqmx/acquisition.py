@@ -60,6 +60,11 @@ class SharedTicks:
         """Let the samples from now on come from ``generation``, the first at its ``tick``."""
         self._pieces.append(_Piece(self.passed(now), generation, tick, row))
 
+    @property
+    def rate(self) -> float:
+        """Rate in Hz of the output on whose clock it started."""
+        return self._pieces[0].generation.rate
+
     def passed(self, now: float) -> int:
         """Samples that are complete at ``now``."""
         if not self._pieces:

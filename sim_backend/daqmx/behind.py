@@ -23,13 +23,13 @@ OUTPUT_MONITOR = "_{}_vs_aognd"
 
 
 class _TaskSettings(RigSettings):
-    """The rig as a task converts it: ``conversions`` s after the tick, a rig's input each."""
+    """The rig as a task converts it: ``conversions`` s after the tick, a rig's input each, if given."""
 
     conversions: tuple[float, ...] = Field(default=())
 
     def skew(self, place: int) -> float:
         """Time in s from the tick to the conversion of the rig's input in ``place``."""
-        return self.conversions[place]
+        return self.conversions[place] if self.conversions else super().skew(place)
 
 
 class Behind:
@@ -46,7 +46,7 @@ class Behind:
         self._names = {t: n for n, t in settings.terminals().items() if n != "voltage_command"}
         self._monitor = OUTPUT_MONITOR.format(settings.card.ao_command)
         laser = settings.laser
-        self.laser_at_rest = laser.direction * laser.rest_position_mm / laser.mm_per_V
+        self._laser_at_rest = laser.direction * laser.rest_position_mm / laser.mm_per_V
         self.zero = int(self._output.counts(np.zeros(1))[0])
 
     def film_voltage(self, counts: int) -> float:
@@ -85,6 +85,12 @@ class Behind:
         path = SignalPath(settings, card, self._streams, number, rate, self._faults)
         return path, path.start(self._plant)
 
+    def laser_reading(self, counts: np.ndarray, inputs: Sequence[AnalogInput]) -> tuple[int, float]:
+        """The last reading of the laser's input in the rig's ``counts`` (channels, n), and range."""
+        ranges = [c.range for c in inputs if c.terminal == self._settings.card.ai_displacement]
+        limit = ranges[0] if ranges else self._settings.card.range_displacement_V
+        return int(counts[self._settings.channel_names.index("displacement"), -1]), limit
+
     def as_read(
         self, counts: np.ndarray, output: np.ndarray, inputs: Sequence[AnalogInput]
     ) -> np.ndarray:
@@ -102,13 +108,6 @@ class Behind:
                 row[:] = self._returned(output, channel)
         return read
 
-    def laser_volts(self, counts: np.ndarray) -> float:
-        """Volts at the laser's analog output at the last of the rig's ``counts`` (channels, n)."""
-        row = self._settings.channel_names.index("displacement")
-        scaling = Card(self._settings, self._streams).channels[row].scaling.coefficients
-        last = float(counts[row, -1])
-        return float(np.polynomial.polynomial.polyval(last, scaling))
-
     def still(
         self,
         inputs: Sequence[AnalogInput],
@@ -116,11 +115,12 @@ class Behind:
         reading: int,
         film: float,
         output: int,
-        laser: float,
+        laser: tuple[int, float] | None,
     ) -> np.ndarray:
         """Counts (inputs, samples) of reading number ``reading`` of a rig on which nothing moves.
 
-        ``film`` V stands at the film, ``output`` counts on the output, ``laser`` V at the laser.
+        ``film`` V stands at the film, ``output`` counts on the output. ``laser`` is what its input
+        read last, in counts, and the range then; None: the film is at rest.
         """
         amplifier = self._settings.amplifier
         noise = self._streams.before_run("card", reading).standard_normal((2, samples))
@@ -128,7 +128,7 @@ class Behind:
         volts: Mapping[str, np.ndarray] = {
             "voltage_monitor": film * 1e-3 * amplifier.monitor_V_per_kV + noise[0],
             "current_monitor": noise[1],
-            "displacement": np.full(samples, laser),
+            "displacement": np.full(samples, self._laser_volts(laser)),
             "temperature": np.full(samples, self._room()),
         }
         card = self._card(inputs)
@@ -144,6 +144,14 @@ class Behind:
     def _returned(self, output: np.ndarray, channel: AnalogInput) -> np.ndarray:
         scale = self._settings.card.ao_range_V / channel.range
         return np.clip(np.rint(output * scale), -COUNT_MAX - 1, COUNT_MAX).astype(np.int16)
+
+    def _laser_volts(self, last: tuple[int, float] | None) -> float:
+        if last is None:
+            return self._laser_at_rest
+        counts, limit = last
+        terminal = self._settings.card.ai_displacement
+        channel = AnalogInput("", terminal, (-limit, limit), limit, 0)
+        return float(np.polynomial.polynomial.polyval(counts, self.coefficients(channel)))
 
     def _room(self) -> float:
         thermometer = self._settings.thermometer

@@ -115,8 +115,10 @@ class Task:
     state: State = State.VERIFIED
     kept: State = State.VERIFIED  # where it goes back to when it stops
     failed: Code | None = None
+    listened: bool = False  # somebody listens to its events
     # an output task's own
     waveform: Waveform | None = None
+    first_write: int = 0  # samples; they make the buffer where no size was set
     generation: Generation | None = None
     # an input task's own
     run: Run | None = None

@@ -1,0 +1,1314 @@
+"""The simulated card: tasks, clocks, buffers and rules, on an injected clock.
+
+It has no thread of its own: whoever asks finds it as it is at that moment, and everything that
+happened since it was last asked is worked out then.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from drivers.channels import COUNT_MAX, COUNT_MIN
+from drivers.settings import RigSettings
+from sim_backend.clock import Clock
+from sim_backend.daqmx.acquisition import OwnTicks, Run, SharedTicks
+from sim_backend.daqmx.behind import OUTPUT_MONITOR, Behind
+from sim_backend.daqmx.errors import Code, DaqmxError
+from sim_backend.daqmx.output import Generation, Track, Waveform
+from sim_backend.daqmx.tasks import (
+    AnalogInput,
+    AnalogOutput,
+    Kind,
+    Lines,
+    SampleClock,
+    State,
+    Task,
+    Watchdog,
+    physical_names,
+)
+from sim_backend.faults import Fault, FaultKind, FaultPlan
+from sim_backend.plant import Plant
+
+__all__ = ["Change", "Device", "Reading"]
+
+INPUT_RANGES = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1)  #: V, plus and minus, as the PCIe-6361 has them
+INPUTS, OUTPUTS = 16, 2
+LINES = tuple(f"port{port}/line{line}" for port in range(3) for line in range(8))
+DIFFERENTIAL, SINGLE, SINGLE_OWN_SENSE = 10106, 10083, 10078  #: DAQmx: DIFF, RSE, NRSE
+SECONDS, TICKS, PERIODS = 10364, 10304, 10286  #: DAQmx: units of the delay
+
+_SLOWEST = 2**32  # ticks of the timebase between two samples
+_SETTLE_US = 10.0  # the driver lets an input settle longer than it must, where there is time
+_FIRST_US = 0.25  # from the sample clock to the first conversion, unless it is set
+_LONGEST_WATCHDOG = 429.0  # s; 2**32 ticks of 10 MHz
+#: Input buffer of a task that goes on: up to a rate in Hz, in samples.
+_BUFFERS = ((100.0, 1000), (10e3, 10_000), (1e6, 100_000), (math.inf, 1_000_000))
+_TRACED = 1 << 20  # samples that are looked through at a time
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Change:
+    """The output arrived at or left its zero at ``time`` s on the clock, or was set.
+
+    ``output`` V stand at the card's terminal and ``wire`` V at the film from then on.
+    """
+
+    time: float
+    output: float
+    wire: float
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a read brings: ``counts`` (channels, n) int16, all of it ``complete`` or not yet."""
+
+    counts: np.ndarray
+    complete: bool
+
+
+class Device:
+    """A PCIe-6361 with the rig of ``settings`` behind it, whose film is ``plant`` at rest.
+
+    Every run of its inputs starts with the film at rest. All calls may come from any thread, and
+    all may raise ``DaqmxError``; those that take a ``timeout`` in s (negative: for ever) wait.
+    """
+
+    def __init__(
+        self,
+        settings: RigSettings,
+        plant: Plant,
+        clock: Clock,
+        *,
+        noise_seed: tuple[int, ...] = (0,),
+        faults: FaultPlan | None = None,
+    ) -> None:
+        self.settings = settings
+        self.name = settings.card.device
+        self._card = settings.card
+        self._clock = clock
+        self._born = clock.now()
+        self._faults = faults or FaultPlan()
+        self._behind = Behind(settings, plant, noise_seed, self._faults)
+        self._lock = threading.RLock()
+        self._waiting: set[threading.Event] = set()
+        self._tasks: dict[str, Task] = {}
+        self._numbered = 0
+        self._reserved: dict[str, Task] = {}
+        self._tracks = {f"ao{i}": Track() for i in range(OUTPUTS)}
+        self._levels = dict.fromkeys(LINES, False)
+        self._enable = self._card.do_hv_enable
+        self._enabled: list[tuple[float, bool]] = [(-math.inf, self._enable is None)]
+        self._history: list[Change] = []
+        self._traced = 0  # ticks of the present generation that the history knows
+        self._away = False  # from zero
+        self._runs = 0
+        self._readings = 0
+        self._laser: tuple[int, float] | None = None  # counts and range of its last reading
+        self._run_start: float | None = None
+        self._fired: set[Fault] = set()
+        self._driver = ""  # client that moved the output last
+        self._trace(0.0, 0)
+
+    # what a test may ask
+
+    def wire_voltage(self) -> float:
+        """Voltage in V that is commanded at the film now."""
+        with self._lock:
+            return self._wire(self._settle())
+
+    def live(self) -> bool:
+        """Whether there is more voltage at the film than the rig's limits take for none."""
+        return abs(self.wire_voltage()) > self.settings.limits.zero_tolerance_kV * 1e3
+
+    def drives(self, client: str) -> bool:
+        """Whether ``client`` was the last to move the output to the amplifier."""
+        return self._driver == client
+
+    def output_voltage(self) -> float:
+        """Voltage in V at the output to the amplifier now."""
+        with self._lock:
+            now = self._settle()
+            return self._behind.output_volts(self._tracks[self._card.ao_command].standing(now))
+
+    def history(self) -> tuple[Change, ...]:
+        """When the film's voltage left or reached zero, and what was set, in time's order."""
+        with self._lock:
+            self._settle()
+            return tuple(self._history)
+
+    def line(self, name: str) -> bool:
+        """Level of the digital line ``name``, such as ``port0/line0``."""
+        with self._lock:
+            self._settle()
+            return self._levels[name]
+
+    def fault(self, kind: FaultKind) -> Fault | None:
+        """A fault of ``kind`` that goes on now, by the time since the run's sample clock started."""
+        with self._lock:
+            elapsed = self._elapsed(self._settle())
+        found = (f for f in self._faults.of(kind) if f.at <= elapsed < f.end)
+        return next(found, None)
+
+    def fires(self, kind: FaultKind) -> Fault | None:
+        """A fault of ``kind`` whose time has come, once in a run."""
+        with self._lock:
+            elapsed = self._elapsed(self._settle())
+            for fault in self._faults.of(kind):
+                if fault.at <= elapsed and fault not in self._fired:
+                    self._fired.add(fault)
+                    return fault
+            return None
+
+    # tasks
+
+    def create(self, name: str, client: str, *, attach: bool = True) -> tuple[Task, bool]:
+        """A task called ``name``, or like no other; and whether it is new."""
+        with self._lock:
+            if name and name in self._tasks:
+                if attach:
+                    return self._tasks[name], False
+                raise DaqmxError(Code.DUPLICATE_TASK, f"Task Name: {name}")
+            while not name or name in self._tasks:
+                name = f"_unnamedTask<{self._numbered:X}>"
+                self._numbered += 1
+            task = self._tasks[name] = Task(name, client)
+            return task, True
+
+    def create_watchdog(self, name: str, client: str, device: str, timeout: float) -> Task:
+        """A task of the watchdog timer that expires ``timeout`` s after its last reset."""
+        with self._lock:
+            self.check_device(device)
+            if timeout != -1.0 and not 0.0 < timeout <= _LONGEST_WATCHDOG:
+                raise DaqmxError(Code.WATCHDOG_TIMEOUT, f"Requested Value: {timeout:g}")
+            task, new = self.create(name, client, attach=False)
+            if new:
+                task.kind = Kind.WATCHDOG
+                task.watchdog = Watchdog(timeout)
+            return task
+
+    def task(self, name: str) -> Task:
+        """The task called ``name``."""
+        with self._lock:
+            if name not in self._tasks:
+                raise DaqmxError(Code.INVALID_TASK, f"Task Name: {name}")
+            return self._tasks[name]
+
+    def tasks_of(self, client: str) -> list[Task]:
+        """The tasks that ``client`` made."""
+        with self._lock:
+            return [task for task in self._tasks.values() if task.client == client]
+
+    def clear(self, task: Task) -> None:
+        """Abort ``task`` and forget it; the output keeps its value."""
+        with self._lock:
+            now = self._settle()
+            self._end(task, now)
+            self._release(task)
+            self._tasks.pop(task.name, None)
+            self._notify()
+
+    def check_device(self, name: str) -> None:
+        """Refuse a device that is not this one."""
+        if name.lower() != self.name.lower():
+            raise DaqmxError(Code.UNKNOWN_DEVICE, f"Device Specified: {name}")
+
+    def reset(self, device: str) -> None:
+        """Abort every task, 0 V on every output, every line low."""
+        with self._lock:
+            self.check_device(device)
+            now = self._settle()
+            for task in self._tasks.values():
+                self._abort(task, now)
+                if task.watchdog is not None:
+                    task.watchdog.expired = False
+            for terminal in self._tracks:
+                self._set_output(terminal, 0, now)
+            for line in LINES:
+                self._set_line(line, False, now)
+            self._notify()
+
+    def make_safe(self, client: str | None = None) -> None:
+        """Abort the tasks of ``client`` (None: of everybody), 0 V, and the enable line low."""
+        with self._lock:
+            now = self._settle()
+            for task in self._tasks.values():
+                if client in (None, task.client):
+                    self._abort(task, now)
+            self._set_output(self._card.ao_command, 0, now)
+            if self._enable is not None:
+                self._set_line(self._enable, False, now)
+            self._notify()
+
+    # channels
+
+    def add_inputs(
+        self, task: Task, physical: str, name: str, wiring: int, limits: tuple[float, float]
+    ) -> None:
+        """Add the inputs ``physical``, read as ``wiring`` says (-1: as usual), within ``limits`` V."""
+        with self._lock:
+            self._may_add(task, Kind.AI)
+            taken = _range(limits, INPUT_RANGES)
+            made = []
+            terminals = physical_names(physical, self.name)
+            for terminal, called in self._named(task, terminals, name):
+                if terminal.startswith("ai") and terminal[2:].isdigit():
+                    pair = int(terminal[2:]) % 16 < 8
+                    known = int(terminal[2:]) < INPUTS
+                    how = (DIFFERENTIAL if pair else SINGLE) if wiring == -1 else wiring
+                    if how not in (DIFFERENTIAL, SINGLE, SINGLE_OWN_SENSE) or (
+                        how == DIFFERENTIAL and not pair
+                    ):
+                        raise DaqmxError(
+                            Code.INVALID_VALUE,
+                            f"Property: AI.TermCfg; Channel: {self.name}/{terminal}",
+                        )
+                else:
+                    known = terminal in [OUTPUT_MONITOR.format(ao) for ao in self._tracks]
+                    how = DIFFERENTIAL
+                if not known:
+                    raise DaqmxError(
+                        Code.UNKNOWN_CHANNEL, f"Physical Channel: {self.name}/{terminal}"
+                    )
+                made.append(AnalogInput(called, terminal, limits, taken, how))
+            task.kind = Kind.AI
+            task.inputs += made
+
+    def add_outputs(
+        self, task: Task, physical: str, name: str, limits: tuple[float, float]
+    ) -> None:
+        """Add the outputs ``physical`` within ``limits`` V."""
+        with self._lock:
+            self._may_add(task, Kind.AO)
+            taken = _range(limits, (self._card.ao_range_V,))
+            made = []
+            terminals = physical_names(physical, self.name)
+            for terminal, called in self._named(task, terminals, name):
+                if terminal not in self._tracks:
+                    raise DaqmxError(
+                        Code.UNKNOWN_CHANNEL, f"Physical Channel: {self.name}/{terminal}"
+                    )
+                made.append(AnalogOutput(called, terminal, limits, taken))
+            task.kind = Kind.AO
+            task.outputs += made
+
+    def add_lines(self, task: Task, physical: str, name: str, *, together: bool) -> None:
+        """Add digital output lines, a channel each or all ``together`` in one."""
+        with self._lock:
+            self._may_add(task, Kind.DO)
+            lines = self.lines_of(physical)
+            if together:
+                given = name or physical.strip()
+                groups = [(given, tuple(lines))]
+            else:
+                groups = [(called, (line,)) for line, called in self._named(task, lines, name)]
+            if {called for called, _ in groups} & set(task.channel_names):
+                raise DaqmxError(Code.CHANNEL_ALREADY_IN_TASK, f"Channel Name: {groups[0][0]}")
+            task.kind = Kind.DO
+            task.lines += [Lines(called, group) for called, group in groups]
+
+    def lines_of(self, physical: str) -> list[str]:
+        """The digital lines in ``physical``: ``Dev1/port0/line0:3``, or a whole port."""
+        lines = []
+        for name in physical_names(physical, self.name):
+            found = [line for line in LINES if line == name or line.startswith(f"{name}/")]
+            if not found:
+                raise DaqmxError(Code.UNKNOWN_CHANNEL, f"Physical Channel: {self.name}/{name}")
+            lines += found
+        return lines
+
+    def scaling(self, task: Task, name: str) -> tuple[float, ...]:
+        """Volts over counts of the input called ``name``; counts over volts of an output."""
+        for channel in task.inputs:
+            if channel.name == name:
+                return self._behind.coefficients(channel)
+        for output in task.outputs:
+            if output.name == name:
+                return (0.0, (COUNT_MAX + 1) / output.range)
+        raise DaqmxError(Code.INVALID_CHANNEL_NAME, f"Channel Name: {name}")
+
+    # timing
+
+    def set_clock(self, task: Task, rate: float, source: str, finite: bool, samples: int) -> None:
+        """Give ``task`` a sample clock of ``rate`` Hz from the terminal ``source``."""
+        with self._lock:
+            self._not_running(task)
+            if task.kind not in (Kind.AI, Kind.AO):
+                raise DaqmxError(
+                    Code.NOT_WITHOUT_CHANNELS
+                    if task.kind is Kind.EMPTY
+                    else Code.NOT_SUPPORTED_IN_TASK,
+                    f"Task Name: {task.name}",
+                )
+            if samples < (2 if finite else 0):
+                raise DaqmxError(
+                    Code.INVALID_VALUE, f"Property: SampQuant.SampPerChan; Value: {samples}"
+                )
+            terminal = self._clock_source(task, source)
+            task.clock = SampleClock(
+                self._coerced(task, rate, external=bool(terminal)), terminal, finite, samples
+            )
+
+    def set_rate(self, task: Task, rate: float) -> None:
+        """Change the rate of a task's sample clock."""
+        clock = self.clock_of(task)
+        self.set_clock(task, rate, clock.source, clock.finite, clock.samples)
+
+    def clock_of(self, task: Task) -> SampleClock:
+        """The sample clock of ``task``, which must have one."""
+        if task.clock is None:
+            raise DaqmxError(Code.NOT_SUPPORTED_IN_TASK, f"Task Name: {task.name}")
+        return task.clock
+
+    def convert_ticks(self, task: Task) -> int:
+        """Ticks of the timebase between two conversions of an input task."""
+        if task.convert_ticks is not None:
+            return task.convert_ticks
+        fastest = math.ceil(self._timebase / (1e3 * self._card.ai_rate_max_kHz))
+        settled = fastest + round(_SETTLE_US * self._card.timebase_MHz)
+        if task.clock is None:
+            return settled
+        room = self._timebase / task.clock.rate - self.delay_ticks(task)
+        return max(fastest, min(settled, math.floor(room / max(1, len(task.inputs)))))
+
+    def set_convert_rate(self, task: Task, rate: float) -> None:
+        """Set the rate in Hz of an input task's conversions."""
+        with self._lock:
+            self._not_running(task)
+            self._of_kind(task, Kind.AI)
+            fastest = 1e3 * self._card.ai_rate_max_kHz
+            if not self._timebase / _SLOWEST <= rate <= fastest * (1.0 + 1e-9):
+                raise DaqmxError(
+                    Code.INVALID_VALUE,
+                    f"Property: AIConv.Rate; Requested Value: {rate:g}; Maximum Value: {fastest:g}",
+                )
+            task.convert_ticks = round(self._timebase / rate)
+
+    def delay_ticks(self, task: Task) -> int:
+        """Ticks of the timebase from a sample clock's edge to the first conversion."""
+        if task.delay_ticks is not None:
+            return task.delay_ticks
+        return round(_FIRST_US * self._card.timebase_MHz)
+
+    def delay(self, task: Task) -> float:
+        """The same in the unit that the program has chosen."""
+        ticks = self.delay_ticks(task)
+        if task.delay_units == TICKS:
+            return float(ticks)
+        seconds = ticks / self._timebase
+        return seconds if task.delay_units == SECONDS else seconds * self.clock_of(task).rate
+
+    def set_delay(self, task: Task, value: float) -> None:
+        """Set that delay, in the unit that the program has chosen."""
+        with self._lock:
+            self._not_running(task)
+            self._of_kind(task, Kind.AI)
+            ticks = value
+            if task.delay_units == SECONDS:
+                ticks = value * self._timebase
+            elif task.delay_units == PERIODS:
+                ticks = value / self.clock_of(task).rate * self._timebase
+            if not 0.0 <= ticks < _SLOWEST:
+                raise DaqmxError(
+                    Code.INVALID_VALUE, f"Property: DelayFromSampClk.Delay; Value: {value:g}"
+                )
+            task.delay_ticks = round(ticks)
+
+    def set_delay_units(self, task: Task, units: int) -> None:
+        """Choose the unit of that delay: ``SECONDS``, ``TICKS`` or ``PERIODS``."""
+        if units not in (SECONDS, TICKS, PERIODS):
+            raise DaqmxError(
+                Code.INVALID_VALUE, f"Property: DelayFromSampClk.DelayUnits; Value: {units}"
+            )
+        task.delay_units = units
+
+    def set_trigger(self, task: Task, source: str) -> None:
+        """Let ``task`` wait for a digital edge on ``source`` when it starts; empty: for nothing."""
+        with self._lock:
+            self._not_running(task)
+            task.trigger = self._terminal(source) if source else ""
+
+    def set_buffer(self, task: Task, samples: int) -> None:
+        """Give the task's buffer room for ``samples`` a channel."""
+        with self._lock:
+            if task.running:
+                raise DaqmxError(Code.PROPERTY_WHILE_RUNNING, f"Task Name: {task.name}")
+            task.buffer = samples
+
+    def set_regeneration(self, task: Task, allowed: bool) -> None:
+        """Say whether an output task repeats what was written."""
+        with self._lock:
+            if task.running:
+                raise DaqmxError(Code.PROPERTY_WHILE_RUNNING, f"Task Name: {task.name}")
+            task.regenerates = allowed
+            task.waveform = None
+
+    def buffer_size(self, task: Task) -> int:
+        """Samples a channel that the task's buffer holds; 0 where there is none."""
+        if task.buffer is not None:
+            return task.buffer
+        if task.clock is None:
+            return 0
+        if task.kind is Kind.AO:
+            return task.first_write if task.waveform is not None else 0
+        if task.clock.finite:
+            return task.clock.samples
+        usual = next(size for rate, size in _BUFFERS if task.clock.rate <= rate)
+        return max(usual, task.clock.samples)
+
+    # states
+
+    def control(self, task: Task, action: int) -> None:
+        """DAQmx's task modes: start, stop, verify, commit, reserve, unreserve, abort."""
+        with self._lock:
+            if action == 0:
+                self.start(task)
+            elif action == 1:
+                self.stop(task)
+            elif action == 2:
+                self._verify(task)
+            elif action in (3, 4):
+                if task.running:
+                    return
+                self._verify(task)
+                self._reserve(task)
+                task.state = State.COMMITTED if action == 3 else State.RESERVED
+                task.kept = task.state
+            elif action == 5:
+                self._not_running(task)
+                self._release(task)
+            elif action == 6:
+                now = self._settle()
+                self._end(task, now)
+                task.failed = None
+                self._release(task)
+                self._notify()
+            else:
+                raise DaqmxError(Code.INVALID_VALUE, f"Action: {action}")
+
+    def start(self, task: Task) -> None:
+        """Start ``task``: at once, or to wait for its clock or trigger."""
+        with self._lock:
+            now = self._settle()
+            if task.running:
+                return
+            self._verify(task)
+            if task.kind is Kind.AO and task.clock is not None:
+                self._may_generate(task)
+            self._reserve(task)
+            task.failed = None
+            task.state = State.RUNNING
+            if task.watchdog is not None:
+                self._start_watchdog(task.watchdog, now)
+            elif task.kind is Kind.AI and task.clock is not None:
+                self._start_acquisition(task, task.clock, now)
+            elif (
+                task.kind is Kind.AO
+                and task.clock is not None
+                and not self._waits_for(task, "ai/starttrigger", Kind.AI)
+            ):
+                self._generate(task, task.clock, now)
+            self._notify()
+
+    def stop(self, task: Task) -> None:
+        """Stop ``task``; the output keeps its value. Raises what had stopped it before."""
+        with self._lock:
+            now = self._settle()
+            failed = task.failed
+            self._end(task, now)
+            task.failed = None
+            if task.kept is State.VERIFIED:
+                self._release(task)
+            elif not task.regenerates:
+                task.waveform = None  # what was put out is gone
+            self._notify()
+            if failed is not None:
+                raise DaqmxError(failed, f"Task Name: {task.name}")
+
+    def is_done(self, task: Task) -> bool:
+        """True once ``task`` has done all it was asked for; raises what has stopped it."""
+        with self._lock:
+            now = self._settle()
+            self._raise_failure(task)
+            return self._done(task, now)
+
+    def wait_done(self, task: Task, timeout: float) -> None:
+        """Wait until it is."""
+
+        def attempt(now: float, last: bool) -> tuple[bool | None, float | None]:
+            self._raise_failure(task)
+            if self._done(task, now):
+                return True, None
+            if last:
+                raise DaqmxError(Code.NOT_DONE_IN_TIME, f"Task Name: {task.name}")
+            due = None
+            wanted = task.wanted
+            if wanted is not None and task.generation is not None:
+                due = task.generation.due(wanted)
+            elif wanted is not None and task.ticks is not None:
+                due = task.ticks.due(wanted, now)
+            return None, due
+
+        self._wait(timeout, attempt)
+
+    # reading
+
+    def available(self, task: Task) -> int:
+        """Samples a channel that wait for their reader."""
+        with self._lock:
+            now = self._settle()
+            return self._acquired(task, now) - task.delivered
+
+    def acquired(self, task: Task) -> int:
+        """Samples a channel since the start."""
+        with self._lock:
+            return self._acquired(task, self._settle())
+
+    def read(self, task: Task, samples: int, timeout: float, most: int | None = None) -> Reading:
+        """Next ``samples`` of every channel; -1: all there are, or will be of a finite task.
+
+        All there are is no more than ``most``.
+        """
+        self._of_kind(task, Kind.AI, Code.NOT_AN_INPUT)
+        with self._lock:
+            self._raise_failure(task, read=0)
+            if task.clock is None:
+                return self._read_still(task, max(1, samples))
+            if not task.running:
+                self.start(task)
+                task.by_read = True
+
+        def attempt(now: float, last: bool) -> tuple[Reading | None, float | None]:
+            self._raise_failure(task, read=0)
+            if not task.running or task.ticks is None:
+                raise DaqmxError(Code.RUNTIME_ABORTED, f"Task Name: {task.name}", read=0)
+            acquired = self._acquired(task, now)
+            waiting = acquired - task.delivered
+            if task.wanted is None and waiting > self.buffer_size(task):
+                self._fail(task, Code.SAMPLES_OVERWRITTEN)
+            elapsed = self._elapsed(now)
+            if any(fault.at <= elapsed for fault in self._faults.of(FaultKind.AI_OVERFLOW)):
+                self._fail(task, Code.SAMPLES_OVERWRITTEN)
+            self._raise_failure(task, read=0)
+            wanted = samples
+            if task.wanted is not None:
+                left = task.wanted - task.delivered
+                if samples > left:
+                    raise DaqmxError(
+                        Code.SAMPLES_NEVER_AVAILABLE,
+                        f"Task Name: {task.name}; Samples Left: {left}",
+                        read=0,
+                    )
+                wanted = left if samples == -1 else samples
+            elif samples == -1:
+                wanted = waiting
+            if most is not None:
+                wanted = min(wanted, most)
+            if waiting >= wanted or last:
+                short = wanted
+                if wanted > 1 and self.fires(FaultKind.SHORT_READ) is not None:
+                    short = wanted // 2
+                return self._deliver(task, min(short, waiting), waiting >= wanted), None
+            return None, task.ticks.due(task.delivered + wanted, now)
+
+        reading = self._wait(timeout, attempt)
+        with self._lock:
+            if task.by_read and task.wanted is not None and task.delivered >= task.wanted:
+                self.stop(task)
+        return reading
+
+    # writing
+
+    def to_counts(self, task: Task, volts: np.ndarray) -> np.ndarray:
+        """Counts (channels, n) for ``volts`` (channels, n); refuses what the range has not."""
+        counts = np.empty(volts.shape, dtype=np.int16)
+        for row, values, channel in zip(counts, volts, task.outputs, strict=True):
+            beyond = ~(np.abs(values) <= channel.range)  # a NaN is beyond as well
+            if beyond.any():
+                raise DaqmxError(
+                    Code.INVALID_SAMPLE,
+                    f"Value: {values[int(np.argmax(beyond))]:g}; Minimum Value: "
+                    f"{-channel.range:g}; Maximum Value: {channel.range:g}; Channel Name: "
+                    f"{channel.name}",
+                    written=0,
+                )
+            step = channel.range / (COUNT_MAX + 1)
+            row[:] = np.clip(np.rint(values / step), COUNT_MIN, COUNT_MAX)
+        return counts
+
+    def write(self, task: Task, counts: np.ndarray, auto_start: bool, timeout: float) -> int:
+        """Write ``counts`` (channels, n) to an output task; returns the samples a channel."""
+        with self._lock:
+            now = self._settle()
+            self._of_kind(task, Kind.AO, Code.NOT_AN_OUTPUT)
+            self._raise_failure(task, written=0)
+            if counts.shape[1] == 0:
+                return 0
+            if task.clock is None:
+                return self._write_still(task, counts, auto_start, now)
+            if not task.running:
+                self._verify(task)
+                self._reserve(task)
+                task.state = max(task.state, State.COMMITTED, key=lambda state: state.value)
+                self._write_ahead(task, counts)
+                if auto_start:
+                    self.start(task)
+                return int(counts.shape[1])
+        return self._write_behind(task, counts, timeout)
+
+    def written(self, task: Task) -> int:
+        """Samples a channel written since the task was set up or stopped."""
+        return task.waveform.written if task.waveform is not None else 0
+
+    def space(self, task: Task) -> int:
+        """Samples a channel that the output buffer would take now."""
+        with self._lock:
+            now = self._settle()
+            return self._space(task, now)
+
+    def generated(self, task: Task) -> int:
+        """Samples a channel that were put out since the start."""
+        with self._lock:
+            now = self._settle()
+            return task.generation.ticks(now) if task.generation is not None else 0
+
+    def write_lines(self, task: Task, levels: Sequence[bool], auto_start: bool) -> None:
+        """Set the lines of a digital task, one level each."""
+        with self._lock:
+            now = self._settle()
+            self._of_kind(task, Kind.DO, Code.NOT_AN_OUTPUT)
+            self._raise_failure(task, written=0)
+            if not (auto_start or task.running):
+                raise DaqmxError(Code.WRITE_WITHOUT_START, f"Task Name: {task.name}", written=0)
+            if any(t.watchdog is not None and t.watchdog.expired for t in self._tasks.values()):
+                raise DaqmxError(Code.WRITE_AFTER_WATCHDOG, f"Task Name: {task.name}", written=0)
+            self._check_free(task)
+            for line, level in zip(task.line_names, levels, strict=True):
+                self._set_line(line, bool(level), now)
+            self._notify()
+
+    # the watchdog
+
+    def set_expiration(self, task: Task, physical: str, high: bool) -> None:
+        """What the lines ``physical`` do when the watchdog of ``task`` expires."""
+        with self._lock:
+            watchdog = self._watchdog(task)
+            self._not_running(task)
+            for line in self.lines_of(physical):
+                watchdog.states[line] = high
+
+    def expiration(self, task: Task, physical: str) -> bool:
+        """What the first of the lines ``physical`` does then."""
+        with self._lock:
+            line = self.lines_of(physical)[0]
+            states = self._watchdog(task).states
+            if line not in states:
+                raise DaqmxError(Code.NOT_SUPPORTED_IN_TASK, f"Lines: {physical}")
+            return states[line]
+
+    def expired(self, task: Task) -> bool:
+        """Whether the watchdog of ``task`` has expired."""
+        with self._lock:
+            self._settle()
+            return self._watchdog(task).expired
+
+    def control_watchdog(self, task: Task, clear: bool) -> None:
+        """Reset the timer, or ``clear`` what its expiration has locked."""
+        with self._lock:
+            now = self._settle()
+            watchdog = self._watchdog(task)
+            if clear:
+                watchdog.expired = False
+                if task.running:
+                    self._start_watchdog(watchdog, now)
+            elif watchdog.expired:
+                raise DaqmxError(Code.WATCHDOG_EXPIRED_NO_RESET, f"Task Name: {task.name}")
+            elif task.running:
+                self._start_watchdog(watchdog, now)
+
+    # time
+
+    def _now(self) -> float:
+        # counted from the card's birth: a tick's time in doubles is then exact enough for hours
+        return self._clock.now() - self._born
+
+    def _settle(self) -> float:
+        """Work out what has happened up to now; returns that time."""
+        now = self._now()
+        for task in list(self._tasks.values()):
+            watchdog = task.watchdog
+            if watchdog is not None and watchdog.deadline is not None and now >= watchdog.deadline:
+                at, watchdog.deadline = watchdog.deadline, None
+                watchdog.expired = True
+                self._follow_wired(at)
+                for line, level in watchdog.states.items():
+                    self._set_line(line, level, at)
+        for task in self._tasks.values():
+            generation = task.generation
+            if generation is not None and generation.settle(now) is not None:
+                task.failed = Code.OUTPUT_STARVED
+        self._follow_wired(now)
+        return now
+
+    def _wait(
+        self,
+        timeout: float,
+        attempt: Callable[[float, bool], tuple[T | None, float | None]],
+    ) -> T:
+        """Try until there is a result; ``attempt(now, last)`` says when to look again, if it knows."""
+        with self._lock:
+            deadline = math.inf if timeout < 0.0 else self._now() + timeout
+        while True:
+            with self._lock:
+                now = self._settle()
+                result, due = attempt(now, now >= deadline)
+                if result is not None:
+                    return result
+                wake = threading.Event()
+                self._waiting.add(wake)
+            until = min(deadline, math.inf if due is None else due)
+            if until < math.inf:
+                self._clock.wait(self._born + until, wake)
+            else:
+                wake.wait()  # nothing that time could bring
+            with self._lock:
+                self._waiting.discard(wake)
+
+    def _notify(self) -> None:
+        for wake in self._waiting:
+            wake.set()
+
+    def _elapsed(self, now: float) -> float:
+        """s since the sample clock of the present run started; before the first one, less than 0."""
+        return -1.0 if self._run_start is None else now - self._run_start
+
+    # the output over time
+
+    def _wire(self, now: float) -> float:
+        if not self._enabled[-1][1]:
+            return 0.0
+        return self._behind.film_voltage(self._tracks[self._card.ao_command].standing(now))
+
+    def _wired_generation(self) -> tuple[Generation, int] | None:
+        for task in self._tasks.values():
+            if task.generation is not None:
+                for row, channel in enumerate(task.outputs):
+                    if channel.terminal == self._card.ao_command:
+                        return task.generation, row
+        return None
+
+    def _follow_wired(self, now: float) -> None:
+        """Take into the history what was put out up to ``now``."""
+        wired = self._wired_generation()
+        if wired is None:
+            return
+        generation, row = wired
+        ticks = generation.ticks(now)
+        # the sample that stands is out as well, unless it was counted at the end
+        end = ticks if generation.finished(now) else ticks + 1
+        while self._traced < end:
+            last = min(end, self._traced + _TRACED)
+            counts = generation.at_ticks(np.arange(self._traced, last))[row].astype(np.int64)
+            away = np.abs(counts - self._behind.zero) > 1
+            for at in np.flatnonzero(np.diff(away, prepend=self._away)):
+                self._trace(generation.due(self._traced + int(at)), int(counts[at]))
+            self._away = bool(away[-1])
+            self._traced = last
+        generation.waveform.drop_before(self._oldest(generation))
+
+    def _oldest(self, generation: Generation) -> int:
+        """First tick of ``generation`` that somebody may still ask for."""
+        oldest = self._traced - 1
+        for task in self._tasks.values():
+            if task.ticks is None or not task.running:
+                continue
+            keeps = task.run.keeps if task.run is not None else 0
+            if isinstance(task.ticks, SharedTicks):
+                needed = task.ticks.needs(generation, keeps)
+                if needed is not None:
+                    oldest = min(oldest, needed)
+            elif task.ticks.start is not None:
+                time = task.ticks.start + keeps / task.ticks.rate
+                oldest = min(oldest, math.floor((time - generation.start) * generation.rate) - 1)
+        return max(0, oldest)
+
+    def _looks_back(self, now: float) -> float:
+        """The earliest time in s whose output somebody may still ask for."""
+        earliest = now
+        for task in self._tasks.values():
+            if task.ticks is not None and task.running and task.ticks.passed(now):
+                keeps = task.run.keeps if task.run is not None else 0
+                earliest = min(earliest, float(task.ticks.times(keeps, keeps + 1)[0]))
+        return earliest
+
+    def _trace(self, now: float, counts: int) -> None:
+        output = self._behind.output_volts(counts)
+        wire = self._behind.film_voltage(counts) if self._enabled[-1][1] else 0.0
+        self._history.append(Change(self._born + now, output, wire))
+
+    def _set_output(self, terminal: str, counts: int, now: float) -> None:
+        self._tracks[terminal].set(now, counts)
+        self._tracks[terminal].forget_before(self._looks_back(now))
+        if terminal == self._card.ao_command:
+            self._away = abs(counts - self._behind.zero) > 1
+            self._trace(now, counts)
+
+    def _set_line(self, line: str, level: bool, now: float) -> None:
+        self._levels[line] = level
+        if line == self._enable and level is not self._enabled[-1][1]:
+            self._enabled.append((now, level))
+            self._trace(now, self._tracks[self._card.ao_command].standing(now))
+
+    def _gated(self, counts: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """``counts`` (n,) on the output as the amplifier follows them: not, while not enabled."""
+        if self._enable is None:
+            return counts
+        since = np.array([time for time, _ in self._enabled])
+        level = np.array([level for _, level in self._enabled])
+        enabled = level[np.searchsorted(since, times, side="right") - 1]
+        return np.where(enabled, counts, np.int16(self._behind.zero))
+
+    # reservations
+
+    def _resources(self, task: Task) -> list[str]:
+        if task.kind is Kind.AI:
+            return ["analog input"]
+        if task.kind is Kind.AO:
+            engine = ["analog output timing"] if task.clock is not None else []
+            return engine + [channel.terminal for channel in task.outputs]
+        if task.kind is Kind.WATCHDOG:
+            return ["watchdog"]
+        return task.line_names
+
+    def _check_free(self, task: Task) -> None:
+        for resource in self._resources(task):
+            owner = self._reserved.get(resource)
+            if owner is not None and owner is not task:
+                raise DaqmxError(
+                    Code.RESOURCE_RESERVED,
+                    f"Device: {self.name}; Resource: {resource}; Task Name: {task.name}; reserved "
+                    f"by: {owner.name}",
+                )
+
+    def _reserve(self, task: Task) -> None:
+        self._check_free(task)
+        for resource in self._resources(task):
+            self._reserved[resource] = task
+
+    def _release(self, task: Task) -> None:
+        task.state = task.kept = State.VERIFIED
+        task.waveform = None
+        self._reserved = {r: owner for r, owner in self._reserved.items() if owner is not task}
+
+    # checks
+
+    def _verify(self, task: Task) -> None:
+        if task.kind is Kind.EMPTY:
+            raise DaqmxError(Code.NOT_WITHOUT_CHANNELS, f"Task Name: {task.name}")
+        if task.clock is None or task.kind is not Kind.AI:
+            return
+        self._coerced(task, task.clock.rate, external=True)
+        last = self.delay_ticks(task) + len(task.inputs) * self.convert_ticks(task)
+        if last > self._timebase / task.clock.rate * (1.0 + 1e-9):
+            raise DaqmxError(
+                Code.CONVERT_PERIOD,
+                f"Sample Rate: {task.clock.rate:g}; Number of Channels: {len(task.inputs)}; the "
+                f"conversions take {last / self._timebase * 1e6:g} us. Task Name: {task.name}",
+            )
+
+    def _coerced(self, task: Task, rate: float, *, external: bool) -> float:
+        """The rate in Hz that the card makes of ``rate``."""
+        most, least = self.fastest(task), self.slowest
+        if not least <= rate <= most * (1.0 + 1e-9):
+            raise DaqmxError(
+                Code.INVALID_VALUE,
+                f"Property: SampClk.Rate; Requested Value: {rate:g}; Maximum Value: {most:g}; "
+                f"Minimum Value: {least:.6g}; Task Name: {task.name}",
+            )
+        return rate if external else self._timebase / max(1, round(self._timebase / rate))
+
+    @property
+    def _timebase(self) -> float:
+        return self._card.timebase_MHz * 1e6
+
+    @property
+    def fastest_input(self) -> float:
+        """Highest rate in Hz of one input alone: the card is twice as fast then."""
+        return 2e3 * self._card.ai_rate_max_kHz
+
+    @property
+    def slowest(self) -> float:
+        """Lowest rate in Hz that the timebase can be divided down to."""
+        return self._timebase / _SLOWEST
+
+    def fastest(self, task: Task) -> float:
+        """Highest rate in Hz of the sample clock of ``task``."""
+        if task.kind is not Kind.AI:
+            return 1e3 * self._card.ao_rate_max_kHz
+        several = len(task.inputs)
+        return 1e3 * self._card.ai_rate_max_kHz / several if several > 1 else self.fastest_input
+
+    def _terminal(self, source: str) -> str:
+        """A terminal such as ``/Dev1/ao/SampleClock`` without its device, in small letters."""
+        text = source.strip().lower()
+        if text.startswith("/"):
+            owner, _, text = text[1:].partition("/")
+            if owner != self.name.lower():
+                raise DaqmxError(Code.INVALID_ROUTE_SOURCE, f"Source Terminal: {source}")
+        known = {
+            f"{side}/{what}" for side in ("ai", "ao") for what in ("sampleclock", "starttrigger")
+        }
+        if text not in known | {f"pfi{i}" for i in range(16)} | {"onboardclock"}:
+            raise DaqmxError(Code.INVALID_ROUTE_SOURCE, f"Source Terminal: {source}")
+        return text
+
+    def _clock_source(self, task: Task, source: str) -> str:
+        """The terminal that clocks ``task``; empty for its own clock."""
+        if not source or self._terminal(source) == "onboardclock":
+            return ""
+        terminal = self._terminal(source)
+        own = "ai/sampleclock" if task.kind is Kind.AI else "ao/sampleclock"
+        if terminal == own:
+            return ""
+        if task.kind is Kind.AI and terminal == "ao/sampleclock":
+            return terminal
+        raise DaqmxError(
+            Code.ROUTE_NOT_SUPPORTED, f"Source Terminal: {source}; Task Name: {task.name}"
+        )
+
+    def _may_add(self, task: Task, kind: Kind) -> None:
+        self._not_running(task)
+        if task.kind not in (Kind.EMPTY, kind):
+            raise DaqmxError(Code.MIXED_CHANNELS, f"Task Name: {task.name}")
+
+    def _named(self, task: Task, terminals: list[str], name: str) -> Iterable[tuple[str, str]]:
+        """Each of ``terminals`` with the name of its channel, which no other has."""
+        names = [f"{self.name}/{terminal}" for terminal in terminals]
+        given = [part.strip() for part in name.split(",")] if name else []
+        if len(given) == 1 and len(terminals) > 1:
+            names = [f"{name}{i}" for i in range(len(terminals))]
+        elif given:
+            names = given + names[len(given) :]
+        for called in names:
+            if called in task.channel_names or names.count(called) > 1:
+                raise DaqmxError(Code.CHANNEL_ALREADY_IN_TASK, f"Channel Name: {called}")
+        return list(zip(terminals, names, strict=False))
+
+    def _not_running(self, task: Task) -> None:
+        if task.running:
+            raise DaqmxError(Code.NOT_WHILE_RUNNING, f"Task Name: {task.name}")
+
+    def _of_kind(self, task: Task, kind: Kind, code: Code = Code.NOT_SUPPORTED_IN_TASK) -> None:
+        if task.kind is Kind.EMPTY:
+            code = Code.NOT_WITHOUT_CHANNELS
+        if task.kind is not kind:
+            raise DaqmxError(code, f"Task Name: {task.name}")
+
+    def _watchdog(self, task: Task) -> Watchdog:
+        if task.watchdog is None:
+            raise DaqmxError(Code.WATCHDOG_ONLY, f"Task Name: {task.name}")
+        return task.watchdog
+
+    def _fail(self, task: Task, code: Code) -> None:
+        task.failed = code
+
+    def _raise_failure(
+        self, task: Task, *, read: int | None = None, written: int | None = None
+    ) -> None:
+        if task.failed is not None:
+            raise DaqmxError(task.failed, f"Task Name: {task.name}", read=read, written=written)
+
+    # starting and ending
+
+    def _waits_for(self, task: Task, trigger: str, kind: Kind) -> bool:
+        """Whether ``task`` has to wait for the start of a task of ``kind`` that is not running."""
+        if not task.trigger:
+            return False
+        started = any(
+            t.running and t.kind is kind and t.clock is not None for t in self._tasks.values()
+        )
+        return task.trigger != trigger or not started
+
+    def _start_watchdog(self, watchdog: Watchdog, now: float) -> None:
+        if watchdog.timeout >= 0.0 and not watchdog.expired:
+            watchdog.deadline = now + watchdog.timeout
+
+    def _start_acquisition(self, task: Task, clock: SampleClock, now: float) -> None:
+        task.delivered, task.run, task.by_read = 0, None, False
+        task.run_number = self._runs
+        self._runs += 1
+        self._run_start = None
+        self._fired.clear()
+        generation = next(
+            (
+                t.generation
+                for t in self._tasks.values()
+                if t.generation is not None and not t.generation.finished(now)
+            ),
+            None,
+        )
+        if clock.source:
+            task.ticks = SharedTicks()
+            if generation is not None:
+                self._share(task, generation, generation.ticks(now) + 1, now)
+        else:
+            waits = self._waits_for(task, "ao/starttrigger", Kind.AO)
+            task.ticks = OwnTicks(clock.rate, None if waits else now)
+            if not waits:
+                self._run_start = now
+        for output in self._tasks.values():
+            if (
+                output.kind is Kind.AO
+                and output.running
+                and output.generation is None
+                and output.trigger == "ai/starttrigger"
+                and output.clock is not None
+            ):
+                self._generate(output, output.clock, now)
+
+    def _generate(self, task: Task, clock: SampleClock, now: float) -> None:
+        """Let an output task generate, and with it the inputs that hang on its clock."""
+        waveform = task.waveform
+        if waveform is None:
+            raise DaqmxError(Code.OUTPUT_BUFFER_EMPTY, f"Task Name: {task.name}")
+        generation = Generation(waveform, clock.rate, now, task.wanted)
+        task.generation = generation
+        self._traced = 0
+        for row, channel in enumerate(task.outputs):
+            self._tracks[channel.terminal].follow(generation, row)
+            if channel.terminal == self._card.ao_command:
+                self._driver = task.client
+        for reader in self._tasks.values():
+            if reader.kind is not Kind.AI or not reader.running:
+                continue
+            if isinstance(reader.ticks, SharedTicks):
+                self._share(reader, generation, 0, now)
+            elif (
+                isinstance(reader.ticks, OwnTicks)
+                and reader.ticks.start is None
+                and reader.trigger == "ao/starttrigger"
+            ):
+                reader.ticks.start = now
+                self._run_start = now
+        if self._run_start is None:
+            self._run_start = now
+        for fault in self._faults.of(FaultKind.AO_UNDERFLOW):
+            at = math.ceil((self._run_start + fault.at - now) * clock.rate)
+            if at > 0:
+                generation.breaks = min(generation.breaks, at)
+
+    def _share(self, task: Task, generation: Generation, tick: int, now: float) -> None:
+        """Let an input task convert on the ticks of ``generation``, from ``tick`` on."""
+        wired = self._wired_generation()
+        row = wired[1] if wired is not None and wired[0] is generation else None
+        if isinstance(task.ticks, SharedTicks):
+            task.ticks.follow(generation, tick, row, now)
+        if self._run_start is None:
+            self._run_start = now
+
+    def _abort(self, task: Task, now: float) -> None:
+        """End ``task`` whatever it does; who goes on with it is told."""
+        busy = task.state is not State.VERIFIED
+        self._end(task, now)
+        self._release(task)
+        if busy:
+            task.failed = Code.RUNTIME_ABORTED
+
+    def _end(self, task: Task, now: float) -> None:
+        if task.generation is not None:
+            task.generation.stop(now)
+            self._follow_wired(now)
+            task.generation = None
+            for channel in task.outputs:
+                self._tracks[channel.terminal].forget_before(self._looks_back(now))
+        if task.ticks is not None:
+            task.ticks, task.run = None, None
+        if task.watchdog is not None:
+            task.watchdog.deadline = None
+        if task.running:
+            task.state = task.kept
+
+    def _done(self, task: Task, now: float) -> bool:
+        if not task.running:
+            return True
+        if task.kind is Kind.AO and task.clock is not None:
+            return task.generation is not None and task.generation.finished(now)
+        if task.kind is Kind.AI and task.wanted is not None:
+            return self._acquired(task, now) >= task.wanted
+        return task.clock is None and task.kind is not Kind.WATCHDOG
+
+    # samples
+
+    def _acquired(self, task: Task, now: float) -> int:
+        if task.ticks is None:
+            return 0
+        passed = task.ticks.passed(now)
+        return passed if task.wanted is None else min(passed, task.wanted)
+
+    def _deliver(self, task: Task, samples: int, complete: bool) -> Reading:
+        first, last = task.delivered, task.delivered + samples
+        if samples == 0 or task.ticks is None:
+            return Reading(np.empty((len(task.inputs), 0), dtype=np.int16), complete)
+        ticks = task.ticks
+        track = self._tracks[self._card.ao_command]
+        if task.run is None:
+            task.run = self._new_run(task)
+        counts = task.run.read(first, last)
+        # while the amplifier is not enabled the film gets 0 V whatever the output says
+        output = counts[0] if self._enable is None else ticks.commands(first, last, track)
+        task.delivered = last
+        self._laser = self._behind.laser_reading(counts, task.inputs)
+        return Reading(self._behind.as_read(counts, output, task.inputs), complete)
+
+    def _new_run(self, task: Task) -> Run:
+        ticks = task.ticks
+        if ticks is None or task.clock is None:
+            raise DaqmxError(Code.RUNTIME_ABORTED, f"Task Name: {task.name}", read=0)
+        us = self._card.timebase_MHz
+        first, step = self.delay_ticks(task) / us, self.convert_ticks(task) / us
+        skews = [(first + place * step) * 1e-6 for place in range(len(task.inputs))]
+        rate = ticks.rate
+        path, state = self._behind.run(task.run_number, rate, task.inputs, skews)
+        track = self._tracks[self._card.ao_command]
+
+        def command(start: int, end: int) -> np.ndarray:
+            counts = ticks.commands(start, end, track)
+            return self._gated(counts, ticks.times(start, end)) if self._enable else counts
+
+        return Run(path, state, command)
+
+    def _read_still(self, task: Task, samples: int) -> Reading:
+        now = self._settle()
+        self._verify(task)
+        self._check_free(task)
+        self._readings += 1
+        output = self._tracks[self._card.ao_command].standing(now)
+        counts = self._behind.still(
+            task.inputs, samples, self._readings, self._wire(now), output, self._laser
+        )
+        return Reading(counts, True)
+
+    def _write_still(self, task: Task, counts: np.ndarray, auto_start: bool, now: float) -> int:
+        if not (auto_start or task.running):
+            raise DaqmxError(Code.WRITE_WITHOUT_START, f"Task Name: {task.name}", written=0)
+        self._check_free(task)
+        for row, channel in zip(counts, task.outputs, strict=True):
+            self._set_output(channel.terminal, int(row[-1]), now)
+            if channel.terminal == self._card.ao_command:
+                self._driver = task.client
+        self._notify()
+        return int(counts.shape[1])
+
+    def _write_ahead(self, task: Task, counts: np.ndarray) -> None:
+        """Write before the start, when the buffer takes what it has room for and no more."""
+        samples = counts.shape[1]
+        if task.waveform is None:
+            task.waveform = Waveform(len(task.outputs), task.regenerates)
+            task.first_write = samples
+        waveform = task.waveform
+        self._within_finite(task, samples)
+        if task.buffer is not None and waveform.written + samples > task.buffer:
+            raise DaqmxError(
+                Code.SAMPLES_NOT_YET_WRITTEN,
+                f"Buffer Size: {task.buffer}; Task Name: {task.name}",
+                written=0,
+            )
+        if task.buffer is None and waveform.written and not task.regenerates:
+            raise DaqmxError(Code.BUFFER_SIZE_FIXED, f"Task Name: {task.name}", written=0)
+        waveform.append(counts)
+
+    def _write_behind(self, task: Task, counts: np.ndarray, timeout: float) -> int:
+        """Write to a task that generates, waiting for room in its buffer."""
+        total = counts.shape[1]
+        done = 0
+
+        def attempt(now: float, last: bool) -> tuple[int | None, float | None]:
+            nonlocal done
+            self._raise_failure(task, written=done)
+            waveform, generation = task.waveform, task.generation
+            if not task.running or waveform is None:
+                raise DaqmxError(Code.RUNTIME_ABORTED, f"Task Name: {task.name}", written=done)
+            if waveform.loops and generation is not None:
+                waveform.replace(counts, generation.ticks(now))
+                self._notify()
+                return total, None
+            self._within_finite(task, total - done)
+            room = min(self._space(task, now), total - done)
+            if room > 0:
+                waveform.append(counts[:, done : done + room])
+                done += room
+                self._notify()
+            if done == total:
+                return total, None
+            if last:
+                raise DaqmxError(
+                    Code.SAMPLES_NOT_YET_WRITTEN, f"Task Name: {task.name}", written=done
+                )
+            if generation is None:
+                return None, None
+            # when a good part of the buffer, or all that is wanted, has gone on to the converter
+            need = min(total - done, max(1, self._buffer_room(task) // 4))
+            gone = waveform.written + need - self._buffer_room(task)
+            return None, generation.due(max(0, gone - self._card.ao_fifo_samples) + 1)
+
+        return self._wait(timeout, attempt)
+
+    def _within_finite(self, task: Task, samples: int) -> None:
+        wanted, waveform = task.wanted, task.waveform
+        if wanted is None or waveform is None:
+            return
+        if waveform.written + samples > wanted and not waveform.loops:
+            raise DaqmxError(
+                Code.BEYOND_FINITE,
+                f"Samples: {wanted}; Task Name: {task.name}",
+                written=0,
+            )
+
+    def _buffer_room(self, task: Task) -> int:
+        """Size of the output buffer: as it was set, or as the first write made it."""
+        return task.buffer if task.buffer is not None else task.first_write
+
+    def _space(self, task: Task, now: float) -> int:
+        waveform = task.waveform
+        if waveform is None:
+            return task.buffer or 0
+        if waveform.loops:
+            return waveform.size
+        gone = 0
+        if task.generation is not None:
+            # the card's FIFO takes samples out of the buffer before they are put out
+            gone = task.generation.ticks(now) + self._card.ao_fifo_samples
+        return max(0, self._buffer_room(task) - (waveform.written - min(waveform.written, gone)))
+
+    def _may_generate(self, task: Task) -> None:
+        if task.waveform is None or task.waveform.written == 0:
+            raise DaqmxError(Code.OUTPUT_BUFFER_EMPTY, f"Task Name: {task.name}")
+        if self._buffer_room(task) < 2:
+            raise DaqmxError(
+                Code.OUTPUT_BUFFER_TOO_SMALL,
+                f"Buffer Size: {self._buffer_room(task)}; Task Name: {task.name}",
+            )
+
+
+def _range(limits: tuple[float, float], offered: Sequence[float]) -> float:
+    """The smallest of the ranges ``offered`` in V that takes ``limits``."""
+    low, high = limits
+    if not low < high:
+        raise DaqmxError(
+            Code.MIN_NOT_LESS_THAN_MAX, f"Minimum Value: {low:g}; Maximum Value: {high:g}"
+        )
+    fitting = [r for r in offered if max(abs(low), abs(high)) <= r * (1.0 + 1e-9)]
+    if not fitting:
+        raise DaqmxError(
+            Code.INVALID_VALUE,
+            f"Property: Max or Min; Requested Values: {low:g}, {high:g}; Largest Range: "
+            f"+-{max(offered):g} V",
+        )
+    return min(fitting)

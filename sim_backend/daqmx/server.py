@@ -1,0 +1,192 @@
+"""The simulated card behind NI's gRPC device protocol, for the unmodified nidaqmx client."""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import grpc
+from nidaqmx._stubs import nidaqmx_pb2_grpc as pb_grpc
+
+from sim_backend.clock import Clock, PacedClock
+from sim_backend.daqmx.clients import Clients
+from sim_backend.daqmx.device import Device
+from sim_backend.daqmx.errors import DaqmxError
+from sim_backend.daqmx.servicer import Servicer, refuse
+from sim_backend.faults import FaultKind
+
+__all__ = ["DaqmxServer"]
+
+log = logging.getLogger(__name__)
+
+_THREADS = 32  # calls at a time; an event that somebody listens to is one
+_LOOK_S = 0.05  # how often silent clients are looked for
+_OPTIONS = (
+    ("grpc.max_send_message_length", -1),
+    ("grpc.max_receive_message_length", -1),
+    ("grpc.so_reuseport", 0),  # a port in use is an error, not a share
+    # a link that is cut without a word is noticed within half a second
+    ("grpc.keepalive_time_ms", 200),
+    ("grpc.keepalive_timeout_ms", 250),
+    ("grpc.keepalive_permit_without_calls", 1),
+    ("grpc.http2.max_pings_without_data", 0),
+    ("grpc.http2.max_ping_strikes", 0),
+    ("grpc.http2.min_recv_ping_interval_without_data_ms", 50),
+)
+
+
+class DaqmxServer:
+    """Serves ``device`` on ``host`` and ``port`` (0: any that is free), a local address by default.
+
+    With ``client_timeout`` in s a client that dies or falls silent with a voltage at the film has
+    the output taken to 0 V; None behaves as NI's server does: tasks and outputs stay as they are.
+    ``link`` is the clock of the link; the card has its own.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        client_timeout: float | None = 1.0,
+        link: Clock | None = None,
+    ) -> None:
+        self.device = device
+        self._address = f"{host}:{port}"
+        self._link = link or PacedClock()
+        self._closing = threading.Event()
+        self.clients = (
+            None if client_timeout is None else Clients(device, self._link, client_timeout)
+        )
+        self._pool = ThreadPoolExecutor(_THREADS, thread_name_prefix="daqmx")
+        self._server = grpc.server(
+            self._pool,
+            interceptors=(_Way(self, self._link, self._closing),),
+            options=_OPTIONS,
+        )
+        pb_grpc.add_NiDAQmxServicer_to_server(Servicer(device, self._closing), self._server)
+        self._watch = threading.Thread(target=self._look, name="daqmx clients", daemon=True)
+        self.port = 0
+
+    def start(self) -> int:
+        """Listen; returns the port. Raises ``OSError`` where the address is not to be had."""
+        try:
+            self.port = self._server.add_insecure_port(self._address)
+        except RuntimeError as error:
+            raise OSError(f"{self._address} cannot be listened on") from error
+        if self.port == 0:
+            raise OSError(f"{self._address} cannot be listened on")
+        self._server.start()
+        self._watch.start()
+        return self.port
+
+    def close(self) -> None:
+        """Take the output to 0 V and drop every connection."""
+        self.device.make_safe()
+        self._closing.set()
+        self._server.stop(0).wait()
+        if self._watch.is_alive():
+            self._watch.join()
+        self._pool.shutdown()
+
+    def __enter__(self) -> DaqmxServer:
+        """Itself, listening."""
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close."""
+        self.close()
+
+    def _look(self) -> None:
+        """Look, until the server is closed, for clients that are silent and for its own end."""
+        while not self._closing.wait(_LOOK_S):
+            if self.clients is not None:
+                self.clients.check()
+            if self.device.fires(FaultKind.SERVER_GONE) is not None:
+                log.warning("fault: the server is gone")
+                self._server.stop(0)
+
+
+class _Way(grpc.ServerInterceptor):  # type: ignore[misc]
+    """What every call passes: faults of the link, who called, and refusals on their way back."""
+
+    def __init__(self, server: DaqmxServer, link: Clock, closing: threading.Event) -> None:
+        self._server = server
+        self._link = link
+        self._closing = closing
+
+    def intercept_service(
+        self, continuation: Callable[[Any], Any], handler_call_details: Any
+    ) -> Any:
+        """See ``grpc.ServerInterceptor``."""
+        handler = continuation(handler_call_details)
+        if handler is None:
+            return None
+        if handler.unary_unary is not None:
+            return grpc.unary_unary_rpc_method_handler(
+                self._answering(handler.unary_unary),
+                handler.request_deserializer,
+                handler.response_serializer,
+            )
+        return grpc.unary_stream_rpc_method_handler(
+            self._streaming(handler.unary_stream),
+            handler.request_deserializer,
+            handler.response_serializer,
+        )
+
+    def _answering(self, call: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+        def answer(request: Any, context: grpc.ServicerContext) -> Any:
+            name = context.peer()
+            clients = self._server.clients
+            if clients is not None:
+                clients.begin(name)
+            try:
+                self._freeze()
+                response = call(request, context)
+                self._freeze()
+                self._delay()
+            except DaqmxError as error:
+                refuse(context, error)
+            else:
+                return response
+            finally:
+                if clients is not None:
+                    clients.end(name)
+
+        return answer
+
+    def _streaming(
+        self, call: Callable[[Any, Any], Iterator[Any]]
+    ) -> Callable[[Any, Any], Iterator[Any]]:
+        def answer(request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
+            name, clients = context.peer(), self._server.clients
+            if clients is not None:
+                clients.listen(name, request.task.name, context)
+            try:
+                yield from call(request, context)
+            except DaqmxError as error:
+                refuse(context, error)
+
+        return answer
+
+    def _freeze(self) -> None:
+        """Hold a call for as long as the server is frozen."""
+        fault = self._server.device.fault(FaultKind.SERVER_FROZEN)
+        if fault is None:
+            return
+        if fault.duration < math.inf:
+            self._link.wait(self._link.now() + fault.duration, self._closing)
+        else:
+            self._closing.wait()
+
+    def _delay(self) -> None:
+        """Give one reply late."""
+        fault = self._server.device.fires(FaultKind.LATE_REPLY)
+        if fault is not None:
+            self._link.wait(self._link.now() + fault.duration, self._closing)

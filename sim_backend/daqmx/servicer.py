@@ -1,0 +1,476 @@
+"""NI's gRPC device protocol on one side, the simulated card on the other; no rule of either here."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import grpc
+import numpy as np
+from nidaqmx._stubs import nidaqmx_pb2 as pb
+from nidaqmx._stubs import nidaqmx_pb2_grpc as pb_grpc
+from session_pb2 import Session
+
+from drivers.channels import COUNT_MAX, COUNT_MIN
+from sim_backend.daqmx import attributes
+from sim_backend.daqmx.attributes import Asked
+from sim_backend.daqmx.device import Device, Reading
+from sim_backend.daqmx.errors import WORDS, Code, DaqmxError
+from sim_backend.daqmx.tasks import Kind, Task
+
+__all__ = ["Servicer", "refuse"]
+
+_BY_CHANNEL = 0  # DAQmx: group by channel
+_FINITE, _CONTINUOUS = 10178, 10123
+_RISING = 10280
+_LOOK_S = 0.02  # how often an event's stream looks whether its time has come
+_GROUPS = (
+    "Buffer", "Chan", "Device", "PhysicalChan", "Read", "SystemInfo", "Task", "Timing", "Trig",
+    "Watchdog", "Write",
+)  # fmt: skip
+
+
+def refuse(context: grpc.ServicerContext, error: DaqmxError) -> None:
+    """End a call with ``error``, as NI's server does."""
+    trailing = [("ni-error", str(error.code))]
+    if error.read is not None:
+        trailing.append(("ni-samps-per-chan-read", str(error.read)))
+    if error.written is not None:
+        trailing.append(("ni-samps-per-chan-written", str(error.written)))
+    context.set_trailing_metadata(tuple(trailing))
+    context.abort(grpc.StatusCode.UNKNOWN, str(error))
+
+
+class Servicer(pb_grpc.NiDAQmxServicer):
+    """Answers the calls; a ``DaqmxError`` is left to who calls it, with ``refuse``.
+
+    What is not here is answered with UNIMPLEMENTED by the class above.
+    """
+
+    def __init__(self, device: Device, closing: threading.Event) -> None:
+        self._device = device
+        self._closing = closing
+        self._streams: set[str] = set()
+
+    # tasks
+
+    def CreateTask(self, request: Any, context: grpc.ServicerContext) -> Any:
+        behaviour = request.initialization_behavior
+        if behaviour == 2:  # attach to an existing one
+            self._device.task(request.session_name)
+        task, new = self._device.create(request.session_name, context.peer(), attach=behaviour != 1)
+        return pb.CreateTaskResponse(task=Session(name=task.name), new_session_initialized=new)
+
+    def ClearTask(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._device.clear(self._task(request))
+        return pb.ClearTaskResponse()
+
+    def StartTask(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._device.start(self._task(request))
+        return pb.StartTaskResponse()
+
+    def StopTask(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._device.stop(self._task(request))
+        return pb.StopTaskResponse()
+
+    def TaskControl(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._device.control(self._task(request), request.action_raw or request.action)
+        return pb.TaskControlResponse()
+
+    def IsTaskDone(self, request: Any, context: grpc.ServicerContext) -> Any:
+        return pb.IsTaskDoneResponse(is_task_done=self._device.is_done(self._task(request)))
+
+    def WaitUntilTaskDone(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._device.wait_done(self._task(request), request.time_to_wait)
+        return pb.WaitUntilTaskDoneResponse()
+
+    def GetErrorString(self, request: Any, context: grpc.ServicerContext) -> Any:
+        words = WORDS.get(request.error_code, f"Error {request.error_code} occurred.")
+        return pb.GetErrorStringResponse(error_string=words)
+
+    def GetNthTaskChannel(self, request: Any, context: grpc.ServicerContext) -> Any:
+        names = self._task(request).channel_names
+        if not 1 <= request.index <= len(names):
+            raise DaqmxError(Code.INVALID_VALUE, f"Index: {request.index}")
+        return pb.GetNthTaskChannelResponse(buffer=names[request.index - 1])
+
+    # channels and timing
+
+    def CreateAIVoltageChan(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._device.add_inputs(
+            self._task(request),
+            request.physical_channel,
+            request.name_to_assign_to_channel,
+            request.terminal_config_raw or request.terminal_config,
+            (request.min_val, request.max_val),
+        )
+        return pb.CreateAIVoltageChanResponse()
+
+    def CreateAOVoltageChan(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._device.add_outputs(
+            self._task(request),
+            request.physical_channel,
+            request.name_to_assign_to_channel,
+            (request.min_val, request.max_val),
+        )
+        return pb.CreateAOVoltageChanResponse()
+
+    def CreateDOChan(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._device.add_lines(
+            self._task(request),
+            request.lines,
+            request.name_to_assign_to_lines,
+            together=(request.line_grouping_raw or request.line_grouping) == 1,
+        )
+        return pb.CreateDOChanResponse()
+
+    def CfgSampClkTiming(self, request: Any, context: grpc.ServicerContext) -> Any:
+        mode = request.sample_mode_raw or request.sample_mode
+        edge = request.active_edge_raw or request.active_edge
+        if mode not in (_FINITE, _CONTINUOUS) or edge != _RISING:
+            raise DaqmxError(
+                Code.INVALID_VALUE, f"Property: SampQuant.SampMode or SampClk.ActiveEdge: {mode}"
+            )
+        self._device.set_clock(
+            self._task(request),
+            request.rate,
+            request.source,
+            mode == _FINITE,
+            request.samps_per_chan,
+        )
+        return pb.CfgSampClkTimingResponse()
+
+    def CfgDigEdgeStartTrig(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._device.set_trigger(self._task(request), request.trigger_source)
+        return pb.CfgDigEdgeStartTrigResponse()
+
+    def DisableStartTrig(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._device.set_trigger(self._task(request), "")
+        return pb.DisableStartTrigResponse()
+
+    # reading
+
+    def ReadAnalogF64(self, request: Any, context: grpc.ServicerContext) -> Any:
+        task = self._task(request)
+        reading = self._read(task, request, request.array_size_in_samps)
+        volts = self._volts(task, reading.counts)
+        return pb.ReadAnalogF64Response(
+            status=_status(reading),
+            read_array=_laid_out(volts, request, request.array_size_in_samps),
+            samps_per_chan_read=volts.shape[1],
+        )
+
+    def ReadAnalogScalarF64(self, request: Any, context: grpc.ServicerContext) -> Any:
+        task = self._task(request)
+        reading = self._device.read(task, 1, request.timeout)
+        if not reading.complete:
+            raise DaqmxError(Code.SAMPLES_NOT_YET_AVAILABLE, read=0)
+        return pb.ReadAnalogScalarF64Response(value=float(self._volts(task, reading.counts)[0, 0]))
+
+    def ReadBinaryI16(self, request: Any, context: grpc.ServicerContext) -> Any:
+        reading = self._read(self._task(request), request, request.array_size_in_samps)
+        return pb.ReadBinaryI16Response(
+            status=_status(reading),
+            read_array=_laid_out(reading.counts, request, request.array_size_in_samps),
+            samps_per_chan_read=reading.counts.shape[1],
+        )
+
+    def ReadRaw(self, request: Any, context: grpc.ServicerContext) -> Any:
+        room = request.array_size_in_bytes // 2
+        reading = self._read(self._task(request), request, room)
+        # the card hands out scan after scan
+        scans = np.ascontiguousarray(reading.counts.T).tobytes()
+        return pb.ReadRawResponse(
+            status=_status(reading),
+            read_array=scans.ljust(request.array_size_in_bytes, b"\0"),
+            samps_read=reading.counts.shape[1],
+            num_bytes_per_samp=2,
+        )
+
+    # writing
+
+    def WriteAnalogF64(self, request: Any, context: grpc.ServicerContext) -> Any:
+        task = self._task(request)
+        volts = self._to_write(task, request, np.float64)
+        return pb.WriteAnalogF64Response(
+            samps_per_chan_written=self._write(task, self._device.to_counts(task, volts), request)
+        )
+
+    def WriteAnalogScalarF64(self, request: Any, context: grpc.ServicerContext) -> Any:
+        task = self._task(request)
+        self._outputs(task)
+        if len(task.outputs) != 1:
+            raise DaqmxError(Code.INVALID_VALUE, "A single value is for a single channel.")
+        self._write(task, self._device.to_counts(task, np.array([[request.value]])), request)
+        return pb.WriteAnalogScalarF64Response()
+
+    def WriteBinaryI16(self, request: Any, context: grpc.ServicerContext) -> Any:
+        task = self._task(request)
+        values = self._to_write(task, request, np.int64)
+        if values.size and not COUNT_MIN <= values.min() <= values.max() <= COUNT_MAX:
+            raise DaqmxError(Code.INVALID_SAMPLE, written=0)
+        return pb.WriteBinaryI16Response(
+            samps_per_chan_written=self._write(task, values.astype(np.int16), request)
+        )
+
+    def WriteRaw(self, request: Any, context: grpc.ServicerContext) -> Any:
+        task = self._task(request)
+        self._outputs(task)
+        scans = np.frombuffer(request.write_array, dtype=np.int16)
+        rows = len(task.outputs)
+        if scans.size < request.num_samps * rows:
+            raise DaqmxError(Code.WRITE_BUFFER_TOO_SMALL, written=0)
+        counts = scans[: request.num_samps * rows].reshape(-1, rows).T
+        return pb.WriteRawResponse(samps_per_chan_written=self._write(task, counts, request))
+
+    def WriteDigitalLines(self, request: Any, context: grpc.ServicerContext) -> Any:
+        task = self._task(request)
+        values = np.frombuffer(request.write_array, dtype=np.uint8)
+        return pb.WriteDigitalLinesResponse(
+            samps_per_chan_written=self._write_lines(task, values, request)
+        )
+
+    def WriteDigitalU32(self, request: Any, context: grpc.ServicerContext) -> Any:
+        task = self._task(request)
+        return pb.WriteDigitalU32Response(
+            samps_per_chan_written=self._write_words(task, request.write_array, request)
+        )
+
+    def WriteDigitalScalarU32(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._write_words(self._task(request), [request.value], request)
+        return pb.WriteDigitalScalarU32Response()
+
+    # the device
+
+    def ResetDevice(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._device.reset(request.device_name)
+        return pb.ResetDeviceResponse()
+
+    def SelfTestDevice(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._device.check_device(request.device_name)
+        return pb.SelfTestDeviceResponse()
+
+    # the watchdog
+
+    def CreateWatchdogTimerTaskEx(self, request: Any, context: grpc.ServicerContext) -> Any:
+        task = self._device.create_watchdog(
+            request.session_name, context.peer(), request.device_name, request.timeout
+        )
+        return pb.CreateWatchdogTimerTaskExResponse(
+            task=Session(name=task.name), new_session_initialized=True
+        )
+
+    def CfgWatchdogDOExpirStates(self, request: Any, context: grpc.ServicerContext) -> Any:
+        task = self._task(request)
+        names = [name.strip() for name in request.channel_names.split(",")]
+        for name, value in zip(names, request.expir_state_array, strict=True):
+            self._device.set_expiration(task, name, attributes.level(value))
+        return pb.CfgWatchdogDOExpirStatesResponse()
+
+    def ControlWatchdogTask(self, request: Any, context: grpc.ServicerContext) -> Any:
+        action = request.action_raw or request.action
+        self._device.control_watchdog(self._task(request), clear=action == 1)
+        return pb.ControlWatchdogTaskResponse()
+
+    # events: each holds a thread for as long as somebody listens
+
+    def RegisterDoneEvent(self, request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
+        task = self._task(request)
+        key = f"done {task.name}"
+        self._open_stream(task, key, context)
+        was_running = False
+        while self._listening(key, context):
+            running = task.running
+            done, status = False, 0
+            if running or was_running:
+                try:
+                    done = running and self._device.is_done(task)
+                except DaqmxError as error:
+                    done, status = True, error.code
+            was_running = running and not done
+            if done:
+                yield pb.RegisterDoneEventResponse(status=status)
+                while self._listening(key, context) and task.running:
+                    self._closing.wait(_LOOK_S)
+
+    def UnregisterDoneEvent(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._streams.discard(f"done {self._task(request).name}")
+        return pb.UnregisterDoneEventResponse()
+
+    def RegisterEveryNSamplesEvent(
+        self, request: Any, context: grpc.ServicerContext
+    ) -> Iterator[Any]:
+        task = self._task(request)
+        key = f"samples {task.name}"
+        every = request.n_samples
+        if every < 1:
+            raise DaqmxError(Code.INVALID_VALUE, f"N Samples: {every}")
+        self._open_stream(task, key, context)
+        told = 0
+        while self._listening(key, context):
+            if not task.running:
+                told = 0
+                continue
+            passed = (
+                self._device.acquired(task)
+                if task.kind is Kind.AI
+                else self._device.generated(task)
+            )
+            for _ in range(passed // every - told):
+                told += 1
+                yield pb.RegisterEveryNSamplesEventResponse(
+                    every_n_samples_event_type_raw=request.every_n_samples_event_type_raw,
+                    n_samples=every,
+                )
+
+    def UnregisterEveryNSamplesEvent(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._streams.discard(f"samples {self._task(request).name}")
+        return pb.UnregisterEveryNSamplesEventResponse()
+
+    def _open_stream(self, task: Task, key: str, context: grpc.ServicerContext) -> None:
+        if task.running:
+            raise DaqmxError(Code.EVENT_WHILE_RUNNING, f"Task Name: {task.name}")
+        if key in self._streams:
+            raise DaqmxError(Code.EVENT_REGISTERED, f"Task Name: {task.name}")
+        self._streams.add(key)
+        context.add_callback(lambda: self._streams.discard(key))
+        # the client waits for this before it goes on
+        context.send_initial_metadata(())
+
+    def _listening(self, key: str, context: grpc.ServicerContext) -> bool:
+        """Whether an event's stream goes on; takes a moment."""
+        over = self._closing.wait(_LOOK_S)
+        return not over and context.is_active() and key in self._streams
+
+    # what they share
+
+    def _task(self, request: Any) -> Task:
+        return self._device.task(request.task.name)
+
+    def _asked(self, request: Any) -> Asked:
+        """What a property's request is about."""
+        fields = request.DESCRIPTOR.fields_by_name
+        task = self._task(request) if "task" in fields else None
+        if "device_name" in fields:
+            self._device.check_device(request.device_name)
+        channel = ""
+        for field in ("channel", "physical_channel", "lines"):
+            if field in fields:
+                channel = getattr(request, field)
+        return Asked(self._device, task, channel)
+
+    def _read(self, task: Task, request: Any, room: int) -> Reading:
+        samples, most = request.num_samps_per_chan, room // max(1, len(task.inputs))
+        if samples > most:
+            raise DaqmxError(Code.READ_BUFFER_TOO_SMALL, f"Task Name: {task.name}", read=0)
+        return self._device.read(task, samples, request.timeout, most)
+
+    def _volts(self, task: Task, counts: np.ndarray) -> np.ndarray:
+        volts = np.empty(counts.shape)
+        for row, raw, channel in zip(volts, counts, task.inputs, strict=True):
+            coefficients = self._device.scaling(task, channel.name)
+            row[:] = np.polynomial.polynomial.polyval(raw.astype(np.float64), coefficients)
+        return volts
+
+    def _outputs(self, task: Task) -> None:
+        if task.kind is not Kind.AO:
+            raise DaqmxError(Code.NOT_AN_OUTPUT, f"Task Name: {task.name}", written=0)
+
+    def _to_write(self, task: Task, request: Any, kind: type) -> np.ndarray:
+        """(channels, n) of a request's array."""
+        self._outputs(task)
+        rows, samples = len(task.outputs), request.num_samps_per_chan
+        values = np.fromiter(request.write_array, kind, len(request.write_array))
+        if values.size < rows * samples:
+            raise DaqmxError(Code.WRITE_BUFFER_TOO_SMALL, f"Task Name: {task.name}", written=0)
+        values = values[: rows * samples]
+        layout = request.data_layout_raw or request.data_layout
+        return values.reshape(rows, -1) if layout == _BY_CHANNEL else values.reshape(-1, rows).T
+
+    def _write(self, task: Task, counts: np.ndarray, request: Any) -> int:
+        return self._device.write(task, counts, request.auto_start, request.timeout)
+
+    def _write_lines(self, task: Task, values: np.ndarray, request: Any) -> int:
+        lines = len(task.line_names)
+        if task.kind is not Kind.DO:
+            raise DaqmxError(Code.NOT_AN_OUTPUT, f"Task Name: {task.name}", written=0)
+        if values.size < lines * request.num_samps_per_chan or not lines:
+            raise DaqmxError(Code.WRITE_BUFFER_TOO_SMALL, f"Task Name: {task.name}", written=0)
+        layout = request.data_layout_raw or request.data_layout
+        samples = request.num_samps_per_chan
+        values = values[: lines * samples]
+        rows = (
+            values.reshape(lines, samples)
+            if layout == _BY_CHANNEL
+            else (values.reshape(samples, lines).T)
+        )
+        self._device.write_lines(task, [bool(v) for v in rows[:, -1]], request.auto_start)
+        return int(samples)
+
+    def _write_words(self, task: Task, words: Any, request: Any) -> int:
+        if task.kind is not Kind.DO:
+            raise DaqmxError(Code.NOT_AN_OUTPUT, f"Task Name: {task.name}", written=0)
+        if len(words) < len(task.lines):
+            raise DaqmxError(Code.WRITE_BUFFER_TOO_SMALL, f"Task Name: {task.name}", written=0)
+        samples = len(words) // len(task.lines)
+        layout = getattr(request, "data_layout_raw", 0) or getattr(request, "data_layout", 0)
+        levels = []
+        for place, channel in enumerate(task.lines):
+            at = (place + 1) * samples - 1 if layout == _BY_CHANNEL else place - len(task.lines)
+            word = int(words[at])
+            levels += [bool(word >> int(line.rpartition("line")[2]) & 1) for line in channel.lines]
+        self._device.write_lines(task, levels, request.auto_start)
+        return samples
+
+
+def _status(reading: Reading) -> int:
+    """A read that timed out is a reply like any other, with a status and what there was."""
+    return 0 if reading.complete else int(Code.SAMPLES_NOT_YET_AVAILABLE)
+
+
+def _laid_out(values: np.ndarray, request: Any, room: int) -> np.ndarray:
+    """(room,) of ``values`` (channels, n): channel after channel or scan after scan, then zeros."""
+    laid = np.zeros(max(room, values.size), dtype=values.dtype)
+    by_channel = (request.fill_mode_raw or request.fill_mode) == _BY_CHANNEL
+    laid[: values.size] = values.ravel() if by_channel else values.T.ravel()
+    return laid
+
+
+def _attribute_call(name: str, response: Any) -> Callable[[Servicer, Any, Any], Any] | None:
+    """What answers the call ``name``, such as ``GetTimingAttributeDouble``, with a ``response``."""
+    found = re.match(r"(Get|Set|Reset)([A-Za-z]+)Attribute", name)
+    if not found or found[2] not in _GROUPS:
+        return None
+    verb, group = found[1], found[2]
+    raw = "value_raw" in response.DESCRIPTOR.fields_by_name
+
+    def answer(self: Servicer, request: Any, context: grpc.ServicerContext) -> Any:  # noqa: ARG001
+        asked = self._asked(request)
+        number = request.attribute_raw or request.attribute
+        if verb == "Reset":
+            attributes.reset(group, number, asked)
+            return response()
+        if verb == "Set":
+            fields = request.DESCRIPTOR.fields_by_name
+            value = request.value
+            if "value_raw" in fields and request.WhichOneof("value_enum") == "value_raw":
+                value = request.value_raw
+            attributes.set_(group, number, asked, value)
+            return response()
+        value = attributes.get(group, number, asked)
+        return response(**{"value_raw" if raw else "value": value})
+
+    return answer
+
+
+def _add_attribute_calls() -> None:
+    """Every property's call by every type, of which the service has a hundred."""
+    for method in pb.DESCRIPTOR.services_by_name["NiDAQmx"].methods:
+        answer = _attribute_call(method.name, getattr(pb, method.output_type.name))
+        if answer is not None:
+            setattr(Servicer, method.name, answer)
+
+
+_add_attribute_calls()
