@@ -14,7 +14,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from app.errors import InputError
+from app.errors import InputError, InstrumentFault
 from app.rigfile import RigFile
 from drivers.channels import Channel
 from drivers.errors import AddressError, RigError
@@ -46,6 +46,12 @@ class CheckOutcome:
     def wrong(self) -> tuple[Finding, ...]:
         """What keeps a run from starting."""
         return tuple(f for f in self.findings if f.verdict == "wrong")
+
+    def refuse(self) -> None:
+        """Raise ``InstrumentFault`` with the first thing that keeps a run from starting, if any."""
+        if self.wrong:
+            more = f" (and {len(self.wrong) - 1} more)" if len(self.wrong) > 1 else ""
+            raise InstrumentFault(f"{self.wrong[0].sentence}{more}")
 
     @property
     def summary(self) -> str:
@@ -174,7 +180,7 @@ def _at_zero(
     zero = np.zeros(max(_SAMPLES_MIN, round(_SECONDS * rate)))
     # at 0 V any film is well
     prediction = Prediction(
-        np.full(zero.size, 1.0 / film.thickness), np.ones(zero.size), film=limits.film
+        np.full(zero.size, 1.0 / film.thickness), film.electric_volume, film=limits.film
     )
     rate = rig.load(admit(zero, rate, limits, prediction))
     rig.arm()

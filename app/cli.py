@@ -275,7 +275,6 @@ def check(
 ) -> None:
     """Say what is connected, what is wrong and which limits hold, without raising a volt."""
     from app.check import check_json, check_rig, check_table
-    from app.errors import InstrumentFault
     from app.rigfile import load_rig_file
     from app.terminal import write_json
     from sim_backend.factory import is_simulated
@@ -287,9 +286,7 @@ def check(
     console.print(check_table(outcome))
     if json is not None:
         write_json(check_json(outcome), json)
-    if outcome.wrong:
-        more = f" (and {len(outcome.wrong) - 1} more)" if len(outcome.wrong) > 1 else ""
-        raise InstrumentFault(f"{outcome.wrong[0].sentence}{more}")
+    outcome.refuse()
 
 
 @app.command("import")
@@ -675,6 +672,64 @@ def simulate(
             },
             json,
         )
+
+
+@app.command("serve-daqmx")
+def serve_daqmx(
+    rig: Annotated[
+        str, typer.Option(help="sim, or sim:SEED for a rig that hides an effect.")
+    ] = "sim",
+    rig_file: RigFileOption = None,
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port to listen on; 0 takes any that is free.")
+    ] = 0,
+    anywhere: Annotated[
+        bool, typer.Option("--anywhere", help="Allow a --host that other computers can reach.")
+    ] = False,
+    paced: Annotated[
+        bool, typer.Option("--paced/--fast", help="In real time, or as fast as it is read.")
+    ] = True,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KIND@SECONDS", help="What goes wrong, and when; may be repeated."),
+    ] = None,
+    client_timeout: Annotated[
+        float,
+        typer.Option(
+            min=0.1,
+            max=3600.0,
+            metavar="SECONDS",
+            help="Silence of a client with a voltage at the film that takes the output to 0 V.",
+        ),
+    ] = 1.0,
+    client_tracking: Annotated[
+        bool,
+        typer.Option(
+            "--client-tracking/--no-client-tracking",
+            help="Make safe when a client is gone; NI's own server does not.",
+        ),
+    ] = True,
+    seed: Seed = 0,
+) -> None:
+    """Serve a simulated card to NI's Python library over NI's network protocol, until ctrl-C."""
+    from app.rigfile import load_rig_file
+    from app.serve import Serving, serve
+
+    settings = load_rig_file(rig_file)
+
+    def told(serving: Serving) -> None:
+        # at once, also into a pipe: who started it waits for the port
+        sys.stdout.write(
+            f"simulated card at {serving.host}:{serving.port}; use it with --rig {serving.rig}; "
+            f"ctrl-C ends it\n"
+        )
+        sys.stdout.flush()
+
+    serve(
+        rig, settings, told=told, host=host, port=port, anywhere=anywhere, paced=paced,
+        faults=fault or (), client_timeout=client_timeout if client_tracking else None, seed=seed,
+    )  # fmt: skip
 
 
 @app.command("rig-file")

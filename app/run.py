@@ -106,12 +106,13 @@ def open_rig(
             f"rig {address!r}: no film is declared; give a --rig-file whose [film] has a name, so "
             f"that its limits are those of the film that hangs there"
         )
+    # not everybody who simulates has what a card needs
+    from app.check import check_rig
     from drivers.daqmx import open_daqmx_rig
 
+    check_rig(address, rig_file).refuse()
     try:
         return open_daqmx_rig(address, rig_file)
-    except AddressError as error:
-        raise InputError(str(error)) from error
     except RigError as error:
         raise InstrumentFault(str(error)) from error
 
@@ -168,7 +169,7 @@ def record(
             onlooker = onlooker or Onlooker()
             onlooker.started(planned, identity, rate)
             interlocks = Interlocks(
-                rig_file, identity.channels, rate, planned.displacement, planned.voltage
+                rig_file, identity.channels, rate, planned.displacement_of_samples, planned.voltage
             )
             run = _Run(rig, writer, interlocks, interrupts, onlooker, clock)
             events = run.follow(waveform.voltage.size, progress)

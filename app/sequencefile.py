@@ -22,9 +22,9 @@ from model.excitation import THESIS_AMPLITUDES, THESIS_FREQUENCIES, Segment, Seq
 __all__ = ["LoadedSequence", "load_sequence", "parse_sequence"]
 
 _KV = 1e3
-#: Samples of a run, at most: 2.8 h at 1 kHz. Every step from the gate to the recording's physical
-#: values holds several rows of that many numbers, and they must fit into an ordinary memory.
-SAMPLES_MAX = 10_000_000
+#: Samples of a run, at most: 69 h at 1 kHz, 12 min at the card's full rate. A run holds some
+#: 40 bytes of each, and they must fit into an ordinary memory.
+SAMPLES_MAX = 250_000_000
 #: Segments with their repeats, at most; the periods of thesis segments do not count.
 SEGMENTS_MAX = 10_000
 _Voltage = Annotated[float, Field(ge=-1e3, le=1e3)]

@@ -17,6 +17,7 @@ from drivers.errors import RefusedWaveform, RigError
 __all__ = ["GatedWaveform", "Limits", "Margin", "Prediction", "admit", "ramp_down"]
 
 _KEY = object()
+_PIECE = 2**20  # samples judged at a time: a run of hours must not need its memory many times over
 
 
 @dataclass(frozen=True)
@@ -57,15 +58,19 @@ class Limits:
 class Prediction:
     """What a model foresees of the film under a waveform of N samples; this layer has no model.
 
-    ``field_per_volt`` (N,) 1/m is the reciprocal of the film's thickness, so that the true field is
-    its product with the voltage; ``capacitance`` (N,) F. ``pull_in`` says in words that the film
-    would collapse, and is empty where it would not. ``film`` names the film that was asked for.
+    ``field_per_volt`` (M,) 1/m is the reciprocal of the film's thickness, so that the true field is
+    its product with the voltage: one number for each ``stride`` samples, M = ceil(N/stride), as a
+    film moves slowly against a fast clock. ``electric_volume`` in F m is its permittivity times
+    its volume, which stays, so that its capacitance is that times the square of
+    ``field_per_volt``. ``pull_in`` says in words that the film would collapse, and is empty where
+    it would not. ``film`` names the film that was asked for.
     """
 
     field_per_volt: np.ndarray
-    capacitance: np.ndarray
+    electric_volume: float
     pull_in: str = ""
     film: str = ""
+    stride: int = 1
 
 
 @dataclass(frozen=True)
@@ -166,67 +171,69 @@ def admit(
     # a copy: what is judged is what goes out, whatever the caller does to its array meanwhile
     voltage = np.array(voltage, dtype=np.float64)
     field_per_volt = np.asarray(prediction.field_per_volt, dtype=np.float64)
-    capacitance = np.asarray(prediction.capacitance, dtype=np.float64)
     for name, limit in vars(limits).items():
         if isinstance(limit, float) and math.isnan(limit):
             raise RefusedWaveform((f"the limit {name} is nan, and lets nothing pass",))
     if not (math.isfinite(rate) and rate > 0.0):
         raise RefusedWaveform((f"the sample rate {rate!r} Hz is not a finite number above 0",))
-    shapes = {voltage.shape, field_per_volt.shape, capacitance.shape}
-    if voltage.ndim != 1 or voltage.size < 2 or len(shapes) > 1:
+    predicted = (-(-voltage.size // prediction.stride),) if prediction.stride >= 1 else (0,)
+    if voltage.ndim != 1 or voltage.size < 2 or field_per_volt.shape != predicted:
         raise RefusedWaveform(
             (
-                f"a waveform is one row of at least 2 samples with as many predictions, not "
-                f"{voltage.shape}, {field_per_volt.shape} and {capacitance.shape}",
+                f"a waveform is one row of at least 2 samples with a prediction for each "
+                f"{prediction.stride}, not {voltage.shape} and {field_per_volt.shape}",
             )
         )
-    finite = np.isfinite(voltage) & np.isfinite(field_per_volt) & np.isfinite(capacitance)
-    if not finite.all():
-        at = int(np.argmin(finite))
-        raise RefusedWaveform((f"sample {at} (at {at / rate:.4g} s) is not a finite number",))
-    for quantity, values, unit in (
-        ("one over the thickness", field_per_volt, "1/m"),
-        ("the capacitance", capacitance, "F"),
+    for values, step in ((voltage, 1), (field_per_volt, prediction.stride)):
+        if not np.isfinite(values.sum()):  # quick; a sum may overflow, and then we look closer
+            at = int(np.argmin(np.isfinite(values))) * step
+            if not np.isfinite(values[at // step]):
+                raise RefusedWaveform(
+                    (f"sample {at} (at {at / rate:.4g} s) is not a finite number",)
+                )
+    thickest = float(field_per_volt.min())
+    for quantity, value, unit in (
+        ("one over the thickness", thickest, "1/m"),
+        ("the film's permittivity times its volume", prediction.electric_volume, "F m"),
     ):
-        if not (values > 0.0).all():
-            at = int(np.argmin(values))
-            raise RefusedWaveform(
-                (f"{quantity} is predicted as {values[at]:.4g} {unit} at sample {at}, not above 0",)
+        if not (math.isfinite(value) and value > 0.0):
+            raise RefusedWaveform((f"{quantity} is predicted as {value:.4g} {unit}, not above 0",))
+
+    reached = _Reached()
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is beyond every limit
+        for first in range(0, voltage.size, _PIECE):
+            last = min(first + _PIECE, voltage.size)
+            before = max(0, first - 1)  # the sample before the piece: its step and rise count
+            at = np.arange(before, last) // prediction.stride
+            reached.take(
+                voltage[before:last], field_per_volt[at], before, first, rate, limits, prediction
             )
 
     reasons: list[str] = []
 
     def check(
-        quantity: str, reached: float, allowed: float, unit: str, scale: float, where: str = ""
+        quantity: str, peak: tuple[float, int], allowed: float, unit: str, scale: float
     ) -> Margin:
+        value, at = peak
         # not (<=), so that what is not a number is refused
-        if not reached <= allowed:
+        if not value <= allowed:
+            where = f" at {at / rate:.4g} s" if at >= 0 else ""
             reasons.append(
-                f"{quantity} reaches {reached * scale:.6g} {unit}{where}, "
+                f"{quantity} reaches {value * scale:.6g} {unit}{where}, "
                 f"{allowed * scale:.6g} {unit} is allowed"
             )
         # + 0.0: a waveform that never goes negative reaches 0, not -0
-        return Margin(quantity, reached * scale + 0.0, allowed * scale + 0.0, unit)
+        return Margin(quantity, value * scale + 0.0, allowed * scale + 0.0, unit)
 
-    def peak(quantity: str, values: np.ndarray, allowed: float, unit: str, scale: float) -> Margin:
-        at = int(np.argmax(values))
-        where = f" at {at / rate:.4g} s"
-        return check(quantity, float(values[at]), allowed, unit, scale, where)
-
-    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is beyond every limit
-        slew = np.abs(np.diff(voltage)) * rate
-        field = np.abs(voltage) * field_per_volt
-        rises = 0.5 * (voltage[1:] + voltage[:-1]) * np.diff(capacitance * voltage)
-        energy = float(np.sum(np.maximum(rises, 0.0)))  # a NaN stays one, and is refused
-    standing = _longest(~(np.abs(voltage) < limits.at_voltage)) / rate
+    standing = reached.longest / rate
     margins = (
-        peak("voltage", voltage, limits.voltage_max, "kV", 1e-3),
-        peak("negative voltage", -voltage, 0.0 - limits.voltage_min, "kV", 1e-3),
-        peak("slew", slew, limits.slew, "kV/s", 1e-3),
-        peak("true field", field, limits.field, "MV/m", 1e-6),
-        check("energy", energy, limits.energy, "J", 1.0),
+        check("voltage", reached.high, limits.voltage_max, "kV", 1e-3),
+        check("negative voltage", reached.low, 0.0 - limits.voltage_min, "kV", 1e-3),
+        check("slew", reached.slew, limits.slew, "kV/s", 1e-3),
+        check("true field", reached.field, limits.field, "MV/m", 1e-6),
+        check("energy", (reached.energy, -1), limits.energy, "J", 1.0),
         check(
-            f"time at {limits.at_voltage * 1e-3:.4g} kV or more", standing,
+            f"time at {limits.at_voltage * 1e-3:.4g} kV or more", (standing, -1),
             limits.time_at_voltage, "s", 1.0,
         ),
     )  # fmt: skip
@@ -245,10 +252,52 @@ def admit(
     return GatedWaveform(voltage, rate, limits, margins, _KEY)
 
 
-def _longest(true: np.ndarray) -> int:
-    """Most samples of ``true`` (N,) in a row."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], true, [False]))))
-    return int(np.max(edges[1::2] - edges[::2], initial=0))
+class _Reached:
+    """The most of each quantity in the pieces taken so far, and the sample at which it was."""
+
+    def __init__(self) -> None:
+        self.high = self.low = self.slew = self.field = (-math.inf, 0)
+        self.energy = 0.0
+        self.longest = 0  # samples in a row at voltage
+        self._standing = 0  # of them, up to the end of the last piece
+
+    def take(
+        self,
+        voltage: np.ndarray,
+        field_per_volt: np.ndarray,
+        start: int,
+        first: int,
+        rate: float,
+        limits: Limits,
+        prediction: Prediction,
+    ) -> None:
+        """The next piece from sample ``first``; the arrays (n,) begin at sample ``start``."""
+        slew = np.abs(np.diff(voltage)) * rate
+        charge = prediction.electric_volume * field_per_volt**2 * voltage
+        rises = 0.5 * (voltage[1:] + voltage[:-1]) * np.diff(charge)
+        self.energy += float(np.sum(np.maximum(rises, 0.0)))  # a NaN stays one, and is refused
+        self.slew = _higher(self.slew, slew, start)
+        new = slice(first - start, None)
+        self.high = _higher(self.high, voltage[new], first)
+        self.low = _higher(self.low, -voltage[new], first)
+        self.field = _higher(self.field, np.abs(voltage[new]) * field_per_volt[new], first)
+
+        standing = ~(np.abs(voltage[new]) < limits.at_voltage)
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], standing, [False]))))
+        lengths = edges[1::2] - edges[::2]
+        if lengths.size and edges[0] == 0:
+            lengths[0] += self._standing
+        self.longest = int(np.max(lengths, initial=self.longest))
+        self._standing = int(lengths[-1]) if lengths.size and standing[-1] else 0
+
+
+def _higher(peak: tuple[float, int], values: np.ndarray, first: int) -> tuple[float, int]:
+    """The greater of ``peak`` and the greatest of ``values`` (n,), which begin at ``first``."""
+    if values.size == 0:
+        return peak
+    at = int(np.argmax(values))  # a NaN is found before every number
+    value = float(values[at])
+    return peak if peak[0] >= value or math.isnan(peak[0]) else (value, first + at)
 
 
 def ramp_down(waveform: GatedWaveform, last: int, duration: float) -> np.ndarray:

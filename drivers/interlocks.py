@@ -340,12 +340,13 @@ class Interlocks:
         predicted = predicted[:planned]
         moved = self._laser.physical(reading[:planned]) - self._rest
         far = np.abs(predicted)
-        broken = (far > locks.following_above_mm * 1e-3) & (
-            np.copysign(1.0, predicted) * moved < locks.following_fraction * far
-        )
-        broken[: max(0, self._rest_from - self._watched)] = False
-        at = self._broken["following"].first(broken)
+        judged = far > locks.following_above_mm * 1e-3
+        judged[: max(0, self._rest_from - self._watched)] = False
+        behind = np.copysign(1.0, predicted) * moved < locks.following_fraction * far
+        # what lies between is no evidence either way: a fast drive comes back to 0 all the time
+        at = self._broken["following"].first(behind[judged])
         if at is not None:
+            at = int(np.flatnonzero(judged)[at])
             yield self._trip(
                 "following",
                 at,
@@ -379,6 +380,8 @@ class _Debounce:
 
     def first(self, broken: np.ndarray) -> int | None:
         """Place in ``broken`` (n,), which follows what came before, or None."""
+        if not broken.size:
+            return None
         if not broken.any():
             self._held = 0
             return None

@@ -394,7 +394,12 @@ class InterlockSettings(Section):
         "following_above_mm does not follow (an open electrode); 0 switches it off",
     )
     following_above_mm: float = Field(default=0.3, gt=0.0, le=1e4, description="see above")
-    following_debounce_ms: float = Field(default=200.0, ge=0.0, le=1e4, description="for so long")
+    following_debounce_ms: float = Field(
+        default=200.0,
+        ge=0.0,
+        le=1e4,
+        description="for so long, not counting the time between such displacements",
+    )
     following_action: Action = Field(default="ramp", description="what is done")
     late_s: float = Field(
         default=1.0, gt=0.0, le=60.0, description="samples that wait for so long for the program"

@@ -77,10 +77,14 @@ class Film:
         """Coefficient of lam'' in the motion equation, rho L1^2/3, in kg/m (eq. 43)."""
         return self.density * self.length**2 / 3.0
 
+    @property
+    def electric_volume(self) -> float:
+        """Permittivity times volume, in F m: the capacitance is that over the thickness squared."""
+        return VACUUM_PERMITTIVITY * self.permittivity * self.length * self.width * self.thickness
+
     def capacitance(self, stretch: np.ndarray) -> np.ndarray:
         """F, of ``stretch`` (N,): the volume stays, so the area gains what the thickness loses."""
-        before = VACUUM_PERMITTIVITY * self.permittivity * self.length * self.width / self.thickness
-        return before * thinning(self.held, stretch) ** 2
+        return self.electric_volume * (thinning(self.held, stretch) / self.thickness) ** 2
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ import copy
 import math
 import pickle
 from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ LIMITS = Limits(
     time_at_voltage=0.004,
     film="F7",
 )
+WIDE = replace(LIMITS, slew=2e7, energy=1.0)
 RATE = 1000.0
 FIELD = 1.0e3
 CAPACITANCE = 5.0e-10
@@ -37,8 +39,8 @@ def gate(voltage, rate=RATE, limits=LIMITS, field=FIELD):
     return admit(voltage, rate, limits, foreseen(voltage.shape, field))
 
 
-def foreseen(shape, field=FIELD, capacitance=CAPACITANCE, pull_in="", film="F7"):
-    return Prediction(np.full(shape, field), np.full(shape, capacitance), pull_in, film)
+def foreseen(shape, field=FIELD, volume=CAPACITANCE / FIELD**2, **more):
+    return Prediction(np.full(shape, field), volume, **{"film": "F7", **more})
 
 
 def within(voltage, field_per_volt, limits=LIMITS, rate=RATE):
@@ -128,14 +130,43 @@ def test_field_factors_that_are_none(field):
 
 
 def test_predictions_must_be_as_many_as_samples():
-    with pytest.raises(RefusedWaveform, match="as many predictions"):
+    with pytest.raises(RefusedWaveform, match="a prediction for each 1"):
         admit(np.zeros(3), RATE, LIMITS, foreseen(2))
 
 
-@pytest.mark.parametrize("capacitance", [0.0, -1e-10, math.nan])
-def test_capacitances_that_are_none(capacitance):
-    with pytest.raises(RefusedWaveform, match=r"capacitance|finite"):
-        admit(np.zeros(3), RATE, LIMITS, foreseen(3, capacitance=capacitance))
+@pytest.mark.parametrize("volume", [0.0, -1e-10, math.nan, math.inf])
+def test_films_that_are_none(volume):
+    with pytest.raises(RefusedWaveform, match="permittivity times its volume is predicted as"):
+        admit(np.zeros(3), RATE, LIMITS, foreseen(3, volume=volume))
+
+
+@settings(deadline=None, max_examples=100)
+@given(
+    st.lists(st.floats(-1500.0, 9000.0), min_size=1, max_size=40),
+    st.integers(1, 5),
+    st.integers(2, 9),
+)
+def test_the_pieces_in_which_it_is_judged_do_not_matter(inside, stride, piece):
+    voltage = np.array([0.0, *inside, 0.0])
+    field = FIELD * (1.0 + 0.01 * np.arange(-(-voltage.size // stride)))
+    seen = []
+    for size in (piece, 10**6):
+        with patch("drivers.gate._PIECE", size):
+            try:
+                passed = admit(
+                    voltage, RATE, WIDE, Prediction(field, 5e-16, film="F7", stride=stride)
+                )
+                seen.append([m.reached for m in passed.margins])
+            except RefusedWaveform as refused:
+                seen.append(refused.reasons)
+    assert seen[0] == pytest.approx(seen[1]) if isinstance(seen[1], list) else seen[0] == seen[1]
+
+
+def test_a_prediction_holds_for_its_stride():
+    voltage = np.array([0.0, 100.0, 200.0, 100.0, 0.0])
+    field = np.array([1e3, 2e3, 1e3])
+    passed = admit(voltage, RATE, LIMITS, Prediction(field, 5e-16, film="F7", stride=2))
+    assert passed.margins[3].reached == pytest.approx(0.4)  # 200 V where the film is thin
 
 
 def test_a_predicted_pull_in_is_refused():

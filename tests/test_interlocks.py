@@ -213,10 +213,12 @@ def test_within_a_step_the_monitor_may_be_anywhere_between(share):
     assert not {"monitor", "breakdown"} & set(signals.tripped())
 
 
-def test_an_output_that_stays_up_is_found_when_the_command_goes_down():
+@pytest.mark.parametrize("cuts", [(), (PEAK,), (PEAK + 1,)])
+def test_an_output_that_stays_up_is_found_when_the_command_goes_down(cuts):
     signals = Signals()
     signals.voltage_command[PEAK:] = 0.0
-    assert signals.tripped()["monitor"] == PEAK + 50  # the step itself may take one sample
+    # the step itself may take one sample
+    assert signals.tripped(cuts=cuts)["monitor"] == PEAK + 50
 
 
 def test_breakdown_of_a_negative_voltage():
@@ -316,6 +318,21 @@ def test_a_stuck_reading_trips_once_the_command_has_moved(rate, needed):
     assert signals.tripped() == {"laser-stuck": start + needed - 1}
 
 
+@pytest.mark.parametrize("cut", [2000, 100, 30, 1])
+def test_what_the_command_did_before_the_reading_stuck_does_not_count(cut):
+    signals = Signals(following_fraction=0.0)
+    for voltage in (signals.voltage_command, signals.voltage_monitor):
+        voltage[:980] = 3000.0
+        voltage[980:] = 5000.0
+    signals.displacement[960:1010] = REST  # for a while it does not change, then once more
+    signals.displacement[1010:] = REST + 5e-6
+    cuts = range(cut, 2000, cut)
+    assert signals.trips(cuts=cuts) == []
+    for voltage in (signals.voltage_command, signals.voltage_monitor):
+        voltage[980:1015] = 3000.0
+    assert signals.tripped(cuts=cuts) == {"laser-stuck": 1509}
+
+
 def test_a_reading_that_changes_by_one_count_now_and_then_is_not_stuck():
     signals = Signals(following_fraction=0.0)
     signals.displacement[:] = REST
@@ -357,6 +374,17 @@ def test_following_is_not_judged_once_the_command_has_left_the_plan():
     signals.displacement[PEAK : PEAK + 1200] += 1e-6 * noise
     assert signals.trips() == []
     assert set(signals.tripped(plan=False)) == {"following"}
+
+
+def test_an_open_electrode_is_found_under_a_drive_that_comes_back_to_zero_all_the_time():
+    signals = Signals()
+    time = np.maximum(0.0, np.arange(2000) / RATE - QUIET / RATE)
+    signals.predicted = 1e-3 * np.sin(5.0 * np.pi * time) ** 2
+    signals.displacement += signals.predicted - 3e-11 * signals.planned**2
+    assert signals.trips() == []
+    signals.displacement[500:] = REST + 1e-6 * np.random.default_rng(0).standard_normal(1500)
+    judged = np.flatnonzero(signals.predicted > 0.3e-3)
+    assert signals.tripped() == {"following": judged[judged >= 500][199]}
 
 
 def test_following_is_not_judged_where_nothing_is_foreseen():

@@ -21,7 +21,8 @@ from drivers.settings import RigSettings
 
 __all__ = ["Guardian", "GuardianProcess"]
 
-_STARTS_WITHIN = 30.0  # s: an interpreter, the driver's library, a connection
+_STARTS_WITHIN = 60.0  # s: an interpreter, the driver's library, a connection
+_TAKES_OVER_WITHIN = 5.0  # s; it goes on trying after that, but the person must be told
 
 
 class Guardian(Protocol):
@@ -55,7 +56,7 @@ class GuardianProcess:
     """
 
     def __init__(self, address: Address, settings: RigSettings) -> None:
-        self._guards = False
+        self._guards = self._trying = False
         self._said: queue.Queue[str] = queue.Queue()
         config = {
             "device": address.device,
@@ -106,14 +107,18 @@ class GuardianProcess:
         """Ask for 0 V now. Raises ``RigError`` where the guardian does not bring it about."""
         if not self._tell("take over"):
             raise RigError("the guardian process is gone too")
-        self._expect_word("safe", _STARTS_WITHIN)
+        self._trying = True
+        self._expect_word("safe", _TAKES_OVER_WITHIN)
+        self._trying = False
 
     def close(self) -> None:
-        """End it."""
+        """End it; one that still tries to reach the card is left to it, and says how that ends."""
         self._tell("bye")
         if self._process.stdin is not None:
             with contextlib.suppress(OSError):  # it is gone, with its end of the pipe
                 self._process.stdin.close()
+        if self._trying:
+            return
         try:
             self._process.wait(5.0)
         except subprocess.TimeoutExpired:

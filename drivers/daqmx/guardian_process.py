@@ -23,7 +23,7 @@ from drivers.settings import RigSettings
 
 __all__ = ["Guard", "main"]
 
-_GIVE_UP = 60.0  # s of trying to reach a card that does not answer
+_GIVE_UP = 20.0  # s of trying to reach a card that does not answer
 
 
 @dataclass

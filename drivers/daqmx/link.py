@@ -14,6 +14,8 @@ __all__ = ["Link"]
 
 # a lost connection is noticed although nothing is being asked
 _KEEPALIVE_MS = 500
+# s: a server that did not answer is asked again, but many questions must not take many timeouts
+_LOST_TIMEOUT = 0.2
 
 
 class Link:
@@ -61,13 +63,21 @@ class _Details(NamedTuple):
 def _channel_with_deadline(server: str, timeout: float) -> grpc.Channel:
     import grpc
 
+    lost_codes = (grpc.StatusCode.DEADLINE_EXCEEDED, grpc.StatusCode.UNAVAILABLE)
+
     class Details(_Details, grpc.ClientCallDetails):
         pass
 
     class Deadline(grpc.UnaryUnaryClientInterceptor):
+        lost = False
+
         def intercept_unary_unary(self, call: Any, details: Any, request: Any) -> Any:
-            timed = Details(details.method, timeout, details.metadata, details.credentials)
-            return call(timed, request)
+            within = min(timeout, _LOST_TIMEOUT) if self.lost else timeout
+            answer = call(
+                Details(details.method, within, details.metadata, details.credentials), request
+            )
+            self.lost = answer.code() in lost_codes
+            return answer
 
     unlimited = -1
     channel = grpc.insecure_channel(

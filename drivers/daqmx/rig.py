@@ -71,8 +71,9 @@ class DaqmxRig:
         self._outputs = Outputs(self._link, address.device, settings)
         try:
             self._card = identify_card(self._link, address.device, settings)
-            # a program that died before this one may have left a voltage
-            self._outputs.zero(force=True)
+            # a program that died before this one may have left a voltage; one that lives has the
+            # card, and was not disturbed
+            self._outputs.zero()
         except RigError:
             self._guardian.close()
             self._link.close()

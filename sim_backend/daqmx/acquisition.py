@@ -149,7 +149,7 @@ class Run:
         return max(0, self._chunk) * CHUNK
 
     def read(self, first: int, last: int) -> np.ndarray:
-        """Counts (channels, n) int16 of the samples ``first`` to before ``last``, never backwards."""
+        """Counts (channels, n) int16 of samples ``first`` to before ``last``, never backwards."""
         parts = []
         while first < last:
             chunk = first // CHUNK

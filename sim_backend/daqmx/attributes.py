@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
-
 
 from sim_backend.daqmx.device import INPUT_RANGES, INPUTS, LINES, OUTPUTS, Device
 from sim_backend.daqmx.errors import Code, DaqmxError
@@ -48,11 +48,11 @@ class Asked:
     def first(self) -> AnalogInput | AnalogOutput | Lines:
         """The first of the task's channels that are meant."""
         task = self.own
-        channels = (*task.inputs, *task.outputs, *task.lines)
-        if not channels:
+        if not task.channels:
             raise DaqmxError(Code.NOT_WITHOUT_CHANNELS, f"Task Name: {task.name}")
-        wanted = self.channel.split(",")[0].strip()
-        for channel in channels:
+        # of a list or range of names such as Dev1/ai0:2, the first
+        wanted = re.sub(r"(?<=\d):\d+$", "", self.channel.split(",")[0].strip())
+        for channel in task.channels:
             if not wanted or channel.name == wanted:
                 return channel
         raise DaqmxError(Code.INVALID_CHANNEL_NAME, f"Channel Name: {self.channel}")
@@ -111,10 +111,10 @@ def _set_quantity(asked: Asked, *, finite: bool | None = None, samples: int | No
     )
 
 
-def _only(*values: Any) -> Setter:  # noqa: ANN401
+def _only(*values: Any) -> Setter:
     """Takes what the card does anyway, and nothing else."""
 
-    def check(_: Asked, value: Any) -> None:  # noqa: ANN401
+    def check(_: Asked, value: Any) -> None:
         if value not in values:
             raise DaqmxError(Code.INVALID_VALUE, f"Requested Value: {value}")
 
@@ -307,7 +307,7 @@ def level(value: int) -> bool:
     return value == _HIGH
 
 
-def get(group: str, number: int, asked: Asked) -> Any:  # noqa: ANN401
+def get(group: str, number: int, asked: Asked) -> Any:
     """Value of a property, as its getter has it."""
     getter, _ = _entry(group, number)
     if getter is None:
@@ -315,7 +315,7 @@ def get(group: str, number: int, asked: Asked) -> Any:  # noqa: ANN401
     return getter(asked)
 
 
-def set_(group: str, number: int, asked: Asked, value: Any) -> None:  # noqa: ANN401
+def set_(group: str, number: int, asked: Asked, value: Any) -> None:
     """Set a property."""
     _, setter = _entry(group, number)
     if setter is None:

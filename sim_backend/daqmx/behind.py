@@ -23,7 +23,7 @@ OUTPUT_MONITOR = "_{}_vs_aognd"
 
 
 class _TaskSettings(RigSettings):
-    """The rig as a task converts it: ``conversions`` s after the tick, a rig's input each, if given."""
+    """The rig as a task converts it: each of its inputs ``conversions`` s after the tick."""
 
     conversions: tuple[float, ...] = Field(default=())
 
@@ -33,7 +33,7 @@ class _TaskSettings(RigSettings):
 
 
 class Behind:
-    """The instruments of ``settings`` with the film ``plant`` at rest and noise of ``noise_seed``."""
+    """The instruments of ``settings``, the film ``plant`` at rest, noise of ``noise_seed``."""
 
     def __init__(
         self, settings: RigSettings, plant: Plant, noise_seed: tuple[int, ...], faults: FaultPlan
@@ -86,7 +86,7 @@ class Behind:
         return path, path.start(self._plant)
 
     def laser_reading(self, counts: np.ndarray, inputs: Sequence[AnalogInput]) -> tuple[int, float]:
-        """The last reading of the laser's input in the rig's ``counts`` (channels, n), and range."""
+        """Last reading of the laser's input in the rig's ``counts`` (channels, n), and range."""
         ranges = [c.range for c in inputs if c.terminal == self._settings.card.ai_displacement]
         limit = ranges[0] if ranges else self._settings.card.range_displacement_V
         return int(counts[self._settings.channel_names.index("displacement"), -1]), limit

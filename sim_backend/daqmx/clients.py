@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import logging
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Protocol
 
 from sim_backend.clock import Clock
 from sim_backend.daqmx.device import Device
@@ -16,6 +18,15 @@ __all__ = ["Clients"]
 log = logging.getLogger(__name__)
 
 _OUTPUTS = (Kind.AO, Kind.DO, Kind.WATCHDOG)
+_DEADLINE_S = 0.05  # a call that ends with no more time left than this was given up by its client
+
+
+class _Context(Protocol):
+    """What is needed of a call's context."""
+
+    def add_callback(self, callback: object) -> bool: ...
+
+    def time_remaining(self) -> float | None: ...
 
 
 @dataclass
@@ -40,23 +51,36 @@ class Clients:
         self._lock = threading.Lock()
         self._clients: dict[str, _Client] = {}
 
-    def begin(self, name: str) -> None:
-        """A call of the client ``name`` has come in."""
+    @contextmanager
+    def call(self, name: str, context: _Context) -> Iterator[None]:
+        """While a call of the client ``name`` is being answered.
+
+        When its ``context`` ends before that, and not because the client had no more time, the
+        connection has ended.
+        """
+        answered = threading.Event()
+
+        def ended() -> None:
+            left = context.time_remaining()
+            if not answered.is_set() and (left is None or left > _DEADLINE_S):
+                self.gone(name)
+
         with self._lock:
             client = self._clients.setdefault(name, _Client())
             client.calls += 1
             client.heard = self._clock.now()
+        context.add_callback(ended)
+        try:
+            yield
+        finally:
+            answered.set()
+            drives = any(task.kind in _OUTPUTS for task in self._device.tasks_of(name))
+            with self._lock:
+                client.calls -= 1
+                client.heard = self._clock.now()
+                client.drives = client.drives or drives
 
-    def end(self, name: str) -> None:
-        """It has been answered."""
-        drives = any(task.kind in _OUTPUTS for task in self._device.tasks_of(name))
-        with self._lock:
-            client = self._clients.setdefault(name, _Client())
-            client.calls -= 1
-            client.heard = self._clock.now()
-            client.drives = client.drives or drives
-
-    def listen(self, name: str, task: str, context: Any) -> None:
+    def listen(self, name: str, task: str, context: _Context) -> None:
         """The client ``name`` listens to an event of ``task`` for as long as ``context`` lasts.
 
         When that ends and the task is still there, the client has not cleared it: it is gone.
@@ -67,24 +91,29 @@ class Clients:
             if there.listened and there in self._device.tasks_of(name):
                 self.gone(name)
 
-        there.listened = True
         context.add_callback(ended)
 
     def gone(self, name: str) -> None:
         """The connection of ``name`` has ended: its tasks are cleared as well."""
         with self._lock:
             client = self._clients.pop(name, None)
-        if client is not None and client.drives:
+        tasks = self._device.tasks_of(name)
+        drives = any(task.kind in _OUTPUTS for task in tasks)
+        if drives or (client is not None and client.drives and self._device.drives(name)):
             self._make_safe(name, "its connection has ended")
-        for task in self._device.tasks_of(name):
+        for task in tasks:
             self._device.clear(task)
+
+    def all_gone(self) -> None:
+        """No connection is left."""
+        with self._lock:
+            names = list(self._clients)
+        for name in names:
+            self.gone(name)
 
     def check(self) -> None:
         """Look for a client that is silent with a voltage at the film."""
         if not self._device.live():
-            with self._lock:
-                for name, client in self._clients.items():
-                    client.drives = client.drives and bool(self._device.tasks_of(name))
             return
         now = self._clock.now()
         with self._lock:
@@ -93,12 +122,10 @@ class Clients:
                 for name, client in self._clients.items()
                 if client.drives and client.calls == 0 and now - client.heard > self._timeout
             ]
-            others = any(c.drives for name, c in self._clients.items() if name not in silent)
         for name in silent:
-            # somebody else may drive it now; the silent one's own tasks end either way
-            if not others or self._device.drives(name):
+            if self._device.drives(name):
                 self._make_safe(name, f"it is silent for more than {self._timeout:g} s")
 
     def _make_safe(self, name: str, why: str) -> None:
-        log.warning("client %s: %s; its tasks are aborted and the output is at 0 V", name, why)
         self._device.make_safe(name)
+        log.warning("client %s: %s; its tasks were aborted, the output is at 0 V", name, why)

@@ -7,6 +7,7 @@ import math
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from typing import Any
 
 import grpc
@@ -57,7 +58,7 @@ class DaqmxServer:
         link: Clock | None = None,
     ) -> None:
         self.device = device
-        self._address = f"{host}:{port}"
+        self._address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
         self._link = link or PacedClock()
         self._closing = threading.Event()
         self.clients = (
@@ -111,9 +112,11 @@ class DaqmxServer:
             if self.device.fires(FaultKind.SERVER_GONE) is not None:
                 log.warning("fault: the server is gone")
                 self._server.stop(0)
+                if self.clients is not None:
+                    self.clients.all_gone()
 
 
-class _Way(grpc.ServerInterceptor):  # type: ignore[misc]
+class _Way(grpc.ServerInterceptor):
     """What every call passes: faults of the link, who called, and refusals on their way back."""
 
     def __init__(self, server: DaqmxServer, link: Clock, closing: threading.Event) -> None:
@@ -142,22 +145,18 @@ class _Way(grpc.ServerInterceptor):  # type: ignore[misc]
 
     def _answering(self, call: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
         def answer(request: Any, context: grpc.ServicerContext) -> Any:
-            name = context.peer()
             clients = self._server.clients
-            if clients is not None:
-                clients.begin(name)
-            try:
-                self._freeze()
-                response = call(request, context)
-                self._freeze()
-                self._delay()
-            except DaqmxError as error:
-                refuse(context, error)
-            else:
-                return response
-            finally:
-                if clients is not None:
-                    clients.end(name)
+            watched = nullcontext() if clients is None else clients.call(context.peer(), context)
+            with watched:
+                try:
+                    self._freeze()
+                    response = call(request, context)
+                    self._freeze()
+                    self._delay()
+                except DaqmxError as error:
+                    refuse(context, error)
+                else:
+                    return response
 
         return answer
 
@@ -165,10 +164,10 @@ class _Way(grpc.ServerInterceptor):  # type: ignore[misc]
         self, call: Callable[[Any, Any], Iterator[Any]]
     ) -> Callable[[Any, Any], Iterator[Any]]:
         def answer(request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
-            name, clients = context.peer(), self._server.clients
-            if clients is not None:
-                clients.listen(name, request.task.name, context)
+            clients = self._server.clients
             try:
+                if clients is not None:
+                    clients.listen(context.peer(), request.task.name, context)
                 yield from call(request, context)
             except DaqmxError as error:
                 refuse(context, error)

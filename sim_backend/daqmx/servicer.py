@@ -1,11 +1,13 @@
-"""NI's gRPC device protocol on one side, the simulated card on the other; no rule of either here."""
+"""NI's gRPC device protocol on one side, the simulated card on the other; no rule of it here."""
+
+# ruff: noqa: N802, ARG002  (names, arguments and messages are the protocol's)
 
 from __future__ import annotations
 
 import re
 import threading
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NoReturn
 
 import grpc
 import numpy as np
@@ -32,7 +34,7 @@ _GROUPS = (
 )  # fmt: skip
 
 
-def refuse(context: grpc.ServicerContext, error: DaqmxError) -> None:
+def refuse(context: grpc.ServicerContext, error: DaqmxError) -> NoReturn:
     """End a call with ``error``, as NI's server does."""
     trailing = [("ni-error", str(error.code))]
     if error.read is not None:
@@ -41,6 +43,7 @@ def refuse(context: grpc.ServicerContext, error: DaqmxError) -> None:
         trailing.append(("ni-samps-per-chan-written", str(error.written)))
     context.set_trailing_metadata(tuple(trailing))
     context.abort(grpc.StatusCode.UNKNOWN, str(error))
+    raise error  # which abort has done already, in its own way
 
 
 class Servicer(pb_grpc.NiDAQmxServicer):
@@ -280,23 +283,21 @@ class Servicer(pb_grpc.NiDAQmxServicer):
         task = self._task(request)
         key = f"done {task.name}"
         self._open_stream(task, key, context)
-        was_running = False
+        told = False  # of the present start
         while self._listening(key, context):
-            running = task.running
-            done, status = False, 0
-            if running or was_running:
+            if not task.running:
+                told = False
+            elif not told:
+                status = 0
                 try:
-                    done = running and self._device.is_done(task)
+                    told = self._device.is_done(task)
                 except DaqmxError as error:
-                    done, status = True, error.code
-            was_running = running and not done
-            if done:
-                yield pb.RegisterDoneEventResponse(status=status)
-                while self._listening(key, context) and task.running:
-                    self._closing.wait(_LOOK_S)
+                    told, status = True, error.code
+                if told:
+                    yield pb.RegisterDoneEventResponse(status=status)
 
     def UnregisterDoneEvent(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._streams.discard(f"done {self._task(request).name}")
+        self._close_stream("done", self._task(request))
         return pb.UnregisterDoneEventResponse()
 
     def RegisterEveryNSamplesEvent(
@@ -326,7 +327,7 @@ class Servicer(pb_grpc.NiDAQmxServicer):
                 )
 
     def UnregisterEveryNSamplesEvent(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._streams.discard(f"samples {self._task(request).name}")
+        self._close_stream("samples", self._task(request))
         return pb.UnregisterEveryNSamplesEventResponse()
 
     def _open_stream(self, task: Task, key: str, context: grpc.ServicerContext) -> None:
@@ -335,9 +336,14 @@ class Servicer(pb_grpc.NiDAQmxServicer):
         if key in self._streams:
             raise DaqmxError(Code.EVENT_REGISTERED, f"Task Name: {task.name}")
         self._streams.add(key)
+        task.listened = True
         context.add_callback(lambda: self._streams.discard(key))
         # the client waits for this before it goes on
         context.send_initial_metadata(())
+
+    def _close_stream(self, what: str, task: Task) -> None:
+        task.listened = False
+        self._streams.discard(f"{what} {task.name}")
 
     def _listening(self, key: str, context: grpc.ServicerContext) -> bool:
         """Whether an event's stream goes on; takes a moment."""
@@ -382,7 +388,7 @@ class Servicer(pb_grpc.NiDAQmxServicer):
         """(channels, n) of a request's array."""
         self._outputs(task)
         rows, samples = len(task.outputs), request.num_samps_per_chan
-        values = np.fromiter(request.write_array, kind, len(request.write_array))
+        values: np.ndarray = np.fromiter(request.write_array, kind, len(request.write_array))
         if values.size < rows * samples:
             raise DaqmxError(Code.WRITE_BUFFER_TOO_SMALL, f"Task Name: {task.name}", written=0)
         values = values[: rows * samples]

@@ -133,9 +133,14 @@ class Task:
         return self.state is State.RUNNING
 
     @property
+    def channels(self) -> list[AnalogInput | AnalogOutput | Lines]:
+        """Its channels, which are of one kind."""
+        return [*self.inputs, *self.outputs, *self.lines]
+
+    @property
     def channel_names(self) -> list[str]:
         """Names of its channels in their order."""
-        return [c.name for c in (*self.inputs, *self.outputs, *self.lines)]
+        return [channel.name for channel in self.channels]
 
     @property
     def line_names(self) -> list[str]:

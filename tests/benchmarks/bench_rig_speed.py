@@ -43,8 +43,8 @@ def thesis_record(settings: RigSettings) -> GatedWaveform:
         elapsed = np.arange(round(RATE / frequency)) / RATE
         lobes.append(amplitude * 1e3 * np.sin(np.pi * frequency * elapsed))
     voltage = np.concatenate((np.zeros(2000), *lobes, *lobes, np.zeros(1000)))
-    stretch = np.full(voltage.size, 1.25)
-    foreseen = Prediction(stretch / THESIS_FILM.thickness, THESIS_FILM.capacitance(stretch))
+    field_per_volt = np.full(voltage.size, 1.25 / THESIS_FILM.thickness)
+    foreseen = Prediction(field_per_volt, THESIS_FILM.electric_volume)
     return admit(voltage, RATE, settings.limits.gate_limits(), foreseen)
 
 

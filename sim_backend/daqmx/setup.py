@@ -1,0 +1,388 @@
+"""What a program may set up on the card, channels and timing, and what the card has not."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Iterable, Sequence
+
+from drivers.settings import RigSettings
+from sim_backend.daqmx.behind import OUTPUT_MONITOR
+from sim_backend.daqmx.errors import Code, DaqmxError
+from sim_backend.daqmx.tasks import (
+    AnalogInput,
+    AnalogOutput,
+    Kind,
+    Lines,
+    SampleClock,
+    Task,
+    Watchdog,
+    physical_names,
+)
+
+__all__ = ["INPUTS", "INPUT_RANGES", "LINES", "OUTPUTS", "Setup"]
+
+INPUT_RANGES = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1)  #: V, plus and minus, as the PCIe-6361 has them
+INPUTS = 16
+OUTPUTS = ("ao0", "ao1")
+LINES = tuple(f"port{port}/line{line}" for port in range(3) for line in range(8))
+DIFFERENTIAL, SINGLE, SINGLE_OWN_SENSE = 10106, 10083, 10078  #: DAQmx: DIFF, RSE, NRSE
+SECONDS, TICKS, PERIODS = 10364, 10304, 10286  #: DAQmx: units of the delay
+
+_SLOWEST = 2**32  # ticks of the timebase between two samples
+_SETTLE_US = 10.0  # the driver lets an input settle longer than it must, where there is time
+_FIRST_US = 0.25  # from the sample clock to the first conversion, unless it is set
+#: Input buffer of a task that goes on: up to a rate in Hz, in samples.
+_BUFFERS = ((100.0, 1000), (10e3, 10_000), (1e6, 100_000), (math.inf, 1_000_000))
+
+
+class Setup:
+    """The card of a rig with ``settings``, as far as setting up goes; nothing happens in time here.
+
+    All calls may come from any thread, and all may raise ``DaqmxError``.
+    """
+
+    def __init__(self, settings: RigSettings) -> None:
+        self.settings = settings
+        self.name = settings.card.device
+        self._card = settings.card
+        self._lock = threading.RLock()
+
+    def check_device(self, name: str) -> None:
+        """Refuse a device that is not this one."""
+        if name.lower() != self.name.lower():
+            raise DaqmxError(Code.UNKNOWN_DEVICE, f"Device Specified: {name}")
+
+    def add_inputs(
+        self, task: Task, physical: str, name: str, wiring: int, limits: tuple[float, float]
+    ) -> None:
+        """Add the inputs ``physical``, wired as ``wiring`` says (-1: as usual), ``limits`` V."""
+        with self._lock:
+            self._may_add(task, Kind.AI)
+            taken = _range(limits, INPUT_RANGES)
+            made = []
+            terminals = physical_names(physical, self.name)
+            for terminal, called in self._named(task, terminals, name):
+                if terminal.startswith("ai") and terminal[2:].isdigit():
+                    pair = int(terminal[2:]) % 16 < 8
+                    known = int(terminal[2:]) < INPUTS
+                    how = (DIFFERENTIAL if pair else SINGLE) if wiring == -1 else wiring
+                    if how not in (DIFFERENTIAL, SINGLE, SINGLE_OWN_SENSE) or (
+                        how == DIFFERENTIAL and not pair
+                    ):
+                        raise DaqmxError(
+                            Code.INVALID_VALUE,
+                            f"Property: AI.TermCfg; Channel: {self.name}/{terminal}",
+                        )
+                else:
+                    known = terminal in [OUTPUT_MONITOR.format(ao) for ao in OUTPUTS]
+                    how = DIFFERENTIAL
+                if not known:
+                    raise DaqmxError(
+                        Code.UNKNOWN_CHANNEL, f"Physical Channel: {self.name}/{terminal}"
+                    )
+                made.append(AnalogInput(called, terminal, limits, taken, how))
+            task.kind = Kind.AI
+            task.inputs += made
+
+    def add_outputs(
+        self, task: Task, physical: str, name: str, limits: tuple[float, float]
+    ) -> None:
+        """Add the outputs ``physical`` within ``limits`` V."""
+        with self._lock:
+            self._may_add(task, Kind.AO)
+            taken = _range(limits, (self._card.ao_range_V,))
+            made = []
+            terminals = physical_names(physical, self.name)
+            for terminal, called in self._named(task, terminals, name):
+                if terminal not in OUTPUTS:
+                    raise DaqmxError(
+                        Code.UNKNOWN_CHANNEL, f"Physical Channel: {self.name}/{terminal}"
+                    )
+                made.append(AnalogOutput(called, terminal, limits, taken))
+            task.kind = Kind.AO
+            task.outputs += made
+
+    def add_lines(self, task: Task, physical: str, name: str, *, together: bool) -> None:
+        """Add digital output lines, a channel each or all ``together`` in one."""
+        with self._lock:
+            self._may_add(task, Kind.DO)
+            lines = self.lines_of(physical)
+            if together:
+                # not the range of lines: a client would take that for a name each
+                port = lines[0].partition("/")[0]
+                given = name or f"{self.name}/{port}_{len(task.lines) + 1}"
+                groups = [(given, tuple(lines))]
+            else:
+                groups = [(called, (line,)) for line, called in self._named(task, lines, name)]
+            if {called for called, _ in groups} & set(task.channel_names):
+                raise DaqmxError(Code.CHANNEL_ALREADY_IN_TASK, f"Channel Name: {groups[0][0]}")
+            task.kind = Kind.DO
+            task.lines += [Lines(called, group) for called, group in groups]
+
+    def lines_of(self, physical: str) -> list[str]:
+        """The digital lines in ``physical``: ``Dev1/port0/line0:3``, or a whole port."""
+        lines = []
+        for name in physical_names(physical, self.name):
+            found = [line for line in LINES if line == name or line.startswith(f"{name}/")]
+            if not found:
+                raise DaqmxError(Code.UNKNOWN_CHANNEL, f"Physical Channel: {self.name}/{name}")
+            lines += found
+        return lines
+
+    # timing
+
+    def set_clock(self, task: Task, rate: float, source: str, finite: bool, samples: int) -> None:
+        """Give ``task`` a sample clock of ``rate`` Hz from the terminal ``source``."""
+        with self._lock:
+            self._not_running(task)
+            if task.kind not in (Kind.AI, Kind.AO):
+                raise DaqmxError(
+                    Code.NOT_WITHOUT_CHANNELS
+                    if task.kind is Kind.EMPTY
+                    else Code.NOT_SUPPORTED_IN_TASK,
+                    f"Task Name: {task.name}",
+                )
+            if samples < (2 if finite else 0):
+                raise DaqmxError(
+                    Code.INVALID_VALUE, f"Property: SampQuant.SampPerChan; Value: {samples}"
+                )
+            terminal = self._clock_source(task, source)
+            task.clock = SampleClock(
+                self._coerced(task, rate, external=bool(terminal)), terminal, finite, samples
+            )
+
+    def set_rate(self, task: Task, rate: float) -> None:
+        """Change the rate of a task's sample clock."""
+        clock = self.clock_of(task)
+        self.set_clock(task, rate, clock.source, clock.finite, clock.samples)
+
+    def clock_of(self, task: Task) -> SampleClock:
+        """The sample clock of ``task``, which must have one."""
+        if task.clock is None:
+            raise DaqmxError(Code.NOT_SUPPORTED_IN_TASK, f"Task Name: {task.name}")
+        return task.clock
+
+    def convert_ticks(self, task: Task) -> int:
+        """Ticks of the timebase between two conversions of an input task."""
+        if task.convert_ticks is not None:
+            return task.convert_ticks
+        fastest = math.ceil(self._timebase / (1e3 * self._card.ai_rate_max_kHz))
+        settled = fastest + round(_SETTLE_US * self._card.timebase_MHz)
+        if task.clock is None:
+            return settled
+        room = self._timebase / task.clock.rate - self.delay_ticks(task)
+        return max(fastest, min(settled, math.floor(room / max(1, len(task.inputs)))))
+
+    def set_convert_rate(self, task: Task, rate: float) -> None:
+        """Set the rate in Hz of an input task's conversions."""
+        with self._lock:
+            self._not_running(task)
+            self._of_kind(task, Kind.AI)
+            fastest = 1e3 * self._card.ai_rate_max_kHz
+            if not self._timebase / _SLOWEST <= rate <= fastest * (1.0 + 1e-9):
+                raise DaqmxError(
+                    Code.INVALID_VALUE,
+                    f"Property: AIConv.Rate; Requested Value: {rate:g}; Maximum Value: {fastest:g}",
+                )
+            task.convert_ticks = round(self._timebase / rate)
+
+    def delay_ticks(self, task: Task) -> int:
+        """Ticks of the timebase from a sample clock's edge to the first conversion."""
+        if task.delay_ticks is not None:
+            return task.delay_ticks
+        return round(_FIRST_US * self._card.timebase_MHz)
+
+    def delay(self, task: Task) -> float:
+        """The same in the unit that the program has chosen."""
+        ticks = self.delay_ticks(task)
+        if task.delay_units == TICKS:
+            return float(ticks)
+        seconds = ticks / self._timebase
+        return seconds if task.delay_units == SECONDS else seconds * self.clock_of(task).rate
+
+    def set_delay(self, task: Task, value: float) -> None:
+        """Set that delay, in the unit that the program has chosen."""
+        with self._lock:
+            self._not_running(task)
+            self._of_kind(task, Kind.AI)
+            ticks = value
+            if task.delay_units == SECONDS:
+                ticks = value * self._timebase
+            elif task.delay_units == PERIODS:
+                ticks = value / self.clock_of(task).rate * self._timebase
+            if not 0.0 <= ticks < _SLOWEST:
+                raise DaqmxError(
+                    Code.INVALID_VALUE, f"Property: DelayFromSampClk.Delay; Value: {value:g}"
+                )
+            task.delay_ticks = round(ticks)
+
+    def set_delay_units(self, task: Task, units: int) -> None:
+        """Choose the unit of that delay: ``SECONDS``, ``TICKS`` or ``PERIODS``."""
+        if units not in (SECONDS, TICKS, PERIODS):
+            raise DaqmxError(
+                Code.INVALID_VALUE, f"Property: DelayFromSampClk.DelayUnits; Value: {units}"
+            )
+        task.delay_units = units
+
+    def set_trigger(self, task: Task, source: str) -> None:
+        """Let ``task`` wait for a digital edge on ``source`` when it starts; empty: for nothing."""
+        with self._lock:
+            self._not_running(task)
+            task.trigger = self._terminal(source) if source else ""
+
+    def set_buffer(self, task: Task, samples: int) -> None:
+        """Give the task's buffer room for ``samples`` a channel."""
+        with self._lock:
+            if task.running:
+                raise DaqmxError(Code.PROPERTY_WHILE_RUNNING, f"Task Name: {task.name}")
+            task.buffer = samples
+
+    def set_regeneration(self, task: Task, allowed: bool) -> None:
+        """Say whether an output task repeats what was written."""
+        with self._lock:
+            if task.running:
+                raise DaqmxError(Code.PROPERTY_WHILE_RUNNING, f"Task Name: {task.name}")
+            task.regenerates = allowed
+            task.waveform = None
+
+    def buffer_size(self, task: Task) -> int:
+        """Samples a channel that the task's buffer holds; 0 where there is none."""
+        if task.buffer is not None:
+            return task.buffer
+        if task.clock is None:
+            return 0
+        if task.kind is Kind.AO:
+            return task.first_write if task.waveform is not None else 0
+        if task.clock.finite:
+            return task.clock.samples
+        usual = next(size for rate, size in _BUFFERS if task.clock.rate <= rate)
+        return max(usual, task.clock.samples)
+
+    # checks
+
+    def _verify(self, task: Task) -> None:
+        if task.kind is Kind.EMPTY:
+            raise DaqmxError(Code.NOT_WITHOUT_CHANNELS, f"Task Name: {task.name}")
+        if task.clock is None or task.kind is not Kind.AI:
+            return
+        self._coerced(task, task.clock.rate, external=True)
+        # the converter must have begun with the last input when the next tick comes
+        last = self.delay_ticks(task) + (len(task.inputs) - 1) * self.convert_ticks(task)
+        if last >= self._timebase / task.clock.rate:
+            raise DaqmxError(
+                Code.CONVERT_PERIOD,
+                f"Sample Rate: {task.clock.rate:g}; Number of Channels: {len(task.inputs)}; the "
+                f"last conversion begins after {last / self._timebase * 1e6:g} us. Task Name: "
+                f"{task.name}",
+            )
+
+    def _coerced(self, task: Task, rate: float, *, external: bool) -> float:
+        """The rate in Hz that the card makes of ``rate``."""
+        most, least = self.fastest(task), self.slowest
+        if not least <= rate <= most * (1.0 + 1e-9):
+            raise DaqmxError(
+                Code.INVALID_VALUE,
+                f"Property: SampClk.Rate; Requested Value: {rate:g}; Maximum Value: {most:g}; "
+                f"Minimum Value: {least:.6g}; Task Name: {task.name}",
+            )
+        return rate if external else self._timebase / max(1, round(self._timebase / rate))
+
+    @property
+    def _timebase(self) -> float:
+        return self._card.timebase_MHz * 1e6
+
+    @property
+    def fastest_input(self) -> float:
+        """Highest rate in Hz of one input alone: the card is twice as fast then."""
+        return 2e3 * self._card.ai_rate_max_kHz
+
+    @property
+    def slowest(self) -> float:
+        """Lowest rate in Hz that the timebase can be divided down to."""
+        return self._timebase / _SLOWEST
+
+    def fastest(self, task: Task) -> float:
+        """Highest rate in Hz of the sample clock of ``task``."""
+        if task.kind is not Kind.AI:
+            return 1e3 * self._card.ao_rate_max_kHz
+        several = len(task.inputs)
+        return 1e3 * self._card.ai_rate_max_kHz / several if several > 1 else self.fastest_input
+
+    def _terminal(self, source: str) -> str:
+        """A terminal such as ``/Dev1/ao/SampleClock`` without its device, in small letters."""
+        text = source.strip().lower()
+        if text.startswith("/"):
+            owner, _, text = text[1:].partition("/")
+            if owner != self.name.lower():
+                raise DaqmxError(Code.INVALID_ROUTE_SOURCE, f"Source Terminal: {source}")
+        known = {
+            f"{side}/{what}" for side in ("ai", "ao") for what in ("sampleclock", "starttrigger")
+        }
+        if text not in known | {f"pfi{i}" for i in range(16)} | {"onboardclock"}:
+            raise DaqmxError(Code.INVALID_ROUTE_SOURCE, f"Source Terminal: {source}")
+        return text
+
+    def _clock_source(self, task: Task, source: str) -> str:
+        """The terminal that clocks ``task``; empty for its own clock."""
+        if not source or self._terminal(source) == "onboardclock":
+            return ""
+        terminal = self._terminal(source)
+        own = "ai/sampleclock" if task.kind is Kind.AI else "ao/sampleclock"
+        if terminal == own:
+            return ""
+        if task.kind is Kind.AI and terminal == "ao/sampleclock":
+            return terminal
+        raise DaqmxError(
+            Code.ROUTE_NOT_SUPPORTED, f"Source Terminal: {source}; Task Name: {task.name}"
+        )
+
+    def _may_add(self, task: Task, kind: Kind) -> None:
+        self._not_running(task)
+        if task.kind not in (Kind.EMPTY, kind):
+            raise DaqmxError(Code.MIXED_CHANNELS, f"Task Name: {task.name}")
+
+    def _named(self, task: Task, terminals: list[str], name: str) -> Iterable[tuple[str, str]]:
+        """Each of ``terminals`` with the name of its channel, which no other has."""
+        names = [f"{self.name}/{terminal}" for terminal in terminals]
+        given = [part.strip() for part in name.split(",")] if name else []
+        if len(given) == 1 and len(terminals) > 1:
+            names = [f"{name}{i}" for i in range(len(terminals))]
+        elif given:
+            names = given + names[len(given) :]
+        for called in names:
+            if called in task.channel_names or names.count(called) > 1:
+                raise DaqmxError(Code.CHANNEL_ALREADY_IN_TASK, f"Channel Name: {called}")
+        return list(zip(terminals, names, strict=False))
+
+    def _not_running(self, task: Task) -> None:
+        if task.running:
+            raise DaqmxError(Code.NOT_WHILE_RUNNING, f"Task Name: {task.name}")
+
+    def _of_kind(self, task: Task, kind: Kind, code: Code = Code.NOT_SUPPORTED_IN_TASK) -> None:
+        if task.kind is Kind.EMPTY:
+            code = Code.NOT_WITHOUT_CHANNELS
+        if task.kind is not kind:
+            raise DaqmxError(code, f"Task Name: {task.name}")
+
+    def _watchdog(self, task: Task) -> Watchdog:
+        if task.watchdog is None:
+            raise DaqmxError(Code.WATCHDOG_ONLY, f"Task Name: {task.name}")
+        return task.watchdog
+
+
+def _range(limits: tuple[float, float], offered: Sequence[float]) -> float:
+    """The smallest of the ranges ``offered`` in V that takes ``limits``."""
+    low, high = limits
+    if not low < high:
+        raise DaqmxError(
+            Code.MIN_NOT_LESS_THAN_MAX, f"Minimum Value: {low:g}; Maximum Value: {high:g}"
+        )
+    fitting = [r for r in offered if max(abs(low), abs(high)) <= r * (1.0 + 1e-9)]
+    if not fitting:
+        raise DaqmxError(
+            Code.INVALID_VALUE,
+            f"Property: Max or Min; Requested Values: {low:g}, {high:g}; Largest Range: "
+            f"+-{max(offered):g} V",
+        )
+    return min(fitting)
