@@ -10,7 +10,7 @@ from pathlib import Path
 
 from app.errors import InputError
 
-__all__ = ["check_output", "file_sha256", "in_words", "replaced_when_done"]
+__all__ = ["check_output", "file_sha256", "in_words", "put_back", "replaced_when_done", "set_aside"]
 
 
 def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Path:
@@ -68,6 +68,28 @@ def replaced_when_done(path: Path) -> Iterator[Path]:
         raise InputError(f"{path} cannot be written: {in_words(error)}") from error
     finally:
         partial.unlink(missing_ok=True)
+
+
+def set_aside(path: Path) -> Path | None:
+    """Give the file at ``path`` the name ``FILE.old`` until another is in its place; None if none.
+
+    Raises ``InputError`` if there is a ``FILE.old`` already, ``OSError``.
+    """
+    if not path.exists():
+        return None
+    old = path.with_name(f"{path.name}.old")
+    if old.exists():
+        raise InputError(
+            f"{old} is there already, left by a run that ended before its first samples: give it "
+            f"back its name or another, or delete it"
+        )
+    return path.rename(old)
+
+
+def put_back(old: Path | None, path: Path) -> None:
+    """Give ``path`` back the file that was set aside as ``old``, if any."""
+    if old is not None and old.exists():
+        old.replace(path)
 
 
 def file_sha256(path: Path) -> str:

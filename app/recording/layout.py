@@ -9,6 +9,10 @@
 /entry/sequence         TOML (runs only)
 /entry/model            TOML of the live overlay (when there was one)
 /entry/events           sample, time, level, message
+/entry/wall_clock       sample, unix_time: the computer's clock at every flush (runs only)
+/entry/pyramid/*        least and greatest counts over bins (runs only)
+/entry/checksums        CRC-32 of the counts (runs only)
+/entry/overview         NXdata: least and greatest physical values of a run too long for its own
 /entry/provenance       versions, configuration and its hash, seed, host, operator
 """
 
@@ -34,6 +38,7 @@ __all__ = [
     "REQUIRED",
     "SIGNALS",
     "UNITS",
+    "WALL_CLOCK_TYPE",
     "ZERO_ORDER",
     "counts_name",
     "describe_field",
@@ -100,6 +105,9 @@ EVENT_TYPE = np.dtype(
         ("message", h5py.string_dtype("utf-8", MESSAGE_BYTES)),
     ]
 )
+
+#: The computer's clock beside the sample clock: so many samples had come at that Unix time in s.
+WALL_CLOCK_TYPE = np.dtype([("sample", "<i8"), ("unix_time", "<f8")])
 
 
 def counts_name(channel: str) -> str:

@@ -8,6 +8,7 @@ one flush of the whole file (of single datasets, channels could differ by an int
 from __future__ import annotations
 
 import math
+import os
 import re
 import time
 import tomllib
@@ -20,7 +21,8 @@ import h5py
 import numpy as np
 
 from app.errors import DearigError, DiskFault, InputError, InstrumentFault
-from app.recording.files import check_output, in_words
+from app.recording.checksums import ChecksumWriter
+from app.recording.files import check_output, in_words, put_back, set_aside
 from app.recording.finish import finish
 from app.recording.layout import (
     EVENT_LEVELS,
@@ -28,12 +30,14 @@ from app.recording.layout import (
     LIBVER,
     MESSAGE_BYTES,
     UNITS,
+    WALL_CLOCK_TYPE,
     ZERO_ORDER,
     counts_name,
     lay_out,
 )
 from app.recording.physical import TEMPERATURE_UNITS, write_channel
 from app.recording.provenance import gather, write_provenance
+from app.recording.pyramid import PyramidWriter
 from app.recording.sample import write_sample
 from app.recording.text import clip_text, fixed, put_text
 from drivers.channels import CHANNEL_NAMES, Channel
@@ -52,6 +56,8 @@ class RecordingWriter:
     ``identity`` names the channels, in the order in which blocks hold them; ``rate_Hz`` is the
     sample clock's, ``samples_expected`` sizes nothing and is kept so that a reader sees what is
     missing. ``configuration`` is the text of the rig file in force. ``now`` gives Unix time in s.
+    ``fsync``: what is flushed is on the disk, so that not even a power cut takes it. A recording
+    that is overwritten stays until the first flush of samples, as ``FILE.h5.old``.
 
     Raises ``InputError`` before anything is touched: the file exists (unless ``overwrite``), its
     folder does not, or the sequence is not TOML. ``ValueError`` is a programming error.
@@ -73,6 +79,7 @@ class RecordingWriter:
         notes: str = "",
         seed: int | None = None,
         overwrite: bool = False,
+        fsync: bool = False,
         now: Callable[[], float] = time.time,
     ) -> None:
         if not (math.isfinite(rate_Hz) and rate_Hz > 0.0):
@@ -83,6 +90,7 @@ class RecordingWriter:
         self._channels = identity.channels
         self._rate = float(rate_Hz)
         self._now = now
+        self._fsync = fsync
         self._written = self._flushed = self._recorded_events = 0
         self._dirty = False
 
@@ -93,22 +101,28 @@ class RecordingWriter:
         provenance["rig"] = identity.address
         provenance["simulated"] = identity.simulated
         with _disk_errors(self._path, InputError):
-            # "x" refuses a file that another process made since it was looked for
-            mode = "w" if overwrite else "x"
-            self._file = h5py.File(self._path, mode, libver=LIBVER)
+            self._old = set_aside(self._path) if overwrite else None
         try:
             with _disk_errors(self._path, InputError):
-                entry = lay_out(self._file, "actuator", title, started)
-                put_text(entry, "sequence", sequence_toml)
-                write_sample(entry, film, load, film_id, notes)
-                write_provenance(entry, provenance)
-                self._lay_out_run(entry, identity, samples_expected)
-                self._file.flush()
-                self._file.swmr_mode = True
-                self._file.flush()
+                # "x" refuses a file that another process made since it was looked for
+                self._file = h5py.File(self._path, "x", libver=LIBVER)
+            try:
+                with _disk_errors(self._path, InputError):
+                    entry = lay_out(self._file, "actuator", title, started)
+                    put_text(entry, "sequence", sequence_toml)
+                    write_sample(entry, film, load, film_id, notes)
+                    write_provenance(entry, provenance)
+                    self._lay_out_run(entry, identity, samples_expected)
+                    self._note_wall_clock(started)
+                    self._file.flush()
+                    self._file.swmr_mode = True
+                    self._flush()
+            except BaseException:
+                self._file.close()
+                self._path.unlink(missing_ok=True)
+                raise
         except BaseException:
-            self._file.close()
-            self._path.unlink(missing_ok=True)
+            put_back(self._old, self._path)
             raise
         self._last_flush = now()
 
@@ -134,6 +148,11 @@ class RecordingWriter:
         self._events = entry.create_dataset(
             "events", shape=(0,), maxshape=(None,), chunks=(32,), dtype=EVENT_TYPE
         )
+        self._wall_clock = entry.create_dataset(
+            "wall_clock", shape=(0,), maxshape=(None,), chunks=(256,), dtype=WALL_CLOCK_TYPE
+        )
+        self._pyramid = PyramidWriter(entry, len(self._channels), self._rate)
+        self._checksums = ChecksumWriter(entry, len(self._channels), self._rate)
 
         instruments = entry.create_group("instrument")
         instruments.attrs["NX_class"] = fixed("NXcollection")
@@ -173,8 +192,8 @@ class RecordingWriter:
     def append(self, block: Block) -> None:
         """Write the next block, its events with it.
 
-        Raises ``InstrumentFault`` if samples are missing before it, ``DiskFault`` if the disk takes
-        no more.
+        Raises ``InstrumentFault`` if samples are missing before it, or come a second time, with an
+        event that says so; ``DiskFault`` if the disk takes no more.
         """
         counts = block.counts
         if counts.ndim != 2 or counts.shape[0] != len(self._channels) or counts.dtype != np.int16:
@@ -183,19 +202,27 @@ class RecordingWriter:
                 f"not {counts.dtype} {counts.shape}"
             )
         if block.start != self._written:
-            raise InstrumentFault(
-                f"{self._path}: a block starts at sample {block.start} where sample "
-                f"{self._written} was due; the rig has lost samples, record again at a lower rate"
-            )
+            raise self._out_of_step(block.start)
         end = self._written + counts.shape[1]
         with _disk_errors(self._path):
             for dataset, row in zip(self._counts, counts, strict=True):
                 dataset.resize((end,))
                 dataset[self._written : end] = row
+            self._pyramid.add(counts)
+            self._checksums.add(counts)
             self._written = end
             self._dirty = True
             self._append_events(block.events)
             self._flush_when_due()
+
+    def _out_of_step(self, start: int) -> InstrumentFault:
+        lost = start - self._written
+        what = f"{lost} samples are missing" if lost > 0 else f"{-lost} samples came twice"
+        self.event(self._written, "fault", f"{what} from here on; the run was ended")
+        return InstrumentFault(
+            f"{self._path}: a block starts at sample {start} where sample {self._written} was due: "
+            f"{what}; the rig has lost step, record again at a lower rate"
+        )
 
     def event(self, sample: int, level: str, message: str) -> None:
         """Note ``message`` at ``sample``; ``level`` is info, warning or fault."""
@@ -226,11 +253,38 @@ class RecordingWriter:
 
     def _flush_when_due(self) -> None:
         # outside the interval on either side: a clock set back must not end the flushing
-        if self._dirty and not 0.0 <= self._now() - self._last_flush < FLUSH_INTERVAL:
-            self._file.flush()
-            self._flushed = self._written
+        moment = self._now()
+        if self._dirty and not 0.0 <= moment - self._last_flush < FLUSH_INTERVAL:
+            self._flush_all(moment)
             self._last_flush = self._now()
-            self._dirty = False
+
+    def _flush_all(self, moment: float) -> None:
+        self._write_pending(moment)
+        self._flush()
+        self._all_safe()
+
+    def _write_pending(self, moment: float) -> None:
+        self._pyramid.write()
+        self._checksums.write()
+        self._note_wall_clock(moment)
+
+    def _all_safe(self) -> None:
+        self._flushed = self._written
+        self._dirty = False
+        if self._old is not None and self._flushed:
+            # from here on there is something in its place
+            self._old.unlink(missing_ok=True)
+            self._old = None
+
+    def _note_wall_clock(self, moment: float) -> None:
+        n = self._wall_clock.shape[0]
+        self._wall_clock.resize((n + 1,))
+        self._wall_clock[n] = (self._written, moment)
+
+    def _flush(self) -> None:
+        self._file.flush()
+        if self._fsync:
+            os.fsync(self._file.id.get_vfd_handle())
 
     def close(
         self,
@@ -252,17 +306,22 @@ class RecordingWriter:
                 f"the overlay has shape {displacement_model.shape}, "
                 f"the recording {self._written} samples"
             )
+        moment = self._now()
         with _disk_errors(self._path):
-            self._file.close()
-        self._flushed = self._written
+            try:
+                self._write_pending(moment)
+            finally:
+                self._file.close()
+        self._all_safe()
         try:
             finish(
                 self._path,
                 complete=True,
                 outcome=outcome,
-                ended=self._now(),
+                ended=moment,
                 displacement_model=displacement_model,
                 model_toml=model_toml,
+                fsync=self._fsync,
             )
         except InputError as error:
             raise DiskFault(
@@ -270,10 +329,11 @@ class RecordingWriter:
             ) from error
 
     def discard(self) -> None:
-        """Leave no file: for a run that ended before its first sample."""
+        """Leave no file, or the one from before: for a run that ended before its first sample."""
         if not self.closed:
             self._file.close()
             self._path.unlink(missing_ok=True)
+            put_back(self._old, self._path)
 
     def __enter__(self) -> RecordingWriter:
         """Itself."""
