@@ -18,17 +18,15 @@ from app.recording.layout import (
     SIGNALS,
     ZERO_ORDER,
     counts_name,
-    describe_field,
+    create_field,
     iso_time,
 )
 from app.recording.physical import SLICE, Counts
 from app.recording.pyramid import complete_pyramid
 from app.recording.text import clip_text, fixed, put_text
 
-__all__ = ["CHUNK", "PHYSICAL_MAX", "finish"]
+__all__ = ["OVERVIEW", "PHYSICAL_MAX", "finish"]
 
-#: Samples in a chunk of physical values.
-CHUNK = 2**17
 #: Runs of more samples hold counts and an overview in physical units: their physical values would
 #: take four times the room, and no viewer can plot as many.
 PHYSICAL_MAX = 2**24
@@ -84,6 +82,7 @@ def _write_physical(entry: h5py.Group) -> int:
         data[counts_name(channel.name)].resize((samples,))
     complete_pyramid(entry, samples, counts.raw)
     complete_checksums(entry, samples, counts.raw)
+    _trim(entry, samples)
     rest = counts.rest
     raw = data[counts_name("displacement")]
     raw.attrs["rest_reading"], raw.attrs["rest_samples"] = rest.reading, rest.samples
@@ -100,6 +99,18 @@ def _write_physical(entry: h5py.Group) -> int:
     data["displacement"].attrs["rest_reading"] = rest.reading
     data["displacement"].attrs["rest_samples"] = rest.samples
     return samples
+
+
+def _trim(entry: h5py.Group, samples: int) -> None:
+    """Take away rows that a kill left ahead of the counts, or without what belongs in them."""
+    for name, told in (("wall_clock", "unix_time"), ("events", "level")):
+        rows = entry.get(name)
+        if rows is None:
+            continue
+        there = rows[()]
+        wrong = (there["sample"] > samples) | (there[told] == there[told].dtype.type())
+        if wrong.any():
+            rows.resize((int(np.argmax(wrong)),))
 
 
 def _write_overview(entry: h5py.Group, counts: Counts) -> None:
@@ -121,14 +132,7 @@ def _write_overview(entry: h5py.Group, counts: Counts) -> None:
 def _write_field(
     data: h5py.Group, name: str, samples: int, attributes: Mapping[str, float]
 ) -> h5py.Dataset:
-    dataset = data.create_dataset(
-        name,
-        shape=(samples,),
-        dtype="<f8",
-        chunks=(min(CHUNK, samples),) if samples else None,
-        fletcher32=bool(samples),
-    )
-    describe_field(dataset, name)
+    dataset = create_field(data, name, samples)
     for key, value in attributes.items():
         dataset.attrs[key] = value
     return dataset

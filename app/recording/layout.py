@@ -41,6 +41,7 @@ __all__ = [
     "WALL_CLOCK_TYPE",
     "ZERO_ORDER",
     "counts_name",
+    "create_field",
     "describe_field",
     "iso_time",
     "lay_out",
@@ -51,6 +52,9 @@ FORMAT = f"{FORMAT_NAME}/1"
 
 #: The one library version under which a file was found to survive a kill at every write boundary.
 LIBVER = ("v110", "v110")
+
+#: Samples in a chunk of physical values.
+CHUNK = 2**17
 
 #: The two kinds: a film driven by voltage, and a film specimen driven by stretch.
 KINDS = ("actuator", "film")
@@ -126,6 +130,19 @@ def describe_field(dataset: h5py.Dataset, name: str) -> None:
     if name in LONG_NAMES:
         # viewers show this instead of name and unit
         dataset.attrs["long_name"] = fixed(f"{LONG_NAMES[name]} ({UNITS[name]})")
+
+
+def create_field(data: h5py.Group, name: str, samples: int) -> h5py.Dataset:
+    """Make the physical dataset ``name``, to be filled; HDF5 keeps a checksum of every chunk."""
+    dataset = data.create_dataset(
+        name,
+        shape=(samples,),
+        dtype="<f8",
+        chunks=(min(CHUNK, samples),) if samples else None,
+        fletcher32=bool(samples),
+    )
+    describe_field(dataset, name)
+    return dataset
 
 
 def lay_out(file: h5py.File, kind: str, title: str, started: float) -> h5py.Group:

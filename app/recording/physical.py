@@ -113,7 +113,7 @@ class Counts:
     def rest(self) -> Rest:
         """What displacement is counted from: as the file says, or from the lead-in."""
         if self._rest is None:
-            self._rest = self._stored_rest() or self._found_rest()
+            self._rest = self._stored_rest() or self.measured_rest()
         return self._rest
 
     def _stored_rest(self) -> Rest | None:
@@ -124,7 +124,8 @@ class Counts:
             return None
         return Rest(float(attrs["rest_reading"]), int(attrs["rest_samples"]))
 
-    def _found_rest(self) -> Rest:
+    def measured_rest(self) -> Rest:
+        """The mean over the lead-in, whatever the file says."""
         if not self.samples or not {"voltage_command", "displacement"} <= self._by_name.keys():
             return Rest(0.0, 0)
         quiet = self.lead_in()

@@ -44,8 +44,8 @@ def blocks(seconds: float) -> list[np.ndarray]:
     time_s = np.arange(round(RATE)) / RATE
     wave = np.array([np.sin(6.0 * time_s), np.sin(6.0 * time_s), np.sin(6.0 * time_s) ** 2])
     counts = np.rint(9000 * wave + rng.normal(0.0, 5.0, wave.shape)).astype(np.int16)
-    ring = [np.ascontiguousarray(counts[:, i : i + BLOCK]) for i in range(0, counts.shape[1], BLOCK)]
-    ring = [block for block in ring if block.shape[1] == BLOCK]
+    starts = range(0, counts.shape[1] - BLOCK, BLOCK)
+    ring = [np.ascontiguousarray(counts[:, start : start + BLOCK]) for start in starts]
     count = round(seconds * RATE / BLOCK)
     return [ring[i % len(ring)] for i in range(count)]
 
@@ -77,9 +77,7 @@ def bare(path: Path, seconds: float) -> dict[str, float]:
     run = blocks(seconds)
     with h5py.File(path, "w", libver=LIBVER) as file:
         rows = [
-            file.create_dataset(
-                c.name, shape=(0,), maxshape=(None,), chunks=(65536,), dtype="<i2"
-            )
+            file.create_dataset(c.name, shape=(0,), maxshape=(None,), chunks=(65536,), dtype="<i2")
             for c in THREE
         ]
         file.swmr_mode = True
