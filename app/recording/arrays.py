@@ -13,7 +13,7 @@ import numpy as np
 from app.errors import InputError
 from app.recording.clockwork import not_forward
 from app.recording.layout import UNITS
-from app.recording.opening import UNREADABLE, opened
+from app.recording.opening import UNREADABLE, damage, opened
 from app.recording.physical import Counts, Rest
 from app.recording.pyramid import reduced
 from app.recording.quiet import lead_in
@@ -104,7 +104,7 @@ class Arrays:
             except Refused as error:
                 raise InputError(f"{self.path}: {error}") from error
             except UNREADABLE as error:
-                raise InputError(f"{self.path} is damaged: {error}") from error
+                raise damage(self.path, error) from error
 
     def _row(self, entry: h5py.Group, name: str) -> h5py.Dataset:
         data = group(entry, "data")

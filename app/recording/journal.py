@@ -37,7 +37,9 @@ def journal_of(path: Path) -> Path:
 class Patched(io.RawIOBase):
     """A binary file with ``pages`` laid over its first ``edge`` bytes; as h5py takes one.
 
-    Writes below ``edge`` are held back in ``pages``, those above go through to the file.
+    Writes below ``edge`` are held back in ``pages``, those above go through to the file. What
+    fails there is kept in ``failure``, and nothing is written after it: HDF5 cannot let go of a
+    file that it cannot write, and brings the program down at its end.
     """
 
     def __init__(self, file: io.FileIO, edge: int, pages: dict[int, bytearray]) -> None:
@@ -46,6 +48,7 @@ class Patched(io.RawIOBase):
         self.edge = edge
         self.pages = pages
         self.end = file.seek(0, 2)
+        self.failure: OSError | None = None
 
     def readable(self) -> bool:
         return True
@@ -100,20 +103,26 @@ class Patched(io.RawIOBase):
                 page = self.pages[number] = bytearray(self.original(number))
             low, high = max(start, number * PAGE), min(below, (number + 1) * PAGE)
             page[low - number * PAGE : high - number * PAGE] = view[low - start : high - start]
-        if stop > self.edge:
+        if stop > self.edge and self.failure is None:
             first = max(start, self.edge)
-            self._file.seek(first)
-            rest = view[first - start :]
-            while rest:
-                rest = rest[self._file.write(rest) :]
+            try:
+                self._file.seek(first)
+                rest = view[first - start :]
+                while rest:
+                    rest = rest[self._file.write(rest) :]
+            except OSError as error:
+                self.failure = error
         self._at = stop
         self.end = max(self.end, stop)
         return len(view)
 
     def truncate(self, size: int | None = None, /) -> int:
         self.end = self._at if size is None else size
-        if self.end >= self.edge and self._file.writable():
-            self._file.truncate(self.end)
+        if self.end >= self.edge and self._file.writable() and self.failure is None:
+            try:
+                self._file.truncate(self.end)
+            except OSError as error:
+                self.failure = error
         return self.end
 
     def flush(self) -> None:
@@ -144,7 +153,11 @@ def changed_in_place(path: Path, fsync: bool = False) -> Iterator[Patched]:
         edge = file.seek(0, 2)
         patched = Patched(file, edge, {})
         try:
-            yield patched
+            try:
+                yield patched
+            finally:
+                if patched.failure is not None:
+                    raise patched.failure
             if fsync:
                 os.fsync(file.fileno())
             _write_journal(journal, patched, fsync)

@@ -53,7 +53,7 @@ FORMAT = f"{FORMAT_NAME}/1"
 #: The one library version under which a file was found to survive a kill at every write boundary.
 LIBVER = ("v110", "v110")
 
-#: Samples in a chunk of physical values.
+#: Samples in a chunk of physical values, at most.
 CHUNK = 2**17
 
 #: The two kinds: a film driven by voltage, and a film specimen driven by stretch.
@@ -138,7 +138,8 @@ def create_field(data: h5py.Group, name: str, samples: int) -> h5py.Dataset:
         name,
         shape=(samples,),
         dtype="<f8",
-        chunks=(min(CHUNK, samples),) if samples else None,
+        # chunks of one size: the last one takes all of its room
+        chunks=(-(-samples // -(-samples // CHUNK)),) if samples else None,
         fletcher32=bool(samples),
     )
     describe_field(dataset, name)

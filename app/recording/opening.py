@@ -13,7 +13,7 @@ from app.recording.files import in_words
 from app.recording.journal import Patched, whole_journal
 from app.recording.superblock import SIZE, flags_of
 
-__all__ = ["UNREADABLE", "opened"]
+__all__ = ["UNREADABLE", "damage", "opened"]
 
 #: What HDF5 raises for damage, and what items of another type than this layout's lead to.
 UNREADABLE = (
@@ -26,6 +26,14 @@ UNREADABLE = (
     TypeError,
     ValueError,
 )
+
+
+def damage(path: Path, error: Exception) -> InputError:
+    """What to tell of an ``UNREADABLE`` that came while ``path`` was read."""
+    text = " ".join(str(error).split())
+    if "filter returned failure" in text:
+        text = "a checksum is wrong: the file was changed, or its disk fails"
+    return InputError(f"{path} is damaged: {text}")
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -30,6 +31,8 @@ TEMPERATURE_UNITS = ("degC", "°C", "C", "K")
 KELVIN = 273.15
 #: Samples that are gone through at a time: memory stays the same however long a run was.
 SLICE = 2**20
+#: Chunks from the end that are looked at one by one: more than any flush writes.
+BACK = 64
 #: Samples of the lead-in whose mean is the rest: more would not make it any better.
 REST_MAX = 2**22
 
@@ -77,7 +80,25 @@ def read_channels(data: h5py.Group) -> tuple[Channel, ...]:
 
 def sample_count(data: h5py.Group, channels: Sequence[Channel]) -> int:
     """Samples that every channel has: a kill may have left some one block ahead of others."""
-    return min((int(data[counts_name(c.name)].shape[0]) for c in channels), default=0)
+    return min((_backed(data[counts_name(c.name)]) for c in channels), default=0)
+
+
+def _backed(counts: h5py.Dataset) -> int:
+    """Samples of ``counts`` whose chunks lie in the file.
+
+    HDF5 goes on writing when a disk refuses a chunk, and a row may claim more than is there.
+    """
+    claimed = int(counts.shape[0])
+    claimed = min(claimed, counts.id.get_storage_size() // counts.dtype.itemsize)
+    if counts.chunks is None or counts.file.driver != "sec2":
+        return claimed
+    chunk, end = int(counts.chunks[0]), os.fstat(counts.file.id.get_vfd_handle()).st_size
+    last = -(-claimed // chunk)
+    for i in range(last - 1, max(last - BACK, 0) - 1, -1):
+        info = counts.id.get_chunk_info_by_coord((i * chunk,))
+        if info.byte_offset is None or info.byte_offset + info.size > end:
+            claimed = i * chunk
+    return claimed
 
 
 def resolution(channel: Channel) -> float:

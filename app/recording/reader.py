@@ -18,7 +18,7 @@ from app.recording.layout import (
     ZERO_ORDER,
     counts_name,
 )
-from app.recording.opening import UNREADABLE, opened
+from app.recording.opening import UNREADABLE, damage, opened
 from app.recording.physical import Counts, Rest, read_channels, resolution
 from app.recording.provenance import read_provenance
 from app.recording.recording import RecordedEvent, Recording
@@ -29,7 +29,7 @@ from drivers.rig import Instrument
 from model.errors import ModelError
 from model.kinematics import KINEMATICS
 
-__all__ = ["is_finished", "open_recording", "opened"]
+__all__ = ["is_finished", "open_recording", "opened", "read_events"]
 
 #: Up to so many samples, stored values are read and checked at once; of longer recordings when they
 #: are first asked for, so that they open at once too.
@@ -48,7 +48,7 @@ def open_recording(path: str | Path) -> Recording:
         except Refused as error:
             raise InputError(f"{path}: {error}") from error
         except UNREADABLE as error:
-            raise InputError(f"{path} is damaged: {error}") from error
+            raise damage(path, error) from error
     if recording.samples <= EAGER:
         for name in recording.arrays.stored:
             recording.arrays.read(name)
@@ -59,6 +59,25 @@ def is_finished(path: Path) -> bool:
     """True if the run in the recording at ``path`` was closed, or has been recovered."""
     with opened(path) as file:
         return "samples" in file["entry"].attrs or "time" in file["entry/data"]
+
+
+def read_events(path: Path, entry: h5py.Group) -> tuple[RecordedEvent, ...]:
+    """The events in ``entry`` of the file ``path``, which is for messages."""
+    rows = dataset(entry, "events")
+    if rows is None:
+        return ()
+    try:
+        return tuple(
+            RecordedEvent(
+                int(row["sample"]),
+                float(row["time"]),
+                text_of(row["level"]),
+                text_of(row["message"]),
+            )
+            for row in rows[()]
+        )
+    except (ValueError, IndexError, TypeError) as error:
+        raise InputError(f"{path}: /entry/events cannot be read: {error}") from error
 
 
 class _Reader:
@@ -77,8 +96,10 @@ class _Reader:
             raise InputError(
                 f"{self.path}: kind {kind!r} of /entry is not one of {', '.join(KINDS)}"
             )
+        finished = "samples" in entry.attrs
         for name in data:
-            item(data, name)
+            # of what a kill or a full disk cut short the channels say how much there is
+            item(data, name, stored=finished or not name.endswith(counts_name("")))
         channels = read_channels(data)
         stored = self._stored(data)
         rest: Rest | None = None
@@ -146,7 +167,7 @@ class _Reader:
                 entry.attrs.get("outcome", "" if complete else "killed, or still running")
             ),
             samples_expected=None if expected is None else int(expected),
-            events=self._events(entry),
+            events=read_events(self.path, entry),
             instruments=self._instruments(entry),
             channels=channels,
             provenance=self._provenance(entry),
@@ -237,23 +258,6 @@ class _Reader:
             if name in data and "hold" in data[name].attrs:
                 return text_of(data[name].attrs["hold"]) == ZERO_ORDER
         return False
-
-    def _events(self, entry: h5py.Group) -> tuple[RecordedEvent, ...]:
-        rows = dataset(entry, "events")
-        if rows is None:
-            return ()
-        try:
-            return tuple(
-                RecordedEvent(
-                    int(row["sample"]),
-                    float(row["time"]),
-                    text_of(row["level"]),
-                    text_of(row["message"]),
-                )
-                for row in rows[()]
-            )
-        except (ValueError, IndexError, TypeError) as error:
-            raise InputError(f"{self.path}: /entry/events cannot be read: {error}") from error
 
     def _instruments(self, entry: h5py.Group) -> tuple[Instrument, ...]:
         instruments = group(entry, "instrument")

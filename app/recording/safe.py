@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import h5py
 
-__all__ = ["Refused", "check_stored", "dataset", "group", "item"]
+__all__ = ["Refused", "dataset", "group", "item"]
 
 #: More than this times its size in the file nothing is unpacked to.
 PACKED_MAX = 100
@@ -18,8 +18,11 @@ class Refused(Exception):  # noqa: N818  (what happened to the file, said by the
     """Why an item is not read."""
 
 
-def item(parent: h5py.Group, name: str) -> h5py.Group | h5py.Dataset | None:
-    """``name`` in ``parent``, None if it is not there. Raises ``Refused`` for a link elsewhere."""
+def item(parent: h5py.Group, name: str, stored: bool = True) -> h5py.Group | h5py.Dataset | None:
+    """``name`` in ``parent``, None if it is not there. Raises ``Refused`` for a link elsewhere.
+
+    ``stored``: and for a dataset that claims more than it holds.
+    """
     link = parent.get(name, getlink=True)
     if link is None:
         return None
@@ -28,7 +31,9 @@ def item(parent: h5py.Group, name: str) -> h5py.Group | h5py.Dataset | None:
         raise Refused(f"{where} is a link, and links are not followed")
     found = parent[name]
     if isinstance(found, h5py.Dataset):
-        check_stored(found)
+        _check_own(found)
+        if stored:
+            _check_stored(found)
     return found
 
 
@@ -44,10 +49,12 @@ def dataset(parent: h5py.Group, name: str) -> h5py.Dataset | None:
     return found if isinstance(found, h5py.Dataset) else None
 
 
-def check_stored(values: h5py.Dataset) -> None:
-    """Raise ``Refused`` unless what ``values`` claims to hold lies in this file."""
+def _check_own(values: h5py.Dataset) -> None:
     if values.is_virtual or values.external:
         raise Refused(f"{values.name} takes its values from other files; they are not followed")
+
+
+def _check_stored(values: h5py.Dataset) -> None:
     claimed, stored = int(values.nbytes), int(values.id.get_storage_size())
     if claimed > stored * (PACKED_MAX if values.compression else 1):
         raise Refused(f"{values.name} claims {claimed} bytes and {stored} are stored")

@@ -17,7 +17,7 @@ from app.recording.checksums import wrong_blocks
 from app.recording.finish import OVERVIEW
 from app.recording.journal import whole_journal
 from app.recording.layout import SIGNALS, counts_name
-from app.recording.opening import UNREADABLE, opened
+from app.recording.opening import UNREADABLE, damage, opened
 from app.recording.physical import SLICE, Counts
 from app.recording.pyramid import BINS
 from app.recording.reader import open_recording
@@ -68,7 +68,7 @@ def verify(path: str | Path) -> Verification:
     except (InputError, Refused) as error:
         found.faults.append(str(error))
     except UNREADABLE as error:
-        found.faults.append(f"{path} is damaged: {error}")
+        found.faults.append(str(damage(path, error)))
     return found
 
 

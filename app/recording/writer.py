@@ -7,9 +7,13 @@ one flush of the whole file (of single datasets, channels could differ by an int
 
 from __future__ import annotations
 
+import errno
+import logging
 import math
 import os
 import re
+import shutil
+import tempfile
 import time
 import tomllib
 from collections.abc import Callable, Iterator
@@ -38,6 +42,7 @@ from app.recording.layout import (
 from app.recording.physical import TEMPERATURE_UNITS, write_channel
 from app.recording.provenance import gather, write_provenance
 from app.recording.pyramid import PyramidWriter
+from app.recording.room import advice
 from app.recording.sample import write_sample
 from app.recording.text import clip_text, fixed, put_text
 from drivers.channels import CHANNEL_NAMES, Channel
@@ -46,8 +51,12 @@ from model.material import Film, Load
 
 __all__ = ["FLUSH_INTERVAL", "RecordingWriter"]
 
+log = logging.getLogger(__name__)
+
 #: s between flushes, at least: at most this much of a run is lost in a kill.
 FLUSH_INTERVAL = 0.25
+#: Bytes free at which a run ends: what HDF5 still has to write needs them. A second is added.
+ROOM_LEFT = 2**21
 
 
 class RecordingWriter:
@@ -93,6 +102,9 @@ class RecordingWriter:
         self._fsync = fsync
         self._written = self._flushed = self._recorded_events = 0
         self._dirty = False
+        self._closed = False
+        self._margin = int(ROOM_LEFT + 2.0 * self._rate * len(identity.channels))
+        self._failure: DiskFault | None = None
 
         started = now()
         provenance = gather(
@@ -118,7 +130,7 @@ class RecordingWriter:
                     self._file.swmr_mode = True
                     self._flush()
             except BaseException:
-                self._file.close()
+                self._let_go()
                 self._path.unlink(missing_ok=True)
                 raise
         except BaseException:
@@ -187,7 +199,7 @@ class RecordingWriter:
     @property
     def closed(self) -> bool:
         """True after ``close``."""
-        return not self._file
+        return self._closed
 
     def append(self, block: Block) -> None:
         """Write the next block, its events with it.
@@ -204,7 +216,8 @@ class RecordingWriter:
         if block.start != self._written:
             raise self._out_of_step(block.start)
         end = self._written + counts.shape[1]
-        with _disk_errors(self._path):
+        with self._writing():
+            self._check_room()
             for dataset, row in zip(self._counts, counts, strict=True):
                 dataset.resize((end,))
                 dataset[self._written : end] = row
@@ -226,9 +239,44 @@ class RecordingWriter:
 
     def event(self, sample: int, level: str, message: str) -> None:
         """Note ``message`` at ``sample``; ``level`` is info, warning or fault."""
-        with _disk_errors(self._path):
+        with self._writing():
             self._append_events((Event(sample, level, message),))
             self._flush_when_due()
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Anything that writes to the file; after a failure there is no more of it."""
+        if self._failure is not None:
+            raise self._failure
+        try:
+            with _disk_errors(self._path):
+                yield
+        except DiskFault as error:
+            self._let_go()
+            self._written = self._flushed
+            self._failure = DiskFault(
+                f"{error}; the {self._flushed} samples until then are safe there, in counts: "
+                f"dearig recover {self._path} finishes them when there is room"
+            )
+            raise self._failure from error
+
+    def _check_room(self) -> None:
+        # asked before it is too late: once HDF5 has met a full disk, what it writes is not in order
+        if shutil.disk_usage(self._path.parent).free < self._margin:
+            raise OSError(errno.ENOSPC, "no room for the next second")
+
+    def _let_go(self) -> None:
+        """Close the file as a kill would: not another byte is written to it.
+
+        HDF5 cannot close a file that it cannot write, and brings the program down at its end; so
+        what it still wants to write goes elsewhere.
+        """
+        with tempfile.TemporaryFile() as elsewhere:
+            os.dup2(elsewhere.fileno(), self._file.id.get_vfd_handle())
+            try:
+                self._file.close()
+            except (OSError, RuntimeError):
+                log.debug("%s could not be closed in order", self._path)
 
     def _append_events(self, events: tuple[Event, ...]) -> None:
         if not events:
@@ -299,19 +347,19 @@ class RecordingWriter:
         overlay, ``model_toml`` its parameters. Raises ``DiskFault`` if the physical values cannot
         be written; the counts are safe then.
         """
-        if self.closed:
+        if self._closed:
             return
         if displacement_model is not None and displacement_model.shape != (self._written,):
             raise ValueError(
                 f"the overlay has shape {displacement_model.shape}, "
                 f"the recording {self._written} samples"
             )
+        self._closed = True
         moment = self._now()
-        with _disk_errors(self._path):
-            try:
-                self._write_pending(moment)
-            finally:
-                self._file.close()
+        with self._writing():
+            self._write_pending(moment)
+            self._flush()
+            self._file.close()
         self._all_safe()
         try:
             finish(
@@ -330,8 +378,10 @@ class RecordingWriter:
 
     def discard(self) -> None:
         """Leave no file, or the one from before: for a run that ended before its first sample."""
-        if not self.closed:
-            self._file.close()
+        if not self._closed:
+            self._closed = True
+            if self._failure is None:
+                self._let_go()
             self._path.unlink(missing_ok=True)
             put_back(self._old, self._path)
 
@@ -348,7 +398,9 @@ class RecordingWriter:
         """Close; a run that failed before its first sample leaves no file."""
         if error is None:
             self.close()
-        elif not self.closed and self._written == 0:
+        elif self._failure is not None:
+            self._closed = True
+        elif not self._closed and self._written == 0:
             self.discard()
         else:
             self.close(f"ended early: {error or type(error).__name__}")
@@ -362,10 +414,7 @@ def _disk_errors(path: Path, kind: type[DearigError] = DiskFault) -> Iterator[No
     except FileExistsError as error:
         raise InputError(f"{path} exists already; choose another name") from error
     except (OSError, RuntimeError) as error:
-        raise kind(
-            f"{path} cannot be written: {in_words(error)}; see that the disk has room and that no "
-            f"other program holds the file"
-        ) from error
+        raise kind(f"{path} cannot be written: {in_words(error)}; {advice(error)}") from error
 
 
 def _check_channels(channels: tuple[Channel, ...]) -> None:

@@ -56,7 +56,7 @@ def check(path: Path, size: int, scratch: Path, total: int | None = None) -> int
     else:
         samples = open_recording(path).samples
     assert samples >= said.flushed, (samples, said.flushed)
-    if said.closing and total is not None:
+    if said.closed and total is not None:
         assert samples == total
     _same(path, samples, size)
     copy = scratch / path.name
