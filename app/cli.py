@@ -246,7 +246,9 @@ def record(
 
 @app.command("import")
 def import_(
-    source: Annotated[Path, typer.Argument(metavar="IN.csv|IN.mat|IN.tdms", help="Measured data.")],
+    source: Annotated[
+        Path, typer.Argument(metavar="IN.csv|IN.mat|IN.tdms|IN.parquet", help="Measured data.")
+    ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE.h5", help="The recording.")],
     column: Annotated[
         list[str] | None,
@@ -267,7 +269,7 @@ def import_(
     json: Json = None,
     force: Force = False,
 ) -> None:
-    """Bring in measured data that was made elsewhere (CSV, MAT, TDMS) as a recording."""
+    """Bring in measured data that was made elsewhere (CSV, MAT, TDMS, Parquet) as a recording."""
     from app.recording.importers import import_file
     from app.recording.reader import open_recording
     from app.recording.summary import describe
