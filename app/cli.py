@@ -291,7 +291,9 @@ def check(
 
 @app.command("import")
 def import_(
-    source: Annotated[Path, typer.Argument(metavar="IN.csv|IN.mat|IN.tdms", help="Measured data.")],
+    source: Annotated[
+        Path, typer.Argument(metavar="IN.csv|IN.mat|IN.tdms|IN.parquet", help="Measured data.")
+    ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE.h5", help="The recording.")],
     column: Annotated[
         list[str] | None,
@@ -312,7 +314,7 @@ def import_(
     json: Json = None,
     force: Force = False,
 ) -> None:
-    """Bring in measured data that was made elsewhere (CSV, MAT, TDMS) as a recording."""
+    """Bring in measured data that was made elsewhere (CSV, MAT, TDMS, Parquet) as a recording."""
     from app.recording.importers import import_file
     from app.recording.reader import open_recording
     from app.recording.summary import describe
@@ -361,6 +363,10 @@ def import_(
 @app.command()
 def info(
     path: Annotated[Path, typer.Argument(metavar="FILE.h5", help="A recording.")],
+    verify: Annotated[
+        bool,
+        typer.Option("--verify", help="Hold it against all its claims; exit code 4 if one fails."),
+    ] = False,
     json: Json = None,
     force: Force = False,
 ) -> None:
@@ -373,6 +379,9 @@ def info(
     from app.terminal import write_json
 
     _check_files(force, (path,), json=json)
+    if verify:
+        _verify(path, json)
+        return
     recording = open_recording(path)
     table = Table(show_header=False, box=None, pad_edge=False)
     table.add_column(style="bold", no_wrap=True)
@@ -383,6 +392,35 @@ def info(
         _console().print(table, highlight=False)
     if json is not None:
         write_json(describe(recording), json)
+
+
+def _verify(path: Path, json: str | None) -> None:
+    from app.errors import InstrumentFault
+    from app.recording.verify import verify
+    from app.terminal import write_json
+
+    found, console = verify(path), _console(json)
+    for what in found.checked:
+        _print(console, f"checked: {what}")
+    for note in found.notes:
+        _print(console, f"note: {note}", style="yellow")
+    for fault in found.faults:
+        _print(console, f"WRONG: {fault}", style="red")
+    _print(console, f"{path}: {'sound' if found.sound else 'not what it claims to be'}")
+    if json is not None:
+        write_json(
+            {
+                "format": "dearig-verification/1",
+                "recording": str(path),
+                "sound": found.sound,
+                "faults": found.faults,
+                "notes": found.notes,
+                "checked": found.checked,
+            },
+            json,
+        )
+    if not found.sound:
+        raise typer.Exit(InstrumentFault.exit_code)
 
 
 @app.command()

@@ -189,8 +189,9 @@ def test_nothing_to_write_is_not_flushed(tmp_path: Path, monkeypatch: pytest.Mon
     with make(tmp_path / "run.h5", now=clock) as recorder:
         clock.moment += 1.0
         recorder.event(0, "info", "armed")
-        monkeypatch.setattr(h5py.File, "flush", lambda _: pytest.fail("flushed twice"))
-        recorder.event(1, "info", "started")
+        with monkeypatch.context() as patch:
+            patch.setattr(h5py.File, "flush", lambda _: pytest.fail("flushed twice"))
+            recorder.event(1, "info", "started")
 
 
 def test_what_is_refused_touches_nothing(tmp_path: Path) -> None:
@@ -237,11 +238,17 @@ def test_channels_it_cannot_record(
 def test_lost_samples_are_a_fault(tmp_path: Path) -> None:
     recorder = make(tmp_path / "run.h5")
     recorder.append(Block(0, run_counts(100)))
-    with pytest.raises(InstrumentFault, match="sample 150 where sample 100 was due"):
+    with pytest.raises(InstrumentFault, match="sample 150 where sample 100 was due: 50 samples ar"):
         recorder.append(Block(150, run_counts(100)))
+    with pytest.raises(InstrumentFault, match="60 samples came twice"):
+        recorder.append(Block(40, run_counts(100)))
     with pytest.raises(ValueError, match=r"counts \(4, n\), not float64"):
         recorder.append(Block(100, np.zeros((4, 10))))
     recorder.close()
+    assert [(e.sample, e.level, e.message) for e in open_recording(recorder.path).events] == [
+        (100, "fault", "50 samples are missing from here on; the run was ended"),
+        (100, "fault", "60 samples came twice from here on; the run was ended"),
+    ]
 
 
 def test_a_run_that_fails_keeps_what_it_had(tmp_path: Path) -> None:

@@ -116,7 +116,8 @@ def _to_parquet(recording: Recording, path: Path) -> None:
     ]
     schema = pyarrow.schema(fields, _about(recording))
     arrays = [pyarrow.array(values) for values in recording.values.values()]
-    parquet.write_table(pyarrow.Table.from_arrays(arrays, schema=schema), path)
+    table = pyarrow.Table.from_arrays(arrays, schema=schema)
+    parquet.write_table(table, path, write_page_checksum=True)
 
 
 #: The formats, each with what writes it.

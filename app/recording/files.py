@@ -4,13 +4,25 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from app.errors import InputError
 
-__all__ = ["check_output", "file_sha256", "in_words", "replaced_when_done"]
+__all__ = [
+    "check_output",
+    "errno_of",
+    "file_sha256",
+    "in_words",
+    "put_back",
+    "replaced_when_done",
+    "set_aside",
+]
+
+#: Bytes of a file's name, so that one with .partial or .journal behind it can stand beside it.
+NAME_MAX = 255 - len(".partial")
 
 
 def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Path:
@@ -34,6 +46,11 @@ def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Pat
                 raise InputError(
                     f"{path} exists already; choose another name, or replace it with --force"
                 )
+        if len(os.fsencode(path.name)) > NAME_MAX:
+            raise InputError(
+                f"{path} cannot be written: its name has more than {NAME_MAX} bytes; choose a "
+                f"shorter one"
+            )
         if not path.parent.is_dir():
             raise InputError(f"{path} cannot be written: there is no folder {path.parent}")
     except (OSError, ValueError) as error:
@@ -46,11 +63,18 @@ def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Pat
     return path
 
 
+def errno_of(error: Exception) -> int | None:
+    """The operating system's number for ``error``, also where HDF5 has it in its text only."""
+    if isinstance(error, OSError) and error.errno:
+        return error.errno
+    found = re.search(r"errno = (\d+)", str(error))
+    return int(found[1]) if found else None
+
+
 def in_words(error: Exception) -> str:
     """What the operating system says of ``error``, without its number and without the path."""
-    if isinstance(error, OSError) and error.errno:
-        return os.strerror(error.errno)
-    return str(error)
+    number = errno_of(error)
+    return " ".join(str(error).split()) if number is None else os.strerror(number)
 
 
 @contextmanager
@@ -68,6 +92,28 @@ def replaced_when_done(path: Path) -> Iterator[Path]:
         raise InputError(f"{path} cannot be written: {in_words(error)}") from error
     finally:
         partial.unlink(missing_ok=True)
+
+
+def set_aside(path: Path) -> Path | None:
+    """Give the file at ``path`` the name ``FILE.old`` until another is in its place; None if none.
+
+    Raises ``InputError`` if there is a ``FILE.old`` already, ``OSError``.
+    """
+    if not path.exists():
+        return None
+    old = path.with_name(f"{path.name}.old")
+    if old.exists():
+        raise InputError(
+            f"{old} is there already, left by a run that ended before its first samples: give it "
+            f"back its name or another, or delete it"
+        )
+    return path.rename(old)
+
+
+def put_back(old: Path | None, path: Path) -> None:
+    """Give ``path`` back the file that was set aside as ``old``, if any."""
+    if old is not None and old.exists():
+        old.replace(path)
 
 
 def file_sha256(path: Path) -> str:

@@ -2,26 +2,36 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-from app.recording.files import replaced_when_done
+from app.errors import InputError
+from app.recording.checksums import complete_checksums
+from app.recording.files import in_words
+from app.recording.journal import Patched, changed_in_place
 from app.recording.layout import (
     LIBVER,
     MESSAGE_BYTES,
+    SIGNALS,
     ZERO_ORDER,
     counts_name,
-    describe_field,
+    create_field,
     iso_time,
 )
-from app.recording.physical import physical_values, read_channels, sample_count
+from app.recording.physical import SLICE, Counts
+from app.recording.pyramid import complete_pyramid
 from app.recording.text import clip_text, fixed, put_text
 
-__all__ = ["finish"]
+__all__ = ["OVERVIEW", "PHYSICAL_MAX", "finish"]
+
+#: Runs of more samples hold counts and an overview in physical units: their physical values would
+#: take four times the room, and no viewer can plot as many.
+PHYSICAL_MAX = 2**24
+#: Bins of that overview; each is two points.
+OVERVIEW = 2**13
 
 
 def finish(
@@ -32,55 +42,97 @@ def finish(
     ended: float | None,
     displacement_model: np.ndarray | None = None,
     model_toml: str = "",
-    mend: Callable[[Path], None] | None = None,
+    mend: Callable[[Patched], None] | None = None,
+    fsync: bool = False,
 ) -> int:
     """Write physical values and closing metadata to the closed recording ``path``.
 
-    Everything happens in a copy that takes the file's place as a whole: outside SWMR a kill can
-    make a file unreadable, and a full disk can strike here, but the counts stay safe. ``mend`` is
-    called with the copy before it is opened. ``ended`` is a Unix time in s, None if unknown.
-    Returns the number of samples. Raises ``InputError`` if the copy cannot be written.
+    As a whole or not at all: outside SWMR a kill can make a file unreadable, and a full disk can
+    strike here, but the counts stay safe. ``mend`` is called with the file before HDF5 opens it.
+    ``ended`` is a Unix time in s, None if unknown. Returns the number of samples. Raises
+    ``InputError`` if it cannot be written; then the file is as it was.
     """
-    with replaced_when_done(path) as partial:
-        shutil.copyfile(path, partial)
-        if mend is not None:
-            mend(partial)
-        with h5py.File(partial, "r+", libver=LIBVER) as file:
-            entry = file["entry"]
-            samples = _write_physical(entry["data"])
-            if displacement_model is not None:
-                model = displacement_model[:samples]
-                _write_field(entry["data"], "displacement_model", model, {})
-                entry["data"].attrs["auxiliary_signals"] = fixed(["displacement_model"])
-            if model_toml:
-                put_text(entry, "model", model_toml)
-            if ended is not None:
-                put_text(entry, "end_time", iso_time(ended))
-            entry.attrs["samples"] = samples
-            entry.attrs["outcome"] = fixed(clip_text(outcome, MESSAGE_BYTES).decode())
-            entry.attrs["complete"] = complete
+    try:
+        with changed_in_place(path, fsync) as changes:
+            if mend is not None:
+                mend(changes)
+            with h5py.File(changes, "r+", libver=LIBVER) as file:
+                entry = file["entry"]
+                samples = _write_physical(entry)
+                if displacement_model is not None:
+                    model = displacement_model[:samples]
+                    _write_field(entry["data"], "displacement_model", samples, {})[:] = model
+                    entry["data"].attrs["auxiliary_signals"] = fixed(["displacement_model"])
+                if model_toml:
+                    put_text(entry, "model", model_toml)
+                if ended is not None:
+                    put_text(entry, "end_time", iso_time(ended))
+                entry.attrs["samples"] = samples
+                entry.attrs["outcome"] = fixed(clip_text(outcome, MESSAGE_BYTES).decode())
+                entry.attrs["complete"] = complete
+    except (OSError, RuntimeError) as error:
+        raise InputError(f"{path} cannot be written: {in_words(error)}") from error
     return samples
 
 
-def _write_physical(data: h5py.Group) -> int:
-    channels = read_channels(data)
-    samples = sample_count(data, channels)
-    physical = physical_values(data, float(data.attrs["rate_Hz"]), samples)
-    timing = {c.name: {"skew_s": c.skew, "delay_s": c.delay} for c in channels}
-    for channel in channels:
+def _write_physical(entry: h5py.Group) -> int:
+    counts = Counts(entry)
+    data, samples = counts.data, counts.samples
+    for channel in counts.channels:
         data[counts_name(channel.name)].resize((samples,))
-    for name, values in physical.values.items():
-        _write_field(data, name, values, timing.get(name, {}))
+    complete_pyramid(entry, samples, counts.raw)
+    complete_checksums(entry, samples, counts.raw)
+    _trim(entry, samples)
+    rest = counts.rest
+    raw = data[counts_name("displacement")]
+    raw.attrs["rest_reading"], raw.attrs["rest_samples"] = rest.reading, rest.samples
+    if samples > PHYSICAL_MAX:
+        _write_overview(entry, counts)
+        return samples
+    timing = {c.name: {"skew_s": c.skew, "delay_s": c.delay} for c in counts.channels}
+    for name in counts.names:
+        field = _write_field(data, name, samples, timing.get(name, {}))
+        for start in range(0, samples, SLICE):
+            stop = min(start + SLICE, samples)
+            field[start:stop] = counts.window(name, start, stop)
     data["voltage_command"].attrs["hold"] = fixed(ZERO_ORDER)
-    data["displacement"].attrs["rest_reading"] = physical.rest_reading
-    data["displacement"].attrs["rest_samples"] = physical.rest_samples
+    data["displacement"].attrs["rest_reading"] = rest.reading
+    data["displacement"].attrs["rest_samples"] = rest.samples
     return samples
+
+
+def _trim(entry: h5py.Group, samples: int) -> None:
+    """Take away rows that a kill left ahead of the counts, or without what belongs in them."""
+    for name, told in (("wall_clock", "unix_time"), ("events", "level")):
+        rows = entry.get(name)
+        if rows is None:
+            continue
+        there = rows[()]
+        wrong = (there["sample"] > samples) | (there[told] == there[told].dtype.type())
+        if wrong.any():
+            rows.resize((int(np.argmax(wrong)),))
+
+
+def _write_overview(entry: h5py.Group, counts: Counts) -> None:
+    """What a viewer shows of a run too long to be shown: an envelope, as a line up and down."""
+    group = entry.create_group("overview")
+    group.attrs["NX_class"] = fixed("NXdata")
+    group.attrs["signal"] = fixed(SIGNALS["actuator"])
+    group.attrs["axes"] = fixed(["time"])
+    entry.attrs["default"] = fixed("overview")
+    for name in counts.names:
+        if name == "time":
+            continue
+        time, low, high = counts.overview(name, 0, counts.samples, OVERVIEW)
+        if "time" not in group:
+            _write_field(group, "time", 2 * time.size, {})[:] = np.repeat(time, 2)
+        _write_field(group, name, 2 * low.size, {})[:] = np.stack((low, high), axis=1).reshape(-1)
 
 
 def _write_field(
-    data: h5py.Group, name: str, values: np.ndarray, attributes: Mapping[str, float]
-) -> None:
-    dataset = data.create_dataset(name, data=np.asarray(values, dtype=np.float64))
-    describe_field(dataset, name)
+    data: h5py.Group, name: str, samples: int, attributes: Mapping[str, float]
+) -> h5py.Dataset:
+    dataset = create_field(data, name, samples)
     for key, value in attributes.items():
         dataset.attrs[key] = value
+    return dataset

@@ -9,6 +9,10 @@
 /entry/sequence         TOML (runs only)
 /entry/model            TOML of the live overlay (when there was one)
 /entry/events           sample, time, level, message
+/entry/wall_clock       sample, unix_time: the computer's clock at every flush (runs only)
+/entry/pyramid/*        least and greatest counts over bins (runs only)
+/entry/checksums        CRC-32 of the counts (runs only)
+/entry/overview         NXdata: least and greatest physical values of a run too long for its own
 /entry/provenance       versions, configuration and its hash, seed, host, operator
 """
 
@@ -34,8 +38,10 @@ __all__ = [
     "REQUIRED",
     "SIGNALS",
     "UNITS",
+    "WALL_CLOCK_TYPE",
     "ZERO_ORDER",
     "counts_name",
+    "create_field",
     "describe_field",
     "iso_time",
     "lay_out",
@@ -46,6 +52,9 @@ FORMAT = f"{FORMAT_NAME}/1"
 
 #: The one library version under which a file was found to survive a kill at every write boundary.
 LIBVER = ("v110", "v110")
+
+#: Samples in a chunk of physical values, at most.
+CHUNK = 2**17
 
 #: The two kinds: a film driven by voltage, and a film specimen driven by stretch.
 KINDS = ("actuator", "film")
@@ -101,6 +110,9 @@ EVENT_TYPE = np.dtype(
     ]
 )
 
+#: The computer's clock beside the sample clock: so many samples had come at that Unix time in s.
+WALL_CLOCK_TYPE = np.dtype([("sample", "<i8"), ("unix_time", "<f8")])
+
 
 def counts_name(channel: str) -> str:
     """Name of the raw counts that stand beside the physical values of ``channel``."""
@@ -118,6 +130,20 @@ def describe_field(dataset: h5py.Dataset, name: str) -> None:
     if name in LONG_NAMES:
         # viewers show this instead of name and unit
         dataset.attrs["long_name"] = fixed(f"{LONG_NAMES[name]} ({UNITS[name]})")
+
+
+def create_field(data: h5py.Group, name: str, samples: int) -> h5py.Dataset:
+    """Make the physical dataset ``name``, to be filled; HDF5 keeps a checksum of every chunk."""
+    dataset = data.create_dataset(
+        name,
+        shape=(samples,),
+        dtype="<f8",
+        # chunks of one size: the last one takes all of its room
+        chunks=(-(-samples // -(-samples // CHUNK)),) if samples else None,
+        fletcher32=bool(samples),
+    )
+    describe_field(dataset, name)
+    return dataset
 
 
 def lay_out(file: h5py.File, kind: str, title: str, started: float) -> h5py.Group:

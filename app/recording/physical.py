@@ -1,23 +1,27 @@
-"""From the counts that a run wrote to physical values."""
+"""From the counts that a run wrote to physical values, as much of them at a time as is wanted."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import h5py
 import numpy as np
 
 from app.recording.layout import UNITS, counts_name
-from app.recording.quiet import lead_in
+from app.recording.pyramid import levels, reduced
+from app.recording.quiet import NEGLIGIBLE
 from app.recording.text import fixed, text_of
 from drivers.channels import CHANNEL_NAMES, Channel, Scaling
 
 __all__ = [
+    "SLICE",
     "TEMPERATURE_UNITS",
-    "Physical",
-    "physical_values",
+    "Counts",
+    "Rest",
     "read_channels",
+    "resolution",
     "sample_count",
     "write_channel",
 ]
@@ -25,19 +29,20 @@ __all__ = [
 #: Units in which a rig may give its temperature; recordings hold degrees Celsius.
 TEMPERATURE_UNITS = ("degC", "°C", "C", "K")
 KELVIN = 273.15
+#: Samples that are gone through at a time: memory stays the same however long a run was.
+SLICE = 2**20
+#: Chunks from the end that are looked at one by one: more than any flush writes.
+BACK = 64
+#: Samples of the lead-in whose mean is the rest: more would not make it any better.
+REST_MAX = 2**22
 
 
-@dataclass(frozen=True, eq=False)
-class Physical:
-    """Physical ``values`` by name, (n,) each, ``time`` among them.
+@dataclass(frozen=True)
+class Rest:
+    """``reading`` m, the sensor's mean over the ``samples`` of the lead-in."""
 
-    ``rest_reading`` in m is the sensor's mean reading over the ``rest_samples`` of the lead-in,
-    already subtracted from the displacement.
-    """
-
-    values: dict[str, np.ndarray]
-    rest_reading: float
-    rest_samples: int
+    reading: float
+    samples: int
 
 
 def write_channel(counts: h5py.Dataset, channel: Channel) -> None:
@@ -75,7 +80,25 @@ def read_channels(data: h5py.Group) -> tuple[Channel, ...]:
 
 def sample_count(data: h5py.Group, channels: Sequence[Channel]) -> int:
     """Samples that every channel has: a kill may have left some one block ahead of others."""
-    return min((int(data[counts_name(c.name)].shape[0]) for c in channels), default=0)
+    return min((_backed(data[counts_name(c.name)]) for c in channels), default=0)
+
+
+def _backed(counts: h5py.Dataset) -> int:
+    """Samples of ``counts`` whose chunks lie in the file.
+
+    HDF5 goes on writing when a disk refuses a chunk, and a row may claim more than is there.
+    """
+    claimed = int(counts.shape[0])
+    claimed = min(claimed, counts.id.get_storage_size() // counts.dtype.itemsize)
+    if counts.chunks is None or counts.file.driver != "sec2":
+        return claimed
+    chunk, end = int(counts.chunks[0]), os.fstat(counts.file.id.get_vfd_handle()).st_size
+    last = -(-claimed // chunk)
+    for i in range(last - 1, max(last - BACK, 0) - 1, -1):
+        info = counts.id.get_chunk_info_by_coord((i * chunk,))
+        if info.byte_offset is None or info.byte_offset + info.size > end:
+            claimed = i * chunk
+    return claimed
 
 
 def resolution(channel: Channel) -> float:
@@ -84,22 +107,127 @@ def resolution(channel: Channel) -> float:
     return float(abs(ends[1] - ends[0]))
 
 
-def physical_values(data: h5py.Group, rate: float, samples: int) -> Physical:
-    """Values of the first ``samples`` samples in /entry/data, clocked at ``rate`` Hz.
+class Counts:
+    """The counts in an open ``entry``, as physical values.
 
     Displacement is measured from the mean reading over the lead-in at 0 V, or from the first
     reading of a run that has none.
     """
-    values = {"time": np.arange(samples) / rate}
-    channels = {c.name: c for c in read_channels(data)}
-    for name, channel in channels.items():
-        counts = data[counts_name(name)][:samples]
-        values[name] = channel.scaling.physical(counts)
-        if name == "temperature" and channel.unit == "K":
-            values[name] -= KELVIN
-    rest, quiet = 0.0, 0
-    if samples and {"voltage_command", "displacement"} <= channels.keys():
-        quiet = lead_in(values["voltage_command"], resolution(channels["voltage_command"]))
-        rest = float(values["displacement"][: max(quiet, 1)].mean())
-        values["displacement"] -= rest
-    return Physical({n: v for n, v in values.items() if n in UNITS}, rest, quiet)
+
+    def __init__(
+        self, entry: h5py.Group, samples: int | None = None, rest: Rest | None = None
+    ) -> None:
+        self._entry = entry
+        self.data: h5py.Group = entry["data"]
+        self.channels = read_channels(self.data)
+        self.rate = float(self.data.attrs["rate_Hz"])
+        self.samples = sample_count(self.data, self.channels) if samples is None else samples
+        self._by_name = {c.name: c for c in self.channels}
+        self._rest = rest
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What there are values of, ``time`` among them, in the order of the layout."""
+        return tuple(n for n in UNITS if n == "time" or n in self._by_name)
+
+    @property
+    def rest(self) -> Rest:
+        """What displacement is counted from: as the file says, or from the lead-in."""
+        if self._rest is None:
+            self._rest = self._stored_rest() or self.measured_rest()
+        return self._rest
+
+    def _stored_rest(self) -> Rest | None:
+        if "displacement" not in self._by_name:
+            return Rest(0.0, 0)
+        attrs = self.data[counts_name("displacement")].attrs
+        if "rest_reading" not in attrs:
+            return None
+        return Rest(float(attrs["rest_reading"]), int(attrs["rest_samples"]))
+
+    def measured_rest(self) -> Rest:
+        """The mean over the lead-in, whatever the file says."""
+        if not self.samples or not {"voltage_command", "displacement"} <= self._by_name.keys():
+            return Rest(0.0, 0)
+        quiet = self.lead_in()
+        readings = self._reading("displacement", 0, min(max(quiet, 1), REST_MAX))
+        return Rest(float(readings.mean()), quiet)
+
+    def lead_in(self) -> int:
+        """Samples at 0 V before the first that is not: ``quiet.lead_in`` of the whole voltage."""
+        channel = self._by_name["voltage_command"]
+        low, high = self.extremes("voltage_command", 0, self.samples, 2000)[1:]
+        largest = float(np.maximum(np.abs(low), np.abs(high)).max(initial=0.0))
+        threshold = max(resolution(channel), NEGLIGIBLE * largest)
+        for start, stop in self.slices():
+            # most of a lead-in is passed over by its extremes
+            _, low, high = self.extremes("voltage_command", start, stop, 1)
+            if float(np.maximum(np.abs(low), np.abs(high)).max()) > threshold:
+                loud = np.abs(self._reading("voltage_command", start, stop)) > threshold
+                return start + int(np.argmax(loud))
+        return self.samples
+
+    def slices(self) -> Iterator[tuple[int, int]]:
+        """Start and stop of one slice of the run after another."""
+        for start in range(0, self.samples, SLICE):
+            yield start, min(start + SLICE, self.samples)
+
+    def raw(self, start: int, stop: int) -> np.ndarray:
+        """Counts (channels, n) of the samples from ``start`` to before ``stop``."""
+        return np.array([self.data[counts_name(c.name)][start:stop] for c in self.channels])
+
+    def window(self, name: str, start: int, stop: int) -> np.ndarray:
+        """Values (n,) of ``name``, of the samples from ``start`` to before ``stop``."""
+        if name == "time":
+            return np.arange(start, stop) / self.rate
+        values = self._reading(name, start, stop)
+        return values - self.rest.reading if name == "displacement" else values
+
+    def _reading(self, name: str, start: int, stop: int) -> np.ndarray:
+        return self._scaled(name, self.data[counts_name(name)][start:stop])
+
+    def _scaled(self, name: str, counts: np.ndarray) -> np.ndarray:
+        channel = self._by_name[name]
+        values = channel.scaling.physical(counts)
+        return values - KELVIN if name == "temperature" and channel.unit == "K" else values
+
+    def extremes(
+        self, name: str, start: int, stop: int, points: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """First sample, least and greatest reading (n,) of at most about ``points`` bins.
+
+        Of the displacement they are not counted from its rest. From the stored levels, so that it
+        takes as long for hours as for seconds.
+        """
+        counts = self.data[counts_name(name)]
+        span = max(stop - start, 0)
+        found = levels(self._entry, self.samples)
+        size = max((s for s in found if span >= points * s), default=1)
+        first, last = -(-start // size), stop // size
+        if size == 1 or first >= last:
+            raw = counts[start:stop]
+            at, low, high = np.arange(start, stop), raw, raw
+        else:
+            place = self.channels.index(self._by_name[name])
+            rows = found[size][first:last, place, :]
+            parts = [(np.arange(first, last) * size, rows[:, 0], rows[:, 1])]
+            # what lies before the first whole bin, and after the last
+            for a, b, where in ((start, first * size, 0), (last * size, stop, 2)):
+                if b > a:
+                    raw = counts[a:b]
+                    ends = (np.array([a]), raw.min(keepdims=True), raw.max(keepdims=True))
+                    parts.insert(where, ends)
+            at, low, high = (np.concatenate(column) for column in zip(*parts, strict=True))
+        if at.size > points:
+            at = at[(np.arange(points) * at.size) // points]
+        low, high = reduced(low, high, points)
+        one, two = self._scaled(name, low), self._scaled(name, high)
+        return at, np.minimum(one, two), np.maximum(one, two)
+
+    def overview(
+        self, name: str, start: int, stop: int, points: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Time s, least and greatest value (n,) of at most about ``points`` bins."""
+        at, low, high = self.extremes(name, start, stop, points)
+        rest = self.rest.reading if name == "displacement" else 0.0
+        return at / self.rate, low - rest, high - rest

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-__all__ = ["MIN_QUIET", "lead_in", "mean_beyond_noise", "noise_floor"]
+__all__ = ["MIN_QUIET", "NEGLIGIBLE", "lead_in", "mean_beyond_noise", "noise_floor"]
 
 #: Fewer samples than this say nothing about noise.
 MIN_QUIET = 20

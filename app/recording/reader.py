@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
 import numpy as np
 
 from app.errors import InputError
-from app.recording.clockwork import not_forward
-from app.recording.files import in_words
+from app.recording.arrays import Arrays
 from app.recording.layout import (
     FORMAT,
     FORMAT_NAME,
@@ -21,29 +18,22 @@ from app.recording.layout import (
     ZERO_ORDER,
     counts_name,
 )
-from app.recording.physical import physical_values, read_channels, resolution, sample_count
+from app.recording.opening import UNREADABLE, damage, opened
+from app.recording.physical import Counts, Rest, read_channels, resolution
 from app.recording.provenance import read_provenance
 from app.recording.recording import RecordedEvent, Recording
+from app.recording.safe import Refused, dataset, group, item
 from app.recording.sample import read_film, read_load
-from app.recording.superblock import consistency_flags
 from app.recording.text import text_of
 from drivers.rig import Instrument
 from model.errors import ModelError
 from model.kinematics import KINEMATICS
 
-__all__ = ["open_recording", "opened"]
+__all__ = ["is_finished", "open_recording", "opened", "read_events"]
 
-#: What HDF5 raises for damage, and what items of another type than this layout's lead to.
-UNREADABLE = (
-    AttributeError,
-    LookupError,
-    MemoryError,
-    OSError,
-    OverflowError,
-    RuntimeError,
-    TypeError,
-    ValueError,
-)
+#: Up to so many samples, stored values are read and checked at once; of longer recordings when they
+#: are first asked for, so that they open at once too.
+EAGER = 2**20
 
 
 def open_recording(path: str | Path) -> Recording:
@@ -54,41 +44,40 @@ def open_recording(path: str | Path) -> Recording:
     path = Path(path)
     with opened(path) as file:
         try:
-            return _Reader(path, file).read()
+            recording = _Reader(path, file).read()
+        except Refused as error:
+            raise InputError(f"{path}: {error}") from error
         except UNREADABLE as error:
-            raise InputError(f"{path} is damaged: {error}") from error
+            raise damage(path, error) from error
+    if recording.samples <= EAGER:
+        for name in recording.arrays.stored:
+            recording.arrays.read(name)
+    return recording
 
 
-@contextmanager
-def opened(path: Path) -> Iterator[h5py.File]:
-    """The HDF5 file at ``path`` open for reading; ``InputError`` where it cannot be."""
+def is_finished(path: Path) -> bool:
+    """True if the run in the recording at ``path`` was closed, or has been recovered."""
+    with opened(path) as file:
+        return "samples" in file["entry"].attrs or "time" in file["entry/data"]
+
+
+def read_events(path: Path, entry: h5py.Group) -> tuple[RecordedEvent, ...]:
+    """The events in ``entry`` of the file ``path``, which is for messages."""
+    rows = dataset(entry, "events")
+    if rows is None:
+        return ()
     try:
-        if not path.is_file():
-            raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")
-        flags = consistency_flags(path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {in_words(error)}") from error
-    except ValueError as error:
-        raise InputError(f"{path} is damaged: {error}") from error
-    if flags is None:
-        raise InputError(
-            f"{path} is not an HDF5 file, as recordings are; bring data made elsewhere in with "
-            f"dearig import"
+        return tuple(
+            RecordedEvent(
+                int(row["sample"]),
+                float(row["time"]),
+                text_of(row["level"]),
+                text_of(row["message"]),
+            )
+            for row in rows[()]
         )
-    try:
-        # a plain open is refused after a kill and during a run; SWMR sees what was flushed. Not
-        # SWMR always: it does not look whether the file has been cut short
-        file = h5py.File(path, "r", swmr=flags != 0)
-    except (OSError, RuntimeError) as error:
-        if "truncated" in str(error):
-            reason = "is truncated: it was not copied or downloaded to its end"
-        elif flags:
-            reason = "is being written by another program, or was killed before its first sample"
-        else:
-            reason = f"cannot be read: {error}"
-        raise InputError(f"{path} {reason}") from error
-    with file:
-        yield file
+    except (ValueError, IndexError, TypeError) as error:
+        raise InputError(f"{path}: /entry/events cannot be read: {error}") from error
 
 
 class _Reader:
@@ -107,21 +96,35 @@ class _Reader:
             raise InputError(
                 f"{self.path}: kind {kind!r} of /entry is not one of {', '.join(KINDS)}"
             )
+        finished = "samples" in entry.attrs
+        for name in data:
+            # of what a kill or a full disk cut short the channels say how much there is
+            item(data, name, stored=finished or not name.endswith(counts_name("")))
         channels = read_channels(data)
-        if "time" in data:
-            values = self._stored_values(data)
-            rest = (
-                float(data["displacement"].attrs.get("rest_reading", 0.0))
-                if (kind == "actuator" and "displacement" in data)
-                else 0.0
-            )
-        elif channels:
-            values, rest = self._values_of_counts(data)
-        else:
+        stored = self._stored(data)
+        rest: Rest | None = None
+        derived: tuple[str, ...] = ()
+        rate: float | None = None
+        if channels:
+            rate = self._rate(data)
+            counts = Counts(entry, samples=self._stored_samples(data, stored))
+            derived, rest = counts.names, counts.rest
+            samples = counts.samples
+        elif "time" not in stored:
             raise InputError(f"{self.path}: /entry/data/time is missing")
-        self._check_values(kind, values)
-        for array in values.values():
-            array.setflags(write=False)
+        else:
+            samples = int(data["time"].shape[0])
+        if samples == 0:
+            raise InputError(
+                f"{self.path} holds no samples"
+                + ("" if stored else ": the run ended before its first block")
+            )
+        self._check_rows(data, stored, samples)
+        if stored:
+            derived = tuple(n for n in derived if n in stored or n == "time")
+        for name in REQUIRED[kind]:
+            if name not in stored and name not in derived:
+                raise InputError(f"{self.path}: /entry/data/{name} is missing")
 
         sample = self._group(entry, "sample")
         try:
@@ -144,13 +147,15 @@ class _Reader:
             path=self.path,
             kind=kind,
             name=self.path.stem,
+            arrays=Arrays(self.path, stored, derived, samples, rest),
+            rate=rate,
             title=self._text(entry, "title"),
             hold=kind == "actuator" and self._hold(data),
             kinematics=kinematics,
             complete=complete,
             displacement_skew=skew,
             displacement_delay=delay,
-            rest_reading=rest,
+            rest_reading=self._rest_reading(data, rest),
             voltage_step=step,
             film=film,
             load=load,
@@ -162,11 +167,10 @@ class _Reader:
                 entry.attrs.get("outcome", "" if complete else "killed, or still running")
             ),
             samples_expected=None if expected is None else int(expected),
-            events=self._events(entry),
+            events=read_events(self.path, entry),
             instruments=self._instruments(entry),
             channels=channels,
-            provenance=read_provenance(entry["provenance"]) if "provenance" in entry else {},
-            **values,
+            provenance=self._provenance(entry),
         )
 
     def _check_format(self) -> None:
@@ -186,76 +190,61 @@ class _Reader:
         raise InputError(f"{self.path} has format {form!r}, not {FORMAT}")
 
     def _group(self, parent: h5py.Group, name: str) -> h5py.Group:
-        found = parent.get(name)
-        if not isinstance(found, h5py.Group):
+        found = group(parent, name)
+        if found is None:
             where = f"{parent.name.rstrip('/')}/{name}"
             raise InputError(f"{self.path}: the group {where} is missing")
         return found
 
     def _text(self, parent: h5py.Group, name: str) -> str:
-        found = parent.get(name)
-        return text_of(found[()]) if isinstance(found, h5py.Dataset) else ""
+        found = dataset(parent, name)
+        return "" if found is None else text_of(found[()])
 
-    def _stored_values(self, data: h5py.Group) -> dict[str, np.ndarray]:
-        values = {}
-        for name, unit in UNITS.items():
-            if name not in data:
-                continue
-            dataset = data[name]
-            where = f"{self.path}: /entry/data/{name}"
-            if (
-                not isinstance(dataset, h5py.Dataset)
-                or dataset.ndim != 1
-                or dataset.dtype.kind not in "fiu"
-            ):
-                raise InputError(f"{where} is not a row of numbers")
-            stored = text_of(dataset.attrs.get("units", unit))
-            if stored != unit:
-                raise InputError(f"{where} is in {stored!r}; {FORMAT} holds it in {unit!r}")
-            values[name] = dataset[()].astype(np.float64)
-        return values
+    def _provenance(self, entry: h5py.Group) -> dict[str, object]:
+        found = group(entry, "provenance")
+        if found is None:
+            return {}
+        for name in found:
+            item(found, name)
+        return read_provenance(found)
 
-    def _values_of_counts(self, data: h5py.Group) -> tuple[dict[str, np.ndarray], float]:
-        channels = read_channels(data)
-        samples = sample_count(data, channels)
-        if samples == 0:
-            raise InputError(f"{self.path} holds no samples: the run ended before its first block")
+    def _rate(self, data: h5py.Group) -> float:
         rate = float(data.attrs["rate_Hz"])
         if not (np.isfinite(rate) and rate > 0.0):
             raise InputError(f"{self.path}: rate_Hz of /entry/data is {rate}, not above 0")
-        physical = physical_values(data, rate, samples)
-        return physical.values, physical.rest_reading
+        return rate
 
-    def _check_values(self, kind: str, values: dict[str, np.ndarray]) -> None:
-        for name in REQUIRED[kind]:
-            if name not in values:
-                raise InputError(f"{self.path}: /entry/data/{name} is missing")
-        time = values["time"]
-        if time.size == 0:
-            raise InputError(f"{self.path} holds no samples")
-        for name, array in values.items():
-            if array.size != time.size:
+    def _stored(self, data: h5py.Group) -> tuple[str, ...]:
+        """Names of the physical values that are there."""
+        found = []
+        for name, unit in UNITS.items():
+            row = item(data, name)
+            if row is None:
+                continue
+            where = f"{self.path}: /entry/data/{name}"
+            if not isinstance(row, h5py.Dataset) or row.ndim != 1 or row.dtype.kind not in "fiu":
+                raise InputError(f"{where} is not a row of numbers")
+            stored = text_of(row.attrs.get("units", unit))
+            if stored != unit:
+                raise InputError(f"{where} is in {stored!r}; {FORMAT} holds it in {unit!r}")
+            found.append(name)
+        return tuple(found)
+
+    def _stored_samples(self, data: h5py.Group, stored: tuple[str, ...]) -> int | None:
+        return int(data["time"].shape[0]) if "time" in stored else None
+
+    def _check_rows(self, data: h5py.Group, stored: tuple[str, ...], samples: int) -> None:
+        for name in stored:
+            size = data[name].shape[0]
+            if size != samples:
                 raise InputError(
-                    f"{self.path}: /entry/data/{name} has {array.size} samples, time {time.size}"
+                    f"{self.path}: /entry/data/{name} has {size} samples, time {samples}"
                 )
-            # the overlay may have had nothing to show at times
-            finite = np.isfinite(array)
-            if not finite.all() and name != "displacement_model":
-                at = int(np.argmin(finite))
-                raise InputError(
-                    f"{self.path}: /entry/data/{name} is {array[at]} at sample {at}, not a number"
-                )
-        if (back := not_forward(time)) is not None:
-            at, how = back
-            raise InputError(
-                f"{self.path}: /entry/data/time {how} at sample {at} ({time[at]:.9g} s)"
-            )
-        if kind == "film" and not (values["stretch"] > 0.0).all():
-            at = int(np.argmax(values["stretch"] <= 0.0))
-            raise InputError(
-                f"{self.path}: /entry/data/stretch is {values['stretch'][at]:.6g} at sample {at}; "
-                f"a stretch is above 0"
-            )
+
+    def _rest_reading(self, data: h5py.Group, rest: Rest | None) -> float:
+        if "displacement" in data:
+            return float(data["displacement"].attrs.get("rest_reading", 0.0))
+        return 0.0 if rest is None else rest.reading
 
     def _timing(self, data: h5py.Group) -> tuple[float, float]:
         for name in ("displacement", counts_name("displacement")):
@@ -270,34 +259,16 @@ class _Reader:
                 return text_of(data[name].attrs["hold"]) == ZERO_ORDER
         return False
 
-    def _events(self, entry: h5py.Group) -> tuple[RecordedEvent, ...]:
-        rows = entry.get("events")
-        if not isinstance(rows, h5py.Dataset):
-            return ()
-        try:
-            return tuple(
-                RecordedEvent(
-                    int(row["sample"]),
-                    float(row["time"]),
-                    text_of(row["level"]),
-                    text_of(row["message"]),
-                )
-                for row in rows[()]
-            )
-        except (ValueError, IndexError, TypeError) as error:
-            raise InputError(f"{self.path}: /entry/events cannot be read: {error}") from error
-
     def _instruments(self, entry: h5py.Group) -> tuple[Instrument, ...]:
-        group = entry.get("instrument")
+        instruments = group(entry, "instrument")
         found = []
-        for item in group.values() if isinstance(group, h5py.Group) else ():
-            if (
-                not isinstance(item, h5py.Group)
-                or text_of(item.attrs.get("NX_class", "")) != "NXinstrument"
-            ):
+        for name in instruments or ():
+            one = group(instruments, name)
+            if one is None or text_of(one.attrs.get("NX_class", "")) != "NXinstrument":
                 continue
-            attrs = item.attrs
-            settings = item["settings"].asstr()[()] if "settings" in item else ()
+            attrs = one.attrs
+            rows = dataset(one, "settings")
+            settings = () if rows is None else rows.asstr()[()]
             found.append(
                 Instrument(
                     role=text_of(attrs.get("role", "")),

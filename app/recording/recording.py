@@ -1,4 +1,4 @@
-"""A recording in memory: immutable arrays and everything that is known about them."""
+"""A recording: its values, read when they are asked for, and all that is known about them."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
+from app.recording.arrays import Arrays, Overview
 from app.recording.files import file_sha256
-from app.recording.layout import SIGNALS, UNITS
-from app.recording.quiet import lead_in, noise_floor
+from app.recording.layout import SIGNALS
+from app.recording.quiet import noise_floor
 from drivers.channels import Channel
 from drivers.rig import Instrument
 from model.material import Film, Load
 
 __all__ = ["RecordedEvent", "Recording"]
+
+#: Samples of a lead-in from which its noise is read: more would not make it any better.
+NOISE_MAX = 2**22
 
 
 @dataclass(frozen=True)
@@ -32,31 +36,28 @@ class RecordedEvent:
 class Recording:
     """What ``open_recording`` found. Arrays are (N,) float64 and read-only; None is "not there".
 
+    They are read from the file when they are first asked for, so that a recording of hours opens
+    at once; ``overview`` and ``window`` read no more than what they show.
+
     ``kind`` is ``actuator`` (``voltage_command`` V drives, ``displacement`` m from the loaded rest
     state answers) or ``film`` (``stretch`` drives, ``nominal_stress`` Pa answers). ``time`` in s
     increases and need not be even. ``hold``: the voltage stands between samples (a converter);
     otherwise it is linear. ``displacement_skew`` and ``displacement_delay`` in s are the known time
     at which the sensor is converted after the tick, and the sensor's own lag; neither has been
     taken off ``time``. ``temperature`` is in degrees Celsius. ``complete`` is False for a run that
-    was killed; ``outcome`` says how it ended.
+    was killed; ``outcome`` says how it ended. ``rate`` in Hz is the sample clock's, None for data
+    that had none.
     """
 
     path: Path
     kind: str
     name: str
     title: str
-    time: np.ndarray
+    arrays: Arrays
     hold: bool
     kinematics: str
     complete: bool
-    displacement: np.ndarray | None = None
-    voltage_command: np.ndarray | None = None
-    voltage_monitor: np.ndarray | None = None
-    current_monitor: np.ndarray | None = None
-    temperature: np.ndarray | None = None
-    displacement_model: np.ndarray | None = None
-    stretch: np.ndarray | None = None
-    nominal_stress: np.ndarray | None = None
+    rate: float | None = None
     displacement_skew: float = 0.0
     displacement_delay: float = 0.0
     rest_reading: float = 0.0
@@ -75,33 +76,115 @@ class Recording:
     provenance: dict[str, object] = field(default_factory=dict)
 
     @property
+    def time(self) -> np.ndarray:
+        """s, of the sample clock."""
+        return self.arrays.read("time")
+
+    @property
+    def displacement(self) -> np.ndarray | None:
+        """m, from the loaded rest state."""
+        return self._row("displacement")
+
+    @property
+    def voltage_command(self) -> np.ndarray | None:
+        """V at the film."""
+        return self._row("voltage_command")
+
+    @property
+    def voltage_monitor(self) -> np.ndarray | None:
+        """V at the film, as read back."""
+        return self._row("voltage_monitor")
+
+    @property
+    def current_monitor(self) -> np.ndarray | None:
+        """A."""
+        return self._row("current_monitor")
+
+    @property
+    def temperature(self) -> np.ndarray | None:
+        """Degrees Celsius."""
+        return self._row("temperature")
+
+    @property
+    def displacement_model(self) -> np.ndarray | None:
+        """m, the live overlay."""
+        return self._row("displacement_model")
+
+    @property
+    def stretch(self) -> np.ndarray | None:
+        """Length over length at rest."""
+        return self._row("stretch")
+
+    @property
+    def nominal_stress(self) -> np.ndarray | None:
+        """Pa."""
+        return self._row("nominal_stress")
+
+    def _row(self, name: str) -> np.ndarray | None:
+        return self.arrays.read(name) if name in self.arrays.names else None
+
+    @property
     def values(self) -> dict[str, np.ndarray]:
         """Every array that is there, by name, ``time`` first."""
-        found = {name: getattr(self, name) for name in UNITS}
-        return {name: values for name, values in found.items() if values is not None}
+        return {name: self.arrays.read(name) for name in self.arrays.names}
 
     @property
     def signal(self) -> np.ndarray:
         """What the film answered: displacement in m, or nominal stress in Pa."""
-        values: np.ndarray = getattr(self, SIGNALS[self.kind])
-        return values
+        return self.arrays.read(SIGNALS[self.kind])
 
     @property
     def samples(self) -> int:
         """N."""
-        return int(self.time.size)
+        return self.arrays.samples
 
     @property
     def duration(self) -> float:
         """s, from the first to the last sample."""
-        return float(self.time[-1] - self.time[0])
+        n = self.samples
+        first, last = (float(self.arrays.window("time", i, i + 1)[0]) for i in (0, n - 1))
+        return last - first
+
+    def overview(
+        self, channel: str, points: int, start: int = 0, stop: int | None = None
+    ) -> Overview:
+        """Least and greatest values of ``channel`` in at most about ``points`` bins.
+
+        From sample ``start`` to before ``stop``, by default the end. From levels stored with the
+        run: as quick for hours as for seconds. Raises ``ValueError`` for a channel that is not
+        there.
+        """
+        self._check_channel(channel)
+        if points < 1:
+            raise ValueError(f"points = {points} must be 1 or more")
+        return self.arrays.overview(channel, points, start, self.samples if stop is None else stop)
+
+    def window(self, channel: str, start: int, stop: int) -> np.ndarray:
+        """Values (n,) of ``channel`` from sample ``start`` to before ``stop``, and only these.
+
+        Raises ``ValueError`` for a channel that is not there.
+        """
+        self._check_channel(channel)
+        return self.arrays.window(channel, start, stop)
+
+    def _check_channel(self, channel: str) -> None:
+        if channel not in self.arrays.names:
+            raise ValueError(
+                f"{self.path} has no channel {channel!r}; it has {', '.join(self.arrays.names)}"
+            )
+
+    @cached_property
+    def quiet_samples(self) -> int:
+        """Samples of the lead-in: at 0 V, before the first voltage. 0 for a film."""
+        if "voltage_command" not in self.arrays.names:
+            return 0
+        return self.arrays.lead_in(self.voltage_step)
 
     @cached_property
     def quiet(self) -> np.ndarray:
-        """(N,) True in the lead-in: at 0 V, before the first voltage. All False for a film."""
+        """(N,) True in the lead-in. All False for a film."""
         mask = np.zeros(self.samples, dtype=bool)
-        if self.voltage_command is not None:
-            mask[: lead_in(self.voltage_command, self.voltage_step)] = True
+        mask[: self.quiet_samples] = True
         mask.setflags(write=False)
         return mask
 
@@ -111,9 +194,11 @@ class Recording:
 
         None for a film, and for a lead-in of fewer than 20 samples.
         """
-        if self.displacement is None:
+        if "displacement" not in self.arrays.names:
             return None
-        return noise_floor(self.time[self.quiet], self.displacement[self.quiet])
+        quiet = min(self.quiet_samples, NOISE_MAX)
+        time, readings = (self.arrays.window(n, 0, quiet) for n in ("time", "displacement"))
+        return noise_floor(time, readings)
 
     @cached_property
     def sha256(self) -> str:

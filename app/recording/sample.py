@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 import h5py
 
+from app.recording.safe import dataset, group
 from app.recording.text import fixed, put_text, text_of
 from model.material import Film, Load
 
@@ -36,37 +37,36 @@ def write_sample(
     for name, owner in (("film", film), ("load", load)):
         if owner is None:
             continue
-        group = sample.create_group(name)
-        group.attrs["NX_class"] = fixed("NXcollection")
+        part = sample.create_group(name)
+        part.attrs["NX_class"] = fixed("NXcollection")
         for item in fields(owner):
             value = getattr(owner, item.name)
             if value is None:
                 continue
             if isinstance(value, str):
-                put_text(group, item.name, value)
+                put_text(part, item.name, value)
             else:
-                group.create_dataset(item.name, data=float(value))
-                group[item.name].attrs["units"] = fixed(UNITS.get(item.name, ""))
+                part.create_dataset(item.name, data=float(value))
+                part[item.name].attrs["units"] = fixed(UNITS.get(item.name, ""))
 
 
-def _values(group: h5py.Group, owner: type[Film] | type[Load]) -> dict[str, object]:
+def _values(parent: h5py.Group, owner: type[Film] | type[Load]) -> dict[str, object]:
     found: dict[str, object] = {}
     for item in fields(owner):
-        if item.name in group:
-            value = group[item.name][()]
+        stored = dataset(parent, item.name)
+        if stored is not None:
+            value = stored[()]
             found[item.name] = text_of(value) if isinstance(value, bytes) else float(value)
     return found
 
 
 def read_film(sample: h5py.Group) -> Film | None:
     """The film, None if the recording does not know it. Raises ``ModelError``, ``TypeError``."""
-    if "film" not in sample:
-        return None
-    return Film(**_values(sample["film"], Film))  # type: ignore[arg-type]
+    film = group(sample, "film")
+    return None if film is None else Film(**_values(film, Film))  # type: ignore[arg-type]
 
 
 def read_load(sample: h5py.Group) -> Load | None:
     """The load, None if the recording does not know it. Raises ``ModelError``, ``TypeError``."""
-    if "load" not in sample:
-        return None
-    return Load(**_values(sample["load"], Load))  # type: ignore[arg-type]
+    load = group(sample, "load")
+    return None if load is None else Load(**_values(load, Load))  # type: ignore[arg-type]

@@ -19,7 +19,7 @@ from app.recording.layout import (
     REQUIRED,
     UNITS,
     ZERO_ORDER,
-    describe_field,
+    create_field,
     lay_out,
 )
 from app.recording.provenance import gather, write_provenance
@@ -77,8 +77,7 @@ def save_recording(
         entry = lay_out(file, kind, title, started)
         data = entry["data"]
         for name, array in values.items():
-            data.create_dataset(name, data=np.asarray(array, dtype=np.float64))
-            describe_field(data[name], name)
+            create_field(data, name, size)[...] = np.asarray(array, dtype=np.float64)
         if kinematics is not None:
             data.attrs["kinematics"] = fixed(kinematics)
         if kind == "actuator":

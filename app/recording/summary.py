@@ -19,9 +19,17 @@ EVEN = 1e-6
 
 def describe(recording: Recording) -> dict[str, Any]:
     """Everything worth knowing but the arrays, ready for JSON; SI units, and names that say so."""
-    steps = np.diff(recording.time)
     timing: dict[str, Any] = {"even": False, "rate_Hz": None}
-    if steps.size:
+    if recording.rate is not None:
+        step = 1.0 / recording.rate
+        timing = {
+            "even": True,
+            "rate_Hz": recording.rate,
+            "step_min_s": step,
+            "step_max_s": step,
+        }
+    elif recording.samples > 1:
+        steps = np.diff(recording.time)
         low, high, mean = float(steps.min()), float(steps.max()), float(steps.mean())
         even = high - low <= EVEN * mean
         timing = {
@@ -47,9 +55,9 @@ def describe(recording: Recording) -> dict[str, Any]:
         "hold": ZERO_ORDER if recording.hold else LINEAR,
         "kinematics": recording.kinematics,
         "channels": [
-            _channel(name, values) for name, values in recording.values.items() if name != "time"
+            _channel(recording, name) for name in recording.arrays.names if name != "time"
         ],
-        "quiet_samples": int(recording.quiet.sum()),
+        "quiet_samples": recording.quiet_samples,
         "noise_floor_m": recording.noise_floor,
         "rest_reading_m": recording.rest_reading,
         "displacement_skew_s": recording.displacement_skew,
@@ -73,10 +81,13 @@ def describe(recording: Recording) -> dict[str, Any]:
     }
 
 
-def _channel(name: str, values: np.ndarray) -> dict[str, Any]:
+def _channel(recording: Recording, name: str) -> dict[str, Any]:
+    whole = recording.overview(name, 2000)
     # an overlay may have had nothing to show at times
-    known = values[np.isfinite(values)]
-    low, high = (float(known.min()), float(known.max())) if known.size else (None, None)
+    known = np.isfinite(whole.low)
+    low = high = None
+    if known.any():
+        low, high = float(whole.low[known].min()), float(whole.high[known].max())
     return {"name": name, "unit": UNITS[name], "min": low, "max": high}
 
 

@@ -7,10 +7,11 @@ offsets and lengths, consistency flags (byte 11), base address, extension addres
 
 from __future__ import annotations
 
+import io
 import struct
 from pathlib import Path
 
-__all__ = ["consistency_flags", "lookup3", "mend_superblock"]
+__all__ = ["SIZE", "consistency_flags", "flags_of", "lookup3", "mend_superblock"]
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 VERSION = 3
@@ -26,7 +27,11 @@ def consistency_flags(path: Path) -> int | None:
     without end.
     """
     with path.open("rb") as stream:
-        head = stream.read(SIZE)
+        return flags_of(stream.read(SIZE))
+
+
+def flags_of(head: bytes) -> int | None:
+    """The same, of the first ``SIZE`` bytes of a file."""
     if head[: len(SIGNATURE)] != SIGNATURE or len(head) < SIZE:
         return None
     if head[VERSION_AT] != VERSION:
@@ -36,21 +41,21 @@ def consistency_flags(path: Path) -> int | None:
     return head[FLAGS_AT]
 
 
-def mend_superblock(path: Path) -> None:
-    """Mark the file at ``path`` as closed, and its end as where it is; changes it in place.
+def mend_superblock(stream: io.RawIOBase) -> None:
+    """Mark the file open in ``stream`` as closed, and its end as where it is.
 
     Raises ``ValueError`` for a superblock of another version than recordings are written with.
     """
-    with path.open("r+b") as stream:
-        head = bytearray(stream.read(SIZE))
-        if head[: len(SIGNATURE)] != SIGNATURE or len(head) < SIZE or head[VERSION_AT] != VERSION:
-            raise ValueError("it does not begin as a recording does")
-        end = stream.seek(0, 2)
-        head[FLAGS_AT] = 0
-        head[END_AT : END_AT + 8] = struct.pack("<Q", end)
-        head[CHECKSUM_AT:SIZE] = struct.pack("<I", lookup3(bytes(head[:CHECKSUM_AT])))
-        stream.seek(0)
-        stream.write(head)
+    stream.seek(0)
+    head = bytearray(stream.read(SIZE) or b"")
+    if head[: len(SIGNATURE)] != SIGNATURE or len(head) < SIZE or head[VERSION_AT] != VERSION:
+        raise ValueError("it does not begin as a recording does")
+    end = stream.seek(0, 2)
+    head[FLAGS_AT] = 0
+    head[END_AT : END_AT + 8] = struct.pack("<Q", end)
+    head[CHECKSUM_AT:SIZE] = struct.pack("<I", lookup3(bytes(head[:CHECKSUM_AT])))
+    stream.seek(0)
+    stream.write(bytes(head))
 
 
 def _rotate(value: int, bits: int) -> int:

@@ -7,8 +7,13 @@ one flush of the whole file (of single datasets, channels could differ by an int
 
 from __future__ import annotations
 
+import errno
+import logging
 import math
+import os
 import re
+import shutil
+import tempfile
 import time
 import tomllib
 from collections.abc import Callable, Iterator
@@ -20,7 +25,8 @@ import h5py
 import numpy as np
 
 from app.errors import DearigError, DiskFault, InputError, InstrumentFault
-from app.recording.files import check_output, in_words
+from app.recording.checksums import ChecksumWriter
+from app.recording.files import check_output, in_words, put_back, set_aside
 from app.recording.finish import finish
 from app.recording.layout import (
     EVENT_LEVELS,
@@ -28,12 +34,15 @@ from app.recording.layout import (
     LIBVER,
     MESSAGE_BYTES,
     UNITS,
+    WALL_CLOCK_TYPE,
     ZERO_ORDER,
     counts_name,
     lay_out,
 )
 from app.recording.physical import TEMPERATURE_UNITS, write_channel
 from app.recording.provenance import gather, write_provenance
+from app.recording.pyramid import PyramidWriter
+from app.recording.room import advice
 from app.recording.sample import write_sample
 from app.recording.text import clip_text, fixed, put_text
 from drivers.channels import CHANNEL_NAMES, Channel
@@ -42,8 +51,12 @@ from model.material import Film, Load
 
 __all__ = ["FLUSH_INTERVAL", "RecordingWriter"]
 
+log = logging.getLogger(__name__)
+
 #: s between flushes, at least: at most this much of a run is lost in a kill.
 FLUSH_INTERVAL = 0.25
+#: Bytes free at which a run ends: what HDF5 still has to write needs them. A second is added.
+ROOM_LEFT = 2**21
 
 
 class RecordingWriter:
@@ -52,6 +65,8 @@ class RecordingWriter:
     ``identity`` names the channels, in the order in which blocks hold them; ``rate_Hz`` is the
     sample clock's, ``samples_expected`` sizes nothing and is kept so that a reader sees what is
     missing. ``configuration`` is the text of the rig file in force. ``now`` gives Unix time in s.
+    ``fsync``: what is flushed is on the disk, so that not even a power cut takes it. A recording
+    that is overwritten stays until the first flush of samples, as ``FILE.h5.old``.
 
     Raises ``InputError`` before anything is touched: the file exists (unless ``overwrite``), its
     folder does not, or the sequence is not TOML. ``ValueError`` is a programming error.
@@ -73,6 +88,7 @@ class RecordingWriter:
         notes: str = "",
         seed: int | None = None,
         overwrite: bool = False,
+        fsync: bool = False,
         now: Callable[[], float] = time.time,
     ) -> None:
         if not (math.isfinite(rate_Hz) and rate_Hz > 0.0):
@@ -83,8 +99,12 @@ class RecordingWriter:
         self._channels = identity.channels
         self._rate = float(rate_Hz)
         self._now = now
+        self._fsync = fsync
         self._written = self._flushed = self._recorded_events = 0
         self._dirty = False
+        self._closed = False
+        self._margin = int(ROOM_LEFT + 2.0 * self._rate * len(identity.channels))
+        self._failure: DiskFault | None = None
 
         started = now()
         provenance = gather(
@@ -93,22 +113,28 @@ class RecordingWriter:
         provenance["rig"] = identity.address
         provenance["simulated"] = identity.simulated
         with _disk_errors(self._path, InputError):
-            # "x" refuses a file that another process made since it was looked for
-            mode = "w" if overwrite else "x"
-            self._file = h5py.File(self._path, mode, libver=LIBVER)
+            self._old = set_aside(self._path) if overwrite else None
         try:
             with _disk_errors(self._path, InputError):
-                entry = lay_out(self._file, "actuator", title, started)
-                put_text(entry, "sequence", sequence_toml)
-                write_sample(entry, film, load, film_id, notes)
-                write_provenance(entry, provenance)
-                self._lay_out_run(entry, identity, samples_expected)
-                self._file.flush()
-                self._file.swmr_mode = True
-                self._file.flush()
+                # "x" refuses a file that another process made since it was looked for
+                self._file = h5py.File(self._path, "x", libver=LIBVER)
+            try:
+                with _disk_errors(self._path, InputError):
+                    entry = lay_out(self._file, "actuator", title, started)
+                    put_text(entry, "sequence", sequence_toml)
+                    write_sample(entry, film, load, film_id, notes)
+                    write_provenance(entry, provenance)
+                    self._lay_out_run(entry, identity, samples_expected)
+                    self._note_wall_clock(started)
+                    self._file.flush()
+                    self._file.swmr_mode = True
+                    self._flush()
+            except BaseException:
+                self._let_go()
+                self._path.unlink(missing_ok=True)
+                raise
         except BaseException:
-            self._file.close()
-            self._path.unlink(missing_ok=True)
+            put_back(self._old, self._path)
             raise
         self._last_flush = now()
 
@@ -134,6 +160,11 @@ class RecordingWriter:
         self._events = entry.create_dataset(
             "events", shape=(0,), maxshape=(None,), chunks=(32,), dtype=EVENT_TYPE
         )
+        self._wall_clock = entry.create_dataset(
+            "wall_clock", shape=(0,), maxshape=(None,), chunks=(256,), dtype=WALL_CLOCK_TYPE
+        )
+        self._pyramid = PyramidWriter(entry, len(self._channels), self._rate)
+        self._checksums = ChecksumWriter(entry, len(self._channels), self._rate)
 
         instruments = entry.create_group("instrument")
         instruments.attrs["NX_class"] = fixed("NXcollection")
@@ -168,13 +199,13 @@ class RecordingWriter:
     @property
     def closed(self) -> bool:
         """True after ``close``."""
-        return not self._file
+        return self._closed
 
     def append(self, block: Block) -> None:
         """Write the next block, its events with it.
 
-        Raises ``InstrumentFault`` if samples are missing before it, ``DiskFault`` if the disk takes
-        no more.
+        Raises ``InstrumentFault`` if samples are missing before it, or come a second time, with an
+        event that says so; ``DiskFault`` if the disk takes no more.
         """
         counts = block.counts
         if counts.ndim != 2 or counts.shape[0] != len(self._channels) or counts.dtype != np.int16:
@@ -183,25 +214,69 @@ class RecordingWriter:
                 f"not {counts.dtype} {counts.shape}"
             )
         if block.start != self._written:
-            raise InstrumentFault(
-                f"{self._path}: a block starts at sample {block.start} where sample "
-                f"{self._written} was due; the rig has lost samples, record again at a lower rate"
-            )
+            raise self._out_of_step(block.start)
         end = self._written + counts.shape[1]
-        with _disk_errors(self._path):
+        with self._writing():
+            self._check_room()
             for dataset, row in zip(self._counts, counts, strict=True):
                 dataset.resize((end,))
                 dataset[self._written : end] = row
+            self._pyramid.add(counts)
+            self._checksums.add(counts)
             self._written = end
             self._dirty = True
             self._append_events(block.events)
             self._flush_when_due()
 
+    def _out_of_step(self, start: int) -> InstrumentFault:
+        lost = start - self._written
+        what = f"{lost} samples are missing" if lost > 0 else f"{-lost} samples came twice"
+        self.event(self._written, "fault", f"{what} from here on; the run was ended")
+        return InstrumentFault(
+            f"{self._path}: a block starts at sample {start} where sample {self._written} was due: "
+            f"{what}; the rig has lost step, record again at a lower rate"
+        )
+
     def event(self, sample: int, level: str, message: str) -> None:
         """Note ``message`` at ``sample``; ``level`` is info, warning or fault."""
-        with _disk_errors(self._path):
+        with self._writing():
             self._append_events((Event(sample, level, message),))
             self._flush_when_due()
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Anything that writes to the file; after a failure there is no more of it."""
+        if self._failure is not None:
+            raise self._failure
+        try:
+            with _disk_errors(self._path):
+                yield
+        except DiskFault as error:
+            self._let_go()
+            self._written = self._flushed
+            self._failure = DiskFault(
+                f"{error}; the {self._flushed} samples until then are safe there, in counts: "
+                f"dearig recover {self._path} finishes them when there is room"
+            )
+            raise self._failure from error
+
+    def _check_room(self) -> None:
+        # asked before it is too late: once HDF5 has met a full disk, what it writes is not in order
+        if shutil.disk_usage(self._path.parent).free < self._margin:
+            raise OSError(errno.ENOSPC, "no room for the next second")
+
+    def _let_go(self) -> None:
+        """Close the file as a kill would: not another byte is written to it.
+
+        HDF5 cannot close a file that it cannot write, and brings the program down at its end; so
+        what it still wants to write goes elsewhere.
+        """
+        with tempfile.TemporaryFile() as elsewhere:
+            os.dup2(elsewhere.fileno(), self._file.id.get_vfd_handle())
+            try:
+                self._file.close()
+            except (OSError, RuntimeError):
+                log.debug("%s could not be closed in order", self._path)
 
     def _append_events(self, events: tuple[Event, ...]) -> None:
         if not events:
@@ -226,11 +301,38 @@ class RecordingWriter:
 
     def _flush_when_due(self) -> None:
         # outside the interval on either side: a clock set back must not end the flushing
-        if self._dirty and not 0.0 <= self._now() - self._last_flush < FLUSH_INTERVAL:
-            self._file.flush()
-            self._flushed = self._written
+        moment = self._now()
+        if self._dirty and not 0.0 <= moment - self._last_flush < FLUSH_INTERVAL:
+            self._flush_all(moment)
             self._last_flush = self._now()
-            self._dirty = False
+
+    def _flush_all(self, moment: float) -> None:
+        self._write_pending(moment)
+        self._flush()
+        self._all_safe()
+
+    def _write_pending(self, moment: float) -> None:
+        self._pyramid.write()
+        self._checksums.write()
+        self._note_wall_clock(moment)
+
+    def _all_safe(self) -> None:
+        self._flushed = self._written
+        self._dirty = False
+        if self._old is not None and self._flushed:
+            # from here on there is something in its place
+            self._old.unlink(missing_ok=True)
+            self._old = None
+
+    def _note_wall_clock(self, moment: float) -> None:
+        n = self._wall_clock.shape[0]
+        self._wall_clock.resize((n + 1,))
+        self._wall_clock[n] = (self._written, moment)
+
+    def _flush(self) -> None:
+        self._file.flush()
+        if self._fsync:
+            os.fsync(self._file.id.get_vfd_handle())
 
     def close(
         self,
@@ -245,24 +347,29 @@ class RecordingWriter:
         overlay, ``model_toml`` its parameters. Raises ``DiskFault`` if the physical values cannot
         be written; the counts are safe then.
         """
-        if self.closed:
+        if self._closed:
             return
         if displacement_model is not None and displacement_model.shape != (self._written,):
             raise ValueError(
                 f"the overlay has shape {displacement_model.shape}, "
                 f"the recording {self._written} samples"
             )
-        with _disk_errors(self._path):
+        self._closed = True
+        moment = self._now()
+        with self._writing():
+            self._write_pending(moment)
+            self._flush()
             self._file.close()
-        self._flushed = self._written
+        self._all_safe()
         try:
             finish(
                 self._path,
                 complete=True,
                 outcome=outcome,
-                ended=self._now(),
+                ended=moment,
                 displacement_model=displacement_model,
                 model_toml=model_toml,
+                fsync=self._fsync,
             )
         except InputError as error:
             raise DiskFault(
@@ -270,10 +377,13 @@ class RecordingWriter:
             ) from error
 
     def discard(self) -> None:
-        """Leave no file: for a run that ended before its first sample."""
-        if not self.closed:
-            self._file.close()
+        """Leave no file, or the one from before: for a run that ended before its first sample."""
+        if not self._closed:
+            self._closed = True
+            if self._failure is None:
+                self._let_go()
             self._path.unlink(missing_ok=True)
+            put_back(self._old, self._path)
 
     def __enter__(self) -> RecordingWriter:
         """Itself."""
@@ -288,7 +398,9 @@ class RecordingWriter:
         """Close; a run that failed before its first sample leaves no file."""
         if error is None:
             self.close()
-        elif not self.closed and self._written == 0:
+        elif self._failure is not None:
+            self._closed = True
+        elif not self._closed and self._written == 0:
             self.discard()
         else:
             self.close(f"ended early: {error or type(error).__name__}")
@@ -302,10 +414,7 @@ def _disk_errors(path: Path, kind: type[DearigError] = DiskFault) -> Iterator[No
     except FileExistsError as error:
         raise InputError(f"{path} exists already; choose another name") from error
     except (OSError, RuntimeError) as error:
-        raise kind(
-            f"{path} cannot be written: {in_words(error)}; see that the disk has room and that no "
-            f"other program holds the file"
-        ) from error
+        raise kind(f"{path} cannot be written: {in_words(error)}; {advice(error)}") from error
 
 
 def _check_channels(channels: tuple[Channel, ...]) -> None:

@@ -30,6 +30,7 @@ class CsvFile:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.about: dict[str, str] = {}
         lines = _decoded(path).replace("\r\n", "\n").replace("\r", "\n").split("\n")
         #: line number in the file (from 1) and text of every line that is neither blank nor comment
         self._rows = [

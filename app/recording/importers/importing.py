@@ -13,7 +13,9 @@ from app.errors import InputError
 from app.recording.files import check_output, file_sha256, in_words
 from app.recording.importers.chosen import Chosen
 from app.recording.importers.csv_file import CsvFile
+from app.recording.importers.exported import exported
 from app.recording.importers.mat_file import MatFile
+from app.recording.importers.parquet_file import ParquetFile
 from app.recording.importers.plausible import doubts
 from app.recording.importers.source import Source
 from app.recording.importers.tdms_file import TdmsChannels
@@ -42,13 +44,15 @@ def import_file(
     overwrite: bool = False,
     now: Callable[[], float] = time.time,
 ) -> list[str]:
-    """Bring the CSV, MAT or TDMS file ``source`` in as the recording ``out``.
+    """Bring the CSV, MAT, Parquet or TDMS file ``source`` in as the recording ``out``.
 
     ``columns`` maps names such as ``voltage_kV`` to what the file calls them: a CSV column, a MAT
     path (``data.xdata[0]``), a TDMS ``group/channel``; columns that have such a name already need
     no mention. Film data with a displacement take ``gauge_length_mm``, with a force ``area_mm2``,
     and are uniaxial unless ``kinematics`` says otherwise. Time is kept as it is, even or not.
-    Displacement of an actuator is counted from the mean of its lead-in at 0 V, if it has one.
+    Displacement of an actuator is counted from the mean of its lead-in at 0 V, if it has one. A
+    recording that was exported to MAT or Parquet comes back with what it said of itself there:
+    film, load, kinematics, sequence, and how its voltage was held.
 
     Returns sentences about values that are possible and look wrong. Raises ``InputError``, with
     nothing written, for everything that cannot be a recording.
@@ -60,9 +64,13 @@ def import_file(
     for name, given in (("gauge length", gauge_length_mm), ("area", area_mm2)):
         if given is not None and not 0.0 < given < float("inf"):
             raise InputError(f"the {name} is {given!r}; it must be a finite number above 0")
-    chosen = Chosen(_open(path), columns or {})
+    opened = _open(path)
+    was = exported(opened.about)
+    chosen = Chosen(opened, columns or {})
     warnings: list[str] = []
     kind = chosen.kind(warnings)
+    kinematics = kinematics or was.kinematics
+    film, load = film or was.film, load or was.load
     if kind == "actuator":
         values = chosen.actuator()
         if gauge_length_mm is not None or area_mm2 is not None:
@@ -81,12 +89,13 @@ def import_file(
         kind,
         values,
         title=path.stem,
-        hold=False,
+        hold=was.hold and kind == "actuator",
         kinematics=kinematics,
         film=film,
         load=load,
         film_id=film_id,
         notes=notes,
+        sequence_toml=was.sequence,
         rest_reading=rest,
         events=(*events, *(Event(0, "warning", sentence) for sentence in warnings)),
         configuration=configuration,
@@ -116,9 +125,13 @@ def _open(path: Path) -> Source:
         return CsvFile(path)
     if suffix == ".mat":
         return MatFile(path)
+    if suffix == ".parquet":
+        return ParquetFile(path)
     if suffix == ".tdms":
         return TdmsChannels(path)
-    raise InputError(f"{path}: files named .csv, .mat and .tdms can be imported, not {suffix!r}")
+    raise InputError(
+        f"{path}: files named .csv, .mat, .parquet and .tdms can be imported, not {suffix!r}"
+    )
 
 
 def _from_rest(values: dict[str, np.ndarray]) -> tuple[float, tuple[Event, ...]]:

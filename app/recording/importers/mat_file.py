@@ -6,27 +6,18 @@ first column of a matrix.
 
 from __future__ import annotations
 
-import io
 import re
-import struct
-import warnings
-import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from app.errors import InputError
-from app.recording.importers.source import PARSER_FAILURES, no_such_column
+from app.recording.files import in_words
+from app.recording.importers.mat5 import Damaged, Value, columns, variables
+from app.recording.importers.source import no_such_column
 
 __all__ = ["MatFile"]
-
-#: MAT-File Format (The MathWorks): a header, then elements of kind, size and body.
-HEADER = 128
-VERSION_5, VERSION_7_3 = 0x0100, 0x0200
-MATRIX, COMPRESSED = 14, 15
-#: Fields of structs are followed to this depth.
-DEEPEST = 8
 
 
 class MatFile:
@@ -34,9 +25,16 @@ class MatFile:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        found = _load(path)
         self._columns = {
-            name: column for top, value in _load(path).items() for name, column in _walk(top, value)
+            name: column for top, value in found.items() for name, column in columns(top, value)
         }
+        about = found.get("about")
+        self.about = (
+            {name: text for name, text in about.items() if isinstance(text, str)}
+            if isinstance(about, dict)
+            else {}
+        )
         if not self._columns:
             raise InputError(f"{path} holds no columns of numbers")
 
@@ -69,75 +67,10 @@ class MatFile:
         return {name: self._columns[name] for name in names}
 
 
-def _walk(name: str, value: np.ndarray, depth: int = 0) -> Iterator[tuple[str, np.ndarray]]:
-    if depth > DEEPEST or not isinstance(value, np.ndarray) or value.size == 0:
-        return
-    if value.dtype.names:
-        if value.size == 1:
-            for field in value.dtype.names:
-                yield from _walk(f"{name}.{field}", value.reshape(-1)[0][field], depth + 1)
-    elif value.dtype.kind == "O":
-        if value.size == 1:
-            yield from _walk(name, value.reshape(-1)[0], depth + 1)
-    elif value.dtype.kind in "fiu" and value.ndim <= 2:
-        if value.ndim < 2 or 1 in value.shape:
-            yield name, value.reshape(-1).astype(np.float64)
-        else:
-            for i in range(value.shape[1]):
-                yield f"{name}[{i}]", value[:, i].astype(np.float64)
-
-
-def _check_whole(path: Path, raw: bytes) -> None:
-    """Raise ``InputError`` unless ``raw`` is a whole MAT file of version 5.
-
-    SciPy's parser was seen to crash the interpreter on damaged files: what has been cut short or
-    fails a checksum (compressed variables have one) never reaches it.
-    """
-    little = raw[126:HEADER] == b"IM"
-    if not little and raw[126:HEADER] != b"MI":
-        raise InputError(f"{path} cannot be read as a MAT file: it does not begin as one")
-    version = struct.unpack_from("<H" if little else ">H", raw, 124)[0]
-    if version == VERSION_7_3:
-        raise InputError(
-            f"{path} is a MAT file of version 7.3; save it in MATLAB with "
-            f"save(..., '-v7') and import that"
-        )
-    if version != VERSION_5:
-        raise InputError(f"{path} is a MAT file of unknown version {version:#06x}")
-    at = HEADER
-    while at < len(raw):
-        if len(raw) < at + 8:
-            raise InputError(f"{path} is truncated at byte {at}")
-        kind, size = struct.unpack_from("<2I" if little else ">2I", raw, at)
-        body = memoryview(raw)[at + 8 : at + 8 + size]
-        if kind not in (MATRIX, COMPRESSED):
-            raise InputError(f"{path} is damaged: at byte {at} there is no variable")
-        if len(body) < size:
-            raise InputError(f"{path} is truncated: the variable at byte {at} has no end")
-        if kind == COMPRESSED:
-            try:
-                zlib.decompress(body)
-            except zlib.error as error:
-                raise InputError(
-                    f"{path} is damaged: the variable at byte {at}: {error}"
-                ) from error
-        at += 8 + size
-
-
-def _load(path: Path) -> dict[str, np.ndarray]:
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
+def _load(path: Path) -> dict[str, Value]:
     try:
-        raw = path.read_bytes()
+        return variables(path.read_bytes())
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {error}") from error
-    _check_whole(path, raw)
-    try:
-        with warnings.catch_warnings():
-            # of variables that are there twice the last one counts, as in MATLAB
-            warnings.simplefilter("ignore")
-            found = loadmat(io.BytesIO(raw), struct_as_record=True)
-    except (*PARSER_FAILURES, MatReadError) as error:
-        raise InputError(f"{path} cannot be read as a MAT file: {error}") from error
-    return {name: value for name, value in found.items() if not name.startswith("__")}
+        raise InputError(f"{path} cannot be read: {in_words(error)}") from error
+    except Damaged as error:
+        raise InputError(f"{path} {error}") from error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -43,6 +43,11 @@ class Source(Protocol):
     @property
     def path(self) -> Path:
         """The file."""
+        ...
+
+    @property
+    def about(self) -> Mapping[str, str]:
+        """What a recording that was exported to it said of itself; empty for all others."""
         ...
 
     @property

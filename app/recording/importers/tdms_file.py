@@ -5,11 +5,15 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from app.errors import InputError
 from app.recording.importers.source import PARSER_FAILURES, no_such_column
+
+if TYPE_CHECKING:
+    from nptdms import TdmsFile
 
 __all__ = ["TdmsChannels"]
 
@@ -23,6 +27,7 @@ class TdmsChannels:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.about: dict[str, str] = {}
         self._columns, timing = _load(path)
         if not self._columns:
             raise InputError(f"{path} holds no channels of numbers")
@@ -53,6 +58,16 @@ class TdmsChannels:
         return {name: self._columns[name] for name in names}
 
 
+def _check_claims(path: Path, metadata: TdmsFile) -> None:
+    """Raise ``InputError`` where the channels claim more values than the file has bytes."""
+    claimed = sum(len(channel) for group in metadata.groups() for channel in group.channels())
+    if claimed > path.stat().st_size:
+        raise InputError(
+            f"{path} is damaged: its channels claim {claimed} values, and it has "
+            f"{path.stat().st_size} bytes"
+        )
+
+
 def _load(path: Path) -> tuple[dict[str, np.ndarray], set[tuple[float, float, int]]]:
     from nptdms import TdmsFile
 
@@ -61,6 +76,8 @@ def _load(path: Path) -> tuple[dict[str, np.ndarray], set[tuple[float, float, in
     try:
         with path.open("rb") as stream, warnings.catch_warnings():
             warnings.simplefilter("ignore")
+            _check_claims(path, TdmsFile.read_metadata(stream))
+            stream.seek(0)
             for group in TdmsFile.read(stream).groups():
                 for channel in group.channels():
                     values = np.asarray(channel[:])

@@ -1,0 +1,141 @@
+"""The values of a recording, read from its file when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from app.errors import InputError
+from app.recording.clockwork import not_forward
+from app.recording.layout import UNITS
+from app.recording.opening import UNREADABLE, damage, opened
+from app.recording.physical import Counts, Rest
+from app.recording.pyramid import reduced
+from app.recording.quiet import lead_in
+from app.recording.safe import Refused, dataset, group
+
+__all__ = ["Arrays", "Overview"]
+
+
+@dataclass(frozen=True, eq=False)
+class Overview:
+    """Least and greatest value, ``low`` and ``high`` (n,), of n bins that begin at ``time`` s."""
+
+    time: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+class Arrays:
+    """Values in the recording at ``path``: ``stored`` there, or ``derived`` from its counts.
+
+    Arrays are float64, read-only, and checked when they are read: numbers, and time that goes
+    forward. Every method raises ``InputError`` for what cannot be read or fails that.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        stored: tuple[str, ...],
+        derived: tuple[str, ...],
+        samples: int,
+        rest: Rest | None = None,
+    ) -> None:
+        self.path = path
+        self.samples = samples
+        self.stored = stored
+        self.names = tuple(n for n in UNITS if n in stored or n in derived)
+        self._derived = derived
+        self._rest = rest
+        self._read: dict[str, np.ndarray] = {}
+
+    def read(self, name: str) -> np.ndarray:
+        """All of ``name``, (N,); read once and kept."""
+        if name not in self._read:
+            values = self.window(name, 0, self.samples)
+            if name in self.stored:
+                self._check(name, values)
+            values.setflags(write=False)
+            self._read[name] = values
+        return self._read[name]
+
+    def window(self, name: str, start: int, stop: int) -> np.ndarray:
+        """``name`` from sample ``start`` to before ``stop``, (n,); reads no more than that."""
+        start, stop = max(start, 0), min(stop, self.samples)
+        if name in self._read:
+            return self._read[name][start:stop]
+        with self._entry() as entry:
+            if name in self.stored:
+                values: np.ndarray = self._row(entry, name)[start:stop].astype(np.float64)
+                return values
+            return self._counts(entry).window(name, start, stop)
+
+    def overview(self, name: str, points: int, start: int, stop: int) -> Overview:
+        """``name`` between two samples in at most about ``points`` bins."""
+        start, stop = max(start, 0), min(stop, self.samples)
+        if name != "time" and name in self._derived:
+            with self._entry() as entry:
+                return Overview(*self._counts(entry).overview(name, start, stop, points))
+        time, values = self.window("time", start, stop), self.window(name, start, stop)
+        if time.size > points:
+            time = time[(np.arange(points) * time.size) // points]
+        return Overview(time, *reduced(values, values, points))
+
+    def lead_in(self, step: float) -> int:
+        """Samples at 0 V at the start, where a voltage below ``step`` V cannot be resolved."""
+        if "voltage_command" in self._derived:
+            with self._entry() as entry:
+                return self._counts(entry).lead_in()
+        return lead_in(self.read("voltage_command"), step)
+
+    @contextmanager
+    def _entry(self) -> Iterator[h5py.Group]:
+        with opened(self.path) as file:
+            try:
+                entry = group(file, "entry")
+                if entry is None:
+                    raise InputError(f"{self.path}: the group /entry is missing")
+                yield entry
+            except Refused as error:
+                raise InputError(f"{self.path}: {error}") from error
+            except UNREADABLE as error:
+                raise damage(self.path, error) from error
+
+    def _row(self, entry: h5py.Group, name: str) -> h5py.Dataset:
+        data = group(entry, "data")
+        row = None if data is None else dataset(data, name)
+        if row is None or row.shape != (self.samples,):
+            raise InputError(
+                f"{self.path}: /entry/data/{name} has changed since the file was opened"
+            )
+        return row
+
+    def _counts(self, entry: h5py.Group) -> Counts:
+        counts = Counts(entry, self.samples, self._rest)
+        self._rest = counts.rest
+        return counts
+
+    def _check(self, name: str, values: np.ndarray) -> None:
+        # the overlay may have had nothing to show at times
+        finite = np.isfinite(values)
+        if not finite.all() and name != "displacement_model":
+            at = int(np.argmin(finite))
+            raise InputError(
+                f"{self.path}: /entry/data/{name} is {values[at]} at sample {at}, not a number"
+            )
+        if name == "time" and (back := not_forward(values)) is not None:
+            at, how = back
+            raise InputError(
+                f"{self.path}: /entry/data/time {how} at sample {at} ({values[at]:.9g} s)"
+            )
+        if name == "stretch" and not (values > 0.0).all():
+            at = int(np.argmax(values <= 0.0))
+            raise InputError(
+                f"{self.path}: /entry/data/stretch is {values[at]:.6g} at sample {at}; "
+                f"a stretch is above 0"
+            )

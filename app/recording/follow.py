@@ -1,0 +1,75 @@
+"""A recording followed while it is written: what is new in it, whenever one asks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from app.errors import InputError
+from app.recording.opening import UNREADABLE, damage, opened
+from app.recording.physical import Counts, Rest
+from app.recording.reader import read_events
+from app.recording.recording import RecordedEvent
+from app.recording.safe import Refused, group
+
+__all__ = ["Follower", "News"]
+
+
+@dataclass(frozen=True, eq=False)
+class News:
+    """What came since the last look: ``values`` by name, (n,) each, from sample ``start`` on.
+
+    ``time`` is among them; SI units. ``ended``: the run was closed, and there will be no more.
+    """
+
+    start: int
+    values: dict[str, np.ndarray]
+    events: tuple[RecordedEvent, ...]
+    ended: bool
+
+
+class Follower:
+    """Looks at the recording at ``path``, of a run that another process makes.
+
+    Between looks it holds nothing open. Displacement is counted from the mean of the lead-in, or,
+    until that is over, of what of it there is.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self._samples = 0
+        self._events = 0
+        self._rest: Rest | None = None
+
+    def look(self, most: int | None = None) -> News:
+        """What is new since the last look, of which at most ``most`` samples.
+
+        A flush makes new samples visible, four times a second. Raises ``InputError`` for what is
+        no recording of a run.
+        """
+        with opened(self.path) as file:
+            try:
+                entry = group(file, "entry")
+                if entry is None or group(entry, "data") is None:
+                    raise InputError(f"{self.path}: the group /entry/data is missing")
+                ended = "samples" in entry.attrs
+                counts = Counts(entry, rest=self._rest)
+                if not counts.channels:
+                    raise InputError(f"{self.path} is not of a run: it has no counts")
+                start, stop = self._samples, counts.samples
+                if most is not None:
+                    stop = min(stop, start + most)
+                rest = counts.rest
+                values = {name: counts.window(name, start, stop) for name in counts.names}
+                events = read_events(self.path, entry)
+            except Refused as error:
+                raise InputError(f"{self.path}: {error}") from error
+            except UNREADABLE as error:
+                raise damage(self.path, error) from error
+        if rest.samples < counts.samples:
+            self._rest = rest
+        fresh = events[self._events :]
+        self._samples, self._events = stop, len(events)
+        return News(start, values, fresh, ended and stop == counts.samples)

@@ -1,0 +1,49 @@
+"""What a recording that was exported said of itself, read back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+from app.recording.layout import FORMAT, ZERO_ORDER
+from model.errors import ModelError
+from model.kinematics import KINEMATICS
+from model.material import Film, Load
+
+__all__ = ["Exported", "exported"]
+
+T = TypeVar("T", Film, Load)
+
+
+@dataclass(frozen=True)
+class Exported:
+    """As in a ``Recording``; what was not said, or makes no sense any more, is absent."""
+
+    hold: bool = False
+    kinematics: str | None = None
+    film: Film | None = None
+    load: Load | None = None
+    sequence: str = ""
+
+
+def exported(about: Mapping[str, str]) -> Exported:
+    """What ``about`` says, texts by name as ``exporters`` wrote them; nothing, of other files."""
+    if about.get("format") != FORMAT:
+        return Exported()
+    kinematics = about.get("kinematics")
+    return Exported(
+        hold=about.get("hold") == ZERO_ORDER,
+        kinematics=kinematics if kinematics in KINEMATICS else None,
+        film=_made(Film, about.get("film", "")),
+        load=_made(Load, about.get("load", "")),
+        sequence=about.get("sequence", ""),
+    )
+
+
+def _made(kind: type[T], text: str) -> T | None:
+    try:
+        return kind(**json.loads(text)) if text else None
+    except (ModelError, TypeError, ValueError, RecursionError):
+        return None

@@ -1,0 +1,230 @@
+"""The variables of a MAT file of version 5, read so that no damage can do more than be told.
+
+Written from "MAT-File Format" (The MathWorks): a header of 128 bytes, then elements of kind, size
+and body; each variable is an element that may be packed (zlib). Every size is held against what
+there is before it is used. Numbers, structs and cells are read; what else there is, is passed over.
+"""
+
+from __future__ import annotations
+
+import itertools
+import struct
+import zlib
+from collections.abc import Iterator
+from types import MappingProxyType
+
+import numpy as np
+
+__all__ = ["Damaged", "Value", "columns", "variables"]
+
+#: A number, a table of them, text, a struct by its fields, or None for anything else.
+Value = np.ndarray | str | dict[str, "Value"] | None
+
+HEADER = 128
+VERSION_5, VERSION_7_3 = 0x0100, 0x0200
+MATRIX, COMPRESSED, UTF8, UTF16, UTF32 = 14, 15, 16, 17, 18
+NUMBERS = MappingProxyType(
+    {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+)
+CELL, STRUCT, OBJECT, CHAR = 1, 2, 3, 4
+#: Classes of arrays of numbers.
+NUMERIC = range(6, 16)
+COMPLEX = 0x08
+#: Structs in structs are followed to this depth.
+DEEPEST = 8
+#: Bytes that are unpacked at most, beside so many times the file's own size.
+UNPACKED_MAX, PACKED_MAX = 2**28, 100
+#: More fields, cells or columns than this no table of measurements has, nor more items in all.
+FIELDS_MAX, ITEMS_MAX = 4096, 200_000
+
+
+class Damaged(Exception):  # noqa: N818  (what happened to the file, said by the importer)
+    """Why the file cannot be read: a sentence's end."""
+
+
+class _Bytes:
+    """Elements one after another in ``raw``, in the byte order ``order``."""
+
+    def __init__(self, raw: memoryview, order: str, where: str, count: Iterator[int]) -> None:
+        self.raw = raw
+        self.order = order
+        self.where = where
+        self.count = count
+        self.at = 0
+
+    def inside(self, body: memoryview) -> _Bytes:
+        """The elements in the ``body`` of one of these."""
+        return _Bytes(body, self.order, self.where, self.count)
+
+    def element(self) -> tuple[int, memoryview]:
+        """Kind and body of the next element."""
+        if next(self.count) > ITEMS_MAX:
+            raise Damaged(f"is not read: it has more than {ITEMS_MAX} items")
+        if len(self.raw) < self.at + 8:
+            raise Damaged(f"is truncated in the variable {self.where}")
+        first, size = struct.unpack_from(f"{self.order}2I", self.raw, self.at)
+        if first >> 16:
+            # up to four bytes stand in the tag itself
+            kind, size, start, step = first & 0xFFFF, first >> 16, self.at + 4, 8
+            if size > 4:
+                raise Damaged(f"is damaged in the variable {self.where}: a short item of {size}")
+        else:
+            kind, start = first, self.at + 8
+            step = 8 + size if kind == COMPRESSED else 8 + -(-size // 8) * 8
+        body = self.raw[start : start + size]
+        if len(body) < size:
+            raise Damaged(f"is truncated: the variable {self.where} has no end")
+        self.at += step
+        return kind, body
+
+    def numbers(self, kind: int, body: memoryview) -> np.ndarray:
+        """The numbers in an element's ``body``."""
+        if kind not in NUMBERS:
+            raise Damaged(f"is damaged in the variable {self.where}: numbers of kind {kind}")
+        dtype = np.dtype(self.order + NUMBERS[kind])
+        if len(body) % dtype.itemsize:
+            raise Damaged(f"is damaged in the variable {self.where}: {len(body)} bytes of {dtype}")
+        return np.frombuffer(body, dtype)
+
+    def left(self) -> bool:
+        return self.at < len(self.raw)
+
+
+def variables(raw: bytes) -> dict[str, Value]:
+    """The variables in the file of which ``raw`` is all; of equal names the last one counts.
+
+    Raises ``Damaged`` for a file that is of another version, cut short, or not in order.
+    """
+    order = {b"IM": "<", b"MI": ">"}.get(raw[126:HEADER])
+    if order is None:
+        raise Damaged("cannot be read as a MAT file: it does not begin as one")
+    version = struct.unpack_from(f"{order}H", raw, 124)[0]
+    if version == VERSION_7_3:
+        raise Damaged(
+            "is a MAT file of version 7.3; save it in MATLAB with save(..., '-v7') and import that"
+        )
+    if version != VERSION_5:
+        raise Damaged(f"is a MAT file of unknown version {version:#06x}")
+    room = UNPACKED_MAX + PACKED_MAX * len(raw)
+    found: dict[str, Value] = {}
+    top = _Bytes(memoryview(raw)[HEADER:], order, "", itertools.count())
+    while top.left():
+        top.where = f"at byte {HEADER + top.at}"
+        kind, body = top.element()
+        if kind == COMPRESSED:
+            unpacked = _unpacked(body, room, top.where)
+            room -= len(unpacked)
+            kind, body = top.inside(memoryview(unpacked)).element()
+        if kind != MATRIX:
+            raise Damaged(f"is damaged: at byte {HEADER + top.at} there is no variable")
+        name, value = _matrix(top.inside(body), 0)
+        if not name.startswith("__"):
+            found[name] = value
+    return found
+
+
+def _unpacked(body: memoryview, room: int, where: str) -> bytes:
+    unpacking = zlib.decompressobj()
+    try:
+        unpacked = unpacking.decompress(body, max(room, 1))
+        # the checksum stands at the end
+        whole = unpacking.eof or not unpacking.decompress(unpacking.unconsumed_tail, 1)
+    except zlib.error as error:
+        raise Damaged(f"is damaged: the variable {where}: {error}") from error
+    if not whole:
+        raise Damaged(f"is not read: the variable {where} unpacks to more than {room} bytes")
+    if not unpacking.eof:
+        raise Damaged(f"is truncated: the variable {where} has no end")
+    return unpacked
+
+
+def _matrix(items: _Bytes, depth: int) -> tuple[str, Value]:
+    """Name and value of an array, whose items are in ``items``."""
+    kind, body = items.element()
+    flags = items.numbers(kind, body)
+    if flags.dtype.kind != "u" or flags.dtype.itemsize != 4 or flags.size < 1:
+        raise Damaged(f"is damaged in the variable {items.where}: no array flags")
+    array_class, complex_ = int(flags[0]) & 0xFF, bool(int(flags[0]) >> 8 & COMPLEX)
+    shape = [int(n) for n in items.numbers(*items.element())]
+    name = bytes(items.element()[1]).decode("latin-1")
+    if not shape or min(shape) < 0 or len(shape) > 32:
+        raise Damaged(f"is damaged in the variable {items.where}: a shape of {shape[:32]}")
+    size = 1
+    for n in shape:
+        size *= n
+    if depth > DEEPEST:
+        return name, None
+    if array_class in NUMERIC:
+        return name, _table(items, shape, size, complex_)
+    if array_class == CHAR:
+        return name, _text(items, shape, size)
+    if array_class == CELL:
+        cells = [_next(items, depth) for _ in _few(size, items)]
+        return name, cells[0] if size == 1 else None
+    if array_class in (STRUCT, OBJECT):
+        if array_class == OBJECT:
+            items.element()
+        fields = _fields(items)
+        _few(size * len(fields), items)
+        values = [(field, _next(items, depth)) for _ in range(size) for field in fields]
+        return name, dict(values) if size == 1 else None
+    return name, None
+
+
+def _few(size: int, items: _Bytes) -> range:
+    if size > FIELDS_MAX:
+        raise Damaged(f"is not read: the variable {items.where} has {size} cells")
+    return range(size)
+
+
+def _next(items: _Bytes, depth: int) -> Value:
+    kind, body = items.element()
+    if kind != MATRIX:
+        raise Damaged(f"is damaged in the variable {items.where}: an item is no array")
+    # an item without anything in it is an empty array
+    return _matrix(items.inside(body), depth + 1)[1] if len(body) else None
+
+
+def _fields(items: _Bytes) -> list[str]:
+    sizes = items.numbers(*items.element())
+    raw = bytes(items.element()[1])
+    width = int(sizes[0]) if sizes.size == 1 else 0
+    if width < 1 or len(raw) % width or len(raw) // width > FIELDS_MAX:
+        raise Damaged(f"is damaged in the variable {items.where}: names of fields")
+    names = (raw[i : i + width].split(b"\0")[0] for i in range(0, len(raw), width))
+    return [name.decode("latin-1") for name in names]
+
+
+def _table(items: _Bytes, shape: list[int], size: int, complex_: bool) -> np.ndarray | None:
+    values = items.numbers(*items.element())
+    if values.size != size:
+        raise Damaged(
+            f"is damaged in the variable {items.where}: {values.size} numbers in place of {size}"
+        )
+    return None if complex_ else values.reshape(shape, order="F")
+
+
+def _text(items: _Bytes, shape: list[int], size: int) -> str | None:
+    kind, body = items.element()
+    if size == 0:
+        return ""
+    if len(shape) != 2 or 1 not in shape:
+        return None
+    encodings = {UTF8: "utf-8", UTF16: "utf-16", UTF32: "utf-32", 1: "latin-1", 2: "latin-1"}
+    encoding = encodings.get(kind, "utf-16")
+    if encoding in ("utf-16", "utf-32"):
+        encoding += "-le" if items.order == "<" else "-be"
+    return bytes(body).decode(encoding, "replace")
+
+
+def columns(name: str, value: Value) -> Iterator[tuple[str, np.ndarray]]:
+    """Path and numbers (n,) float64 of every column in ``value``, which is called ``name``."""
+    if isinstance(value, dict):
+        for field, inner in value.items():
+            yield from columns(f"{name}.{field}", inner)
+    elif isinstance(value, np.ndarray) and value.size and value.ndim <= 2:
+        if 1 in value.shape or value.ndim < 2:
+            yield name, value.reshape(-1).astype(np.float64)
+        elif value.shape[1] <= FIELDS_MAX:
+            for i in range(value.shape[1]):
+                yield f"{name}[{i}]", value[:, i].astype(np.float64)

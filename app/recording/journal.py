@@ -1,0 +1,243 @@
+"""Changes to a file made in place, as a whole or not at all, whenever the program is killed.
+
+What is appended goes into the file at once: nothing in it points there yet. What would take the
+place of something is held back, written with what it replaces to ``FILE.journal`` beside the file,
+and only then into the file. A journal that is not whole has changed nothing; a whole one is carried
+out by whoever finds it, and readers look through it.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import struct
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+__all__ = ["Patched", "carry_out", "changed_in_place", "journal_of", "whole_journal"]
+
+MAGIC = b"dearig-journal/1"
+#: Held back in pieces of this many bytes.
+PAGE = 4096
+HEAD = struct.Struct("<16sQQQ")  # magic, size before, size after, pages
+PIECE = struct.Struct("<QI")  # offset, length; then the old bytes, then the new ones
+#: No finishing touches more than this; what claims to is no journal.
+LARGEST = 2**28
+
+
+def journal_of(path: Path) -> Path:
+    """Where the journal of the file ``path`` lies."""
+    return path.with_name(f"{path.name}.journal")
+
+
+class Patched(io.RawIOBase):
+    """A binary file with ``pages`` laid over its first ``edge`` bytes; as h5py takes one.
+
+    Writes below ``edge`` are held back in ``pages``, those above go through to the file. What
+    fails there is kept in ``failure``, and nothing is written after it: HDF5 cannot let go of a
+    file that it cannot write, and brings the program down at its end.
+    """
+
+    def __init__(self, file: io.FileIO, edge: int, pages: dict[int, bytearray]) -> None:
+        self._file = file
+        self._at = 0
+        self.edge = edge
+        self.pages = pages
+        self.end = file.seek(0, 2)
+        self.failure: OSError | None = None
+
+    def readable(self) -> bool:
+        return True
+
+    def writable(self) -> bool:
+        return self._file.writable()
+
+    def seekable(self) -> bool:
+        return True
+
+    def seek(self, offset: int, whence: int = 0, /) -> int:
+        self._at = offset + (0, self._at, self.end)[whence]
+        return self._at
+
+    def tell(self) -> int:
+        return self._at
+
+    def readinto(self, buffer: memoryview, /) -> int:  # type: ignore[override]
+        view = memoryview(buffer).cast("B")
+        start = self._at
+        stop = min(start + len(view), self.end)
+        if stop <= start:
+            return 0
+        self._file.seek(start)
+        self._fill(view[: stop - start])
+        for number in self._numbers(start, min(stop, self.edge)):
+            page = self.pages.get(number)
+            if page is None:
+                continue
+            low, high = max(start, number * PAGE), min(stop, self.edge, (number + 1) * PAGE)
+            view[low - start : high - start] = page[low - number * PAGE : high - number * PAGE]
+        self._at = stop
+        return stop - start
+
+    def _fill(self, view: memoryview) -> None:
+        got = 0
+        while got < len(view):
+            more = self._file.readinto(view[got:])
+            if not more:
+                # what was truncated away and grown again reads as nothing written
+                view[got:] = bytes(len(view) - got)
+                return
+            got += more
+
+    def write(self, data: bytes, /) -> int:  # type: ignore[override]
+        view = memoryview(data).cast("B")
+        start, stop = self._at, self._at + len(view)
+        below = min(stop, self.edge)
+        for number in self._numbers(start, below):
+            page = self.pages.get(number)
+            if page is None:
+                page = self.pages[number] = bytearray(self.original(number))
+            low, high = max(start, number * PAGE), min(below, (number + 1) * PAGE)
+            page[low - number * PAGE : high - number * PAGE] = view[low - start : high - start]
+        if stop > self.edge and self.failure is None:
+            first = max(start, self.edge)
+            try:
+                self._file.seek(first)
+                rest = view[first - start :]
+                while rest:
+                    rest = rest[self._file.write(rest) :]
+            except OSError as error:
+                self.failure = error
+        self._at = stop
+        self.end = max(self.end, stop)
+        return len(view)
+
+    def truncate(self, size: int | None = None, /) -> int:
+        self.end = self._at if size is None else size
+        if self.end >= self.edge and self._file.writable() and self.failure is None:
+            try:
+                self._file.truncate(self.end)
+            except OSError as error:
+                self.failure = error
+        return self.end
+
+    def flush(self) -> None:
+        """Nothing waits."""
+
+    def original(self, number: int) -> bytes:
+        """What stands in the file in the place of page ``number``, up to the edge."""
+        size = min(PAGE, self.edge - number * PAGE)
+        held = bytearray(size)
+        self._file.seek(number * PAGE)
+        self._fill(memoryview(held))
+        return bytes(held)
+
+    @staticmethod
+    def _numbers(start: int, stop: int) -> range:
+        return range(start // PAGE, -(-stop // PAGE)) if stop > start else range(0)
+
+
+@contextmanager
+def changed_in_place(path: Path, fsync: bool = False) -> Iterator[Patched]:
+    """The file at ``path`` to read and write; if the body ends well all of it counts, else nothing.
+
+    ``fsync``: nothing is lost with the power either. Raises ``OSError``, with the file as it was
+    before, unless it is raised while the journal is carried out; then that stays to be done.
+    """
+    journal = journal_of(path)
+    with path.open("r+b", buffering=0) as file:
+        edge = file.seek(0, 2)
+        patched = Patched(file, edge, {})
+        try:
+            try:
+                yield patched
+            finally:
+                if patched.failure is not None:
+                    raise patched.failure
+            if fsync:
+                os.fsync(file.fileno())
+            _write_journal(journal, patched, fsync)
+        except BaseException:
+            file.truncate(edge)
+            journal.unlink(missing_ok=True)
+            raise
+        _apply(file, patched.end, {n: bytes(p) for n, p in patched.pages.items()})
+        if fsync:
+            os.fsync(file.fileno())
+    journal.unlink()
+
+
+def _write_journal(journal: Path, patched: Patched, fsync: bool) -> None:
+    parts = [HEAD.pack(MAGIC, patched.edge, patched.end, len(patched.pages))]
+    for number, page in sorted(patched.pages.items()):
+        parts += [PIECE.pack(number * PAGE, len(page)), patched.original(number), bytes(page)]
+    content = b"".join(parts)
+    with journal.open("wb") as stream:
+        stream.write(content + struct.pack("<I", zlib.crc32(content)))
+        stream.flush()
+        if fsync:
+            os.fsync(stream.fileno())
+
+
+def _apply(file: io.FileIO, end: int, pages: dict[int, bytes]) -> None:
+    for number, page in sorted(pages.items()):
+        file.seek(number * PAGE)
+        rest = memoryview(page)
+        while rest:
+            rest = rest[file.write(rest) :]
+    file.truncate(end)
+
+
+def whole_journal(path: Path) -> tuple[int, int, dict[int, bytes]] | None:
+    """Size before, size after, and new pages that the journal of ``path`` holds; else None.
+
+    None too for one that is cut short, or of another file: every byte in the file must be the
+    old or the new one. Raises ``OSError``.
+    """
+    try:
+        with journal_of(path).open("rb") as stream:
+            raw = stream.read(LARGEST + 1)
+    except FileNotFoundError:
+        return None
+    if not HEAD.size + 4 <= len(raw) <= LARGEST or raw[: len(MAGIC)] != MAGIC:
+        return None
+    content = raw[:-4]
+    if struct.unpack("<I", raw[-4:])[0] != zlib.crc32(content):
+        return None
+    _, before, after, count = HEAD.unpack_from(content)
+    pages: dict[int, bytes] = {}
+    at = HEAD.size
+    with path.open("rb") as file:
+        if file.seek(0, 2) < min(before, after):
+            return None
+        for _ in range(count):
+            offset, size = PIECE.unpack_from(content, at)
+            at += PIECE.size
+            old, new = content[at : at + size], content[at + size : at + 2 * size]
+            at += 2 * size
+            file.seek(offset)
+            here = file.read(size).ljust(size, b"\0")
+            if not _either(here, old, new):
+                return None
+            pages[offset // PAGE] = new
+    return before, after, pages
+
+
+def _either(here: bytes, old: bytes, new: bytes) -> bool:
+    bytes_of = [np.frombuffer(b, dtype=np.uint8) for b in (here, old, new)]
+    return bool(((bytes_of[0] == bytes_of[1]) | (bytes_of[0] == bytes_of[2])).all())
+
+
+def carry_out(path: Path) -> bool:
+    """Do what a journal beside ``path`` has left; True if there was one. Raises ``OSError``."""
+    found = whole_journal(path)
+    if found is not None:
+        _, after, pages = found
+        with path.open("r+b", buffering=0) as file:
+            _apply(file, after, pages)
+    journal_of(path).unlink(missing_ok=True)
+    return found is not None

@@ -1,0 +1,60 @@
+"""What is read of a file that anybody may have made: its own, and no more than it holds.
+
+Links that lead out of the file, virtual datasets and values that lie in other files are not
+followed. A dataset that claims more values than are stored is refused before room is made for it.
+"""
+
+from __future__ import annotations
+
+import h5py
+
+__all__ = ["Refused", "dataset", "group", "item"]
+
+#: More than this times its size in the file nothing is unpacked to.
+PACKED_MAX = 100
+
+
+class Refused(Exception):  # noqa: N818  (what happened to the file, said by the reader)
+    """Why an item is not read."""
+
+
+def item(parent: h5py.Group, name: str, stored: bool = True) -> h5py.Group | h5py.Dataset | None:
+    """``name`` in ``parent``, None if it is not there. Raises ``Refused`` for a link elsewhere.
+
+    ``stored``: and for a dataset that claims more than it holds.
+    """
+    link = parent.get(name, getlink=True)
+    if link is None:
+        return None
+    where = f"{parent.name.rstrip('/')}/{name}"
+    if not isinstance(link, h5py.HardLink):
+        raise Refused(f"{where} is a link, and links are not followed")
+    found = parent[name]
+    if isinstance(found, h5py.Dataset):
+        _check_own(found)
+        if stored:
+            _check_stored(found)
+    return found
+
+
+def group(parent: h5py.Group, name: str) -> h5py.Group | None:
+    """The group ``name`` in ``parent``, None if there is none."""
+    found = item(parent, name)
+    return found if isinstance(found, h5py.Group) else None
+
+
+def dataset(parent: h5py.Group, name: str) -> h5py.Dataset | None:
+    """The dataset ``name`` in ``parent``, None if there is none."""
+    found = item(parent, name)
+    return found if isinstance(found, h5py.Dataset) else None
+
+
+def _check_own(values: h5py.Dataset) -> None:
+    if values.is_virtual or values.external:
+        raise Refused(f"{values.name} takes its values from other files; they are not followed")
+
+
+def _check_stored(values: h5py.Dataset) -> None:
+    claimed, stored = int(values.nbytes), int(values.id.get_storage_size())
+    if claimed > stored * (PACKED_MAX if values.compression else 1):
+        raise Refused(f"{values.name} claims {claimed} bytes and {stored} are stored")

@@ -1,0 +1,327 @@
+"""A recording held against all its claims: what is wrong with it, in words."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from datetime import datetime
+from itertools import pairwise
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from app.errors import InputError
+from app.recording.checksums import wrong_blocks
+from app.recording.finish import OVERVIEW
+from app.recording.journal import whole_journal
+from app.recording.layout import SIGNALS, counts_name
+from app.recording.opening import UNREADABLE, damage, opened
+from app.recording.physical import SLICE, Counts
+from app.recording.pyramid import BINS
+from app.recording.reader import open_recording
+from app.recording.recording import Recording
+from app.recording.safe import Refused, dataset, group
+from app.recording.superblock import consistency_flags
+from app.recording.text import text_of
+
+__all__ = ["Verification", "verify"]
+
+#: Rounding of the same formula by another library.
+ROUNDING = 1e-12
+#: Of the sample clock against the computer's, over runs of at least so many s: more is a fault.
+CLOCKS_APART, CLOCKS_OVER = 0.01, 10.0
+#: More of one sort is not listed one by one.
+LISTED = 5
+
+
+@dataclass
+class Verification:
+    """What was found: ``faults`` contradict the file's claims, ``notes`` are to be known."""
+
+    path: Path
+    checked: list[str] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def sound(self) -> bool:
+        """True if nothing contradicts anything."""
+        return not self.faults
+
+
+def verify(path: str | Path) -> Verification:
+    """Hold the recording at ``path`` against what it says of itself; every sample is read.
+
+    Raises ``InputError`` only if there is no such file.
+    """
+    path = Path(path)
+    found = Verification(path)
+    if not path.is_file():
+        raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")
+    try:
+        recording = open_recording(path)
+        with opened(path) as file:
+            _Check(found, recording, file["entry"]).all()
+        _state(found, recording)
+    except (InputError, Refused) as error:
+        found.faults.append(str(error))
+    except UNREADABLE as error:
+        found.faults.append(str(damage(path, error)))
+    return found
+
+
+def _state(found: Verification, recording: Recording) -> None:
+    if whole_journal(found.path) is not None:
+        found.notes.append("its end lies in a journal beside it; dearig recover puts it in")
+    elif consistency_flags(found.path):
+        found.notes.append("it was killed, or is being written; dearig recover mends it")
+    if not recording.complete:
+        found.notes.append(f"the run did not come to its end: {recording.outcome}")
+    faults = [e for e in recording.events if e.level == "fault"]
+    found.notes += [f"fault at sample {e.sample} ({e.time:.6g} s): {e.message}" for e in faults]
+
+
+class _Check:
+    def __init__(self, found: Verification, recording: Recording, entry: h5py.Group) -> None:
+        self.found = found
+        self.recording = recording
+        self.entry = entry
+        self.data: h5py.Group = entry["data"]
+        self.samples = recording.samples
+
+    def all(self) -> None:
+        self.stored()
+        if self.recording.channels:
+            counts = Counts(self.entry, self.samples)
+            self.counts_shapes()
+            self.checksums(counts)
+            self.pyramid(counts)
+            self.physical(counts)
+            self.long_overview(counts)
+            self.wall_clock()
+        self.events()
+        self.provenance()
+        self.for_viewers()
+
+    def fault(self, sentence: str) -> None:
+        self.found.faults.append(sentence)
+
+    def done(self, what: str) -> None:
+        self.found.checked.append(what)
+
+    def slices(self) -> Iterator[tuple[int, int]]:
+        for start in range(0, self.samples, SLICE):
+            yield start, min(start + SLICE, self.samples)
+
+    def span(self, start: int, stop: int) -> str:
+        return f"samples {start} to {stop - 1}"
+
+    def stored(self) -> None:
+        """Every stored value can be read: HDF5 holds each chunk against its checksum."""
+        arrays = self.recording.arrays
+        for name in arrays.stored:
+            before = -np.inf
+            for start, stop in self.slices():
+                try:
+                    values = self.data[name][start:stop]
+                except (OSError, RuntimeError):
+                    self.fault(
+                        f"/entry/data/{name}: {self.span(start, stop)} cannot be read: a checksum "
+                        f"is wrong"
+                    )
+                    break
+                if name == "time":
+                    if values[0] <= before or (np.diff(values) <= 0.0).any():
+                        self.fault(f"time does not go forward in {self.span(start, stop)}")
+                        break
+                    before = values[-1]
+                elif name != "displacement_model" and not np.isfinite(values).all():
+                    self.fault(
+                        f"/entry/data/{name} has values that are no numbers in "
+                        f"{self.span(start, stop)}"
+                    )
+                    break
+        if arrays.stored:
+            self.done(f"{len(arrays.stored)} rows of stored values, {self.samples} samples each")
+
+    def counts_shapes(self) -> None:
+        claimed = self.entry.attrs.get("samples")
+        finished = claimed is not None
+        for channel in self.recording.channels:
+            there = int(self.data[counts_name(channel.name)].shape[0])
+            if finished and there != self.samples:
+                self.fault(f"{channel.name} has {there} counts, not {self.samples}")
+            elif there > self.samples:
+                self.found.notes.append(
+                    f"{channel.name} has {there - self.samples} counts more than every channel has"
+                )
+        if finished and int(claimed) != self.samples:
+            self.fault(f"/entry claims {int(claimed)} samples and holds {self.samples}")
+        expected, outcome = self.recording.samples_expected, self.recording.outcome
+        if outcome == "finished" and expected is not None and expected != self.samples:
+            self.fault(
+                f"the run is said to have finished, with {self.samples} of {expected} samples"
+            )
+        self.done(f"{self.samples} samples of {len(self.recording.channels)} channels are there")
+
+    def checksums(self, counts: Counts) -> None:
+        if dataset(self.entry, "checksums") is None:
+            self.found.notes.append("its counts have no checksums: it is of an earlier version")
+            return
+        compared, wrong = wrong_blocks(self.entry, self.samples, counts.raw)
+        for channel, start, stop in wrong[:LISTED]:
+            name = counts.channels[channel].name
+            self.fault(
+                f"the counts of {name} are not those that were written: {self.span(start, stop)} "
+                f"({start / counts.rate:.6g} to {stop / counts.rate:.6g} s) have another checksum"
+            )
+        if len(wrong) > LISTED:
+            self.fault(f"{len(wrong) - LISTED} more blocks of counts have another checksum")
+        if compared < self.samples:
+            rest = f"the last {self.samples - compared} samples have no checksum"
+            if "samples" in self.entry.attrs:
+                self.fault(rest)
+            else:
+                self.found.notes.append(f"{rest} yet: the run was killed before")
+        self.done(f"checksums of the counts of {compared} samples")
+
+    def pyramid(self, counts: Counts) -> None:
+        stored = group(self.entry, "pyramid")
+        if stored is None:
+            return
+        for size in BINS:
+            level = stored[f"bins_of_{size}"]
+            rows = min(level.shape[0], self.samples // size)
+            if "samples" in self.entry.attrs and level.shape[0] != self.samples // size:
+                self.fault(
+                    f"/entry/pyramid has {level.shape[0]} bins of {size} samples, not "
+                    f"{self.samples // size}"
+                )
+            # bins are few samples wide or many: about a slice of them at a time
+            step = max(SLICE // size, 1)
+            for first in range(0, rows, step):
+                last = min(first + step, rows)
+                raw = counts.raw(first * size, last * size)
+                binned = raw.reshape(raw.shape[0], last - first, size)
+                ends = np.stack((binned.min(axis=2).T, binned.max(axis=2).T), axis=2)
+                if not np.array_equal(ends, level[first:last]):
+                    self.fault(
+                        f"/entry/pyramid is not of these counts in "
+                        f"{self.span(first * size, last * size)} (bins of {size})"
+                    )
+                    break
+        self.done("least and greatest counts over bins")
+
+    def physical(self, counts: Counts) -> None:
+        stored = [n for n in counts.names if n in self.recording.arrays.stored]
+        for name in stored:
+            for start, stop in self.slices():
+                try:
+                    there = self.data[name][start:stop]
+                except (OSError, RuntimeError):
+                    break  # said by stored()
+                expected = counts.window(name, start, stop)
+                off = np.abs(there - expected)
+                scale = np.abs(expected).max(initial=0.0) + abs(counts.rest.reading)
+                if not (off <= ROUNDING * scale).all():
+                    at = start + int(np.argmax(~(off <= ROUNDING * scale)))
+                    self.fault(
+                        f"/entry/data/{name} is not what its counts give: "
+                        f"{there[at - start]:.9g} at sample {at}, not {expected[at - start]:.9g}"
+                    )
+                    break
+        found = Counts(self.entry, self.samples).measured_rest()
+        rest = counts.rest
+        if abs(found.reading - rest.reading) > 1e-9 * abs(found.reading) + 1e-15:
+            self.fault(
+                f"displacement is counted from {rest.reading:.9g} m, and the sensor's mean over "
+                f"the lead-in is {found.reading:.9g} m"
+            )
+        if stored:
+            self.done("stored values against counts and scaling")
+
+    def long_overview(self, counts: Counts) -> None:
+        shown = group(self.entry, "overview")
+        if shown is None:
+            return
+        for name in counts.names:
+            if name == "time":
+                continue
+            _, low, high = counts.overview(name, 0, self.samples, OVERVIEW)
+            there = shown[name][()]
+            both = np.stack((low, high), axis=1).reshape(-1)
+            if there.shape != both.shape or not np.allclose(there, both, rtol=1e-9, atol=1e-15):
+                self.fault(f"/entry/overview/{name} does not show these counts")
+        self.done("the overview for viewers")
+
+    def wall_clock(self) -> None:
+        rows = dataset(self.entry, "wall_clock")
+        if rows is None:
+            return
+        at, moments = (rows[()][name] for name in ("sample", "unix_time"))
+        if (np.diff(at) < 0).any() or (at.size and int(at[-1]) > self.samples):
+            self.fault("/entry/wall_clock notes samples that go back, or that are not there")
+            return
+        if (np.diff(moments) < 0.0).any():
+            self.found.notes.append("the computer's clock was set back during the run")
+        elif at.size > 1 and not self.recording.provenance.get("simulated", False):
+            # the first row is from before the run was started
+            took, counted = float(moments[-1] - moments[1]), float(at[-1] - at[1])
+            rate = self.recording.rate or 0.0
+            if took >= CLOCKS_OVER and abs(counted / rate - took) > CLOCKS_APART * took:
+                self.fault(
+                    f"the sample clock counted {counted / rate:.6g} s and the computer's clock "
+                    f"{took:.6g} s: rate_Hz is wrong, or samples are missing"
+                )
+        self.done("the computer's clock beside the sample clock")
+
+    def events(self) -> None:
+        rate = self.recording.rate
+        for event in self.recording.events:
+            where = f"the event {event.message[:60]!r}"
+            if not 0 <= event.sample <= self.samples:
+                late = self.entry.attrs.get("samples") is None
+                say = self.found.notes.append if late else self.fault
+                say(f"{where} is at sample {event.sample}, which is not there")
+            elif rate is not None and abs(event.time - event.sample / rate) > 1e-6 / rate:
+                self.fault(
+                    f"{where} is at {event.time:.9g} s, and its sample {event.sample} at "
+                    f"{event.sample / rate:.9g} s"
+                )
+        self.done(f"{len(self.recording.events)} events")
+
+    def provenance(self) -> None:
+        noted = self.recording.provenance
+        if "configuration" in noted and "configuration_sha256" in noted:
+            digest = hashlib.sha256(str(noted["configuration"]).encode()).hexdigest()
+            if digest != noted["configuration_sha256"]:
+                self.fault("/entry/provenance: the configuration is not the one of its SHA-256")
+            self.done("the configuration's SHA-256")
+        moments = [
+            text_of(self.entry[n][()]) for n in ("start_time", "end_time") if n in self.entry
+        ]
+        try:
+            times = [datetime.fromisoformat(moment) for moment in moments]
+        except ValueError:
+            self.fault(f"/entry: one of {', '.join(moments)} is no time")
+            return
+        if any(later < earlier for earlier, later in pairwise(times)):
+            self.found.notes.append(f"it ended at {moments[1]}, before its start at {moments[0]}")
+
+    def for_viewers(self) -> None:
+        """What a viewer of NeXus files follows to the default plot."""
+        shown = text_of(self.entry.attrs.get("default", ""))
+        plot = group(self.entry, shown) if shown else None
+        if plot is None:
+            self.fault(f"/entry names {shown!r} as its default plot, which is not there")
+            return
+        if "samples" not in self.entry.attrs and self.recording.channels:
+            return  # what was killed has no plot before it is recovered
+        signal = text_of(plot.attrs.get("signal", ""))
+        if signal != SIGNALS[self.recording.kind] or signal not in plot or "time" not in plot:
+            self.fault(f"{plot.name} has no plot of {SIGNALS[self.recording.kind]} over time")
+        elif plot[signal].shape != plot["time"].shape:
+            self.fault(f"{plot.name}: {signal} and time have different lengths")
+        self.done("the default plot")

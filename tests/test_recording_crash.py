@@ -1,0 +1,17 @@
+"""Every write boundary of a small run; ``python -m tests.crash`` does the same of longer ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.crash.__main__ import replay
+from tests.crash.changes import able
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not able(), reason="writes are noted with a C compiler on Linux only")
+def test_no_crash_point_loses_what_was_flushed(tmp_path: Path) -> None:
+    points, rich = replay(tmp_path, blocks=5, size=200, overwrite=True, torn=False)
+    assert points > rich > 30
