@@ -204,9 +204,15 @@ def admit(
         for first in range(0, voltage.size, _PIECE):
             last = min(first + _PIECE, voltage.size)
             before = max(0, first - 1)  # the sample before the piece: its step and rise count
-            at = np.arange(before, last) // prediction.stride
+            strides = np.arange(before, last) // prediction.stride
             reached.take(
-                voltage[before:last], field_per_volt[at], before, first, rate, limits, prediction
+                voltage[before:last],
+                field_per_volt[strides],
+                before,
+                first,
+                rate,
+                limits,
+                prediction,
             )
 
     reasons: list[str] = []

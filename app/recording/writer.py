@@ -13,7 +13,6 @@ import math
 import os
 import re
 import shutil
-import tempfile
 import time
 import tomllib
 from collections.abc import Callable, Iterator
@@ -271,8 +270,9 @@ class RecordingWriter:
         HDF5 cannot close a file that it cannot write, and brings the program down at its end; so
         what it still wants to write goes elsewhere.
         """
-        with tempfile.TemporaryFile() as elsewhere:
-            os.dup2(elsewhere.fileno(), self._file.id.get_vfd_handle())
+        # nowhere: another file could be refused as well, by the same disk or the same limit
+        with Path(os.devnull).open("r+b") as nowhere:
+            os.dup2(nowhere.fileno(), self._file.id.get_vfd_handle())
             try:
                 self._file.close()
             except (OSError, RuntimeError):
