@@ -1,0 +1,21 @@
+"""Runs that die, freeze or lose something; the campaign does many more of them."""
+
+import sys
+
+import pytest
+
+from tests.campaign.cases import run_case
+
+# a busy machine is late, and lateness is not what is tested here: the campaign measures it
+PATIENCE = 20.0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="stops and kills processes by signals")
+@pytest.mark.parametrize(
+    "kind",
+    ["client-killed", "client-frozen", "guardian-killed", "amplifier-trip", "disk-full",
+     "server-gone", "operator-stops", "serial-garbage"],
+)  # fmt: skip
+def test_it_ends_at_zero_volts_with_what_was_recorded(kind, tmp_path):
+    outcome = run_case(kind, 1, tmp_path, PATIENCE)
+    assert outcome.wrong == []
