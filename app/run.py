@@ -259,7 +259,11 @@ class _Run:
                 if (trip is not None or interrupts.asked()) and not stopping:
                     stopping = True
                     if trip is None:
-                        self._note("warning", "interrupted by the operator: ramping down to 0 V")
+                        self._note(
+                            self._writer.samples,
+                            "warning",
+                            "interrupted by the operator: ramping down to 0 V",
+                        )
                     rig.stop()
         except (RigError, KeyboardInterrupt):
             raise
@@ -279,7 +283,7 @@ class _Run:
         trips = self._interlocks.watch(block)
         trips += [trip for trip in (self._interlocks.late(self._rig.waiting), self._disk()) if trip]
         for trip in trips:
-            self._note("fault", f"interlock {trip.interlock}: {trip.message}")
+            self._note(trip.sample, "fault", f"interlock {trip.interlock}: {trip.message}")
             self._trip = self._trip or trip
         if not trips:
             return None
@@ -300,9 +304,9 @@ class _Run:
             ) from error
         return self._interlocks.disk(free)
 
-    def _note(self, level: str, message: str) -> None:
-        event = Event(self._writer.samples, level, message)
-        self._writer.event(event.sample, level, message)
+    def _note(self, sample: int, level: str, message: str) -> None:
+        event = Event(sample, level, message)
+        self._writer.event(sample, level, message)
         self._tell(event)
 
     def _tell(self, event: Event) -> None:

@@ -581,6 +581,12 @@ class RigSettings(Section):
         for terminal in inputs:
             if inputs.count(terminal) > 1:
                 raise ValueError(f"card: input {terminal} is wired to two channels, one is allowed")
+        if self.interlocks.current_max_mA >= amplifier.current_limit_mA:
+            raise ValueError(
+                f"interlocks.current_max_mA = {self.interlocks.current_max_mA:g} is not below "
+                f"amplifier.current_limit_mA = {amplifier.current_limit_mA:g}: the amplifier would "
+                f"never deliver what trips it"
+            )
         for name, how in self.wiring().items():
             number = int(self.terminals()[name].removeprefix("ai"))
             if how == "DIFF" and number % 16 >= 8:

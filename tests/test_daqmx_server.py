@@ -934,3 +934,44 @@ def test_tasks_on_a_rate_that_only_the_clock_knows(session, output, inputs):
         read(inputs, waveform.voltage.size), play(the_rig(), waveform).counts[1:]
     )
     assert inputs.timing.samp_quant_samp_mode is AcquisitionType.FINITE
+
+
+def test_a_long_stream_is_forgotten_behind_itself_and_nothing_of_it_is_wrong(session, card):
+    rate, size, piece = 100e3, 450_000, 30_000
+    command = np.round(2000.0 * (1.0 + np.sin(np.arange(size) * 3e-4)))
+    with task(session) as ao, task(session) as ai:
+        add_output(ao)
+        add_inputs(ai, "_ao0_vs_aognd", "ai0")
+        clock_output(ao, rate, buffer=2 * piece)
+        ai.timing.cfg_samp_clk_timing(
+            rate, source=AO_CLOCK, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=size
+        )
+        gone = write(ao, command[: 2 * piece] / 3276.8)
+        ai.start()
+        ao.start()
+        parts = []
+        while gone < size:
+            parts.append(read(ai, piece)[0])
+            gone += write(ao, command[gone : gone + piece] / 3276.8)
+        parts.append(read(ai, 2 * piece)[0])
+        held = card.device.task(ao.name).waveform._used
+    np.testing.assert_array_equal(np.concatenate(parts), command.astype(np.int16))
+    assert held < size // 2
+
+
+def test_a_narrower_range_reads_the_same_volts_in_finer_steps():
+    waveform, found = lobes(), []
+    for limit in (10.0, 2.0):
+        with served() as card, task(card.session) as ao, task(card.session) as ai:
+            add_output(ao)
+            ai.ai_channels.add_ai_voltage_chan("Dev1/ai2", min_val=-limit, max_val=limit)
+            clock_output(ao, RATE, waveform.voltage.size)
+            clock_inputs(ai, RATE, waveform.voltage.size)
+            ao.write(volts(waveform))
+            ai.start()
+            ao.start()
+            found.append(np.array(ai.read(waveform.voltage.size)))
+    wide, narrow = found
+    # half a step of the wide range, and its calibration
+    np.testing.assert_allclose(narrow, wide, atol=10.0 * 350e-6 + 10.0 / 65536)
+    assert not np.array_equal(narrow, wide)

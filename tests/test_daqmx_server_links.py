@@ -98,6 +98,17 @@ def test_a_killed_client_has_its_voltage_taken_away(heard, how):
             ao.write(1.0)
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="a process cannot be halted there")
+def test_a_client_that_is_halted_has_its_voltage_taken_away(heard):
+    """Its link is up and its calls do not come: the pings that nobody answers tell."""
+    with served(client_timeout=3600.0) as card, victim(card.server.port, "listening") as process:
+        process.send_signal(signal.SIGSTOP)
+        assert heard.something.wait(30.0)
+        assert "connection has ended" in heard.messages[0]
+        assert card.device.wire_voltage() == 0.0
+        process.send_signal(signal.SIGCONT)
+
+
 def test_without_tracking_the_voltage_stays_as_on_the_real_server():
     with served(client_timeout=None) as card:
         with victim(card.server.port, "listening") as process:
@@ -288,7 +299,8 @@ def test_a_late_reply_comes_in_the_end():
 def test_a_frozen_server_holds_its_replies_and_a_deadline_ends_the_wait():
     from nidaqmx._stubs import nidaqmx_pb2 as pb
 
-    with running("server-frozen@0.3") as (card, ao, ai):
+    link = ManualClock()
+    with running("server-frozen@0.3", link=link) as (card, ao, ai):
         read(ai, 299)
         with pytest.raises(grpc.RpcError) as caught:
             ai._interpreter._client.ReadRaw(
@@ -298,6 +310,11 @@ def test_a_frozen_server_holds_its_replies_and_a_deadline_ends_the_wait():
                 timeout=0.2,
             )
         assert caught.value.code() is grpc.StatusCode.DEADLINE_EXCEEDED
+        # what does not get through is silence
+        assert high(card.device)
+        link.advance(1.1)
+        card.server.clients.check()
+        assert card.device.wire_voltage() == 0.0
         card.server.close()
         for made in (ao, ai):
             with pytest.raises(RpcError):

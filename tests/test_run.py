@@ -283,7 +283,7 @@ def test_a_disk_that_gets_full_ends_the_run_before_it_is(
     command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ticks = iter(np.arange(0.0, 100.0, 0.15))
-    monkeypatch.setattr("app.run.shutil.disk_usage", lambda _: SimpleNamespace(free=10))
+    monkeypatch.setattr("app.run.shutil.disk_usage", lambda _: SimpleNamespace(free=50_000_000))
     rig = Troubled("", lambda: None)
     monkeypatch.setattr("app.run.open_rig", lambda *_, **__: rig)
     with pytest.raises(SafetyStop, match=r"free.*ramped down to 0 V"):

@@ -105,6 +105,8 @@ class GuardianProcess:
 
     def take_over(self) -> None:
         """Ask for 0 V now. Raises ``RigError`` where the guardian does not bring it about."""
+        if self._trying:
+            raise RigError("the guardian process is still trying to reach the card")
         if not self._tell("take over"):
             raise RigError("the guardian process is gone too")
         self._trying = True

@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sim_backend.daqmx.device import INPUT_RANGES, INPUTS, LINES, OUTPUTS, Device
+from sim_backend.daqmx.device import Device
 from sim_backend.daqmx.errors import Code, DaqmxError
+from sim_backend.daqmx.setup import INPUT_RANGES, INPUTS, LINES, OUTPUTS
 from sim_backend.daqmx.tasks import AnalogInput, AnalogOutput, Kind, Lines, Task
 
 __all__ = ["SERIAL", "Asked", "get", "reset", "set_"]
@@ -162,7 +163,7 @@ TABLE: dict[tuple[str, int], tuple[Getter | None, Setter | None]] = {
     ("Device", 0x29A9): (_always(_X_SERIES), None),
     ("Device", 0x22CA): (_always(True), None),
     ("Device", 0x231E): (lambda a: _names(a, [f"ai{i}" for i in range(INPUTS)]), None),
-    ("Device", 0x231F): (lambda a: _names(a, [f"ao{i}" for i in range(OUTPUTS)]), None),
+    ("Device", 0x231F): (lambda a: _names(a, OUTPUTS), None),
     ("Device", 0x2320): (lambda a: _names(a, LINES), None),
     ("Device", 0x2322): (lambda a: _names(a, LINES), None),
     ("Device", 0x2321): (lambda a: _names(a, [f"port{i}" for i in range(3)]), None),

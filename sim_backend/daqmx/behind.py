@@ -49,6 +49,15 @@ class Behind:
         self._laser_at_rest = laser.direction * laser.rest_position_mm / laser.mm_per_V
         self.zero = int(self._output.counts(np.zeros(1))[0])
 
+    def warm_up(self) -> None:
+        """Compute two samples: the kernels are compiled now, not while somebody waits for 0 V."""
+        rate = self._settings.card.sample_rate_Hz
+        wired = [t for n, t in self._settings.terminals().items() if n != "voltage_command"]
+        inputs = [AnalogInput(t, t, (-10.0, 10.0), 10.0, 0) for t in wired]
+        skews = [self._settings.skew(place) for place in range(len(inputs))]
+        path, state = self.run(0, rate, inputs, skews)
+        path.advance(0, np.full(2, self.zero, dtype=np.int16), state)
+
     def film_voltage(self, counts: int) -> float:
         """Voltage in V at the film for ``counts`` on the output, with the amplifier enabled."""
         limit = self._settings.amplifier.range_kV * 1e3

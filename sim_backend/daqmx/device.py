@@ -1,4 +1,4 @@
-"""The simulated card: tasks, clocks, buffers and rules, on an injected clock.
+"""The simulated card at work: tasks, clocks and buffers, on an injected clock.
 
 It has no thread of its own: whoever asks finds it as it is at that moment, and everything that
 happened since it was last asked is worked out then.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -18,41 +18,20 @@ from drivers.channels import COUNT_MAX, COUNT_MIN
 from drivers.settings import RigSettings
 from sim_backend.clock import Clock
 from sim_backend.daqmx.acquisition import OwnTicks, Run, SharedTicks
-from sim_backend.daqmx.behind import OUTPUT_MONITOR, Behind
+from sim_backend.daqmx.behind import Behind
 from sim_backend.daqmx.errors import Code, DaqmxError
-from sim_backend.daqmx.output import Generation, Track, Waveform
-from sim_backend.daqmx.tasks import (
-    AnalogInput,
-    AnalogOutput,
-    Kind,
-    Lines,
-    SampleClock,
-    State,
-    Task,
-    Watchdog,
-    physical_names,
-)
+from sim_backend.daqmx.output import Generation, Waveform
+from sim_backend.daqmx.setup import LINES, OUTPUTS, Setup
+from sim_backend.daqmx.tasks import Kind, SampleClock, State, Task, Watchdog
+from sim_backend.daqmx.wire import Change, Wire
 from sim_backend.faults import Fault, FaultKind, FaultPlan
 from sim_backend.plant import Plant
 
-__all__ = ["Change", "Device", "Reading"]
+__all__ = ["Device", "Reading"]
 
 _LONGEST_WATCHDOG = 429.0  # s; 2**32 ticks of 10 MHz
-_TRACED = 1 << 20  # samples that are looked through at a time
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Change:
-    """The output arrived at or left its zero at ``time`` s on the clock, or was set.
-
-    ``output`` V stand at the card's terminal and ``wire`` V at the film from then on.
-    """
-
-    time: float
-    output: float
-    wire: float
 
 
 @dataclass(frozen=True)
@@ -63,7 +42,7 @@ class Reading:
     complete: bool
 
 
-class Device:
+class Device(Setup):
     """A PCIe-6361 with the rig of ``settings`` behind it, whose film is ``plant`` at rest.
 
     Every run of its inputs starts with the film at rest. All calls may come from any thread, and
@@ -79,39 +58,29 @@ class Device:
         noise_seed: tuple[int, ...] = (0,),
         faults: FaultPlan | None = None,
     ) -> None:
-        self.settings = settings
-        self.name = settings.card.device
-        self._card = settings.card
+        super().__init__(settings)
         self._clock = clock
         self._born = clock.now()
         self._faults = faults or FaultPlan()
         self._behind = Behind(settings, plant, noise_seed, self._faults)
-        self._lock = threading.RLock()
+        self._behind.warm_up()
+        self._wire = Wire(self._card, self._behind, OUTPUTS, LINES, self._born)
         self._waiting: set[threading.Event] = set()
         self._tasks: dict[str, Task] = {}
         self._numbered = 0
         self._reserved: dict[str, Task] = {}
-        self._tracks = {f"ao{i}": Track() for i in range(OUTPUTS)}
-        self._levels = dict.fromkeys(LINES, False)
-        self._enable = self._card.do_hv_enable
-        self._enabled: list[tuple[float, bool]] = [(-math.inf, self._enable is None)]
-        self._history: list[Change] = []
-        self._traced = 0  # ticks of the present generation that the history knows
-        self._away = False  # from zero
         self._runs = 0
         self._readings = 0
         self._laser: tuple[int, float] | None = None  # counts and range of its last reading
         self._run_start: float | None = None
         self._fired: set[Fault] = set()
-        self._driver = ""  # client that moved the output last
-        self._trace(0.0, 0)
 
     # what a test may ask
 
     def wire_voltage(self) -> float:
         """Voltage in V that is commanded at the film now."""
         with self._lock:
-            return self._wire(self._settle())
+            return self._wire.film_voltage(self._settle())
 
     def live(self) -> bool:
         """Whether there is more voltage at the film than the rig's limits take for none."""
@@ -119,25 +88,24 @@ class Device:
 
     def drives(self, client: str) -> bool:
         """Whether ``client`` was the last to move the output to the amplifier."""
-        return self._driver == client
+        return self._wire.client == client
 
     def output_voltage(self) -> float:
         """Voltage in V at the output to the amplifier now."""
         with self._lock:
-            now = self._settle()
-            return self._behind.output_volts(self._tracks[self._card.ao_command].standing(now))
+            return self._wire.output_voltage(self._settle())
 
     def history(self) -> tuple[Change, ...]:
         """When the film's voltage left or reached zero, and what was set, in time's order."""
         with self._lock:
             self._settle()
-            return tuple(self._history)
+            return tuple(self._wire.history)
 
     def line(self, name: str) -> bool:
         """Level of the digital line ``name``, such as ``port0/line0``."""
         with self._lock:
             self._settle()
-            return self._levels[name]
+            return self._wire.levels[name]
 
     def fault(self, kind: FaultKind) -> Fault | None:
         """A fault of ``kind`` that goes on now, counted from the start of the run's clock."""
@@ -213,10 +181,10 @@ class Device:
                 self._abort(task, now)
                 if task.watchdog is not None:
                     task.watchdog.expired = False
-            for terminal in self._tracks:
+            for terminal in OUTPUTS:
                 self._set_output(terminal, 0, now)
             for line in LINES:
-                self._set_line(line, False, now)
+                self._wire.set_line(line, False, now)
             self._notify()
 
     def make_safe(self, client: str | None = None) -> None:
@@ -227,8 +195,7 @@ class Device:
                 if client in (None, task.client):
                     self._abort(task, now)
             self._set_output(self._card.ao_command, 0, now)
-            if self._enable is not None:
-                self._set_line(self._enable, False, now)
+            self._wire.disable(now)
             self._notify()
 
     def scaling(self, task: Task, name: str) -> tuple[float, ...]:
@@ -370,10 +337,10 @@ class Device:
             acquired = self._acquired(task, now)
             waiting = acquired - task.delivered
             if task.wanted is None and waiting > self.buffer_size(task):
-                self._fail(task, Code.SAMPLES_OVERWRITTEN)
+                task.failed = Code.SAMPLES_OVERWRITTEN
             elapsed = self._elapsed(now)
             if any(fault.at <= elapsed for fault in self._faults.of(FaultKind.AI_OVERFLOW)):
-                self._fail(task, Code.SAMPLES_OVERWRITTEN)
+                task.failed = Code.SAMPLES_OVERWRITTEN
             self._raise_failure(task, read=0)
             wanted = samples
             if task.wanted is not None:
@@ -469,7 +436,7 @@ class Device:
                 raise DaqmxError(Code.WRITE_AFTER_WATCHDOG, f"Task Name: {task.name}", written=0)
             self._check_free(task)
             for line, level in zip(task.line_names, levels, strict=True):
-                self._set_line(line, bool(level), now)
+                self._wire.set_line(line, bool(level), now)
             self._notify()
 
     # the watchdog
@@ -525,14 +492,14 @@ class Device:
             if watchdog is not None and watchdog.deadline is not None and now >= watchdog.deadline:
                 at, watchdog.deadline = watchdog.deadline, None
                 watchdog.expired = True
-                self._follow_wired(at)
+                self._wire.follow(at, self._oldest)
                 for line, level in watchdog.states.items():
-                    self._set_line(line, level, at)
+                    self._wire.set_line(line, level, at)
         for task in self._tasks.values():
             generation = task.generation
             if generation is not None and generation.settle(now) is not None:
                 task.failed = Code.OUTPUT_STARVED
-        self._follow_wired(now)
+        self._wire.follow(now, self._oldest)
         return now
 
     def _wait(
@@ -567,6 +534,37 @@ class Device:
         """Time in s since the sample clock of the present run started; less than 0 before it."""
         return -1.0 if self._run_start is None else now - self._run_start
 
+    # what is still asked for
+
+    def _oldest(self, generation: Generation) -> int:
+        """First tick of ``generation`` that a reader may still ask for; the last one: none may."""
+        oldest = generation.waveform.written
+        for task in self._tasks.values():
+            if task.ticks is None or not task.running:
+                continue
+            keeps = task.run.keeps if task.run is not None else 0
+            if isinstance(task.ticks, SharedTicks):
+                needed = task.ticks.needs(generation, keeps)
+                if needed is not None:
+                    oldest = min(oldest, needed)
+            elif task.ticks.start is not None:
+                time = task.ticks.start + keeps / task.ticks.rate
+                oldest = min(oldest, math.floor((time - generation.start) * generation.rate) - 1)
+        return oldest
+
+    def _looks_back(self, now: float) -> float:
+        """The earliest time in s whose output somebody may still ask for."""
+        earliest = now
+        for task in self._tasks.values():
+            if task.ticks is not None and task.running and task.ticks.passed(now):
+                keeps = task.run.keeps if task.run is not None else 0
+                earliest = min(earliest, float(task.ticks.times(keeps, keeps + 1)[0]))
+        return earliest
+
+    def _set_output(self, terminal: str, counts: int, now: float, client: str = "") -> None:
+        self._wire.set_output(terminal, counts, now, client)
+        self._wire.forget_before(self._looks_back(now))
+
     # reservations
 
     def _resources(self, task: Task) -> list[str]:
@@ -598,9 +596,6 @@ class Device:
         task.state = task.kept = State.VERIFIED
         task.waveform = None
         self._reserved = {r: owner for r, owner in self._reserved.items() if owner is not task}
-
-    def _fail(self, task: Task, code: Code) -> None:
-        task.failed = code
 
     def _raise_failure(
         self, task: Task, *, read: int | None = None, written: int | None = None
@@ -663,11 +658,7 @@ class Device:
             raise DaqmxError(Code.OUTPUT_BUFFER_EMPTY, f"Task Name: {task.name}")
         generation = Generation(waveform, clock.rate, now, task.wanted)
         task.generation = generation
-        self._traced = 0
-        for row, channel in enumerate(task.outputs):
-            self._tracks[channel.terminal].follow(generation, row)
-            if channel.terminal == self._card.ao_command:
-                self._driver = task.client
+        self._wire.begin(generation, [c.terminal for c in task.outputs], task.client)
         for reader in self._tasks.values():
             if reader.kind is not Kind.AI or not reader.running:
                 continue
@@ -689,10 +680,8 @@ class Device:
 
     def _share(self, task: Task, generation: Generation, tick: int, now: float) -> None:
         """Let an input task convert on the ticks of ``generation``, from ``tick`` on."""
-        wired = self._wired_generation()
-        row = wired[1] if wired is not None and wired[0] is generation else None
         if isinstance(task.ticks, SharedTicks):
-            task.ticks.follow(generation, tick, row, now)
+            task.ticks.follow(generation, tick, self._wire.row(generation), now)
         if self._run_start is None:
             self._run_start = now
 
@@ -707,10 +696,10 @@ class Device:
     def _end(self, task: Task, now: float) -> None:
         if task.generation is not None:
             task.generation.stop(now)
-            self._follow_wired(now)
+            self._wire.follow(now, self._oldest)
+            self._wire.end(task.generation)
             task.generation = None
-            for channel in task.outputs:
-                self._tracks[channel.terminal].forget_before(self._looks_back(now))
+            self._wire.forget_before(self._looks_back(now))
         if task.ticks is not None:
             task.ticks, task.run = None, None
         if task.watchdog is not None:
@@ -740,12 +729,13 @@ class Device:
         if samples == 0 or task.ticks is None:
             return Reading(np.empty((len(task.inputs), 0), dtype=np.int16), complete)
         ticks = task.ticks
-        track = self._tracks[self._card.ao_command]
         if task.run is None:
             task.run = self._new_run(task)
         counts = task.run.read(first, last)
         # while the amplifier is not enabled the film gets 0 V whatever the output says
-        output = counts[0] if self._enable is None else ticks.commands(first, last, track)
+        output = counts[0]
+        if self._wire.switched:
+            output = ticks.commands(first, last, self._wire.track)
         task.delivered = last
         self._laser = self._behind.laser_reading(counts, task.inputs)
         return Reading(self._behind.as_read(counts, output, task.inputs), complete)
@@ -759,11 +749,11 @@ class Device:
         skews = [(first + place * step) * 1e-6 for place in range(len(task.inputs))]
         rate = ticks.rate
         path, state = self._behind.run(task.run_number, rate, task.inputs, skews)
-        track = self._tracks[self._card.ao_command]
+        wire = self._wire
 
         def command(start: int, end: int) -> np.ndarray:
-            counts = ticks.commands(start, end, track)
-            return self._gated(counts, ticks.times(start, end)) if self._enable else counts
+            counts = ticks.commands(start, end, wire.track)
+            return wire.gated(counts, ticks.times(start, end)) if wire.switched else counts
 
         return Run(path, state, command)
 
@@ -772,10 +762,8 @@ class Device:
         self._verify(task)
         self._check_free(task)
         self._readings += 1
-        output = self._tracks[self._card.ao_command].standing(now)
-        counts = self._behind.still(
-            task.inputs, samples, self._readings, self._wire(now), output, self._laser
-        )
+        film, output = self._wire.film_voltage(now), self._wire.track.standing(now)
+        counts = self._behind.still(task.inputs, samples, self._readings, film, output, self._laser)
         return Reading(counts, True)
 
     def _write_still(self, task: Task, counts: np.ndarray, auto_start: bool, now: float) -> int:
@@ -783,9 +771,7 @@ class Device:
             raise DaqmxError(Code.WRITE_WITHOUT_START, f"Task Name: {task.name}", written=0)
         self._check_free(task)
         for row, channel in zip(counts, task.outputs, strict=True):
-            self._set_output(channel.terminal, int(row[-1]), now)
-            if channel.terminal == self._card.ao_command:
-                self._driver = task.client
+            self._set_output(channel.terminal, int(row[-1]), now, task.client)
         self._notify()
         return int(counts.shape[1])
 
@@ -878,5 +864,3 @@ class Device:
                 Code.OUTPUT_BUFFER_TOO_SMALL,
                 f"Buffer Size: {self._buffer_room(task)}; Task Name: {task.name}",
             )
-
-

@@ -33,6 +33,7 @@ _OPTIONS = (
     # a link that is cut without a word is noticed within half a second
     ("grpc.keepalive_time_ms", 200),
     ("grpc.keepalive_timeout_ms", 250),
+    ("grpc.http2.ping_timeout_ms", 250),
     ("grpc.keepalive_permit_without_calls", 1),
     ("grpc.http2.max_pings_without_data", 0),
     ("grpc.http2.max_ping_strikes", 0),
@@ -147,16 +148,17 @@ class _Way(grpc.ServerInterceptor):
         def answer(request: Any, context: grpc.ServicerContext) -> Any:
             clients = self._server.clients
             watched = nullcontext() if clients is None else clients.call(context.peer(), context)
-            with watched:
-                try:
-                    self._freeze()
+            # a call that is held does not get through: its client counts as silent
+            self._freeze()
+            try:
+                with watched:
                     response = call(request, context)
-                    self._freeze()
-                    self._delay()
-                except DaqmxError as error:
-                    refuse(context, error)
-                else:
-                    return response
+            except DaqmxError as error:
+                self._freeze()
+                refuse(context, error)
+            self._freeze()
+            self._delay()
+            return response
 
         return answer
 

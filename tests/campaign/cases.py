@@ -110,7 +110,8 @@ KINDS: dict[str, Expected] = {
     "client-killed": Expected((-signal.SIGKILL,), 0.5),
     "client-frozen": Expected((4,), 1.0 + 0.5, "fault"),
     "guardian-killed": Expected((4,), RAMP + LATE, "guardian"),
-    "disk-full": Expected((4,), RAMP + LATE),
+    # seen when the file next grows: it is extended by a second, and written every quarter of one
+    "disk-full": Expected((4,), 1.25 + RAMP + LATE),
     "operator-stops": Expected((130,), RAMP + LATE, "interrupted by the operator"),
 }
 
