@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from drivers.interlocks import Interlocks, Trip
 from drivers.rig import Block
-from drivers.settings import InterlockSettings, LaserSettings, RigSettings
+from drivers.settings import AmplifierSettings, InterlockSettings, LaserSettings, RigSettings
 
 RATE = 1000.0
 QUIET = 100  # samples of lead-in
@@ -28,9 +28,18 @@ COEFFICIENTS = {
 class Signals:
     """A healthy run: half-sine lobes of 6 kV and 0.5 s, the film following."""
 
-    def __init__(self, samples=2000, rate=RATE, laser: LaserSettings | None = None, **locks):
+    def __init__(
+        self,
+        samples=2000,
+        rate=RATE,
+        laser: LaserSettings | None = None,
+        amplifier: AmplifierSettings | None = None,
+        **locks,
+    ):
         self.settings = RigSettings(
-            interlocks=InterlockSettings(**locks), laser=laser or LaserSettings()
+            interlocks=InterlockSettings(**locks),
+            laser=laser or LaserSettings(),
+            amplifier=amplifier or AmplifierSettings(),
         )
         self.rate = rate
         self.channels = self.settings.channels(COEFFICIENTS)
@@ -249,7 +258,7 @@ def test_below_its_voltage_a_breakdown_is_not_judged():
     ("flowing", "cause"), [(0.039, "broke down or something arcs"), (0.0, "amplifier tripped")]
 )
 def test_the_current_tells_a_short_from_an_amplifier_that_gave_up(flowing, cause):
-    signals = Signals(current_max_mA=40.0)
+    signals = Signals(current_max_mA=39.5)
     breakdown(signals, slice(PEAK, PEAK + 10))
     signals.current_monitor[PEAK : PEAK + 10] = flowing
     (trip,) = signals.trips()
@@ -258,7 +267,8 @@ def test_the_current_tells_a_short_from_an_amplifier_that_gave_up(flowing, cause
 
 
 def test_a_current_at_the_end_of_the_input_may_be_any_current():
-    signals = Signals(current_max_mA=100.0)  # the input ends at 40
+    # the input ends at 40
+    signals = Signals(amplifier=AmplifierSettings(current_limit_mA=200.0), current_max_mA=100.0)
     signals.current_monitor[PEAK : PEAK + 10] = 0.2
     assert signals.tripped() == {"current": PEAK + 1}
 
