@@ -741,6 +741,15 @@ def serve_daqmx(
             help="Silence of a client with a voltage at the film that takes the output to 0 V.",
         ),
     ] = 1.0,
+    link_timeout: Annotated[
+        float,
+        typer.Option(
+            min=0.2,
+            max=3600.0,
+            metavar="SECONDS",
+            help="The same for a link that is cut; a busy computer may need longer than 0.5.",
+        ),
+    ] = 1.0,
     client_tracking: Annotated[
         bool,
         typer.Option(
@@ -766,7 +775,8 @@ def serve_daqmx(
 
     serve(
         rig, settings, told=told, host=host, port=port, anywhere=anywhere, paced=paced,
-        faults=fault or (), client_timeout=client_timeout if client_tracking else None, seed=seed,
+        faults=fault or (), client_timeout=client_timeout if client_tracking else None,
+        link_timeout=link_timeout, seed=seed,
     )  # fmt: skip
 
 

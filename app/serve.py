@@ -38,12 +38,14 @@ def serve(
     paced: bool = True,
     faults: Sequence[str] = (),
     client_timeout: float | None = 1.0,
+    link_timeout: float = 1.0,
     seed: int = 0,
 ) -> None:
     """Serve the card of the simulated rig at ``address`` until ctrl-C; ``told`` hears where.
 
     ``anywhere`` allows a ``host`` that other computers can reach. ``client_timeout`` in s is how
-    long a client may be silent with a voltage at the film; None: for ever. Raises ``InputError``
+    long a client may be silent with a voltage at the film; None: for ever. ``link_timeout``
+    in s is how long its link may be dead. Raises ``InputError``
     for an address, host or port that cannot be had, ``InstrumentFault`` without the libraries.
     """
     if not (anywhere or _is_loopback(host)):
@@ -69,7 +71,9 @@ def serve(
         raise InputError(str(error)) from error
     except ValueError as error:  # a fault that is none, or a film that cannot hang at rest
         raise InputError(f"rig {address!r}: {error}") from error
-    server = DaqmxServer(device, host=host, port=port, client_timeout=client_timeout)
+    server = DaqmxServer(
+        device, host=host, port=port, client_timeout=client_timeout, link_timeout=link_timeout
+    )
     with Interrupts() as interrupts:
         try:
             try:

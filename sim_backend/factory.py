@@ -15,7 +15,7 @@ from sim_backend.plant import Plant
 from sim_backend.rig import SimulatedRig
 from sim_backend.truth import cases
 
-__all__ = ["is_simulated", "open_simulated_rig"]
+__all__ = ["is_simulated", "open_simulated_rig", "plant_of"]
 
 
 def is_simulated(address: str) -> bool:
@@ -47,21 +47,7 @@ def open_simulated_rig(
     Raises ``AddressError`` for an address that is neither, ``ModelError`` or ``ValueError`` for a
     film that cannot hang at rest, ``ValueError`` for faults that this rig cannot have.
     """
-    found = re.fullmatch(r"sim(?::(\d{1,18}))?", address)
-    if not found:
-        raise AddressError(
-            f"rig {address!r} is not a simulated rig: write sim, or sim:SEED with a whole number "
-            f"such as sim:7"
-        )
-    plant: Plant
-    if found[1] is None:
-        hidden = None
-        plant = ModelPlant.at_rest(actuator or Actuator(film, load, TABLE_3))
-    else:
-        if actuator is not None:
-            raise AddressError(f"rig {address!r} brings its own film; only sim takes an actuator")
-        hidden = int(found[1])
-        plant = cases.draw(hidden, film, load).plant()
+    plant, hidden = plant_of(address, film, load, actuator)
     return SimulatedRig(
         settings,
         plant,
@@ -72,3 +58,24 @@ def open_simulated_rig(
         block_samples=block_samples,
         faults=faults,
     )
+
+
+def plant_of(
+    address: str, film: Film, load: Load, actuator: Actuator | None = None
+) -> tuple[Plant, int | None]:
+    """What hangs at the rig at ``address``, at rest, and the seed of what it hides, if it does.
+
+    Raises as ``open_simulated_rig``.
+    """
+    found = re.fullmatch(r"sim(?::(\d{1,18}))?", address)
+    if not found:
+        raise AddressError(
+            f"rig {address!r} is not a simulated rig: write sim, or sim:SEED with a whole number "
+            f"such as sim:7"
+        )
+    if found[1] is None:
+        return ModelPlant.at_rest(actuator or Actuator(film, load, TABLE_3)), None
+    if actuator is not None:
+        raise AddressError(f"rig {address!r} brings its own film; only sim takes an actuator")
+    hidden = int(found[1])
+    return cases.draw(hidden, film, load).plant(), hidden

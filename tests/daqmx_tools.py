@@ -107,6 +107,7 @@ def served(
     seed: int = 0,
     faults: tuple[str, ...] = (),
     client_timeout: float | None = 1.0,
+    link_timeout: float = 20.0,
     link: Clock | None = None,
 ) -> Iterator[Served]:
     """A server in this process, as fast as it can be, and a client of it."""
@@ -121,7 +122,9 @@ def served(
         faults=FaultPlan.parse(faults),
     )
     with (
-        DaqmxServer(device, client_timeout=client_timeout, link=link) as server,
+        DaqmxServer(
+            device, client_timeout=client_timeout, link_timeout=link_timeout, link=link
+        ) as server,
         connected(server.port) as session,
     ):
         yield Served(server, device, session)

@@ -64,7 +64,8 @@ def inspect(device: str, server: str | None, settings: RigSettings) -> Inspectio
         )
         return Inspection(tuple(findings), monitors, outputs.read("displacement"))
     except RigError as error:
-        findings.append(Finding(name, "state", str(error), verdict="wrong"))
+        said = str(error).removeprefix(f"{name}: ")
+        findings.append(Finding(name, "state", said, verdict="wrong"))
         return Inspection(tuple(findings))
     finally:
         link.close()

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Link"]
 
-# a lost connection is noticed although nothing is being asked
-_KEEPALIVE_MS = 500
 # s: a server that did not answer is asked again, but many questions must not take many timeouts
 _LOST_TIMEOUT = 0.2
 
@@ -85,9 +83,6 @@ def _channel_with_deadline(server: str, timeout: float) -> grpc.Channel:
         options=(
             ("grpc.max_receive_message_length", unlimited),
             ("grpc.max_send_message_length", unlimited),
-            ("grpc.keepalive_time_ms", _KEEPALIVE_MS),
-            ("grpc.keepalive_timeout_ms", _KEEPALIVE_MS),
-            ("grpc.http2.max_pings_without_data", 0),
             # a proxy of the surroundings has no business between a rig and its card
             ("grpc.enable_http_proxy", 0),
         ),

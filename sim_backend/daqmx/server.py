@@ -30,15 +30,11 @@ _OPTIONS = (
     ("grpc.max_send_message_length", -1),
     ("grpc.max_receive_message_length", -1),
     ("grpc.so_reuseport", 0),  # a port in use is an error, not a share
-    # a link that is cut without a word is noticed within half a second
-    ("grpc.keepalive_time_ms", 200),
-    ("grpc.keepalive_timeout_ms", 250),
-    ("grpc.http2.ping_timeout_ms", 250),
-    ("grpc.keepalive_permit_without_calls", 1),
-    ("grpc.http2.max_pings_without_data", 0),
+    # a client may look as often as it likes whether the link is up
     ("grpc.http2.max_ping_strikes", 0),
     ("grpc.http2.min_recv_ping_interval_without_data_ms", 50),
 )
+_PING_S = 0.1  # how often a client is asked whether it is there
 
 
 class DaqmxServer:
@@ -46,6 +42,8 @@ class DaqmxServer:
 
     With ``client_timeout`` in s a client that dies or falls silent with a voltage at the film has
     the output taken to 0 V; None behaves as NI's server does: tasks and outputs stay as they are.
+    Likewise one that gives no sign of life for ``link_timeout`` s, its link cut without a word or
+    its process halted; too short a time mistakes a busy computer for that.
     ``link`` is the clock of the link; the card has its own.
     """
 
@@ -56,6 +54,7 @@ class DaqmxServer:
         host: str = "127.0.0.1",
         port: int = 0,
         client_timeout: float | None = 1.0,
+        link_timeout: float = 1.0,
         link: Clock | None = None,
     ) -> None:
         self.device = device
@@ -69,7 +68,7 @@ class DaqmxServer:
         self._server = grpc.server(
             self._pool,
             interceptors=(_Way(self, self._link, self._closing),),
-            options=_OPTIONS,
+            options=_OPTIONS if client_timeout is None else _OPTIONS + _pings(link_timeout),
         )
         pb_grpc.add_NiDAQmxServicer_to_server(Servicer(device, self._closing), self._server)
         self._watch = threading.Thread(target=self._look, name="daqmx clients", daemon=True)
@@ -115,6 +114,18 @@ class DaqmxServer:
                 self._server.stop(0)
                 if self.clients is not None:
                     self.clients.all_gone()
+
+
+def _pings(timeout: float) -> tuple[tuple[str, int], ...]:
+    """Options that notice within ``timeout`` s that nobody answers."""
+    answer = max(50, round((timeout - _PING_S) * 1e3))
+    return (
+        ("grpc.keepalive_time_ms", round(_PING_S * 1e3)),
+        ("grpc.keepalive_timeout_ms", answer),
+        ("grpc.http2.ping_timeout_ms", answer),  # the one that counts, though it is not for this
+        ("grpc.keepalive_permit_without_calls", 1),
+        ("grpc.http2.max_pings_without_data", 0),
+    )
 
 
 class _Way(grpc.ServerInterceptor):

@@ -72,7 +72,7 @@ SAMPLE_RATE = 1000.0  # Hz, as a rig file has it by default
 EARLIEST, LATEST = 0.7, 2.7  # s after the start: when trouble sets in
 STARTS_WITHIN = 120.0  # s, on a machine that is busy
 ENDS_WITHIN = 60.0  # s
-FLUSH = 0.25 + 0.1  # s of a recording that a kill may take: since the last flush, and a block
+FLUSH = 0.25 + 0.2  # s of a run that a kill may take: since the last flush, and two blocks
 RAMP = 0.3 + 0.1  # s, and a block
 LATE = 0.4  # s for whatever the machine does meanwhile
 
@@ -253,7 +253,7 @@ def _recording_faults(kind: str, expected: Expected, moment: float, out: Path) -
         return [f"the recording cannot be read: {error}"]
     wrong = []
     seconds = recording.samples / SAMPLE_RATE
-    if seconds < moment - FLUSH:
+    if seconds < moment - FLUSH - LATE:
         wrong.append(f"{seconds:.2f} s were recorded of {moment:.2f} s")
     if expected.event and not any(expected.event in event.message for event in recording.events):
         wrong.append(f"no event {expected.event!r} in the recording")
