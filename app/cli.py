@@ -757,6 +757,10 @@ def serve_daqmx(
             help="Make safe when a client is gone; NI's own server does not.",
         ),
     ] = True,
+    laser: Annotated[
+        bool,
+        typer.Option("--laser", help="Serve the laser's controller too, at a serial port."),
+    ] = False,
     seed: Seed = 0,
 ) -> None:
     """Serve a simulated card to NI's Python library over NI's network protocol, until ctrl-C."""
@@ -771,12 +775,15 @@ def serve_daqmx(
             f"simulated card at {serving.host}:{serving.port}; use it with --rig {serving.rig}; "
             f"ctrl-C ends it\n"
         )
+        if serving.laser:
+            sys.stdout.write(f'laser controller: port = "{serving.laser}" in [laser]\n')
         sys.stdout.flush()
 
     serve(
         rig, settings, told=told, host=host, port=port, anywhere=anywhere, paced=paced,
         faults=fault or (), client_timeout=client_timeout if client_tracking else None,
         link_timeout=link_timeout, seed=seed,
+        laser=laser,
     )  # fmt: skip
 
 

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import ipaddress
+import sys
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from app.errors import InputError, InstrumentFault
 from app.interrupts import Interrupts
 from app.rigfile import RigFile
 from drivers.errors import AddressError
 from sim_backend.faults import FaultPlan
+from sim_backend.keyence import SimulatedController
+from sim_backend.serial_port import serve_on_pty, serve_on_socket
+
+if TYPE_CHECKING:
+    from sim_backend.daqmx.device import Device
 
 __all__ = ["Serving", "serve"]
 
@@ -20,11 +28,15 @@ _LOOK_S = 0.1  # how often ctrl-C is looked at
 
 @dataclass(frozen=True)
 class Serving:
-    """Where the server listens, and the ``rig`` address that reaches it."""
+    """Where the server listens, and the ``rig`` address that reaches it.
+
+    ``laser`` is the serial port of the simulated laser controller, empty where none was asked for.
+    """
 
     host: str
     port: int
     rig: str
+    laser: str = ""
 
 
 def serve(
@@ -40,6 +52,7 @@ def serve(
     client_timeout: float | None = 1.0,
     link_timeout: float = 1.0,
     seed: int = 0,
+    laser: bool = False,
 ) -> None:
     """Serve the card of the simulated rig at ``address`` until ctrl-C; ``told`` hears where.
 
@@ -83,13 +96,25 @@ def serve(
                     f"port {port} on {host} cannot be listened on: another program may have it, or "
                     f"the host is not one of this computer's; --port 0 takes any that is free"
                 ) from error
-            told(Serving(host, found, f"daqmx:{device.name}@{host}:{found}"))
-            waiting = threading.Event()
-            while not interrupts.asked():
-                waiting.wait(_LOOK_S)
+            rig = f"daqmx:{device.name}@{host}:{found}"
+            with _controller(rig_file, device, plan) if laser else nullcontext("") as serial_port:
+                told(Serving(host, found, rig, serial_port))
+                waiting = threading.Event()
+                while not interrupts.asked():
+                    waiting.wait(_LOOK_S)
             interrupts.close()
         finally:
             server.close()
+
+
+def _controller(
+    rig_file: RigFile, device: Device, faults: FaultPlan
+) -> AbstractContextManager[str]:
+    """A laser controller at a serial port, set as the rig file says, that sees the card's film."""
+    controller = SimulatedController(rig_file.laser, lambda _: device.displacement(), faults=faults)
+    if sys.platform == "win32":
+        return serve_on_socket(controller)
+    return serve_on_pty(controller, baud_rate=rig_file.laser.baud_rate)
 
 
 def _is_loopback(host: str) -> bool:

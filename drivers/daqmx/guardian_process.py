@@ -107,7 +107,7 @@ def _insist(outputs: Outputs) -> None:
     until = time.monotonic() + _GIVE_UP
     while True:
         try:
-            outputs.zero(force=True)
+            outputs.shut()
         except RigError:
             if time.monotonic() > until:
                 raise

@@ -29,21 +29,32 @@ class Outputs:
         self._settings = settings
 
     def zero(self, *, force: bool = False) -> None:
-        """0 V at the output and the enable line low, seen on the voltage monitor.
+        """0 V at the output, seen on the voltage monitor.
 
         With ``force``, whoever holds the card loses it: it is reset, which aborts every task and
-        takes the outputs to 0 V in one step.
+        takes outputs and lines down in one step.
         """
         try:
             self._write_zero()
-            self.enable(False)
         except RigError as error:
             if not force or error.code != RESERVED:
                 raise
             self.reset()
             self._write_zero()
-            self.enable(False)
         self.check_zero()
+
+    def shut(self) -> None:
+        """0 V and the enable line low, whoever holds the card: what a guardian does."""
+        try:
+            self.zero(force=True)
+        finally:
+            try:
+                self._disable()
+            except RigError as error:
+                if error.code != RESERVED:
+                    raise
+                self.reset()
+                self._disable()
 
     def reset(self) -> None:
         """Abort every task on the card, whoever's it is; its outputs go to 0 V in one step."""
@@ -51,18 +62,6 @@ class Outputs:
             from nidaqmx.system import Device
 
             Device(self._device, grpc_options=self._link.session).reset_device()
-
-    def enable(self, on: bool) -> None:
-        """Set the line that enables the amplifier's high voltage, if it is wired."""
-        line = self._settings.card.do_hv_enable
-        if line is None:
-            return
-        with instrument_errors(self._device, self._link.server):
-            import nidaqmx
-
-            with nidaqmx.Task(grpc_options=self._link.session) as task:
-                task.do_channels.add_do_chan(f"{self._device}/{line}")
-                task.write(on, auto_start=True)
 
     def check_zero(self) -> None:
         """Raise ``RigError`` unless the voltage monitor reads 0 within the limits' tolerance."""
@@ -94,6 +93,18 @@ class Outputs:
                     max_val=limit,
                 )
                 return float(np.mean([task.read() for _ in range(10)]))
+
+    def _disable(self) -> None:
+        """The line that enables the amplifier's high voltage low, if it is wired."""
+        line = self._settings.card.do_hv_enable
+        if line is None:
+            return
+        with instrument_errors(self._device, self._link.server):
+            import nidaqmx
+
+            with nidaqmx.Task(grpc_options=self._link.session) as task:
+                task.do_channels.add_do_chan(f"{self._device}/{line}")
+                task.write(False, auto_start=True)
 
     def _write_zero(self) -> None:
         card, offset = self._settings.card, self._settings.amplifier.offset_V

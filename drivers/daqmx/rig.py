@@ -198,8 +198,7 @@ class DaqmxRig:
             if self._state is RigState.CLOSED:
                 return
             try:
-                self._drop_tasks()
-                self._outputs.zero(force=True)
+                self._bring_down()
             except RigError as error:
                 log.warning("%s; the guardian is asked", error)
                 try:
@@ -276,6 +275,20 @@ class DaqmxRig:
         if self._tasks is None or self._run is None:
             raise RigError("no waveform is loaded")
         return self._tasks, self._run
+
+    def _bring_down(self) -> None:
+        """0 V, seen on the monitor, and then the enable line low, which is done in any case."""
+        tasks, self._tasks, self._run = self._tasks, None, None
+        try:
+            if tasks is not None:
+                try:
+                    tasks.release()
+                except RigError as error:  # a card that is reset needs no tasks cleared
+                    log.warning("%s", error)
+            self._outputs.zero(force=True)
+        finally:
+            if tasks is not None:
+                tasks.disable()
 
     def _drop_tasks(self) -> None:
         tasks, self._tasks, self._run = self._tasks, None, None

@@ -201,18 +201,31 @@ class ClockedTasks:
         with self._errors():
             self._output().is_task_done()
 
+    def release(self) -> None:
+        """Clear output and inputs; the output keeps its last value. Raises as ``close``."""
+        ao, ai = self._ao, self._ai
+        self._ao = self._ai = None
+        self._all([task.close for task in (ao, ai) if task is not None])
+
+    def disable(self) -> None:
+        """Take the enable line low and its watchdog off. Raises as ``close``."""
+        enable, watchdog = self._enable, self._watchdog
+        self._enable = self._watchdog = None
+        calls: list[Callable[[], object]] = []
+        if enable is not None:
+            calls.append(lambda: enable.write(False, auto_start=True))
+        calls.extend(task.close for task in (enable, watchdog) if task is not None)
+        self._all(calls)
+
     def close(self) -> None:
-        """Clear every task, the enable line low first; the output keeps its last value.
+        """Clear every task.
 
         Each is cleared although another one cannot be; raises ``RigError`` for the first that
         could not.
         """
-        enable, watchdog, ao, ai = self._enable, self._watchdog, self._ao, self._ai
-        self._enable = self._watchdog = self._ao = self._ai = None
-        calls: list[Callable[[], object]] = []
-        if enable is not None:
-            calls.append(lambda: enable.write(False, auto_start=True))
-        calls.extend(task.close for task in (enable, watchdog, ao, ai) if task is not None)
+        self._all([self.release, self.disable])
+
+    def _all(self, calls: list[Callable[[], object]]) -> None:
         failed: RigError | None = None
         for call in calls:
             try:

@@ -82,6 +82,15 @@ class Device(Setup):
         with self._lock:
             return self._wire.film_voltage(self._settle())
 
+    def displacement(self) -> float:
+        """What the laser read last, in m; with the film at rest before the first run."""
+        laser = self.settings.laser
+        with self._lock:
+            if self._laser is None:
+                return laser.rest_position_mm * 1e-3
+            counts, limit = self._laser
+            return laser.direction * laser.mm_per_V * 1e-3 * counts * limit / (COUNT_MAX + 1)
+
     def live(self) -> bool:
         """Whether there is more voltage at the film than the rig's limits take for none."""
         return abs(self.wire_voltage()) > self.settings.limits.zero_tolerance_kV * 1e3
