@@ -14,6 +14,12 @@ ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 SCRIPTS = VENV / ("Scripts" if os.name == "nt" else "bin")
 CONSTRAINTS = ROOT / ".ci" / "constraints.txt"
+#: Debian's names of what Qt loads at run time, and of a screen in memory.
+SCREEN = [
+    "libgl1", "libegl1", "libxkbcommon0", "libglib2.0-0", "libfontconfig1", "libdbus-1-3",
+    "xvfb", "xauth", "libxcb-cursor0", "libxkbcommon-x11-0", "libxcb-icccm4", "libxcb-keysyms1",
+    "libxcb-shape0", "fonts-dejavu-core",
+]  # fmt: skip
 
 
 def prepare(extras: str = "") -> Path:
@@ -48,19 +54,36 @@ def prepare(extras: str = "") -> Path:
     return python
 
 
+def prepare_screen(python: Path) -> None:
+    """Install what windows need without a screen, and a screen in memory, where Debian lacks it."""
+    if not sys.platform.startswith("linux"):
+        return
+    loads = [str(python), "-c", "import PySide6.QtGui, PySide6.QtWidgets"]
+    missing = subprocess.run(loads, capture_output=True, text=True, check=False)
+    if missing.returncode == 0 and shutil.which("Xvfb"):
+        return
+    why = missing.stderr.strip().splitlines()[-1] if missing.returncode else "there is no Xvfb"
+    _install_packages(SCREEN, f"The window's tests need libraries of the system ({why})")
+
+
 def _install_venv_package() -> None:
     """Debian keeps what venv needs in a package of its own."""
-    apt = shutil.which("apt-get")
     package = f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"
+    _install_packages([package], "This Python cannot make virtual environments")
+
+
+def _install_packages(packages: list[str], why: str) -> None:
+    names = " ".join(packages)
+    apt = shutil.which("apt-get")
     if apt is None:
-        sys.exit("This Python cannot make virtual environments: install its venv and ensurepip.")
+        sys.exit(f"{why}: install what Debian calls {names}.")
     become = [] if os.geteuid() == 0 else ["sudo"]
     if become and shutil.which("sudo") is None:
-        sys.exit(f"This Python cannot make virtual environments: install {package} as root.")
-    print(f"Installing {package} ...", flush=True)
+        sys.exit(f"{why}: install {names} as root.")
+    print(f"Installing {names} ...", flush=True)
     environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
     subprocess.run([*become, apt, "update", "-qq"], check=True, env=environment)
-    subprocess.run([*become, apt, "install", "-y", "-qq", package], check=True, env=environment)
+    subprocess.run([*become, apt, "install", "-y", "-qq", *packages], check=True, env=environment)
 
 
 def run(arguments: list[str]) -> int:

@@ -2,8 +2,9 @@
 
 import sys
 
-from bootstrap import prepare, run
+from bootstrap import prepare, prepare_screen, run
 
 if __name__ == "__main__":
     python = prepare("test")
+    prepare_screen(python)
     sys.exit(run([str(python), "-m", "pytest", "-n", "2", *sys.argv[1:]]))

@@ -164,7 +164,8 @@ def record(
             writer = RecordingWriter(
                 out, identity, rate, waveform.voltage.size, loaded.toml, rig_file.as_film(),
                 rig_file.as_load(), configuration, operator=operator,
-                film_id=film_id or rig_file.film.name, notes=notes, seed=seed, overwrite=overwrite,
+                film_id=film_id or rig_file.film.name, notes=notes,
+                seed=seed if is_simulated(address) else None, overwrite=overwrite,
             )  # fmt: skip
             onlooker = onlooker or Onlooker()
             onlooker.started(planned, identity, rate)
