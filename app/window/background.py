@@ -17,13 +17,15 @@ class _Thread(QThread):
         super().__init__(parent)
         self._function = function
         self.answer: Any = None
-        self.error: DearigError | None = None
+        self.error = "a fault of the program: what it was stands in the terminal"
 
     def run(self) -> None:
         try:
             self.answer = self._function()
         except DearigError as error:
-            self.error = error
+            self.error = str(error)
+        else:
+            self.error = ""
 
 
 class Background(QObject):
@@ -76,7 +78,7 @@ class Background(QObject):
             self.start(function)
             return
         self.busy_changed.emit(False)
-        if thread.error is not None:
-            self.failed.emit(str(thread.error))
+        if thread.error:
+            self.failed.emit(thread.error)
         else:
             self.done.emit(thread.answer)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 from PySide6.QtCore import QObject, QSettings, Signal
 
 from app.plan import Plan
@@ -14,7 +16,7 @@ from app.sequencefile import LoadedSequence
 from app.window.theme import LIGHT, Theme
 from model.actuator import Actuator
 
-__all__ = ["OverlayModel", "Preview", "Session"]
+__all__ = ["Breach", "OverlayModel", "Preview", "Session"]
 
 _RECENT_MAX = 8
 FIRST_SEQUENCE = "thesis"
@@ -30,13 +32,29 @@ class OverlayModel:
 
 
 @dataclass(frozen=True)
+class Breach:
+    """Where a plan breaks a limit: from ``first`` to ``last`` s, ``quantity`` in words."""
+
+    quantity: str
+    first: float
+    last: float
+
+
+@dataclass(frozen=True)
 class Preview:
-    """A sequence's text and what became of it: a plan, or a ``sentence`` why there is none."""
+    """A sequence's text and what became of it: a plan, or a ``sentence`` why there is none.
+
+    ``curves`` are (time in s, value in SI units) of voltage, displacement and field, thinned for a
+    plot with their extremes kept; ``segments`` are label, begin and end in s, with the quiet ends.
+    """
 
     toml: str
     loaded: LoadedSequence | None = None
     plan: Plan | None = None
     sentence: str = ""
+    curves: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    breaches: tuple[Breach, ...] = ()
+    segments: tuple[tuple[str, float, float], ...] = ()
 
     @property
     def playable(self) -> bool:
