@@ -83,7 +83,7 @@ class HighVoltageBadge(QWidget):
         painter.setPen(front)
         font = painter.font()
         font.setBold(True)
-        font.setPixelSize(int(area.height() * (0.36 if self._large else 0.56)))
+        font.setPixelSize(int(area.height() * (0.34 if self._large else 0.54)))
         painter.setFont(font)
         words = area.adjusted(side * 1.8, 0, -6, 0)
         vertical = Qt.AlignmentFlag.AlignVCenter
@@ -91,6 +91,8 @@ class HighVoltageBadge(QWidget):
             upper, lower = words.adjusted(0, 4, 0, -words.height() / 2), QRectF(words)
             lower.setTop(words.center().y())
             painter.drawText(upper, vertical, self._state.value)
+            font.setPixelSize(int(area.height() * 0.29))
+            painter.setFont(font)
             painter.drawText(lower.adjusted(0, 0, 0, -4), vertical, self._detail)
         else:
             text = f"{self._state.value}  {self._detail}".rstrip()

@@ -31,15 +31,16 @@ _SIGNALS = {
     "current_monitor": "current",
     "displacement": "displacement",
 }
-_READOUT = 0.05  # s over which a number is the mean, so that it can be read
+_READOUT = 0.01  # s over which a number is the mean, so that it can be read
 _RECENT = 1.0  # s of the running error
 
 
 @dataclass(frozen=True)
 class Now:
-    """A moment of a run: ``samples`` of ``total`` at ``rate`` Hz, and the means of its last 50 ms.
+    """A moment of a run: ``samples`` of ``total`` at ``rate`` Hz, and the means of its last 10 ms.
 
-    ``values`` in SI units by name (command, monitor, current, displacement), ``errors`` and
+    ``revision`` is another one whenever there is something else to draw. ``values`` in
+    SI units by name (command, monitor, current, displacement), ``errors`` and
     ``words`` (why it could not follow) one for each model.
     """
 
@@ -49,6 +50,7 @@ class Now:
     values: dict[str, float]
     errors: tuple[ErrorsSoFar, ...]
     words: tuple[str, ...]
+    revision: int = 0
 
 
 class Live(Onlooker):
@@ -174,6 +176,7 @@ class _Run:
         self._models: tuple[_Model, ...] = ()
         self._quiet = _Quiet()
         self._newest: dict[str, float] = {}
+        self.revision = 0
 
     def follow(self, overlays: tuple[OverlayModel, ...], drive: str) -> None:
         models = []
@@ -192,6 +195,7 @@ class _Run:
         """The same run so far, with other models."""
         fresh = _Run(self.total, self.channels, self.rate)
         fresh.follow(overlays, drive)
+        fresh.revision = self.revision + 1
         for block in self._blocks:
             fresh.show(fresh.digest(block))
         return fresh
@@ -212,10 +216,11 @@ class _Run:
         return _Digested(values, tuple(model.advance(block) for model in self._models))
 
     def show(self, taken: _Digested) -> None:
+        self.revision += 1
         for name, values in taken.values.items():
             self.curves[name].push(values)
             last = values[-max(1, round(_READOUT * self.rate)) :]
-            self._newest[name] = float(last.mean())
+            self._newest[name] = float(last[-1] if name == "command" else last.mean())
         measured = taken.values.get("displacement")
         for i, (model, moved) in enumerate(zip(self._models, taken.models, strict=True)):
             self.curves[f"model {i}"].push(moved)
@@ -234,6 +239,7 @@ class _Run:
             dict(self._newest),
             tuple(model.running.now() for model in self._models),
             tuple(model.words for model in self._models),
+            self.revision,
         )
 
 

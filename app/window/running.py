@@ -186,15 +186,14 @@ class _RunThread(QThread):
                 safe=True,
                 result=result,
             )
-        finally:
-            self._live.close()
 
 
 def _early_end(error: DearigError, out: Path) -> RunEnd:
     """An instrument that failed is believed to be safe only where it says so."""
     safe = not isinstance(error, InstrumentFault) or "was made safe" in str(error)
     headline = next((words for kind, words in _ENDS.items() if isinstance(error, kind)), "Ended")
-    return RunEnd(headline, str(error), out if out.exists() else None, safe)
+    sentence = str(error).removeprefix("interrupted: ")
+    return RunEnd(headline, sentence, out if out.exists() else None, safe)
 
 
 def next_free(folder: Path, name: str) -> Path:
