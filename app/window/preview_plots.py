@@ -52,17 +52,22 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
         return sum(isinstance(item, _Refused) for _, item in self._marks)
 
     def show_preview(self, preview: Preview) -> None:
-        """Draw ``preview``; one without a plan leaves the plots empty."""
+        """Draw ``preview``; one without a plan leaves what was there, faded."""
         self._preview = preview
+        planned = preview.plan is not None
         for name, curve in self._curves.items():
+            curve.setOpacity(1.0 if planned else 0.3)  # what was drawn last, as a thing of the past
+            if not planned:
+                continue
             x, y = preview.curves.get(name, (np.empty(0), np.empty(0)))
             curve.setData(x, y * _PLOTS[name][1])
             unknown = bool(y.size) and not np.isfinite(y).any()
             words = "not foreseen: a limit is broken without it" if unknown else None
             self._plots[name].setTitle(words, color=self._session.theme.muted, size="9pt")
         self._mark()
-        if preview.plan is not None:
-            self._plots["voltage"].setXRange(0.0, float(preview.plan.time[-1]), padding=0.01)
+        if preview.plan is None:
+            return
+        self._plots["voltage"].setXRange(0.0, float(preview.plan.time[-1]), padding=0.01)
         for plot in self._plots.values():
             plot.enableAutoRange(axis="y")
 

@@ -119,6 +119,7 @@ class RunPage(QWidget):
             self.live.close()
         self.live, self._drawn, self._segments = live, (-1, None), preview.segments
         self.plots.foresee(preview)
+        self.plots.start()
         self.log.clear()
         self.result.say("")
         self.show_button.hide()
@@ -140,7 +141,7 @@ class RunPage(QWidget):
         self._asked.append((place, path))
         self._load_next()
 
-    def close_down(self) -> None:
+    def close_work(self) -> None:
         """Make safe, and wait for every thread."""
         self.runner.stop()
         self.runner.wait()

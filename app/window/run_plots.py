@@ -51,6 +51,10 @@ class RunPlots(pg.GraphicsLayoutWidget):
             if row < len(_PLOTS) - 1:
                 plot.getAxis("bottom").setStyle(showValues=False)
             self._plots[name] = plot
+        self._planned = {name: pg.PlotCurveItem() for name in ("voltage", "displacement")}
+        for name, curve in self._planned.items():
+            curve.setZValue(-5)
+            self._plots[name].addItem(curve)
         self._plots["residual"].setLabel("bottom", "Time (s)")
         layout = self.ci.layout
         for row, share in enumerate((3, 4, 3)):
@@ -71,6 +75,8 @@ class RunPlots(pg.GraphicsLayoutWidget):
             **{f"{name} {i}": theme.models[i] for name in ("model", "residual") for i in (0, 1)},
             **{f"rms {i}": theme.text for i in (0, 1)},
         }
+        for curve in self._planned.values():
+            curve.setPen(pen(theme.line))
         for legend in self._legends:
             legend.scene().removeItem(legend)
         self._legends = []
@@ -89,17 +95,26 @@ class RunPlots(pg.GraphicsLayoutWidget):
                     legend.addItem(self._curves[signal], words)
 
     def foresee(self, preview: Preview | None) -> None:
-        """Make room for what is foreseen, and forget what was drawn."""
-        for curve in self._curves.values():
-            curve.setData(np.empty(0), np.empty(0))
+        """Show what is foreseen, and forget what was drawn."""
+        nothing = np.empty(0)
+        for curve in (*self._curves.values(), *self._planned.values()):
+            curve.setData(nothing, nothing)
         self._low = {"voltage": 0.0, "displacement": 0.0, "residual": -_RESIDUAL_LEAST}
         self._high = {"voltage": 1e3, "displacement": 1e-4, "residual": _RESIDUAL_LEAST}
         self._duration = 1.0
         if preview is not None and preview.plan is not None:
             self._duration = float(preview.plan.time[-1])
             for name in ("voltage", "displacement"):
-                self._include(name, preview.curves[name][1])
+                x, y = preview.curves[name]
+                self._include(name, y)
+                self._planned[name].setData(x, y * _SCALE[name])
         self._scale()
+        self._show(0.0, self._duration)
+
+    def start(self) -> None:
+        """Room for the run that begins: what was foreseen is taken away, it would cost frames."""
+        for curve in self._planned.values():
+            curve.setData(np.empty(0), np.empty(0))
         self._roll(0.0)
 
     def draw(self, live: Live, end: float) -> None:
@@ -126,7 +141,9 @@ class RunPlots(pg.GraphicsLayoutWidget):
         if int(number) >= len(overlays):
             return ""
         name = overlays[int(number)].name
-        return {"model": name, "residual": f"to {name}", "rms": "RMS, last 1 s"}[kind]
+        if kind == "rms":
+            return "RMS, last 1 s" if number == "0" else ""
+        return name if kind == "model" else f"to {name}"
 
     def _include(self, name: str, values: np.ndarray) -> bool:
         """Let the range of a plot hold ``values``; True where it had to grow."""
@@ -158,6 +175,9 @@ class RunPlots(pg.GraphicsLayoutWidget):
             first, last = 0.0, self._duration
         else:
             first, last = max(0.0, end - self.window), max(self.window, end)
+        self._show(first, last)
+
+    def _show(self, first: float, last: float) -> None:
         for plot in self._plots.values():
             view: QRectF = plot.getViewBox().viewRect()
             if abs(view.left() - first) > 1e-9 or abs(view.right() - last) > 1e-9:

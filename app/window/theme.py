@@ -159,9 +159,7 @@ def _sheet(t: Theme) -> str:
         padding: 5px 12px; border: 1px solid {t.line}; border-radius: 4px; background: {t.raised};
     }}
     QPushButton:hover {{ border-color: {t.accent}; }}
-    QPushButton:focus, QLineEdit:focus, QComboBox:focus, QAbstractSpinBox:focus {{
-        border: 2px solid {t.accent};
-    }}
+    QPushButton:focus, QLineEdit:focus {{ border: 2px solid {t.accent}; }}
     QPushButton:disabled {{ color: {t.muted}; background: {t.window}; }}
     QPushButton[role="primary"] {{
         color: {t.on_accent}; background: {t.accent}; border-color: {t.accent}; font-weight: 600;
@@ -169,11 +167,12 @@ def _sheet(t: Theme) -> str:
     QPushButton[role="primary"]:disabled {{
         color: {t.muted}; background: {t.window}; border-color: {t.line};
     }}
-    QLineEdit, QComboBox, QAbstractSpinBox, QPlainTextEdit {{
+    QLineEdit, QPlainTextEdit {{
         padding: 3px 5px; border: 1px solid {t.line}; border-radius: 4px; background: {t.surface};
         selection-background-color: {t.accent}; selection-color: {t.on_accent};
     }}
     QLineEdit[wrong="true"] {{ border: 2px solid {t.bad}; }}
+    QTabWidget::pane {{ border: 1px solid {t.line}; }}
     QListWidget#pages {{ border: none; background: {t.raised}; outline: none; font-size: 11pt; }}
     QListWidget#pages::item {{ padding: 10px 12px; }}
     QListWidget#pages::item:selected {{ color: {t.on_accent}; background: {t.accent}; }}
