@@ -107,7 +107,7 @@ class SequencePage(QWidget):
         """Take one of the sequences that are known by name."""
         self._take(PRESETS[name], Path(), None)
 
-    def close_down(self) -> None:
+    def close_work(self) -> None:
         """Wait for the thread."""
         self._files.close()
 

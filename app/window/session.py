@@ -15,6 +15,7 @@ from app.rigfile import RigFile
 from app.sequencefile import LoadedSequence
 from app.window.theme import LIGHT, Theme
 from model.actuator import Actuator
+from model.material import TABLE_3
 
 __all__ = ["Breach", "OverlayModel", "Preview", "Session"]
 
@@ -101,7 +102,7 @@ class Session(QObject):
         self.sequence_folder = Path()
         self.sequence_path: Path | None = None
         self.preview: Preview | None = None
-        self.overlays: tuple[OverlayModel, ...] = ()
+        self.overlays: tuple[OverlayModel, ...] = (self.thesis_model,)
         self.overlay_drive = "command"
         self.folder = folder
         self.operator = str(settings.value("operator", ""))
@@ -120,6 +121,10 @@ class Session(QObject):
         """Another rig file; ``text`` goes into every recording, ``path`` is None for none yet."""
         self.rig_path, self.rig_text, self.rig_file = path, text, rig_file
         self.rig_changed.emit()
+        if any(model.path is None for model in self.overlays):
+            thesis = self.thesis_model
+            overlays = tuple(thesis if m.path is None else m for m in self.overlays)
+            self.set_overlays(overlays, self.overlay_drive)
 
     def set_sequence(self, toml: str, folder: Path, path: Path | None = None) -> None:
         """Another sequence, as text; its CSV files lie in ``folder``."""
@@ -138,6 +143,12 @@ class Session(QObject):
         """The models beside the measurement, two at most, and what drives them."""
         self.overlays, self.overlay_drive = overlays[:2], drive
         self.overlays_changed.emit()
+
+    @property
+    def thesis_model(self) -> OverlayModel:
+        """The thesis's springs (Table 3) in the film and under the load of the rig file."""
+        film, load = self.rig_file.as_film(), self.rig_file.as_load()
+        return OverlayModel("thesis (Table 3)", Actuator(film, load, TABLE_3))
 
     def set_folder(self, folder: Path) -> None:
         """Where recordings are made and looked for."""
