@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, Slot
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.browse import Curves
 from app.report.units import SHOWN
+from app.window.plotting import add_curve, add_legend, emptied, stacked
 from app.window.session import Session
-from app.window.theme import pen, style_plot
+from app.window.theme import pen
 
 __all__ = ["CurvesPlot"]
 
 
-class CurvesPlot(pg.GraphicsLayoutWidget):
+class CurvesPlot(QWidget):
     """Three plots on one time axis; the model is dashed where several recordings share a plot."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
@@ -26,16 +26,12 @@ class CurvesPlot(pg.GraphicsLayoutWidget):
         self._session = session
         self._shown: tuple[Curves, ...] = ()
         self._with_model = True
-        self.setAccessibleName("Curves of the chosen recordings")
-        self.plots = [self.addPlot(row=row, col=0) for row in range(3)]
-        for plot in self.plots[1:]:
-            plot.setXLink(self.plots[0])
-        for plot in self.plots[:-1]:
-            plot.getAxis("bottom").setStyle(showValues=False)
         # the measurement matters most
-        for row, weight in enumerate((2, 4, 3)):
-            self.ci.layout.setRowStretchFactor(row, weight)
-        self.ci.layout.setVerticalSpacing(2)
+        self._area, self.plots = stacked((2, 4, 3))
+        self._area.setAccessibleName("Curves of the chosen recordings")
+        outer = QVBoxLayout(self)
+        outer.setContentsMargins(0, 0, 0, 0)
+        outer.addWidget(self._area)
         session.theme_changed.connect(self._draw)
         self._draw()
 
@@ -64,16 +60,11 @@ class CurvesPlot(pg.GraphicsLayoutWidget):
     @Slot()
     def _draw(self) -> None:
         theme = self._session.theme
-        self.setBackground(QColor(theme.surface))
+        self._area.setBackground(QColor(theme.surface))
         for plot in self.plots:
-            plot.clear()
-            style_plot(plot, theme)
-            if plot.legend is not None:
-                plot.legend.scene().removeItem(plot.legend)
-                plot.legend = None
+            emptied(plot, theme)
         drive, both, residual = self.plots
         shown = SHOWN[self._shown[0].kind if self._shown else "actuator"]
-        drive.setLabel("left", shown.drive, units=None)
         drive.setLabel("left", shown.drive_label)
         both.setLabel("left", shown.label)
         residual.setLabel("left", f"Residual ({shown.error_unit})")
@@ -82,43 +73,26 @@ class CurvesPlot(pg.GraphicsLayoutWidget):
         both.getAxis("bottom").setStyle(showValues=not self._with_model)
         if not self._shown:
             return
-        both.addLegend(
-            offset=(8, 4), labelTextColor=QColor(theme.text), brush=QColor(theme.surface),
-            pen=pg.mkPen(QColor(theme.line)), verSpacing=-4,
-        )  # fmt: skip
+        add_legend(both, theme)
         alone = len(self._shown) == 1
         zero = pg.InfiniteLine(0.0, angle=0, pen=pen(theme.muted, dashed=True))
         residual.addItem(zero, ignoreBounds=True)
         for i, curves in enumerate(self._shown):
             colour = theme.measured if alone else theme.curves[i % len(theme.curves)]
-            self._curve(drive, curves.drive, shown.drive_factor, theme.command if alone else colour)
+            driven = theme.command if alone else colour
+            add_curve(drive, curves.drive[0], curves.drive[1] * shown.drive_factor, driven)
             name = "measured" if alone else curves.name
-            self._curve(both, curves.measured, shown.factor, colour, name)
+            add_curve(both, curves.measured[0], curves.measured[1] * shown.factor, colour, name)
             if not self._with_model or curves.model is None or curves.residual is None:
                 continue
             beside = theme.models[0] if alone else colour
-            label = "model" if alone else None
-            self._curve(both, curves.model, shown.factor, beside, label, dashed=not alone)
-            self._curve(residual, curves.residual, shown.error_factor, beside)
+            time, model = curves.model
+            name = "model" if alone else ""
+            add_curve(both, time, model * shown.factor, beside, name, dashed=not alone)
+            time, left = curves.residual
+            add_curve(residual, time, left * shown.error_factor, beside)
             if alone:
                 self._events(curves)
-
-    def _curve(
-        self,
-        plot: pg.PlotItem,
-        points: tuple[np.ndarray, np.ndarray],
-        factor: float,
-        colour: str,
-        name: str | None = None,
-        dashed: bool = False,
-    ) -> None:
-        item = pg.PlotDataItem(
-            points[0], points[1] * factor, pen=pen(colour, dashed), name=name, connect="finite",
-        )  # fmt: skip
-        plot.addItem(item)
-        # only now: while it is put into a view it takes the whole widget for one
-        item.setClipToView(True)
-        item.setDownsampling(auto=True, method="peak")
 
     def _events(self, curves: Curves) -> None:
         theme = self._session.theme

@@ -25,7 +25,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QMenu,
-    QPushButton,
     QSplitter,
     QTableView,
     QTabWidget,
@@ -42,9 +41,9 @@ from app.window.curves_plot import CurvesPlot
 from app.window.folder_table import COLUMNS, PATH, SORT, FolderModel, ThumbnailDelegate
 from app.window.library import library_of
 from app.window.report_table import ReportTable, two_columns
-from app.window.saying import Saying
 from app.window.session import Session
 from app.window.theme import SPACE
+from app.window.widgets import Sentence, button, label
 from app.window.worker import Job
 
 __all__ = ["RecordingsPage"]
@@ -76,8 +75,7 @@ class RecordingsPage(QWidget):
         self._choose = QTimer(self, singleShot=True, interval=_CHOOSE_MS)
         self._choose.timeout.connect(self._show_chosen)
 
-        self.folder_button = QPushButton()
-        self.folder_button.setToolTip("Choose the folder in which recordings are made and found")
+        self.folder_button = button("", "")
         self.folder_button.clicked.connect(self._ask_folder)
         self.filter = QLineEdit(placeholderText="Find by name, sequence, film, operator or notes")
         self.filter.setClearButtonEnabled(True)
@@ -85,8 +83,7 @@ class RecordingsPage(QWidget):
         self.model_box = QComboBox()
         self.model_box.setToolTip("The model with which every recording is compared")
         self.model_box.activated.connect(self._model_chosen)
-        self.count = QLabel()
-        self.count.setProperty("role", "muted")
+        self.count = label("", "muted")
         find = QAction(self)
         find.setShortcut(QKeySequence(QKeySequence.StandardKey.Find))
         find.triggered.connect(self.filter.setFocus)
@@ -113,10 +110,9 @@ class RecordingsPage(QWidget):
         self.model_shown.setChecked(True)
         self.model_shown.setToolTip("Draw the model beside the measurement, and what it leaves")
         self.model_shown.toggled.connect(self.plot.show_model)
-        self.whole = QPushButton("&Whole run")
-        self.whole.setToolTip("Show all of the time again after zooming (wheel, or drag)")
+        self.whole = button("&Whole run", "Show all of the time again after zooming")
         self.whole.clicked.connect(self._show_whole)
-        self.saying = Saying(session)
+        self.saying = Sentence()
 
         self.about, self.events, self.differences = (ReportTable(words=True) for _ in range(3))
         self.sides = QTabWidget()
@@ -150,7 +146,7 @@ class RecordingsPage(QWidget):
 
         self._library.listed.connect(self._listed)
         self._library.looked.connect(self._looked)
-        self._library.trouble.connect(self.saying.wrong)
+        self._library.trouble.connect(self.saying.say)
         self._library.busy.connect(self._busy)
         session.folder_changed.connect(self._name_folder)
         session.overlays_changed.connect(self._list_models)
@@ -160,28 +156,35 @@ class RecordingsPage(QWidget):
         self._show_chosen()
 
     def _tools(self) -> QHBoxLayout:
-        self.export_button = QPushButton("&Export as")
-        self.export_button.setToolTip("Write the chosen recordings as CSV, MAT (MATLAB) or Parquet")
+        self.export_button = button(
+            "&Export as", "Write the chosen recordings as CSV, MAT (MATLAB) or Parquet"
+        )
         menu = QMenu(self.export_button)
         for form in EXPORTS:
             action = menu.addAction(form.upper() if form != "parquet" else "Parquet")
             action.triggered.connect(lambda _=False, form=form: self._ask_export(form))
         self.export_button.setMenu(menu)
-        self.recover_button = QPushButton("&Recover")
-        self.recover_button.setToolTip(
-            "Mend a recording whose run was killed, so that any program can read it"
+        self.recover_button = button(
+            "&Recover", "Mend a recording whose run was killed, so that any program can read it"
         )
         self.recover_button.clicked.connect(self.recover)
-        self.again_button = QPushButton("&Play again")
-        self.again_button.setToolTip("Take the sequence of this recording to the page Sequence")
+        self.again_button = button(
+            "&Play again", "Take the sequence of this recording to the page Sequence"
+        )
         self.again_button.clicked.connect(self._play_again)
         tools = QHBoxLayout()
-        for button in (self.export_button, self.recover_button, self.again_button):
-            tools.addWidget(button)
+        for made in (self.export_button, self.recover_button, self.again_button):
+            tools.addWidget(made)
         tools.addStretch(1)
         tools.addWidget(self.model_shown)
         tools.addWidget(self.whole)
         return tools
+
+    def close_work(self) -> None:
+        """End the process in which recordings are read; the window is closing."""
+        self._choose.stop()
+        self._round += 1
+        self._library.close()
 
     # ------------------------------------------------------------ what is chosen
 
@@ -217,14 +220,15 @@ class RecordingsPage(QWidget):
         self._read.clear()
         self._wanted = chosen[:_TOGETHER_MAX]
         if len(chosen) > _TOGETHER_MAX:
-            self.saying.note(
-                f"{len(chosen)} recordings are chosen; the first {_TOGETHER_MAX} of them are drawn"
+            self.saying.say(
+                f"{len(chosen)} recordings are chosen; the first {_TOGETHER_MAX} of them are drawn",
+                "warn",
             )
         else:
-            self.saying.nothing()
+            self.saying.say("")
         readable = [path for path in self._wanted if not self._trouble(path)]
         for words in filter(None, map(self._trouble, self._wanted)):
-            self.saying.wrong(words)
+            self.saying.say(words)
         self._wanted = readable
         if not readable:
             self.plot.show_curves(())
@@ -235,7 +239,7 @@ class RecordingsPage(QWidget):
                 curves, path, self._library.model, self._session.overlay_drive
             )
             job.finished.connect(lambda found, of=of: self._took(found, of))
-            job.failed.connect(self.saying.wrong)
+            job.failed.connect(self.saying.say)
             self._reading.append(job)
         if self._differing is not None:
             self._differing.cancel()
@@ -268,15 +272,16 @@ class RecordingsPage(QWidget):
         if len(kinds) > 1:
             first = ready[0].kind
             ready = [c for c in ready if c.kind == first]
-            self.saying.note(
+            self.saying.say(
                 "Recordings driven by voltage and by stretch have no axis in common: those like "
-                f"{ready[0].name} are drawn"
+                f"{ready[0].name} are drawn",
+                "warn",
             )
         self.plot.show_curves(ready)
         self._show_about()
         unfit = next((c.unfit for c in ready if c.unfit), "")
         if unfit:
-            self.saying.note(f"No model is drawn: {unfit}")
+            self.saying.say(f"No model is drawn: {unfit}", "warn")
         self.again_button.setEnabled(len(ready) == 1 and bool(ready[0].sequence_toml))
 
     def _show_about(self) -> None:
@@ -313,10 +318,10 @@ class RecordingsPage(QWidget):
 
     def export(self, path: Path, form: str, out: Path) -> None:
         """Write the recording at ``path`` as ``form`` to ``out``, in the other process."""
-        self.saying.note(f"Writing {out.name}")
+        self.saying.say(f"Writing {out.name}", "muted")
         job = self._library.submit(hand_on, path, form, out)
-        job.finished.connect(lambda written: self.saying.good(f"{written} was written"))
-        job.failed.connect(self.saying.wrong)
+        job.finished.connect(lambda written: self.saying.say(f"{written} was written", "good"))
+        job.failed.connect(self.saying.say)
 
     def _ask_export(self, form: str) -> None:
         chosen = self.chosen()
@@ -340,12 +345,12 @@ class RecordingsPage(QWidget):
         for path in filter(self._broken, self.chosen()):
             job = self._library.submit(mend, path)
             job.finished.connect(self._recovered)
-            job.failed.connect(self.saying.wrong)
+            job.failed.connect(self.saying.say)
 
     @Slot(object)
     def _recovered(self, words: str) -> None:
         self._library.refresh()
-        self.saying.good(words)
+        self.saying.say(words, "good")
 
     @Slot()
     def _play_again(self) -> None:

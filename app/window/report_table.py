@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFont, QGuiApplication, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import (
@@ -17,6 +19,9 @@ from app.report.tables import Row, Table
 
 __all__ = ["ReportTable", "two_columns"]
 
+_NUMBER = re.compile(
+    r"[(<]?[-\N{MINUS SIGN}\N{EN DASH}\N{INFINITY}+]?\d|[-\N{EN DASH}\N{INFINITY}]$"
+)
 _NARROW = ("Recording", "Level")  # heads of columns that hold a word, among those with sentences
 
 
@@ -48,6 +53,7 @@ class ReportTable(QTableWidget):
         self.setToolTip("Ctrl+C copies what is selected")
         if whole:
             self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+            self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
             self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def show_table(self, table: Table) -> None:
@@ -63,7 +69,7 @@ class ReportTable(QTableWidget):
         for i, row in enumerate(table.rows):
             for k, text in enumerate(row.cells):
                 item = QTableWidgetItem(text)
-                right = k > 0 and not self._words
+                right = k > 0 and not self._words and _NUMBER.match(text) is not None
                 side = Qt.AlignmentFlag.AlignRight if right else Qt.AlignmentFlag.AlignLeft
                 item.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
                 item.setToolTip(row.detail or text)
@@ -102,8 +108,9 @@ class ReportTable(QTableWidget):
         self.resizeRowsToContents()
         if not self._whole:
             return
-        header = self.horizontalHeader()
+        header, edges = self.horizontalHeader(), 2 * self.frameWidth()
         # hidden, not invisible: this is asked before the table itself is seen
-        height = 2 * self.frameWidth() + (0 if header.isHidden() else header.sizeHint().height())
+        height = edges + (0 if header.isHidden() else header.sizeHint().height())
         height += sum(self.rowHeight(row) for row in range(self.rowCount()))
         self.setFixedHeight(height)
+        self.setMaximumWidth(header.length() + edges)

@@ -49,13 +49,11 @@ class Job(QObject):
     failed = Signal(str)
     cancelled = Signal()
 
-    def __init__(
-        self, worker: Worker, number: int, function: Callable[..., Any], given: tuple[Any, ...]
-    ) -> None:
+    def __init__(self, worker: Worker, ask: Ask, whole: bool) -> None:
         super().__init__()  # no parent: it lives as long as somebody cares for it
         self._worker = worker
-        self.number = number
-        self.ask = Ask(number, function, given)
+        self.ask = ask
+        self.whole = whole
         self.asked_to_stop = False
 
     @Slot()
@@ -65,10 +63,7 @@ class Job(QObject):
 
 
 class Worker(QObject):
-    """Does jobs one after another, in a process that is spawned with the first.
-
-    ``whole``: the jobs tell the fraction of all their work, not of each of its stages.
-    """
+    """Does jobs one after another, in a process that is spawned with the first."""
 
     _arrived = Signal(int, object)
 
@@ -76,12 +71,10 @@ class Worker(QObject):
         self,
         parent: QObject | None = None,
         *,
-        whole: bool = False,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         super().__init__(parent)
         self._clock = clock
-        self._whole = whole
         self._process: BaseProcess | None = None
         self._connection: Connection | None = None
         self._reader: threading.Thread | None = None
@@ -92,14 +85,17 @@ class Worker(QObject):
         self._estimate = Estimate()
         self._arrived.connect(self._take, Qt.ConnectionType.QueuedConnection)
 
-    def submit(self, function: Callable[..., Any], *given: Any, first: bool = False) -> Job:
+    def submit(
+        self, function: Callable[..., Any], *given: Any, first: bool = False, whole: bool = False
+    ) -> Job:
         """Have ``function(*given, progress=...)`` called; ``first`` before all that wait.
 
+        ``whole``: it tells the fraction of all its work, not of each of its stages.
         The function stands at the top of a module, and everything that goes in and comes out can
         be pickled. A ``DearigError`` becomes ``failed`` with its sentence.
         """
         self._number += 1
-        job = Job(self, self._number, function, given)
+        job = Job(self, Ask(self._number, function, given), whole)
         if first:
             self._waiting.appendleft(job)
         else:
@@ -125,7 +121,7 @@ class Worker(QObject):
                 self._next()
             else:
                 job.asked_to_stop = True
-                self._send(Stop(job.number))
+                self._send(Stop(job.ask.number))
 
     def clear(self) -> None:
         """Cancel everything that waits, not what is under way."""
@@ -210,12 +206,12 @@ class Worker(QObject):
                 self._end(job, "broken", f"{words}; start the work again")
             self._next()
             return
-        if job is None or answer.number != job.number:
+        if job is None or answer.number != job.ask.number:
             return
         if answer.kind == "progress":
             stage, fraction = answer.value
             # of the whole work one estimate holds, whatever its stage is called
-            left = self._estimate.left("" if self._whole else stage, fraction, self._clock())
+            left = self._estimate.left("" if job.whole else stage, fraction, self._clock())
             job.progressed.emit(stage, fraction, float("nan") if left is None else left)
             return
         self._current = None

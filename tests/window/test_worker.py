@@ -196,9 +196,9 @@ def test_the_estimate_is_that_of_the_stage():
 
 def test_the_whole_work_keeps_one_estimate_through_its_stages(qtbot):
     now = iter((0.0, 3.0, 6.0, 9.0))
-    worker = Worker(whole=True, clock=lambda: next(now))
+    worker = Worker(clock=lambda: next(now))
     left: list[float] = []
-    job = worker.submit(staged)
+    job = worker.submit(staged, whole=True)
     job.progressed.connect(lambda stage, part, seconds: left.append(seconds))
     with qtbot.waitSignal(job.finished, timeout=_PATIENCE):
         pass
