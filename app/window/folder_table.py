@@ -198,16 +198,15 @@ def _level(glance: Glance) -> str:
 
 
 def _state(glance: Glance) -> str:
-    if glance.trouble:
-        return "cannot be read"
-    words = "" if glance.complete else "incomplete"
-    count = sum(event.level != "info" for event in glance.events)
-    if count:
-        words = f"{words}, " if words else ""
-        words += f"{count} event{'' if count == 1 else 's'}"
     # a sign besides the colour
     sign = {"fault": "\N{MULTIPLICATION X} ", "warning": "! "}.get(_level(glance), "")
-    return f"{sign}{words}" if words else "\N{CHECK MARK} finished"
+    if glance.trouble:
+        return f"{sign}cannot be read"
+    said = [] if glance.complete else ["incomplete"]
+    count = sum(event.level != "info" for event in glance.events)
+    if count:
+        said.append(f"{count} event{'' if count == 1 else 's'}")
+    return f"{sign}{', '.join(said)}" if said else "\N{CHECK MARK} finished"
 
 
 def _error(glance: Glance, column: int) -> str:

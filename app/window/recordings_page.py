@@ -72,6 +72,7 @@ class RecordingsPage(QWidget):
         self._wanted: list[Path] = []
         self._round = 0
         self._differing: Job | None = None
+        self._waited: list[Path] = []  # to be chosen when they are there
         self._choose = QTimer(self, singleShot=True, interval=_CHOOSE_MS)
         self._choose.timeout.connect(self._show_chosen)
 
@@ -194,7 +195,8 @@ class RecordingsPage(QWidget):
         return [row.data(PATH) for row in rows]
 
     def choose(self, paths: list[Path]) -> None:
-        """Select the rows of ``paths``."""
+        """Select the rows of ``paths``; those that are not listed yet, as soon as they are."""
+        self._waited = [path for path in paths if path not in self._library.files]
         selection = QItemSelection()
         for row in range(self._sorted.rowCount()):
             index = self._sorted.index(row, 0)
@@ -407,6 +409,8 @@ class RecordingsPage(QWidget):
     @Slot()
     def _listed(self) -> None:
         self.files.set_files(self._library.files, self._library.glances)
+        if self._waited and all(path in self._library.files for path in self._waited):
+            self.choose(self._waited)
         if not self._library.files:
             self.count.setText("no recordings yet")
 

@@ -80,7 +80,7 @@ def ended(job: Job) -> list:
 def test_a_job_gives_its_result_and_its_progress(qtbot, worker):
     job = worker.submit(doubled, 21)
     seen, stages = ended(job), []
-    job.progressed.connect(lambda stage, part, left: stages.append((stage, part)))
+    job.progressed.connect(lambda *told: stages.append(told[:2]))
     qtbot.waitUntil(lambda: seen != [], timeout=_PATIENCE)
     assert seen == [("done", 42)]
     # a change too small to be seen is not worth a message
@@ -199,7 +199,7 @@ def test_the_whole_work_keeps_one_estimate_through_its_stages(qtbot):
     worker = Worker(clock=lambda: next(now))
     left: list[float] = []
     job = worker.submit(staged, whole=True)
-    job.progressed.connect(lambda stage, part, seconds: left.append(seconds))
+    job.progressed.connect(lambda *told: left.append(told[2]))
     with qtbot.waitSignal(job.finished, timeout=_PATIENCE):
         pass
     worker.close()
