@@ -123,9 +123,7 @@ class MainWindow(QMainWindow):
             event.ignore()
             return
         self._remember()
-        application = QApplication.instance()
-        if application is not None:
-            application.removeEventFilter(self)
+        self._listen(running=False)
         self.run_page.close_work()
         self.planner.close()
         for page in (
@@ -233,10 +231,17 @@ class MainWindow(QMainWindow):
         self.study_page.open_sequence.connect(self._play_sequence)
         self.study_page.show_model.connect(self._show_model)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._look_changed)
+        session.running_changed.connect(self._listen)
+        self._where_changed()
+
+    @Slot(bool)
+    def _listen(self, running: bool) -> None:
+        """Hear every key while a run goes on, and none else: all events pass through here."""
         application = QApplication.instance()
         if application is not None:
-            application.installEventFilter(self)
-        self._where_changed()
+            application.removeEventFilter(self)
+            if running:
+                application.installEventFilter(self)
 
     @Slot(object)
     def _state_changed(self, state: HighVoltage) -> None:

@@ -55,7 +55,8 @@ class RigPage(QWidget):
         super().__init__(parent)
         self.session = session
         self.text = session.rig_text
-        self.forms: dict[str, Form] = {}
+        self.forms: dict[str, Form] = {}  # made when they are first looked at
+        self._areas: dict[str, QScrollArea] = {}
         self._saved = session.rig_text
         self._checks = Background(self)
         self._checks.done.connect(self._checked)
@@ -181,9 +182,10 @@ class RigPage(QWidget):
 
     def _show_faults(self, faults: dict[tuple[str, str], str]) -> None:
         said = set()
-        for i, (table, form) in enumerate(self.forms.items()):
+        for i, table in enumerate(SECTIONS):
             keys = {k: words for (t, k), words in faults.items() if t == table}
-            form.show_faults(keys)
+            if table in self.forms:
+                self.forms[table].show_faults(keys)
             said |= {(table, k) for k in keys if k in SECTIONS[table].model_fields}
             mark = "✗ " if keys else ""
             self.tabs.setTabText(i, f"{mark}{table}")
@@ -357,19 +359,37 @@ class RigPage(QWidget):
         column.addWidget(self.state)
         self.tabs = QTabWidget()
         self.tabs.setUsesScrollButtons(True)
-        for table, section in SECTIONS.items():
-            form = Form(form_fields(section), section_values(self.text, table), explain=True)
-            form.changed.connect(lambda key, value, table=table: self.set_value(table, key, value))
-            form.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
+        for table in SECTIONS:
             area = QScrollArea()
             area.setWidgetResizable(True)
             area.setFrameShape(QScrollArea.Shape.NoFrame)
             area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-            area.setWidget(form)
             self.tabs.addTab(area, table)
-            self.forms[table] = form
+            self._areas[table] = area
+        self.tabs.currentChanged.connect(self._tab_changed)
+        self.form("film")
         column.addWidget(self.tabs, 1)
         return card(column)
+
+    def form(self, table: str) -> Form:
+        """The form of one table of the rig file."""
+        if table not in self.forms:
+            values = section_values(self.text, table)
+            form = Form(form_fields(SECTIONS[table]), values, explain=True)
+            form.changed.connect(lambda key, value: self.set_value(table, key, value))
+            form.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
+            self._areas[table].setWidget(form)
+            self.forms[table] = form
+        return self.forms[table]
+
+    def show_table(self, table: str) -> None:
+        """Bring a table of the rig file to the front."""
+        self.tabs.setCurrentIndex(list(SECTIONS).index(table))
+
+    @Slot(int)
+    def _tab_changed(self, place: int) -> None:
+        self.form(list(SECTIONS)[place])
+        self._show_faults(faults_of(self.text))
 
     @Slot()
     def _ask_open(self) -> None:

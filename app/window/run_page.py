@@ -106,7 +106,6 @@ class RunPage(QWidget):
         session, preview = self.session, self.session.preview
         if preview is None or preview.loaded is None or not preview.playable:
             return
-        session.set_notes(self.operator.text(), self.film.text(), self.notes.text())
         live = Live(session.overlays, session.overlay_drive)
         order = RunOrder(
             preview.loaded, session.address, session.rig_file, session.rig_text, session.folder,
@@ -281,6 +280,8 @@ class RunPage(QWidget):
         self._count()
         self.badge.show_state(self.runner.state, self._kind())
         self.left.setText(end.headline)
+        if end.result is not None:
+            self.progress.setValue(1000)
         self.segment.setText("")
         role = "good" if end.result is not None else "bad"
         where = f" · recorded in {end.path}" if end.path is not None else ""
@@ -479,8 +480,7 @@ class RunPage(QWidget):
             field.setToolTip(tip)
             row.addWidget(caption)
             row.addWidget(field, share)
-        self.film.editingFinished.connect(self._noted)
-        self.operator.editingFinished.connect(self._noted)
+            field.textChanged.connect(self._noted)
         self.paced = QCheckBox("Real &time")
         self.paced.setChecked(True)
         self.paced.setToolTip("Let the simulated rig take its time, as a real one does")

@@ -163,7 +163,7 @@ class Session(QObject):
         self.settings.setValue("operator", operator)
         self.settings.setValue("film", film)
         self.notes_changed.emit()
-        if film != film_before:  # the limits are those of one film
+        if film != film_before and self.rig_file.film.name:  # its limits are those of one film
             self.preview = None
             self.sequence_changed.emit()
 

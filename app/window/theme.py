@@ -114,7 +114,8 @@ def prepare_plots() -> None:
 
 def apply(application: QApplication, theme: Theme) -> None:
     """Give the whole application this look."""
-    application.setStyle("Fusion")
+    if not application.styleSheet():
+        application.setStyle("Fusion")
     palette = QPalette()
     roles = QPalette.ColorRole
     for role, colour in (
@@ -139,8 +140,10 @@ def apply(application: QApplication, theme: Theme) -> None:
         palette.setColor(role, QColor(colour))
     for role in (roles.Text, roles.ButtonText, roles.WindowText):
         palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(theme.muted))
-    application.setPalette(palette)
-    application.setStyleSheet(_sheet(theme))
+    sheet = _sheet(theme)
+    if application.styleSheet() != sheet:  # each time all widgets are looked at anew
+        application.setPalette(palette)
+        application.setStyleSheet(sheet)
 
 
 def _sheet(t: Theme) -> str:
@@ -172,6 +175,15 @@ def _sheet(t: Theme) -> str:
         selection-background-color: {t.accent}; selection-color: {t.on_accent};
     }}
     QLineEdit[wrong="true"] {{ border: 2px solid {t.bad}; }}
+    QRadioButton::indicator, QCheckBox::indicator {{
+        width: 12px; height: 12px; border: 1px solid {t.muted}; background: {t.surface};
+    }}
+    QRadioButton::indicator {{ border-radius: 7px; }}
+    QCheckBox::indicator {{ border-radius: 2px; }}
+    QRadioButton::indicator:checked, QCheckBox::indicator:checked {{
+        border: 1px solid {t.accent}; background: {t.accent};
+    }}
+    QRadioButton::indicator:focus, QCheckBox::indicator:focus {{ border: 2px solid {t.accent}; }}
     QTabWidget::pane {{ border: 1px solid {t.line}; }}
     QListWidget#pages {{ border: none; background: {t.raised}; outline: none; font-size: 11pt; }}
     QListWidget#pages::item {{ padding: 10px 12px; }}
