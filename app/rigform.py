@@ -52,7 +52,7 @@ def faults_of(text: str) -> dict[tuple[str, str], str]:
     try:
         RigFile.model_validate(data)
     except ValidationError as error:
-        found = {}
+        found: dict[tuple[str, str], str] = {}
         for fault in error.errors(include_url=False):
             place = [str(part) for part in fault["loc"]]
             table, key = [*place, "", ""][:2]

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
     QHeaderView,
+    QLabel,
     QLineEdit,
     QMenu,
     QProgressBar,
@@ -184,7 +185,7 @@ class SequencePage(QWidget):
         if row >= 0:
             self._do(lambda: self.draft.remove(row), max(row - 1, 0))
 
-    def move(self, by: int) -> None:
+    def shift(self, by: int) -> None:
         """Move the chosen segment up (-1) or down (1)."""
         row = self.table.currentRow()
         if row >= 0 and 0 <= row + by < len(self.draft.segments):
@@ -525,8 +526,8 @@ class SequencePage(QWidget):
         for words, tip, key, done in (
             ("Duplicate", "The chosen segment once more", "Ctrl+D", self.duplicate),
             ("Remove", "Take the chosen segment away", "Ctrl+Del", self.remove),
-            ("▲", "Move the chosen segment up", "Alt+Up", lambda: self.move(-1)),
-            ("▼", "Move the chosen segment down", "Alt+Down", lambda: self.move(1)),
+            ("▲", "Move the chosen segment up", "Alt+Up", lambda: self.shift(-1)),
+            ("▼", "Move the chosen segment down", "Alt+Down", lambda: self.shift(1)),
         ):
             made = button(words, f"{tip} ({key})")
             made.setShortcut(QKeySequence(key))
@@ -547,7 +548,7 @@ class SequencePage(QWidget):
         below.addWidget(self.state)
         grid = QGridLayout()
         grid.setHorizontalSpacing(2 * SPACE)
-        self.margins: list[tuple[QWidget, QProgressBar]] = []
+        self.margins: list[tuple[QLabel, QProgressBar]] = []
         for i in range(6):
             words, bar = label(""), QProgressBar()
             bar.setTextVisible(False)
