@@ -72,7 +72,6 @@ class SequencePage(QWidget):
         session.sequence_changed.connect(self._sequence_changed)
         session.preview_changed.connect(self._preview_changed)
         session.recent_changed.connect(self._recent_changed)
-        session.running_changed.connect(lambda running: self._bar.setEnabled(not running))
         self._recent_changed()
         self._fill(0)
         if session.preview is not None:
@@ -148,7 +147,7 @@ class SequencePage(QWidget):
 
     def dropEvent(self, event: QDropEvent) -> None:  # noqa: N802
         for url in event.mimeData().urls():
-            if _usable(url.toLocalFile()) and not self.session.running:
+            if _usable(url.toLocalFile()):
                 self.open_file(Path(url.toLocalFile()))
         event.acceptProposedAction()
 
@@ -405,8 +404,7 @@ class SequencePage(QWidget):
         outer = QVBoxLayout(self)
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
         outer.setSpacing(SPACE)
-        self._bar = self._tool_bar()
-        outer.addWidget(self._bar)
+        outer.addWidget(self._tool_bar())
         self.trouble = Sentence()
         outer.addWidget(self.trouble)
         self.split = QSplitter(Qt.Orientation.Horizontal)

@@ -209,11 +209,14 @@ def style_plot(plot: pg.PlotItem, theme: Theme) -> None:
     """Give a plot the theme's colours, and axes wide enough not to move while numbers change."""
     view = plot.getViewBox()
     view.setBackgroundColor(QColor(theme.surface))
-    plot.showGrid(x=True, y=True, alpha=0.15)
+    plot.showGrid(x=True, y=True, alpha=1.0)
     for name in ("left", "bottom"):
         axis = plot.getAxis(name)
         axis.setPen(pg.mkPen(QColor(theme.muted)))
         axis.setTextPen(pg.mkPen(QColor(theme.text)))
+        # few lines and none that shines through: pyqtgraph's own grid costs more than the curves
+        axis.setTickPen(pg.mkPen(QColor(theme.raised)))
+        axis.setStyle(maxTickLevel=0, tickAlpha=255)
     plot.getAxis("left").setWidth(64)
     plot.setMenuEnabled(False)
     plot.hideButtons()

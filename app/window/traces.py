@@ -13,7 +13,7 @@ import numpy as np
 
 __all__ = ["ErrorsSoFar", "Pyramid", "RunningErrors"]
 
-_FACTOR = 4  # bins of one level in a bin of the next
+_FACTOR = 2  # bins of one level in a bin of the next
 
 
 class _Level:
@@ -44,13 +44,13 @@ class _Level:
 
 
 class Pyramid:
-    """Extremes of a signal over bins of 1, 4, 16, ... samples, ``capacity`` bins each.
+    """Extremes of a signal over bins of 1, 2, 4, ... samples, ``capacity`` bins each.
 
     What is kept does not grow with the length of the run: the finest bins hold its last moments,
     the coarsest all of ``total`` samples.
     """
 
-    def __init__(self, total: int, capacity: int = 4096) -> None:
+    def __init__(self, total: int, capacity: int = 2048) -> None:
         self._levels = [_Level(1, capacity)]
         while self._levels[-1].size * capacity < total:
             self._levels.append(_Level(self._levels[-1].size * _FACTOR, capacity))

@@ -74,8 +74,9 @@ def keep(qtbot: QtBot) -> Iterator[Callable[[QWidget], None]]:
     def show(widget: QWidget) -> None:
         qtbot.addWidget(widget)
         kept.append(widget)
-        widget.show()
-        qtbot.waitExposed(widget)
+        with qtbot.waitActive(widget):  # keys go to the window that is active
+            widget.show()
+            widget.activateWindow()
 
     yield show
     for widget in kept:
