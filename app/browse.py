@@ -21,6 +21,7 @@ from app.recording.recover import recover
 from app.recording.summary import describe_rows
 from app.records import compare
 from app.report.decimate import decimate
+from app.report.diagnosis import readable
 from model.actuator import Actuator
 from model.film import Strip
 from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
@@ -198,7 +199,7 @@ def curves(
         residual=residual,
         errors=errors,
         events=recording.events,
-        about=tuple(describe_rows(recording)),
+        about=tuple((what, readable(value)) for what, value in describe_rows(recording)),
         sequence_toml=recording.sequence_toml,
         unfit=unfit,
     )
@@ -249,7 +250,14 @@ def _short(time: np.ndarray, values: np.ndarray, columns: int) -> tuple[np.ndarr
 
 
 #: Lines of a recording's description that say what came of it, not under what it was made.
-_RESULTS = ("recording", "displacement", "displacement model", "voltage monitor", "current monitor")
+_RESULTS = (
+    "recording",
+    "noise floor",
+    "displacement",
+    "displacement model",
+    "voltage monitor",
+    "current monitor",
+)
 
 
 def _conditions(recording: Recording) -> dict[str, str]:

@@ -48,6 +48,8 @@ def emptied(plot: pg.PlotItem, theme: Theme) -> None:
     """Take everything out of ``plot``, and give it the colours of ``theme``."""
     plot.clear()
     style_plot(plot, theme)
+    for name in ("left", "bottom"):
+        plot.getAxis(name).enableAutoSIPrefix(False)  # the units are what people say: kV, mm
     if plot.legend is not None:
         plot.legend.scene().removeItem(plot.legend)
         plot.legend = None

@@ -480,7 +480,7 @@ def _table(model: QSortFilterProxyModel, session: Session) -> QTableView:
     table.verticalHeader().setDefaultSectionSize(32)
     header = table.horizontalHeader()
     header.setHighlightSections(False)
-    for column, width in enumerate((88, 170, 190, 90, 130, 70, 90, 70, 80, 120)):
+    for column, width in enumerate((88, 170, 170, 130, 126, 64, 84, 74, 84, 116)):
         table.setColumnWidth(column, width)
     header.setSectionResizeMode(2, QHeaderView.ResizeMode.Stretch)
     return table

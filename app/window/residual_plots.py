@@ -123,17 +123,23 @@ class ResidualPlots(QWidget):
         if found.missing:
             self._stress(found.missing[min(last, len(found.missing) - 1)], found.kind)
 
-    def _colours(self) -> tuple[tuple[str, str], tuple[str, str]]:
+    def _colours(self) -> tuple[tuple[str, str], ...]:
         theme = self._session.theme
         return (("before", theme.models[0]), ("after", theme.models[1]))
+
+    def _key(self, stands: int) -> tuple[tuple[str, str, str], ...]:
+        """What the colours mean where ``stands`` models are compared."""
+        names = self._colours()[:stands]
+        if stands == 1:
+            names = (("residual", names[0][1]),)
+        return tuple(("\N{EM DASH}", name, colour) for name, colour in names)
 
     def _over_time(self, found: Residual) -> None:
         plot, theme, shown = self.time.getPlotItem(), self._session.theme, SHOWN[found.kind]
         plot.setLabel("left", f"Residual ({shown.error_unit})")
         plot.setLabel("bottom", "Time (s)")
         stands = self._colours()[: len(found.over_time)]
-        names = stands if len(stands) > 1 else (("residual", stands[0][1]),)
-        set_key(plot, *(("\N{EM DASH}", name, colour) for name, colour in names))
+        set_key(plot, *self._key(len(found.over_time)))
         for (_, colour), trace in zip(stands, found.over_time, strict=True):
             add_curve(plot, trace.x, trace.y * shown.error_factor, colour)
         if found.noise is not None:
@@ -146,7 +152,7 @@ class ResidualPlots(QWidget):
         plot.setLogMode(x=True, y=True)
         plot.setLabel("left", f"Density ({shown.error_unit}/\N{SQUARE ROOT}Hz)")
         plot.setLabel("bottom", "Frequency (Hz)")
-        set_key(plot, ("- -", "noise floor", theme.muted))
+        set_key(plot, *self._key(len(found.density)), ("- -", "noise floor", theme.muted))
         for (_, colour), trace in zip(self._colours(), found.density, strict=False):
             good = (trace.x > 0.0) & (trace.y > 0.0)
             add_curve(plot, trace.x[good], trace.y[good] * shown.error_factor, colour)

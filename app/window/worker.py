@@ -81,6 +81,7 @@ class Worker(QObject):
         self._life = 0  # of the process: what an earlier one said late is not heard
         self._number = 0
         self._current: Job | None = None
+        self._urgent: deque[Job] = deque()
         self._waiting: deque[Job] = deque()
         self._estimate = Estimate()
         self._arrived.connect(self._take, Qt.ConnectionType.QueuedConnection)
@@ -88,7 +89,7 @@ class Worker(QObject):
     def submit(
         self, function: Callable[..., Any], *given: Any, first: bool = False, whole: bool = False
     ) -> Job:
-        """Have ``function(*given, progress=...)`` called; ``first`` before all that wait.
+        """Have ``function(*given, progress=...)`` called; ``first`` before those that are not.
 
         ``whole``: it tells the fraction of all its work, not of each of its stages.
         The function stands at the top of a module, and everything that goes in and comes out can
@@ -96,24 +97,22 @@ class Worker(QObject):
         """
         self._number += 1
         job = Job(self, Ask(self._number, function, given), whole)
-        if first:
-            self._waiting.appendleft(job)
-        else:
-            self._waiting.append(job)
+        (self._urgent if first else self._waiting).append(job)
         self._next()
         return job
 
     @property
     def busy(self) -> bool:
         """True while something is under way or waits."""
-        return self._current is not None or bool(self._waiting)
+        return self._current is not None or bool(self._urgent or self._waiting)
 
     def cancel(self, job: Job) -> None:
         """End ``job``, whether it waits or is under way."""
-        if job in self._waiting:
-            self._waiting.remove(job)
-            self._end(job, "stopped", None)
-        elif job is self._current:
+        for queue in (self._urgent, self._waiting):
+            if job in queue:
+                queue.remove(job)
+                self._end(job, "stopped", None)
+        if job is self._current:
             if job.asked_to_stop:
                 self._kill()
                 self._current = None
@@ -124,12 +123,13 @@ class Worker(QObject):
                 self._send(Stop(job.ask.number))
 
     def clear(self) -> None:
-        """Cancel everything that waits, not what is under way."""
+        """Cancel everything that waits and is not urgent, not what is under way."""
         while self._waiting:
             self._end(self._waiting.popleft(), "stopped", None)
 
     def close(self) -> None:
         """End the process and wait for it; nothing is signalled any more."""
+        self._urgent.clear()
         self._waiting.clear()
         self._current = None
         self._kill()
@@ -137,9 +137,10 @@ class Worker(QObject):
     # ------------------------------------------------------------ the process
 
     def _next(self) -> None:
-        if self._current is not None or not self._waiting:
+        queue = self._urgent or self._waiting
+        if self._current is not None or not queue:
             return
-        self._current = self._waiting.popleft()
+        self._current = queue.popleft()
         self._estimate = Estimate()
         if self._process is None:
             self._start()

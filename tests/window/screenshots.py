@@ -139,7 +139,10 @@ def views(window: MainWindow) -> Iterator[str]:
     until(lambda: [c.name for c in recordings.plot.shown] == ["thesis-003"], "a recording")
     yield "recordings"
     recordings.choose([folder / f"thesis-00{n}.h5" for n in (1, 2, 3)])
-    until(lambda: recordings.differences.rowCount() > 0, "the differences")
+    until(
+        lambda: len(recordings.plot.shown) == 3 and recordings.differences.rowCount() > 0,
+        "the differences",
+    )
     yield "recordings-several"
 
     window.show_page(study)

@@ -90,10 +90,10 @@ def test_a_job_gives_its_result_and_its_progress(qtbot, worker):
 
 def test_jobs_come_in_their_order_but_for_those_put_first(qtbot, worker):
     order: list[int] = []
-    for number, first in ((1, False), (2, False), (3, True)):
+    for number, first in ((1, False), (2, False), (3, True), (4, True)):
         worker.submit(doubled, number, first=first).finished.connect(order.append)
-    qtbot.waitUntil(lambda: len(order) == 3, timeout=_PATIENCE)
-    assert order == [2, 6, 4]
+    qtbot.waitUntil(lambda: len(order) == 4, timeout=_PATIENCE)
+    assert order == [2, 6, 8, 4]
 
 
 def test_a_refusal_is_a_sentence_and_the_next_job_runs(qtbot, worker):
