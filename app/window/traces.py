@@ -13,8 +13,6 @@ import numpy as np
 
 __all__ = ["ErrorsSoFar", "Pyramid", "RunningErrors"]
 
-_FACTOR = 2  # bins of one level in a bin of the next
-
 
 class _Level:
     """The newest ``capacity`` bins of ``size`` samples each; whole bins only."""
@@ -53,7 +51,7 @@ class Pyramid:
     def __init__(self, total: int, capacity: int = 2048) -> None:
         self._levels = [_Level(1, capacity)]
         while self._levels[-1].size * capacity < total:
-            self._levels.append(_Level(self._levels[-1].size * _FACTOR, capacity))
+            self._levels.append(_Level(self._levels[-1].size * 2, capacity))
         self._samples = 0
         # what does not fill a bin of the next level yet, for each level
         self._rest = [(np.empty(0), np.empty(0)) for _ in self._levels]
@@ -71,11 +69,11 @@ class Pyramid:
         for k in range(1, len(self._levels)):
             low = np.concatenate((self._rest[k][0], low))
             high = np.concatenate((self._rest[k][1], high))
-            whole = low.size // _FACTOR * _FACTOR
+            whole = low.size // 2 * 2
             self._rest[k] = (low[whole:], high[whole:])
             # fmin and fmax: a bin with a gap in it still shows what it has
-            low = np.fmin.reduce(low[:whole].reshape(-1, _FACTOR), axis=1)
-            high = np.fmax.reduce(high[:whole].reshape(-1, _FACTOR), axis=1)
+            low = np.fmin(low[0:whole:2], low[1:whole:2])
+            high = np.fmax(high[0:whole:2], high[1:whole:2])
             self._levels[k].push(low, high)
 
     def view(self, first: int, last: int) -> tuple[np.ndarray, np.ndarray]:

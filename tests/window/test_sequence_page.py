@@ -53,9 +53,7 @@ def test_a_preset_is_taken_and_drawn(qtbot: QtBot, page: SequencePage) -> None:
     assert bar.value() == 94
 
 
-def test_segments_are_added_moved_and_taken_back_by_keys(
-    qtbot: QtBot, page: SequencePage
-) -> None:
+def test_segments_are_added_moved_and_taken_back_by_keys(qtbot: QtBot, page: SequencePage) -> None:
     page.preset("rich")
     before = kinds(page)
     page.choose(1)
@@ -63,18 +61,24 @@ def test_segments_are_added_moved_and_taken_back_by_keys(
     assert kinds(page) == [*before[:2], "hold", *before[2:]]
     assert page.table.currentRow() == 2
     alt, ctrl = Qt.KeyboardModifier.AltModifier, Qt.KeyboardModifier.ControlModifier
-    qtbot.keyClick(page, Qt.Key.Key_Down, alt)
-    assert kinds(page)[3] == "hold"
-    qtbot.keyClick(page, Qt.Key.Key_D, ctrl)
-    assert kinds(page)[3:5] == ["hold", "hold"]
-    qtbot.keyClick(page, Qt.Key.Key_Delete, ctrl)
-    for _ in range(3):
-        qtbot.keyClick(page, Qt.Key.Key_Z, ctrl)
-    assert kinds(page) == [*before[:2], "hold", *before[2:]]
-    qtbot.keyClick(page, Qt.Key.Key_Z, ctrl)
-    assert kinds(page) == before
-    qtbot.keyClick(page, Qt.Key.Key_Z, ctrl | Qt.KeyboardModifier.ShiftModifier)
-    assert len(kinds(page)) == 7
+
+    def press(key: Qt.Key, with_: Qt.KeyboardModifier, then: list[str]) -> None:
+        qtbot.keyClick(page, key, with_)  # the button is seen to go down before it acts
+        qtbot.waitUntil(lambda: kinds(page) == then)
+
+    lower = [*before[:3], "hold", *before[3:]]
+    press(Qt.Key.Key_Down, alt, lower)
+    press(Qt.Key.Key_D, ctrl, [*lower[:4], "hold", *lower[4:]])
+    press(Qt.Key.Key_Delete, ctrl, lower)
+    press(Qt.Key.Key_Up, alt, [*before[:2], "hold", *before[2:]])
+    press(Qt.Key.Key_Z, ctrl, lower)
+    page.undo()
+    page.undo()
+    page.undo()
+    press(Qt.Key.Key_Z, ctrl, before)
+    press(
+        Qt.Key.Key_Z, ctrl | Qt.KeyboardModifier.ShiftModifier, [*before[:2], "hold", *before[2:]]
+    )
     settled(qtbot, page.session)
     assert page.session.preview is not None
     assert page.session.preview.playable
