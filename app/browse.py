@@ -108,7 +108,7 @@ class Difference:
     values: tuple[str, ...]
 
 
-def recordings_in(folder: Path, progress: Progress = quiet) -> dict[Path, tuple[float, int]]:
+def recordings_in(folder: Path) -> dict[Path, tuple[float, int]]:
     """Files in ``folder`` that may be recordings, with the time of their last change and bytes.
 
     Raises ``InputError`` where the folder cannot be read.
@@ -121,7 +121,6 @@ def recordings_in(folder: Path, progress: Progress = quiet) -> dict[Path, tuple[
                 found[path] = (about.st_mtime, about.st_size)
     except OSError as error:
         raise InputError(f"{folder} cannot be read: {in_words(error)}") from error
-    progress(folder.name, 1.0)
     return found
 
 

@@ -28,7 +28,7 @@ class BeforeAfterPlot(QWidget):
         self._pairs: tuple[_Pair, ...] = ()
         self.record = QComboBox()
         self.record.setToolTip("Untouched recordings come first: no fit and no choice saw them")
-        of = QLabel("&Recording")
+        of = QLabel("Recor&ding")
         of.setBuddy(self.record)
         self.says = label("", "muted")
         top = QHBoxLayout()

@@ -1,4 +1,4 @@
-"""The recordings of the session's folder, looked at in another process, with news of each."""
+"""The recordings of the session's folder: listed at once, looked at in another process."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from PySide6.QtCore import QFileSystemWatcher, QObject, QTimer, Signal, Slot
 
 from app.browse import Glance, glance, recordings_in
+from app.window.background import Background
 from app.window.session import Session
 from app.window.worker import Job, Worker
 
@@ -36,7 +37,9 @@ class Library(QObject):
         self._worker = Worker(self)
         self._watcher = QFileSystemWatcher(self)
         self._settle = QTimer(self, singleShot=True, interval=_SETTLE_MS)
-        self._listing: Job | None = None
+        self._listing = Background(self)  # a thread: it has to wait for no process
+        self._listing.done.connect(self._took_list)
+        self._listing.failed.connect(self.trouble)
         self._pending: set[Path] = set()
         self._round = 0  # of looks: a late answer of an earlier one is not shown
         self.model: Path | None = None
@@ -71,6 +74,7 @@ class Library(QObject):
         """End the process."""
         self._settle.stop()
         self._round += 1
+        self._listing.close()
         self._worker.close()
 
     @Slot()
@@ -78,12 +82,8 @@ class Library(QObject):
         """List the folder again, and look at what is new or changed."""
         if self._session.running:
             return  # its end comes here again
-        if self._listing is not None:
-            self._settle.start()  # once more when that is done: it may have been too early
-            return
-        self._listing = self.submit(recordings_in, self.folder)
-        self._listing.finished.connect(self._took_list)
-        self._listing.failed.connect(self._no_list)
+        folder = self.folder
+        self._listing.start(lambda: recordings_in(folder))
 
     @Slot(str)
     @Slot(Path)
@@ -99,7 +99,6 @@ class Library(QObject):
         if self.folder.is_dir():
             self._watcher.addPath(str(self.folder))
         self._worker.clear()
-        self._listing = None
         self._round += 1
         self.files, self.glances = {}, {}
         self._pending.clear()
@@ -108,10 +107,9 @@ class Library(QObject):
 
     @Slot(object)
     def _took_list(self, files: dict[Path, tuple[float, int]]) -> None:
-        self._listing = None
-        before, self.files = self.files, files
         if any(path.parent != self.folder for path in files):
             return  # of the folder that was left meanwhile
+        before, self.files = self.files, files
         self.glances = {path: g for path, g in self.glances.items() if path in files}
         fresh = [
             path for path in files
@@ -120,11 +118,6 @@ class Library(QObject):
         ]  # fmt: skip
         self.listed.emit()
         self._look(sorted(fresh, key=lambda path: -files[path][0]))
-
-    @Slot(str)
-    def _no_list(self, words: str) -> None:
-        self._listing = None
-        self.trouble.emit(words)
 
     def _look(self, paths: list[Path]) -> None:
         drive, round_ = self._session.overlay_drive, self._round

@@ -41,6 +41,7 @@ from app.window.curves_plot import CurvesPlot
 from app.window.folder_table import COLUMNS, PATH, SORT, FolderModel, ThumbnailDelegate
 from app.window.library import library_of
 from app.window.report_table import ReportTable, two_columns
+from app.window.room import remember
 from app.window.session import Session
 from app.window.theme import SPACE
 from app.window.widgets import Sentence, button, label
@@ -125,8 +126,8 @@ class RecordingsPage(QWidget):
         lower = QSplitter(Qt.Orientation.Horizontal)
         lower.addWidget(self.plot)
         lower.addWidget(self.sides)
-        lower.setSizes([760, 420])
         lower.setChildrenCollapsible(False)
+        self.columns = lower
         self.splitter = QSplitter(Qt.Orientation.Vertical)
         self.splitter.addWidget(self.table)
         below = QWidget()
@@ -135,8 +136,10 @@ class RecordingsPage(QWidget):
         inner.addLayout(self._tools())
         inner.addWidget(lower, 1)
         self.splitter.addWidget(below)
-        self.splitter.setSizes([260, 430])
         self.splitter.setChildrenCollapsible(False)
+        self.reset_layout()
+        remember(self.splitter, session.settings, "recordings/rows")
+        remember(self.columns, session.settings, "recordings/columns")
 
         outer = QVBoxLayout(self)
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
@@ -180,6 +183,12 @@ class RecordingsPage(QWidget):
         tools.addWidget(self.model_shown)
         tools.addWidget(self.whole)
         return tools
+
+    @Slot()
+    def reset_layout(self) -> None:
+        """Give every part the room that it has at the first start."""
+        self.splitter.setSizes([260, 430])
+        self.columns.setSizes([760, 420])
 
     def close_work(self) -> None:
         """End the process in which recordings are read; the window is closing."""

@@ -53,7 +53,7 @@ class ResidualPlots(QWidget):
 
         row = QHBoxLayout()
         for text, box in (
-            ("&Recording", self.record), ("A&gainst", self.quantity), ("Mode&l", self.stand),
+            ("Recor&ding", self.record), ("A&gainst", self.quantity), ("Mode&l", self.stand),
         ):  # fmt: skip
             of = QLabel(text)
             of.setBuddy(box)

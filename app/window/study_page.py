@@ -39,6 +39,7 @@ from app.window.before_after_plot import BeforeAfterPlot
 from app.window.library import library_of
 from app.window.report_table import ReportTable
 from app.window.residual_plots import ResidualPlots
+from app.window.room import remember
 from app.window.session import Session
 from app.window.theme import SPACE
 from app.window.widgets import Sentence, button, card, label
@@ -74,15 +75,16 @@ class StudyPage(QWidget):
         self._job: Job | None = None
         self._shown: Study | None = None
 
-        split = QSplitter(Qt.Orientation.Horizontal)
-        split.addWidget(self._asking())
-        split.addWidget(self._answering())
-        split.setSizes([_LEFT, 860])
-        split.setStretchFactor(1, 1)
-        split.setChildrenCollapsible(False)
+        self.split = QSplitter(Qt.Orientation.Horizontal)
+        self.split.addWidget(self._asking())
+        self.split.addWidget(self._answering())
+        self.split.setStretchFactor(1, 1)
+        self.split.setChildrenCollapsible(False)
+        self.reset_layout()
+        remember(self.split, session.settings, "study/columns")
         outer = QVBoxLayout(self)
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
-        outer.addWidget(split)
+        outer.addWidget(self.split)
 
         self._library.listed.connect(self._list)
         self._library.looked.connect(self._looked)
@@ -385,6 +387,11 @@ class StudyPage(QWidget):
             made.setEnabled(found is not None)
         self.overlay_button.setEnabled(found is not None and found.outcome.kind == "actuator")
         self.run_button.setEnabled(self.proposed() is not None)
+
+    @Slot()
+    def reset_layout(self) -> None:
+        """Give every part the room that it has at the first start."""
+        self.split.setSizes([_LEFT, 860])
 
     def close_work(self) -> None:
         """End whatever is under way, and its process; the window is closing."""

@@ -173,6 +173,7 @@ def test_the_list_follows_the_folder(session, folder, keep, qtbot, tmp_path):
     page.choose([path])
     page._library.refresh()
     assert not page._library._worker.busy
+    assert not page._library._listing.busy
     session.set_running(False)
     session.recorded.emit(path)
     # it was asked for before it was listed

@@ -143,6 +143,7 @@ def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
     qtbot.waitUntil(lambda: any(m.path == found.model for m in session.overlays), timeout=_PATIENCE)
 
     # the experiment, filled in and not armed
+    assert session.address == address
     click(qtbot, page.run_button)
     assert window.stack.currentWidget() is run
     qtbot.waitUntil(
@@ -167,3 +168,19 @@ def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
         lambda: live.now().errors[place].rms == pytest.approx(after.rms, rel=0.05),
         timeout=_PATIENCE,
     )
+
+
+def test_the_room_of_the_parts_is_kept_until_it_is_reset(session, keep, qtbot):
+    first = StudyPage(session)
+    first.resize(1190, 690)
+    keep(first)
+    default = first.split.sizes()
+    first.split.setSizes([default[0] + 150, default[1] - 150])
+    first.split.splitterMoved.emit(default[0] + 150, 1)  # as a drag ends
+    moved = first.split.sizes()
+    second = StudyPage(session)
+    second.resize(1190, 690)
+    keep(second)
+    assert second.split.sizes() == moved != default
+    second.reset_layout()
+    assert second.split.sizes() == default
