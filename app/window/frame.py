@@ -99,6 +99,11 @@ class MainWindow(QMainWindow):
         self._default_geometry()
         self.show_page(self.run_page)
 
+    def leave(self) -> None:
+        """Close without asking, once the rig is safe; for a program that is told to end."""
+        self._closing = True
+        self.close()
+
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
         """STOP by a key, whatever has the focus; but a space may still be typed into a text."""
         if event.type() == QEvent.Type.KeyPress and self.run_page.runner.running:
@@ -250,7 +255,9 @@ class MainWindow(QMainWindow):
 
     @Slot()
     def _where_changed(self) -> None:
-        self.where.setText(f"rig {self.session.address}   ·   {self.session.folder}  ")
+        folder = self.session.folder
+        self.where.setText(f"rig {self.session.address}   ·   {folder.name or folder}  ")
+        self.where.setToolTip(f"Recordings go to {folder}")
         self._state_changed(self.run_page.runner.state)
 
     @Slot(int)

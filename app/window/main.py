@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -10,6 +11,9 @@ from app.errors import InputError
 
 __all__ = ["run_window"]
 
+# a closed terminal or a stopped service must not leave a voltage up
+_SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+_HEARD = 200  # ms
 _INSTALL = "install it with: pip install 'dearig[gui]'"
 
 
@@ -22,7 +26,7 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     _require_qt()
     _require_screen()
 
-    from PySide6.QtCore import QSettings
+    from PySide6.QtCore import QSettings, QTimer
     from PySide6.QtWidgets import QApplication
 
     from app.rigfile import load_rig_file
@@ -42,8 +46,19 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     if rig_file is not None:
         session.set_rig_file(rig_file.absolute(), text, settings)
     window = MainWindow(session)
+    for name in _SIGNALS:
+        if (number := getattr(signal, name, None)) is not None:
+            signal.signal(number, lambda *_: window.leave())
+    # signals are heard when the interpreter runs, which an idle window does not let it do
+    heard = QTimer()
+    heard.timeout.connect(_nothing)
+    heard.start(_HEARD)
     window.show()
     return application.exec()
+
+
+def _nothing() -> None:
+    """Let the interpreter run."""
 
 
 def _require_qt() -> None:

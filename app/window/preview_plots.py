@@ -84,7 +84,6 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
 
     def _restyle(self) -> None:
         theme = self._session.theme
-        self.setBackground(theme.window)
         for name, colour in (
             ("voltage", theme.command), ("displacement", theme.models[0]), ("field", theme.field)
         ):  # fmt: skip

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import Qt, Slot
-from PySide6.QtGui import QColor, QDragEnterEvent, QDropEvent, QKeySequence
+from PySide6.QtGui import QColor, QDragEnterEvent, QDropEvent, QKeySequence, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QButtonGroup,
@@ -37,6 +37,7 @@ from app.window.form import Form
 from app.window.session import Session
 from app.window.theme import SPACE
 from app.window.widgets import Sentence, button, card, label
+from sim_backend.factory import is_simulated
 
 __all__ = ["RigPage"]
 
@@ -72,6 +73,7 @@ class RigPage(QWidget):
         session.theme_changed.connect(self._show_outcome)
         session.running_changed.connect(self._running_changed)
         self._show_address()
+        self._show_outcome()
         self._show_all()
 
     # which rig
@@ -98,9 +100,15 @@ class RigPage(QWidget):
         address, rig_file = self.session.address, self.session.rig_file
         self._checks.start(lambda: check_rig(address, rig_file))
 
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Look at a simulated rig without being asked: there is nothing to be moved."""
+        super().showEvent(event)
+        if self.outcome is None and not self._checks.busy and is_simulated(self.session.address):
+            self.check()
+
     @Slot(object)
     def _checked(self, outcome: CheckOutcome) -> None:
-        self.outcome = outcome
+        self.outcome = outcome if outcome.rig == self.session.address else None
         self._show_outcome()
 
     @Slot(bool)
@@ -216,7 +224,11 @@ class RigPage(QWidget):
         outcome, theme = self.outcome, self.session.theme
         self.findings.setRowCount(0 if outcome is None else len(outcome.findings))
         if outcome is None:
-            self.summary.say(f"{self.session.address} was not looked at yet", "muted")
+            self.summary.say(
+                f"{self.session.address} was not looked at yet: Check looks at every instrument, "
+                f"and puts out nothing but 0 V",
+                "muted",
+            )
             return
         colours = {
             "ok": theme.good, "warning": theme.warn, "wrong": theme.bad, "not wired": theme.muted
@@ -244,7 +256,9 @@ class RigPage(QWidget):
         kind = "remote" if "@" in body else "local" if address.startswith("daqmx:") else "sim"
         if address.startswith("sim:"):
             kind = "hidden"
+            before = self.seed.blockSignals(True)  # it is shown, not chosen
             self.seed.setValue(int(body) if body.isdigit() else 0)
+            self.seed.blockSignals(before)
         if kind in ("local", "remote"):
             device, _, server = body.partition("@")
             self.device.setText(device)
@@ -327,12 +341,12 @@ class RigPage(QWidget):
         self.findings.setTabKeyNavigation(False)
         self.findings.setAccessibleName("Findings")
         header = self.findings.horizontalHeader()
-        for i in range(3):
+        for i in (0, 2):
             header.setSectionResizeMode(i, QHeaderView.ResizeMode.ResizeToContents)
+        header.resizeSection(1, 120)  # a long name is cut, and whole in the tip
         header.setSectionResizeMode(3, QHeaderView.ResizeMode.Stretch)
         self.findings.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         column.addWidget(self.findings, 1)
-        self.summary.say(f"{self.session.address} was not looked at yet", "muted")
         return card(column)
 
     def _editor(self) -> QWidget:

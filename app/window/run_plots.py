@@ -67,7 +67,6 @@ class RunPlots(pg.GraphicsLayoutWidget):
     def restyle(self) -> None:
         """Take the theme's colours, and the names of the models."""
         theme = self._session.theme
-        self.setBackground(theme.window)
         colours = {
             "command": theme.command,
             "monitor": theme.monitor,

@@ -7,6 +7,7 @@ seen. What a colour says is said by a shape or a word besides.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
@@ -27,6 +28,7 @@ __all__ = [
 ]
 
 SPACE = 8  #: px between things
+_ICONS = Path(__file__).with_name("icons")
 
 
 @dataclass(frozen=True)
@@ -147,6 +149,7 @@ def apply(application: QApplication, theme: Theme) -> None:
 
 
 def _sheet(t: Theme) -> str:
+    tick = (_ICONS / f"tick-{'dark' if t.dark else 'light'}.png").as_posix()
     return f"""
     QToolTip {{ color: {t.text}; background: {t.surface}; border: 1px solid {t.line}; }}
     QLabel[role="title"] {{ font-size: 15pt; font-weight: 600; }}
@@ -175,13 +178,18 @@ def _sheet(t: Theme) -> str:
         selection-background-color: {t.accent}; selection-color: {t.on_accent};
     }}
     QLineEdit[wrong="true"] {{ border: 2px solid {t.bad}; }}
-    QRadioButton::indicator, QCheckBox::indicator {{
+    QRadioButton::indicator, QCheckBox::indicator, QAbstractItemView::indicator {{
         width: 12px; height: 12px; border: 1px solid {t.muted}; background: {t.surface};
     }}
     QRadioButton::indicator {{ border-radius: 7px; }}
-    QCheckBox::indicator {{ border-radius: 2px; }}
-    QRadioButton::indicator:checked, QCheckBox::indicator:checked {{
-        border: 1px solid {t.accent}; background: {t.accent};
+    QCheckBox::indicator, QAbstractItemView::indicator {{ border-radius: 2px; }}
+    QRadioButton::indicator:checked {{
+        border-color: {t.accent};
+        background: qradialgradient(cx:0.5, cy:0.5, radius:0.5, fx:0.5, fy:0.5,
+            stop:0 {t.accent}, stop:0.55 {t.accent}, stop:0.65 {t.surface}, stop:1 {t.surface});
+    }}
+    QCheckBox::indicator:checked, QAbstractItemView::indicator:checked {{
+        border-color: {t.accent}; background: {t.accent}; image: url("{tick}");
     }}
     QRadioButton::indicator:focus, QCheckBox::indicator:focus {{ border: 2px solid {t.accent}; }}
     QTabWidget::pane {{ border: 1px solid {t.line}; }}
@@ -206,17 +214,23 @@ def pen(colour: str, dashed: bool = False) -> object:
 
 
 def style_plot(plot: pg.PlotItem, theme: Theme) -> None:
-    """Give a plot the theme's colours, and axes wide enough not to move while numbers change."""
-    view = plot.getViewBox()
-    view.setBackgroundColor(QColor(theme.surface))
+    """Give a plot and the widget it is in the theme's colours.
+
+    The left axis is wide enough not to move while its numbers change.
+    """
+    widget = plot.getViewWidget()
+    if widget is not None:
+        widget.setBackground(theme.surface)
     plot.showGrid(x=True, y=True, alpha=1.0)
     for name in ("left", "bottom"):
         axis = plot.getAxis(name)
         axis.setPen(pg.mkPen(QColor(theme.muted)))
         axis.setTextPen(pg.mkPen(QColor(theme.text)))
-        # few lines and none that shines through: pyqtgraph's own grid costs more than the curves
+        # few lines, behind the curves and none that shines through: pyqtgraph's own grid costs more
+        # than the curves do
         axis.setTickPen(pg.mkPen(QColor(theme.raised)))
         axis.setStyle(maxTickLevel=0, tickAlpha=255)
+        axis.setZValue(-1000)
     plot.getAxis("left").setWidth(64)
     plot.setMenuEnabled(False)
     plot.hideButtons()

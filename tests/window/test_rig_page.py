@@ -47,7 +47,7 @@ def test_a_rig_is_chosen(qtbot: QtBot, page: RigPage, kind: int, address: str) -
 
 
 def test_a_look_at_the_instruments_is_told_in_words(qtbot: QtBot, page: RigPage) -> None:
-    qtbot.mouseClick(page.check_button, Qt.MouseButton.LeftButton)
+    # a simulated rig is looked at without being asked
     qtbot.waitUntil(lambda: page.outcome is not None, timeout=60_000)
     assert page.outcome is not None
     assert page.findings.rowCount() == len(page.outcome.findings) > 3
@@ -55,6 +55,20 @@ def test_a_look_at_the_instruments_is_told_in_words(qtbot: QtBot, page: RigPage)
     page.session.set_address("sim:3")  # what was found there says nothing of this one
     assert page.findings.rowCount() == 0
     assert "not looked at" in page.summary.text()
+    qtbot.mouseClick(page.check_button, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: page.outcome is not None, timeout=60_000)
+    assert page.outcome is not None
+    assert page.outcome.rig == "sim:3"
+
+
+def test_a_card_that_is_not_there_is_told(qtbot: QtBot, page: RigPage) -> None:
+    page.session.set_address("daqmx:Dev1")
+    qtbot.mouseClick(page.check_button, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: page.outcome is not None, timeout=60_000)
+    assert page.outcome is not None
+    assert page.outcome.wrong
+    assert "wrong" in page.summary.text()
+    assert "✗ wrong" in [page.findings.item(r, 0).text() for r in range(page.findings.rowCount())]
 
 
 def test_a_wrong_value_is_said_beside_its_field_and_not_used(qtbot: QtBot, page: RigPage) -> None:
