@@ -18,9 +18,6 @@ RATE = 1000.0
 SCALING = Scaling((0.0, 10.0 / 32768), 1000.0)
 COMMAND = Channel("voltage_command", "V", SCALING)
 MONITOR = Channel("voltage_monitor", "V", SCALING)
-    Channel("voltage_command", "V", SCALING),
-    Channel("voltage_monitor", "V", SCALING),
-)
 READING = Channel("displacement", "m", SCALING, skew=7e-5, delay=2e-3)
 CHANNELS = (COMMAND, MONITOR, READING)
 THESIS = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)

@@ -29,6 +29,7 @@ from app.window.hv import HighVoltage, HighVoltageBadge
 from app.window.planner import Planner
 from app.window.recordings_page import RecordingsPage
 from app.window.rig_page import RigPage
+from app.window.room import GROUP
 from app.window.run_page import RunPage
 from app.window.running import simulated
 from app.window.sequence_page import SequencePage
@@ -94,8 +95,10 @@ class MainWindow(QMainWindow):
     @Slot()
     def reset_layout(self) -> None:
         """Put every part back to where it was at the first start."""
-        for key in ("geometry", "page"):
+        for key in ("geometry", "page", GROUP):
             self.session.settings.remove(key)
+        for page in (self.sequence_page, self.recordings_page, self.study_page):
+            page.reset_layout()
         self._default_geometry()
         self.show_page(self.run_page)
 

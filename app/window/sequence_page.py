@@ -38,6 +38,7 @@ from app.window.draft import NEW_SEGMENTS, Draft, Place, place_of, relative_csv
 from app.window.fields import FormField, form_fields, shown_value
 from app.window.form import Form
 from app.window.preview_plots import PreviewPlots
+from app.window.room import remember
 from app.window.session import Preview, Session
 from app.window.theme import SPACE
 from app.window.widgets import Sentence, button, card, label
@@ -106,6 +107,10 @@ class SequencePage(QWidget):
     def preset(self, name: str) -> None:
         """Take one of the sequences that are known by name."""
         self._take(PRESETS[name], Path(), None)
+
+    def reset_layout(self) -> None:
+        """Give every part the room that it has at the first start."""
+        self.split.setSizes([400, 600])
 
     def close_work(self) -> None:
         """Wait for the thread."""
@@ -411,8 +416,8 @@ class SequencePage(QWidget):
         self.split.setChildrenCollapsible(False)
         self.split.addWidget(self._left())
         self.split.addWidget(self._right())
-        self.split.setStretchFactor(0, 4)
-        self.split.setStretchFactor(1, 6)
+        self.reset_layout()
+        remember(self.split, self.session.settings, "sequence/columns")
         outer.addWidget(self.split, 1)
 
     def _tool_bar(self) -> QWidget:

@@ -120,6 +120,7 @@ class Session(QObject):
     def set_rig_file(self, path: Path | None, text: str, rig_file: RigFile) -> None:
         """Another rig file; ``text`` goes into every recording, ``path`` is None for none yet."""
         self.rig_path, self.rig_text, self.rig_file = path, text, rig_file
+        self.preview = None  # it was made under other limits
         self.rig_changed.emit()
         if any(model.path is None for model in self.overlays):
             thesis = self.thesis_model

@@ -43,6 +43,7 @@ def test_a_rig_is_chosen(qtbot: QtBot, page: RigPage, kind: int, address: str) -
     again = RigPage(page.session)
     qtbot.addWidget(again)
     assert again.kinds.checkedId() == kind
+    assert page.session.address == address  # to show it is not to choose it
     again.close_work()
 
 
