@@ -26,6 +26,7 @@ class Guide(QDialog):
         self.resize(_WIDTH + 80, 700)
         self.text = _Illustrated()
         self.text.setOpenExternalLinks(False)
+        self.text.document().setDocumentMargin(16)
         self.text.document().setBaseUrl(QUrl.fromLocalFile(str(_TEXT)))
         self.text.setMarkdown(_TEXT.read_text(encoding="utf-8").partition(_QUESTIONED)[0])
         layout = QVBoxLayout(self)

@@ -49,7 +49,9 @@ def emptied(plot: pg.PlotItem, theme: Theme) -> None:
     plot.clear()
     style_plot(plot, theme)
     for name in ("left", "bottom"):
-        plot.getAxis(name).enableAutoSIPrefix(False)  # the units are what people say: kV, mm
+        axis = plot.getAxis(name)
+        if axis.autoSIPrefix:  # switched off again it would scale once more, and for good
+            axis.enableAutoSIPrefix(False)  # the units are what people say: kV, mm
     if plot.legend is not None:
         plot.legend.scene().removeItem(plot.legend)
         plot.legend = None

@@ -9,6 +9,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, QUrl, Signal, Slot
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
+    QAbstractItemView,
     QButtonGroup,
     QComboBox,
     QFileDialog,
@@ -113,6 +114,8 @@ class StudyPage(QWidget):
         self.recordings.verticalHeader().hide()
         self.recordings.verticalHeader().setDefaultSectionSize(26)
         self.recordings.setShowGrid(False)
+        # ticks are what counts, and a chosen row would look like one
+        self.recordings.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         self.recordings.setAlternatingRowColors(True)
         self.recordings.setTabKeyNavigation(False)
         self.recordings.itemChanged.connect(self._ticked)

@@ -15,7 +15,9 @@ from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # before Qt is loaded
 
+from PIL import Image
 from PySide6.QtCore import QEventLoop, QSettings, QTimer
+from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QApplication
 
 from app.presets import PRESETS
@@ -171,6 +173,14 @@ def far(run: object, seconds: float) -> bool:
     return now is not None and now.samples / now.rate > seconds
 
 
+def small(picture: QPixmap, path: Path) -> None:
+    """Save ``picture`` with no more colours than a window has: a third of the bytes."""
+    picture.save(str(path))
+    with Image.open(path) as image:
+        few = image.convert("RGB").quantize(128, dither=Image.Dither.NONE)
+    few.save(path, optimize=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, help="where every view goes, in all sizes and looks")
@@ -207,7 +217,7 @@ def main() -> None:
                     if asked.guide and (width, height) == SIZES[0]:
                         for file, view in GUIDE.items():
                             if view == (name, look):
-                                picture.save(str(asked.guide / file))
+                                small(picture, asked.guide / file)
         window.close()
     application.quit()
 
