@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QFont, QGuiApplication, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -41,6 +41,7 @@ class ReportTable(QTableWidget):
         self, parent: QWidget | None = None, *, whole: bool = False, words: bool = False
     ) -> None:
         super().__init__(parent)
+        self._shown = Table("", (), ())
         self._whole, self._words = whole, words
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionMode(QAbstractItemView.SelectionMode.ContiguousSelection)
@@ -75,9 +76,9 @@ class ReportTable(QTableWidget):
                 item.setToolTip(row.detail or text)
                 if row.mark:
                     item.setFont(bold)
-                if row.muted:
-                    item.setForeground(self.palette().placeholderText())
                 self.setItem(i, k, item)
+        self._shown = table
+        self._mute()
         header = self.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         if self._words:
@@ -85,6 +86,11 @@ class ReportTable(QTableWidget):
                 if column and head not in _NARROW:
                     header.setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
         self._fit()
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._mute()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         super().resizeEvent(event)
@@ -103,6 +109,14 @@ class ReportTable(QTableWidget):
             for row in range(chosen.topRow(), chosen.bottomRow() + 1)
         ]
         QGuiApplication.clipboard().setText("\n".join(lines))
+
+    def _mute(self) -> None:
+        """Set back what is of less weight, in the colours of the present theme."""
+        for i, row in enumerate(self._shown.rows):
+            for k in range(len(row.cells)) if row.muted else ():
+                item = self.item(i, k)
+                if item is not None:
+                    item.setForeground(self.palette().placeholderText())
 
     def _fit(self) -> None:
         self.resizeRowsToContents()

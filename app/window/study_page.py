@@ -431,7 +431,8 @@ class StudyPage(QWidget):
 
     def _show_diagnosis(self, outcome: DiagnoseOutcome) -> None:
         finding = outcome.finding
-        self.headline.setText(diagnosis.HEADLINES[finding.verdict])
+        early = ", in a search that was ended early" if finding.interrupted else ""
+        self.headline.setText(f"{diagnosis.HEADLINES[finding.verdict]}{early}")
         pieces: list[str | Table] = list(diagnosis.summary(outcome))
         for heading, before, after in (
             ("Untouched recordings", outcome.before.validation, outcome.after.validation),
@@ -445,7 +446,9 @@ class StudyPage(QWidget):
         self.verdict.show_pieces(pieces, diagnosis.warnings(outcome))
         rounds: list[str | Table] = [diagnosis.ranking(found) for found in finding.rounds]
         dropped = diagnosis.dropped(outcome)
-        self.ranking.show_pieces([*rounds, *([dropped] if dropped else [])])
+        self.ranking.show_pieces(
+            [*(rounds or ["No round of candidates was finished."]), *([dropped] if dropped else [])]
+        )
         proposal: list[str | Table] = [diagnosis.readable(f"{outcome.experiment_words}.")]
         considered = diagnosis.experiment_table(outcome)
         if considered is not None:
