@@ -31,6 +31,7 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
 
     from app.rigfile import load_rig_file
     from app.toml_input import read_text
+    from app.window.collector import Collector
     from app.window.frame import MainWindow
     from app.window.session import Session
     from app.window.theme import of_system, prepare_plots
@@ -53,8 +54,12 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     heard = QTimer()
     heard.timeout.connect(_nothing)
     heard.start(_HEARD)
+    collector = Collector(application)
     window.show()
-    return application.exec()
+    try:
+        return application.exec()
+    finally:
+        collector.close()
 
 
 def _nothing() -> None:
