@@ -289,6 +289,22 @@ def check(
     outcome.refuse()
 
 
+@app.command()
+def gui(
+    rig: Annotated[
+        str, typer.Option(help="sim, sim:SEED, daqmx:Dev1 or daqmx:Dev1@HOST:PORT.")
+    ] = "sim",
+    rig_file: RigFileOption = None,
+    folder: Annotated[
+        Path, typer.Option(metavar="DIR", help="Where recordings go. [default: here]")
+    ] = Path(),
+) -> None:
+    """Open the operator's window."""
+    from app.window.main import run_window
+
+    raise typer.Exit(run_window(rig, rig_file, folder))
+
+
 @app.command("import")
 def import_(
     source: Annotated[

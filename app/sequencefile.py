@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import difflib
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -19,7 +21,7 @@ from model import excitation
 from model.errors import ModelError
 from model.excitation import THESIS_AMPLITUDES, THESIS_FREQUENCIES, Segment, Sequence
 
-__all__ = ["LoadedSequence", "load_sequence", "parse_sequence"]
+__all__ = ["SEGMENT_KINDS", "LoadedSequence", "load_sequence", "parse_sequence"]
 
 _KV = 1e3
 #: Samples of a run, at most: 69 h at 1 kHz, 12 min at the card's full rate. A run holds some
@@ -274,6 +276,10 @@ _KINDS: dict[str, type[_Segment]] = {
     "thesis": _Thesis,
     "csv": _Csv,
 }
+
+
+#: Every kind of segment with the keys that it takes.
+SEGMENT_KINDS: Mapping[str, type[Table]] = MappingProxyType(_KINDS)
 
 
 class _File(Table):

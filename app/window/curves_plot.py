@@ -1,0 +1,106 @@
+"""Recordings over time, one or several: drive, measurement beside the model, and the residual."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pyqtgraph as pg
+from PySide6.QtCore import Qt, Slot
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from app.browse import Curves
+from app.report.units import SHOWN
+from app.window.plotting import add_curve, add_legend, emptied, stacked
+from app.window.session import Session
+from app.window.theme import pen
+
+__all__ = ["CurvesPlot"]
+
+
+class CurvesPlot(QWidget):
+    """Three plots on one time axis; the model is dashed where several recordings share a plot."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self._shown: tuple[Curves, ...] = ()
+        self._with_model = True
+        # the measurement matters most
+        self._area, self.plots = stacked((2, 4, 3))
+        self._area.setAccessibleName("Curves of the chosen recordings")
+        outer = QVBoxLayout(self)
+        outer.setContentsMargins(0, 0, 0, 0)
+        outer.addWidget(self._area)
+        session.theme_changed.connect(self._draw)
+        self._draw()
+
+    @property
+    def shown(self) -> tuple[Curves, ...]:
+        """What is drawn."""
+        return self._shown
+
+    def show_curves(self, curves: Sequence[Curves]) -> None:
+        """Draw ``curves``, all of one kind, in place of what was there; all of the time is seen."""
+        self._shown = tuple(curves)
+        self._draw()
+        if self._shown:
+            first = min(c.drive[0][0] for c in self._shown)
+            last = max(c.drive[0][-1] for c in self._shown)
+            self.plots[0].setXRange(first, last, padding=0.0)
+        for plot in self.plots:
+            plot.enableAutoRange(axis="y")
+
+    @Slot(bool)
+    def show_model(self, shown: bool) -> None:
+        """With the model and the residual, or the measurement alone."""
+        self._with_model = shown
+        self._draw()
+
+    @Slot()
+    def _draw(self) -> None:
+        theme = self._session.theme
+        self._area.setBackground(QColor(theme.surface))
+        for plot in self.plots:
+            emptied(plot, theme)
+        drive, both, residual = self.plots
+        shown = SHOWN[self._shown[0].kind if self._shown else "actuator"]
+        drive.setLabel("left", shown.drive_label)
+        both.setLabel("left", shown.label)
+        residual.setLabel("left", f"Residual ({shown.error_unit})")
+        self.plots[-1].setLabel("bottom", "Time (s)")
+        residual.setVisible(self._with_model)
+        both.getAxis("bottom").setStyle(showValues=not self._with_model)
+        if not self._shown:
+            return
+        add_legend(both, theme)
+        alone = len(self._shown) == 1
+        zero = pg.InfiniteLine(0.0, angle=0, pen=pen(theme.muted, dashed=True))
+        residual.addItem(zero, ignoreBounds=True)
+        for i, curves in enumerate(self._shown):
+            colour = theme.measured if alone else theme.curves[i % len(theme.curves)]
+            driven = theme.command if alone else colour
+            add_curve(drive, curves.drive[0], curves.drive[1] * shown.drive_factor, driven)
+            name = "measured" if alone else curves.name
+            add_curve(both, curves.measured[0], curves.measured[1] * shown.factor, colour, name)
+            if not self._with_model or curves.model is None or curves.residual is None:
+                continue
+            beside = theme.models[0] if alone else colour
+            time, model = curves.model
+            name = "model" if alone else ""
+            add_curve(both, time, model * shown.factor, beside, name, dashed=not alone)
+            time, left = curves.residual
+            add_curve(residual, time, left * shown.error_factor, beside)
+            if alone:
+                self._events(curves)
+
+    def _events(self, curves: Curves) -> None:
+        theme = self._session.theme
+        for event in curves.events:
+            if event.level == "info":
+                continue
+            colour = theme.bad if event.level == "fault" else theme.warn
+            line = pg.InfiniteLine(event.time, angle=90, pen=pen(colour, dashed=True))
+            line.setToolTip(f"{event.time:.4g} s, {event.level}: {event.message}")
+            line.setCursor(Qt.CursorShape.WhatsThisCursor)
+            self.plots[1].addItem(line, ignoreBounds=True)

@@ -1,0 +1,169 @@
+"""A sequence that is being written: its tables, with undo and redo."""
+
+from __future__ import annotations
+
+import copy
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from app.errors import InputError
+from app.sequencefile import SEGMENT_KINDS
+from app.toml_input import parse_toml
+
+__all__ = ["NEW_SEGMENTS", "Draft", "Place", "place_of", "relative_csv"]
+
+_STEPS_MAX = 200
+
+#: What a segment is when it is added; each can be played as it stands.
+NEW_SEGMENTS: dict[str, dict[str, Any]] = {
+    "half_sine": {"amplitude_kV": 6.0, "frequency_Hz": 0.5},
+    "thesis": {"periods": 1},
+    "ramp": {"to_kV": 0.0, "duration_s": 1.0},
+    "hold": {"duration_s": 1.0},
+    "steps": {"levels_kV": [3.0, 6.0, 0.0], "dwell_s": 1.0, "rise_s": 0.02},
+    "triangle": {"amplitude_kV": 6.0, "frequency_Hz": 0.5},
+    "sine": {"amplitude_kV": 2.0, "frequency_Hz": 0.5, "cycles": 2.0},
+    "chirp": {"amplitude_kV": 2.0, "from_Hz": 0.5, "to_Hz": 5.0, "duration_s": 10.0},
+    "multisine": {"amplitude_kV": 2.0, "frequencies_Hz": [0.5, 1.1, 2.3], "duration_s": 10.0},
+    "csv": {"file": "waveform.csv"},
+}
+
+
+class Draft:
+    """The tables of a sequence file; every change can be taken back.
+
+    ``name``, ``lead_in_s`` and ``tail_s`` stand in ``head``, the segments in ``segments``.
+    """
+
+    def __init__(self, toml: str) -> None:
+        self._states: list[dict[str, Any]] = [_tables(toml)]
+        self._at = 0
+        self._last: tuple[object, ...] = ()
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The tables as they stand; not to be changed but by the methods here."""
+        return self._states[self._at]
+
+    @property
+    def segments(self) -> list[dict[str, Any]]:
+        """The tables [[segment]]."""
+        found: list[dict[str, Any]] = self.data["segment"]
+        return found
+
+    @property
+    def toml(self) -> str:
+        """The sequence as the text of a file."""
+        return tomli_w.dumps(self.data)
+
+    @property
+    def can_undo(self) -> bool:
+        """True where there is something to take back."""
+        return self._at > 0
+
+    @property
+    def can_redo(self) -> bool:
+        """True where something was taken back."""
+        return self._at < len(self._states) - 1
+
+    def undo(self) -> None:
+        """Take the last change back."""
+        self._at = max(self._at - 1, 0)
+        self._last = ()
+
+    def redo(self) -> None:
+        """Make it again."""
+        self._at = min(self._at + 1, len(self._states) - 1)
+        self._last = ()
+
+    def replace(self, toml: str) -> None:
+        """Another sequence altogether; raises ``InputError`` where it is not TOML."""
+        self._push(_tables(toml))
+
+    def set_head(self, key: str, value: Any) -> None:
+        """``name``, ``lead_in_s`` or ``tail_s``; None leaves it out."""
+        self._change(("head", key), lambda data: _put(data, key, value))
+
+    def set_value(self, row: int, key: str, value: Any) -> None:
+        """A key of a segment; None leaves it out. Typing on in one key is one change."""
+        self._change((row, key), lambda data: _put(data["segment"][row], key, value))
+
+    def add(self, kind: str, row: int, **given: Any) -> None:
+        """A new segment of ``kind`` before ``row``."""
+        table = {"kind": kind, **copy.deepcopy(NEW_SEGMENTS[kind]), **given}
+        self._change((), lambda data: data["segment"].insert(row, table))
+
+    def duplicate(self, row: int) -> None:
+        """The segment in ``row`` once more, after it."""
+        table = copy.deepcopy(self.segments[row])
+        self._change((), lambda data: data["segment"].insert(row + 1, table))
+
+    def remove(self, row: int) -> None:
+        """Take the segment in ``row`` away."""
+        self._change((), lambda data: data["segment"].pop(row))
+
+    def move(self, row: int, to: int) -> None:
+        """Take the segment in ``row`` to another place."""
+        self._change((), lambda data: data["segment"].insert(to, data["segment"].pop(row)))
+
+    def _change(self, what: tuple[object, ...], change: Any) -> None:
+        data = copy.deepcopy(self.data)
+        change(data)
+        if data == self.data:
+            return
+        if what and what == self._last and not self.can_redo:
+            self._states[self._at] = data
+            return
+        self._push(data)
+        self._last = what
+
+    def _push(self, data: dict[str, Any]) -> None:
+        self._states = [*self._states[: self._at + 1], data][-_STEPS_MAX:]
+        self._at = len(self._states) - 1
+        self._last = ()
+
+
+def _put(table: dict[str, Any], key: str, value: Any) -> None:
+    if value is None:
+        table.pop(key, None)
+    else:
+        table[key] = value
+
+
+def _tables(toml: str) -> dict[str, Any]:
+    data = parse_toml(toml, "the sequence")
+    segments = data.get("segment", [])
+    if not (isinstance(segments, list) and all(isinstance(s, dict) for s in segments)):
+        raise InputError(
+            "the sequence has no list of segments: write [[segment]], in double brackets, above "
+            "the keys of each"
+        )
+    return {"name": "", **{k: v for k, v in data.items() if k != "segment"}, "segment": segments}
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a fault is: ``row`` of the segment from 0, and ``key``; None where it is in none."""
+
+    row: int | None = None
+    key: str | None = None
+
+
+def place_of(sentence: str) -> Place:
+    """Where the fault is that ``sentence`` (of ``app.sequencefile``) tells of."""
+    kinds = "|".join(SEGMENT_KINDS)
+    key = r"(?:: (\w+?)(?:\[\d+\])? (?:=|is))?"
+    found = re.search(rf"segment (\d+)(?: \((?:{kinds})\))?{key}", sentence)
+    if found:
+        return Place(int(found[1]) - 1, found[2])
+    found = re.search(r": (name|lead_in_s|tail_s) (?:=|is)", sentence)
+    return Place(None, found[1] if found else None)
+
+
+def relative_csv(path: Path, folder: Path) -> str:
+    """How a sequence in ``folder`` names the CSV file at ``path``: short where it lies beside."""
+    return path.name if path.parent == folder else path.as_posix()

@@ -1,0 +1,119 @@
+"""What a form asks for: the keys of a file that people write, with words, units and bounds."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from app.toml_input import allowed
+
+__all__ = ["FormField", "form_fields", "shown_value", "typed_value"]
+
+# as they stand at the end of a key -> as a person writes them
+_UNITS = {
+    "kV_per_s": "kV/s", "MV_per_m": "MV/m", "V_per_us": "V/µs", "V_per_kV": "V/kV",
+    "V_per_mA": "V/mA", "V_per_V": "V/V", "mm_per_V": "mm/V", "celsius_per_V": "°C/V",
+    "kg_m3": "kg/m³", "kV": "kV", "Hz": "Hz", "kHz": "kHz", "MHz": "MHz", "deg": "°", "mm": "mm",
+    "um": "µm", "us": "µs", "ms": "ms", "s": "s", "mA": "mA", "mV": "mV", "mK": "mK", "V": "V",
+    "g": "g", "J": "J", "MB": "MB", "ppm": "ppm", "celsius": "°C",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class FormField:
+    """One key: its name in words, its unit, what it means and what it may hold.
+
+    ``kind`` is number, whole, text, numbers (a list) or choice (one of ``choices``); ``default`` is
+    what it holds where it is left out, None where it may stay empty or has to be given.
+    """
+
+    key: str
+    label: str
+    unit: str
+    about: str
+    may: str
+    kind: str
+    choices: tuple[Any, ...]
+    default: Any
+
+    @property
+    def tip(self) -> str:
+        """Everything there is to know, for a tooltip."""
+        unit = f", in {self.unit}" if self.unit else ""
+        return f"{self.key}: {self.about}{unit} ({self.may})"
+
+
+def form_fields(table: type[BaseModel], leave_out: tuple[str, ...] = ()) -> Iterator[FormField]:
+    """The fields of a table, in its order."""
+    for key, info in table.model_fields.items():
+        if key not in leave_out:
+            yield _field(key, info)
+
+
+def _field(key: str, info: FieldInfo) -> FormField:
+    name, unit = key, ""
+    for ending in sorted(_UNITS, key=len, reverse=True):
+        if key.endswith(f"_{ending}"):
+            name, unit = key.removesuffix(f"_{ending}"), _UNITS[ending]
+            break
+    kind = _bare(info.annotation)
+    choices: tuple[Any, ...] = ()
+    words = {float: "number", int: "whole", str: "text"}.get(kind, "text")
+    if get_origin(kind) is Literal:
+        words, choices = "choice", get_args(kind)
+    elif get_origin(kind) is list:
+        words = "numbers"
+    default = None if info.is_required() else info.get_default(call_default_factory=True)
+    return FormField(
+        key, name.replace("_", " "), unit, info.description or "", allowed(info), words, choices,
+        default,
+    )  # fmt: skip
+
+
+def _bare(kind: Any) -> Any:
+    if get_origin(kind) in (Union, types.UnionType):
+        kind = next(part for part in get_args(kind) if part is not type(None))
+    if get_origin(kind) is Annotated:
+        kind = get_args(kind)[0]
+    return kind
+
+
+def shown_value(value: Any) -> str:
+    """A value as it stands in a field of a form."""
+    if value is None:
+        return ""
+    if isinstance(value, list):
+        return ", ".join(shown_value(part) for part in value)
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def typed_value(field: FormField, text: str) -> Any:
+    """The value that was typed; None for an empty field.
+
+    What is no number stays text, for the file's own check to refuse in its own words.
+    """
+    text = text.strip()
+    if not text:
+        return None
+    if field.kind == "number":
+        return _number(text)
+    if field.kind == "whole":
+        number = _number(text)
+        return int(number) if isinstance(number, float) and number.is_integer() else number
+    if field.kind == "numbers":
+        return [_number(part) for part in text.replace(";", ",").replace(",", " ").split()]
+    if field.kind == "choice":
+        return next((choice for choice in field.choices if str(choice) == text), text)
+    return text
+
+
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text

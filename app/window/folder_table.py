@@ -1,0 +1,279 @@
+"""The files of a folder as rows: thumbnail, sequence, film, error, events."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    QPointF,
+    QRectF,
+    QSize,
+    Qt,
+    Slot,
+)
+from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
+from PySide6.QtWidgets import QStyle, QStyledItemDelegate, QStyleOptionViewItem
+
+from app.browse import Glance
+from app.report.numbers import NOTHING, significant
+from app.report.units import SHOWN
+from app.window.session import Session
+
+__all__ = ["COLUMNS", "GLANCE", "PATH", "SORT", "FolderModel", "ThumbnailDelegate"]
+
+_Index = QModelIndex | QPersistentModelIndex
+
+GLANCE = int(Qt.ItemDataRole.UserRole)
+PATH = GLANCE + 1
+SORT = GLANCE + 2
+_ROOT = QModelIndex()
+
+#: Heads of the columns, each with what it means.
+COLUMNS = (
+    ("", "The measured displacement (or stress) over time"),
+    ("Recording", "Name of the file"),
+    ("Sequence", "What was played"),
+    ("Film", "Which film hung there"),
+    ("Made", "When the run began"),
+    ("Length", "Duration in s"),
+    ("RMS", "RMS error of the chosen model, in µm (kPa for a film driven by stretch)"),
+    ("NRMSE", "RMS error in % of the measured range"),
+    ("RMS / noise", "RMS error over the noise floor: 1 is as good as can be"),
+    ("State", "How the run ended, and what happened in it"),
+)
+_NAME, _SEQUENCE, _FILM, _MADE, _LENGTH, _RMS, _NRMSE, _NOISE, _STATE = range(1, 10)
+
+
+class FolderModel(QAbstractTableModel):
+    """One row a file; what is not known yet is empty."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self._session = session
+        self._paths: list[Path] = []
+        self._row: dict[Path, int] = {}
+        self._changed: dict[Path, float] = {}
+        self._glances: dict[Path, Glance] = {}
+        session.theme_changed.connect(self._redraw)
+
+    def set_files(self, files: dict[Path, tuple[float, int]], glances: dict[Path, Glance]) -> None:
+        """Show ``files`` (path to time of change and size), with the ``glances`` there are."""
+        paths = sorted(files, key=lambda path: (-files[path][0], path.name))
+        changed = {path: about[0] for path, about in files.items()}
+        if paths == self._paths:
+            self._glances, self._changed = dict(glances), changed
+            self._redraw()
+            return
+        # only what came and went: a selection stays
+        for row in reversed(range(len(self._paths))):
+            if self._paths[row] not in files:
+                self.beginRemoveRows(_ROOT, row, row)
+                del self._paths[row]
+                self.endRemoveRows()
+        self._glances, self._changed = dict(glances), changed
+        known = set(self._paths)
+        fresh = [path for path in paths if path not in known]
+        if fresh:
+            self.beginInsertRows(_ROOT, len(self._paths), len(self._paths) + len(fresh) - 1)
+            self._paths.extend(fresh)
+            self.endInsertRows()
+        self._row = {path: i for i, path in enumerate(self._paths)}
+
+    def set_glance(self, glance: Glance) -> None:
+        """What was found in one of the files."""
+        row = self._row.get(glance.path)
+        if row is not None:
+            self._glances[glance.path] = glance
+            self.dataChanged.emit(self.index(row, 0), self.index(row, len(COLUMNS) - 1))
+
+    def forget_errors(self) -> None:
+        """Another model was chosen: the errors are no longer those of the one that is named."""
+        self._glances = {
+            path: replace(g, errors=None, unfit="", fitted=False)
+            for path, g in self._glances.items()
+        }
+        self._redraw()
+
+    def rowCount(self, parent: _Index = _ROOT) -> int:  # noqa: N802
+        return 0 if parent.isValid() else len(self._paths)
+
+    def columnCount(self, parent: _Index = _ROOT) -> int:  # noqa: N802
+        return 0 if parent.isValid() else len(COLUMNS)
+
+    def headerData(  # noqa: N802
+        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
+    ) -> Any:
+        if orientation != Qt.Orientation.Horizontal:
+            return None
+        if role == Qt.ItemDataRole.DisplayRole:
+            return COLUMNS[section][0]
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return COLUMNS[section][1]
+        return None
+
+    def data(self, index: _Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        if not index.isValid():
+            return None
+        path = self._paths[index.row()]
+        glance, column = self._glances.get(path), index.column()
+        if role == PATH:
+            return path
+        if role == GLANCE:
+            return glance
+        if role == SORT:
+            return self._sort_key(path, glance, column)
+        if role == Qt.ItemDataRole.DisplayRole:
+            return self._text(path, glance, column)
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return _tip(path, glance, column)
+        if role == Qt.ItemDataRole.TextAlignmentRole and _LENGTH <= column <= _NOISE:
+            return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        if role == Qt.ItemDataRole.ForegroundRole and column == _STATE and glance is not None:
+            theme, level = self._session.theme, _level(glance)
+            colour = {"fault": theme.bad, "warning": theme.warn}.get(level)
+            return None if colour is None else QColor(colour)
+        return None
+
+    def _text(self, path: Path, glance: Glance | None, column: int) -> str:
+        if column == _NAME:
+            return path.stem
+        if column == 0:
+            return ""
+        if glance is None:
+            return "…" if column == _STATE else ""
+        if column == _STATE:
+            return _state(glance)
+        if column == _MADE:
+            return _when(glance.started, self._changed.get(path, 0.0))
+        if glance.trouble:
+            return ""
+        if column == _SEQUENCE:
+            return glance.title
+        if column == _FILM:
+            return glance.film
+        if column == _LENGTH:
+            return f"{significant(glance.duration)} s"
+        return _error(glance, column)
+
+    def _sort_key(self, path: Path, glance: Glance | None, column: int) -> Any:
+        if column == _MADE:
+            return self._changed.get(path, 0.0)
+        if glance is None or glance.trouble:
+            return path.stem if column in (0, _NAME) else (-1.0 if column >= _LENGTH else "")
+        if column == _LENGTH:
+            return glance.duration
+        if _RMS <= column <= _NOISE:
+            e = glance.errors
+            if e is None:
+                return -1.0
+            over = e.rms / glance.noise if glance.noise else -1.0
+            return {_RMS: e.rms, _NRMSE: e.nrmse_pct, _NOISE: over}[column]
+        if column == _STATE:
+            return float(("", "info", "warning", "fault").index(_level(glance)))
+        return {_SEQUENCE: glance.title, _FILM: glance.film}.get(column, path.stem)
+
+    @Slot()
+    def _redraw(self) -> None:
+        if self._paths:
+            last = self.index(len(self._paths) - 1, len(COLUMNS) - 1)
+            self.dataChanged.emit(self.index(0, 0), last)
+
+
+def _level(glance: Glance) -> str:
+    if glance.trouble:
+        return "fault"
+    levels = {event.level for event in glance.events}
+    if "fault" in levels:
+        return "fault"
+    if "warning" in levels or not glance.complete:
+        return "warning"
+    return "info" if levels else ""
+
+
+def _state(glance: Glance) -> str:
+    # a sign besides the colour
+    sign = {"fault": "\N{MULTIPLICATION X} ", "warning": "! "}.get(_level(glance), "")
+    if glance.trouble:
+        return f"{sign}cannot be read"
+    said = [] if glance.complete else ["incomplete"]
+    count = sum(event.level != "info" for event in glance.events)
+    if count:
+        said.append(f"{count} event{'' if count == 1 else 's'}")
+    return f"{sign}{', '.join(said)}" if said else "\N{CHECK MARK} finished"
+
+
+def _error(glance: Glance, column: int) -> str:
+    if glance.errors is None:
+        return NOTHING if glance.unfit else ""
+    shown, e = SHOWN[glance.kind], glance.errors
+    if column == _RMS:
+        mark = "*" if glance.fitted else ""
+        return f"{significant(e.rms * shown.error_factor)} {shown.error_unit}{mark}"
+    if column == _NRMSE:
+        return f"{significant(e.nrmse_pct)} %"
+    return significant(e.rms / glance.noise) if glance.noise else NOTHING
+
+
+def _tip(path: Path, glance: Glance | None, column: int) -> str:
+    if glance is None:
+        return f"{path}: not looked at yet"
+    if glance.trouble:
+        return glance.trouble
+    if _RMS <= column <= _NOISE:
+        if glance.unfit:
+            return glance.unfit
+        if glance.fitted:
+            return "The model was fitted to this very recording: its error here proves nothing"
+        return COLUMNS[column][1]
+    if column == _STATE:
+        told = [f"{event.time:.4g} s, {event.level}: {event.message}" for event in glance.events]
+        return "\n".join([glance.outcome, *told[:12]])
+    notes = f"\nNotes: {glance.notes}" if glance.notes else ""
+    by = f"\nOperator: {glance.operator}" if glance.operator else ""
+    return f"{path}{by}{notes}"
+
+
+def _when(started: str, changed: float) -> str:
+    """The start of the run in the time of this place, else the file's own time."""
+    try:
+        moment = datetime.fromisoformat(started)
+    except ValueError:
+        moment = datetime.fromtimestamp(changed).astimezone()
+    return moment.astimezone().strftime("%Y-%m-%d %H:%M")
+
+
+class ThumbnailDelegate(QStyledItemDelegate):
+    """Draws a recording's thumbnail."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self._session = session
+
+    def sizeHint(self, option: QStyleOptionViewItem, index: _Index) -> QSize:  # noqa: ARG002, N802
+        return QSize(84, 30)
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: _Index) -> None:
+        super().paint(painter, option, index)
+        glance = index.data(GLANCE)
+        area = QRectF(option.rect).adjusted(4, 4, -4, -4)
+        if not isinstance(glance, Glance) or glance.thumbnail[0].size < 2:
+            return
+        time, values = glance.thumbnail
+        span, height = np.ptp(time) or 1.0, np.ptp(values) or 1.0
+        x = area.left() + (time - time[0]) / span * area.width()
+        y = area.bottom() - (values - values.min()) / height * area.height()
+        line = QPolygonF([QPointF(float(a), float(b)) for a, b in zip(x, y, strict=True)])
+        painter.save()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        theme, selected = self._session.theme, QStyle.StateFlag.State_Selected
+        colour = theme.on_accent if option.state & selected else theme.accent
+        painter.setPen(QPen(QColor(colour), 1.0))
+        painter.drawPolyline(line)
+        painter.restore()

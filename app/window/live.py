@@ -1,0 +1,261 @@
+"""A run as a screen shows it: blocks from the rig's thread in, curves and numbers out.
+
+Three threads meet here and none waits for another: the rig's hands a block over and goes on, one of
+our own makes curves of it and lets the models follow, and the screen's looks at what is there.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from queue import SimpleQueue
+
+import numpy as np
+
+from app.overlay import Overlay
+from app.plan import Plan
+from app.recording.quiet import lead_in
+from app.run import Onlooker
+from app.window.session import OverlayModel
+from app.window.traces import ErrorsSoFar, Pyramid, RunningErrors
+from drivers.channels import Channel
+from drivers.rig import Block, Event, RigIdentity
+from model.errors import ModelError
+
+__all__ = ["Live", "Now"]
+
+_SIGNALS = {
+    "voltage_command": "command",
+    "voltage_monitor": "monitor",
+    "current_monitor": "current",
+    "displacement": "displacement",
+}
+_READOUT = 0.01  # s over which a number is the mean, so that it can be read
+_RECENT = 1.0  # s of the running error
+
+
+@dataclass(frozen=True)
+class Now:
+    """A moment of a run: ``samples`` of ``total`` at ``rate`` Hz, and the means of its last 10 ms.
+
+    ``revision`` is another one whenever there is something else to draw. ``values`` in
+    SI units by name (command, monitor, current, displacement), ``errors`` and
+    ``words`` (why it could not follow) one for each model.
+    """
+
+    samples: int
+    total: int
+    rate: float
+    values: dict[str, float]
+    errors: tuple[ErrorsSoFar, ...]
+    words: tuple[str, ...]
+    revision: int = 0
+
+
+class Live(Onlooker):
+    """Looks on at one run. ``close`` ends its thread, after everything that came was taken in."""
+
+    def __init__(self, overlays: Sequence[OverlayModel] = (), drive: str = "command") -> None:
+        self._lock = threading.Lock()
+        self._inbox: SimpleQueue[Block | tuple[tuple[OverlayModel, ...], str] | None] = (
+            SimpleQueue()
+        )
+        self._wanted = (tuple(overlays), drive)
+        self._run: _Run | None = None
+        self._events: list[Event] = []
+        self._thread: threading.Thread | None = None
+
+    # from the thread that runs the rig
+
+    def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:
+        run = _Run(planned.voltage.size, identity.channels, rate)
+        run.follow(*self._wanted)
+        self._run = run
+        self._thread = threading.Thread(target=self._work, name="live", daemon=True)
+        self._thread.start()
+
+    def block(self, block: Block) -> None:
+        self._inbox.put(block)
+
+    def event(self, event: Event) -> None:
+        with self._lock:
+            self._events.append(event)
+
+    # from the screen's
+
+    def follow(self, overlays: Sequence[OverlayModel], drive: str) -> None:
+        """Let other models run beside the measurement, from its start on."""
+        self._wanted = (tuple(overlays), drive)
+        self._inbox.put(self._wanted)
+
+    def take_events(self) -> list[Event]:
+        """What happened since this was asked last."""
+        with self._lock:
+            taken, self._events = self._events, []
+        return taken
+
+    def now(self) -> Now | None:
+        """The present moment; None before the run has started."""
+        if self._run is None:
+            return None
+        with self._lock:
+            return self._run.now()
+
+    def view(self, name: str, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
+        """Time in s and values in SI units of a signal, (m,) each, from ``first`` to ``last`` s.
+
+        ``name`` is command, monitor, current, displacement, or model, residual, rms with the
+        number of the model (``model 0``); unknown names have nothing to show.
+        """
+        run = self._run
+        if run is None:
+            return np.empty(0), np.empty(0)
+        with self._lock:
+            pyramid = run.curves.get(name)
+            if pyramid is None:
+                return np.empty(0), np.empty(0)
+            begin, end = int(first * run.rate), int(np.ceil(last * run.rate)) + 1
+            samples, values = pyramid.view(begin, end)
+        return samples / run.rate, values
+
+    def close(self) -> None:
+        """Take in what is waiting, and end the thread."""
+        if self._thread is not None:
+            self._inbox.put(None)
+            self._thread.join()
+            self._thread = None
+
+    def _work(self) -> None:
+        run = self._run
+        while run is not None and (item := self._inbox.get()) is not None:
+            if isinstance(item, Block):
+                taken = run.digest(item)
+                with self._lock:
+                    run.show(taken)
+                continue
+            # a model that comes late runs through what it has missed, on curves of its own
+            fresh = run.again(*item)
+            with self._lock:
+                self._run = run = fresh
+
+
+@dataclass(frozen=True)
+class _Digested:
+    values: dict[str, np.ndarray]
+    models: tuple[np.ndarray, ...]
+
+
+class _Model:
+    """One model beside a run."""
+
+    def __init__(self, overlay: Overlay | None, words: str, rate: float) -> None:
+        self.overlay = overlay
+        self._words = words
+        self.running = RunningErrors(round(_RECENT * rate))
+
+    @property
+    def words(self) -> str:
+        return self._words if self.overlay is None else self.overlay.words
+
+    def advance(self, block: Block) -> np.ndarray:
+        if self.overlay is None:
+            return np.full(block.counts.shape[1], np.nan)
+        return self.overlay.advance(block)
+
+
+class _Run:
+    """Curves and models of one run; ``show`` and what reads are called under the lock."""
+
+    def __init__(self, total: int, channels: tuple[Channel, ...], rate: float) -> None:
+        self.total = total
+        self.channels = channels
+        self.rate = rate
+        self.curves = {_SIGNALS[c.name]: Pyramid(total) for c in channels if c.name in _SIGNALS}
+        self._blocks: list[Block] = []
+        self._models: tuple[_Model, ...] = ()
+        self._quiet = _Quiet()
+        self._newest: dict[str, float] = {}
+        self.revision = 0
+
+    def follow(self, overlays: tuple[OverlayModel, ...], drive: str) -> None:
+        models = []
+        for i, chosen in enumerate(overlays):
+            overlay, words = None, ""
+            try:
+                overlay = Overlay(chosen.actuator, self.channels, self.rate, drive)
+            except (ModelError, ValueError) as error:
+                words = str(error)
+            models.append(_Model(overlay, words, self.rate))
+            for name in ("model", "residual", "rms"):
+                self.curves[f"{name} {i}"] = Pyramid(self.total)
+        self._models = tuple(models)
+
+    def again(self, overlays: tuple[OverlayModel, ...], drive: str) -> _Run:
+        """The same run so far, with other models."""
+        fresh = _Run(self.total, self.channels, self.rate)
+        fresh.follow(overlays, drive)
+        fresh.revision = self.revision + 1
+        for block in self._blocks:
+            fresh.show(fresh.digest(block))
+        return fresh
+
+    def digest(self, block: Block) -> _Digested:
+        """The block in SI units, with what the models make of it; the slow part."""
+        self._blocks.append(block)
+        values = {
+            _SIGNALS[c.name]: c.scaling.physical(block.counts[i])
+            for i, c in enumerate(self.channels)
+            if c.name in _SIGNALS
+        }
+        if "displacement" in values:
+            step = abs(self.channels[0].scaling.gain * self.channels[0].scaling.coefficients[1])
+            values["displacement"] = self._quiet.from_rest(
+                values["displacement"], lead_in(values["command"], step)
+            )
+        return _Digested(values, tuple(model.advance(block) for model in self._models))
+
+    def show(self, taken: _Digested) -> None:
+        self.revision += 1
+        for name, values in taken.values.items():
+            self.curves[name].push(values)
+            last = values[-max(1, round(_READOUT * self.rate)) :]
+            self._newest[name] = float(last[-1] if name == "command" else last.mean())
+        measured = taken.values.get("displacement")
+        for i, (model, moved) in enumerate(zip(self._models, taken.models, strict=True)):
+            self.curves[f"model {i}"].push(moved)
+            if measured is None:
+                continue
+            model.running.push(measured, moved)
+            self.curves[f"residual {i}"].push(measured - moved)
+            recent = model.running.now().recent
+            self.curves[f"rms {i}"].push(np.full(moved.size, recent))
+
+    def now(self) -> Now:
+        return Now(
+            self.curves["command"].samples,
+            self.total,
+            self.rate,
+            dict(self._newest),
+            tuple(model.running.now() for model in self._models),
+            tuple(model.words for model in self._models),
+            self.revision,
+        )
+
+
+class _Quiet:
+    """Displacement from the mean reading over the lead-in, as far as it has come."""
+
+    def __init__(self) -> None:
+        self._sum = 0.0
+        self._count = 0
+        self._over = False
+
+    def from_rest(self, reading: np.ndarray, quiet: int) -> np.ndarray:
+        if not self._over:
+            if not self._count:
+                quiet = max(quiet, 1)  # a run without a lead-in starts from its first reading
+            self._sum += float(reading[:quiet].sum())
+            self._count += min(quiet, reading.size)
+            self._over = quiet < reading.size
+        return reading - self._sum / self._count

@@ -1,0 +1,111 @@
+"""The plan of the present sequence, made anew in the background whenever something changes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from PySide6.QtCore import QObject, Slot
+
+from app.errors import InputError
+from app.plan import Plan, plan
+from app.rigfile import RigFile
+from app.sequencefile import LoadedSequence, parse_sequence
+from app.window.background import Background
+from app.window.session import Breach, Preview, Session
+from app.window.traces import Pyramid
+from drivers.gate import Limits
+
+__all__ = ["Planner", "foresee"]
+
+_BREACHES_MAX = 50  # stretches of time marked in one plot; more are drawn as one
+
+
+class Planner(QObject):
+    """Keeps ``session.preview`` true to the sequence, the rig file and the film."""
+
+    def __init__(self, session: Session, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self._background = Background(self)
+        self._background.done.connect(self._done)
+        session.sequence_changed.connect(self.renew)
+        session.rig_changed.connect(self.renew)
+
+    @Slot()
+    def renew(self) -> None:
+        """Make the plan anew."""
+        s = self._session
+        s.preview = None
+        toml, folder, rig_file, film = s.sequence_toml, s.sequence_folder, s.rig_file, s.film
+        self._background.start(lambda: foresee(toml, folder, rig_file, film))
+
+    def close(self) -> None:
+        """Wait for the thread."""
+        self._background.close()
+
+    @Slot(object)
+    def _done(self, preview: Preview) -> None:
+        self._session.set_preview(preview)
+
+
+def foresee(toml: str, folder: Path, rig_file: RigFile, film: str = "") -> Preview:
+    """What becomes of the sequence ``toml``; faults in it are a sentence, not an exception."""
+    try:
+        loaded = parse_sequence(toml, "the sequence", folder)
+    except InputError as error:
+        return Preview(toml, sentence=str(error))
+    try:
+        planned = plan(loaded, rig_file, film=film)
+    except InputError as error:
+        return Preview(toml, loaded, sentence=str(error))
+    return Preview(
+        toml,
+        loaded,
+        planned,
+        curves={
+            name: _thinned(getattr(planned, name), planned.rate)
+            for name in ("voltage", "displacement", "field")
+        },
+        breaches=_breaches(planned, rig_file.gate_limits()),
+        segments=_segments(loaded, float(planned.time[-1])),
+    )
+
+
+def _thinned(values: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
+    pyramid = Pyramid(values.size)
+    pyramid.push(values)
+    samples, extremes = pyramid.view(0, values.size)
+    return samples / rate, extremes
+
+
+def _segments(loaded: LoadedSequence, end: float) -> tuple[tuple[str, float, float], ...]:
+    sequence = loaded.sequence
+    at, found = sequence.lead_in, [("lead-in", 0.0, sequence.lead_in)]
+    many = len(sequence.segments)
+    for i, segment in enumerate(sequence.segments):
+        found.append((f"{sequence.labels[i]} ({i + 1} of {many})", at, at + segment.duration))
+        at += segment.duration
+    return (*found, ("tail", at, end))
+
+
+def _breaches(planned: Plan, limits: Limits) -> tuple[Breach, ...]:
+    """Where the gate's limits of an instant are broken; which are broken at all says the gate."""
+    volts, rate = planned.voltage, planned.rate
+    slew = np.abs(np.diff(volts, append=volts[-1:])) * rate
+    broken = {
+        "voltage": (volts > limits.voltage_max) | (volts < limits.voltage_min),
+        "slew": slew > limits.slew,
+        "true field": planned.field > limits.field,  # what is not known is not marked
+    }
+    found: list[Breach] = []
+    for quantity, where in broken.items():
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], where, [False]))))
+        starts, ends = edges[::2], edges[1::2]
+        if starts.size > _BREACHES_MAX:
+            starts, ends = starts[:1], ends[-1:]
+        found += [
+            Breach(quantity, float(a / rate), float(b / rate))
+            for a, b in zip(starts, ends, strict=True)
+        ]
+    return tuple(found)

@@ -1,0 +1,133 @@
+"""What a sequence would do, drawn: voltage, predicted displacement, true field, and the limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QWidget
+
+from app.window.session import Preview, Session
+from app.window.theme import pen, style_plot
+
+__all__ = ["PreviewPlots"]
+
+_PLOTS = {
+    "voltage": ("Voltage (kV)", 1e-3),
+    "displacement": ("Predicted (mm)", 1e3),
+    "field": ("True field (MV/m)", 1e-6),
+}
+_MARKED = {"voltage": "voltage", "slew": "voltage", "true field": "field"}
+
+
+class PreviewPlots(pg.GraphicsLayoutWidget):
+    """Shows a ``Preview``; the wheel zooms in time, a double click shows all again."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self._preview: Preview | None = None
+        self._chosen: tuple[float, float] | None = None
+        self._plots: dict[str, pg.PlotItem] = {}
+        self._curves: dict[str, pg.PlotCurveItem] = {}
+        self._marks: list[tuple[pg.PlotItem, pg.GraphicsObject]] = []
+        for row, (name, (words, _)) in enumerate(_PLOTS.items()):
+            plot = self.addPlot(row=row, col=0)
+            plot.setLabel("left", words)
+            plot.setMouseEnabled(x=True, y=False)
+            curve = pg.PlotCurveItem(connect="finite")
+            plot.addItem(curve)
+            self._plots[name], self._curves[name] = plot, curve
+            if row < len(_PLOTS) - 1:
+                plot.getAxis("bottom").setStyle(showValues=False)
+            if row:
+                plot.setXLink(self._plots["voltage"])
+        self._plots["field"].setLabel("bottom", "Time (s)")
+        session.theme_changed.connect(self._restyle)
+        self._restyle()
+
+    @property
+    def marks(self) -> int:
+        """How many stretches of time are marked as refused."""
+        return sum(isinstance(item, _Refused) for _, item in self._marks)
+
+    def show_preview(self, preview: Preview) -> None:
+        """Draw ``preview``; one without a plan leaves what was there, faded."""
+        self._preview = preview
+        planned = preview.plan is not None
+        for name, curve in self._curves.items():
+            curve.setOpacity(1.0 if planned else 0.3)  # what was drawn last, as a thing of the past
+            if not planned:
+                continue
+            x, y = preview.curves.get(name, (np.empty(0), np.empty(0)))
+            curve.setData(x, y * _PLOTS[name][1])
+            unknown = bool(y.size) and not np.isfinite(y).any()
+            words = "not foreseen: a limit is broken without it" if unknown else None
+            self._plots[name].setTitle(words, color=self._session.theme.muted, size="9pt")
+        self._mark()
+        if preview.plan is None:
+            return
+        self._plots["voltage"].setXRange(0.0, float(preview.plan.time[-1]), padding=0.01)
+        for plot in self._plots.values():
+            plot.enableAutoRange(axis="y")
+
+    def choose(self, span: tuple[float, float] | None) -> None:
+        """Shade a stretch of time: the segment that is chosen."""
+        if span != self._chosen:
+            self._chosen = span
+            self._mark()
+
+    def mouseDoubleClickEvent(self, event: object) -> None:  # noqa: N802
+        super().mouseDoubleClickEvent(event)
+        if self._preview is not None and self._preview.plan is not None:
+            self._plots["voltage"].setXRange(0.0, float(self._preview.plan.time[-1]), padding=0.01)
+
+    def _restyle(self) -> None:
+        theme = self._session.theme
+        for name, colour in (
+            ("voltage", theme.command), ("displacement", theme.models[0]), ("field", theme.field)
+        ):  # fmt: skip
+            style_plot(self._plots[name], theme)
+            self._curves[name].setPen(pen(colour))
+        self._mark()
+
+    def _mark(self) -> None:
+        """Limits, the chosen segment, and where limits are broken."""
+        theme = self._session.theme
+        for plot, item in self._marks:
+            plot.removeItem(item)
+        self._marks = []
+        limits = self._session.rig_file.gate_limits()
+        lines = [("voltage", limits.voltage_max), ("field", limits.field)]
+        if limits.voltage_min < 0.0:
+            lines.append(("voltage", limits.voltage_min))
+        for name, value in lines:
+            line = pg.InfiniteLine(
+                value * _PLOTS[name][1], angle=0, pen=pen(theme.limit, dashed=True), label="limit",
+                labelOpts={"position": 0.04, "color": theme.limit, "anchors": [(0, 0), (0, 0)]},
+            )  # fmt: skip
+            self._put(self._plots[name], line)
+        if self._chosen is not None:
+            shade = QColor(theme.accent)
+            shade.setAlpha(36)
+            for plot in self._plots.values():
+                self._put(plot, pg.LinearRegionItem(
+                    self._chosen, movable=False, brush=shade, pen=pg.mkPen(None)))  # fmt: skip
+        for breach in () if self._preview is None else self._preview.breaches:
+            colour = QColor(theme.bad)
+            colour.setAlpha(90)
+            region = _Refused(
+                (breach.first, breach.last), movable=False, brush=colour,
+                pen=pen(theme.bad),
+            )  # fmt: skip
+            region.setToolTip(f"{breach.quantity} beyond its limit")
+            self._put(self._plots[_MARKED[breach.quantity]], region)
+
+    def _put(self, plot: pg.PlotItem, item: pg.GraphicsObject) -> None:
+        item.setZValue(-10)
+        plot.addItem(item, ignoreBounds=isinstance(item, pg.LinearRegionItem))
+        self._marks.append((plot, item))
+
+
+class _Refused(pg.LinearRegionItem):
+    """A stretch of time in which a limit is broken."""

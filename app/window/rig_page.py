@@ -1,0 +1,434 @@
+"""The page of the rig: which one, whether it is well, and its file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import Qt, Slot
+from PySide6.QtGui import QColor, QDragEnterEvent, QDropEvent, QKeySequence, QShowEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QButtonGroup,
+    QFileDialog,
+    QGridLayout,
+    QHBoxLayout,
+    QHeaderView,
+    QLineEdit,
+    QMessageBox,
+    QRadioButton,
+    QScrollArea,
+    QSpinBox,
+    QTableWidget,
+    QTableWidgetItem,
+    QTabWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.check import CheckOutcome, check_rig
+from app.errors import InputError
+from app.recording.files import check_output, replaced_when_done
+from app.rigform import SECTIONS, faults_of, parse_rig_file, section_values, with_value
+from app.toml_input import read_text
+from app.window.background import Background
+from app.window.fields import form_fields
+from app.window.form import Form
+from app.window.session import Session
+from app.window.theme import SPACE
+from app.window.widgets import Sentence, button, card, label
+from sim_backend.factory import is_simulated
+
+__all__ = ["RigPage"]
+
+_SHAPES = {"ok": "●", "warning": "▲", "wrong": "✗", "not wired": "○"}
+_WORDS = {"ok": "well", "warning": "look at it", "wrong": "wrong", "not wired": "not wired"}
+_KINDS = ("sim", "hidden", "local", "remote")
+
+
+class RigPage(QWidget):
+    """Chooses the rig, looks at it, and edits the rig file with what is wrong beside each field."""
+
+    title = "Rig"
+    shortcut = "Ctrl+1"
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session = session
+        self.text = session.rig_text
+        self.forms: dict[str, Form] = {}  # made when they are first looked at
+        self._areas: dict[str, QScrollArea] = {}
+        self._saved = session.rig_text
+        self._checks = Background(self)
+        self._checks.done.connect(self._checked)
+        self._checks.failed.connect(lambda words: self.summary.say(words))
+        self._checks.busy_changed.connect(self._checking)
+        self._files = Background(self)
+        self._files.done.connect(self._file_done)
+        self._files.failed.connect(lambda words: self.trouble.say(words))
+        self.outcome: CheckOutcome | None = None
+        self.setAcceptDrops(True)
+        self._build()
+        session.rig_changed.connect(self._rig_changed)
+        session.theme_changed.connect(self._show_outcome)
+        session.running_changed.connect(self._running_changed)
+        self._show_address()
+        self._show_outcome()
+        self._show_all()
+
+    # which rig
+
+    @Slot()
+    def choose(self) -> None:
+        """Take the rig that the fields say."""
+        kind = _KINDS[self.kinds.checkedId()]
+        device = self.device.text().strip()
+        address = {
+            "sim": "sim",
+            "hidden": f"sim:{self.seed.value()}",
+            "local": f"daqmx:{device}",
+            "remote": f"daqmx:{device}@{self.server.text().strip()}",
+        }[kind]
+        self.seed.setEnabled(kind == "hidden")
+        self.device.setEnabled(kind in ("local", "remote"))
+        self.server.setEnabled(kind == "remote")
+        self.session.set_address(address)
+
+    @Slot()
+    def check(self) -> None:
+        """Look at the instruments; nothing but 0 V is put out."""
+        address, rig_file = self.session.address, self.session.rig_file
+        self._checks.start(lambda: check_rig(address, rig_file))
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Look at a simulated rig without being asked: there is nothing to be moved."""
+        super().showEvent(event)
+        if self.outcome is None and not self._checks.busy and is_simulated(self.session.address):
+            self.check()
+
+    @Slot(object)
+    def _checked(self, outcome: CheckOutcome) -> None:
+        self.outcome = outcome if outcome.rig == self.session.address else None
+        self._show_outcome()
+
+    @Slot(bool)
+    def _checking(self, busy: bool) -> None:
+        self.check_button.setEnabled(not busy and not self.session.running)
+        if busy:
+            self.summary.say(f"looking at {self.session.address} …", "muted")
+
+    @Slot(bool)
+    def _running_changed(self, running: bool) -> None:
+        for part in (self.which, self.editor):
+            part.setEnabled(not running)
+        self.check_button.setEnabled(not running and not self._checks.busy)
+
+    @Slot()
+    def _rig_changed(self) -> None:
+        self.outcome = None
+        self._show_outcome()
+        self._show_address()
+        if self.session.rig_text != self.text:  # another page has brought another file
+            self.text = self._saved = self.session.rig_text
+            self._show_all()
+
+    # the rig file
+
+    def open_file(self, path: Path) -> None:
+        """Read a rig file."""
+        self._files.start(lambda: (path, read_text(path, "rig file")))
+
+    def save_file(self, path: Path) -> None:
+        """Write the rig file as it stands; a file of that name is replaced."""
+        text = self.text
+
+        def write() -> tuple[Path, None]:
+            out = check_output(path, overwrite=True)
+            with replaced_when_done(out) as partial:
+                partial.write_text(text, encoding="utf-8")
+            return out, None
+
+        self._files.start(write)
+
+    def set_value(self, table: str, key: str, value: Any) -> None:
+        """Change one key; a file that is not in order is shown so, and not used."""
+        self._take(with_value(self.text, table, key, value), self.session.rig_path)
+
+    def close_work(self) -> None:
+        """Wait for the threads."""
+        self._checks.close()
+        self._files.close()
+
+    @Slot(object)
+    def _file_done(self, answer: tuple[Path, str | None]) -> None:
+        path, text = answer
+        self.trouble.say("")
+        if text is None:
+            self._saved = self.text
+            self.session.set_rig_file(path, self.session.rig_text, self.session.rig_file)
+            self.session.message.emit(f"saved {path}")
+        else:
+            self._saved = text
+            self._take(text, path)
+        self._show_all()
+
+    def _take(self, text: str, path: Path | None) -> None:
+        try:
+            faults = faults_of(text)
+        except InputError as error:
+            self.trouble.say(str(error))
+            return
+        self.text = text
+        if not faults:
+            self.session.set_rig_file(path, text, parse_rig_file(text))
+        self._show_faults(faults)
+
+    def _show_all(self) -> None:
+        for table, form in self.forms.items():
+            form.show_values(section_values(self.text, table))
+        self._show_faults(faults_of(self.text))
+
+    def _show_faults(self, faults: dict[tuple[str, str], str]) -> None:
+        said = set()
+        for i, table in enumerate(SECTIONS):
+            keys = {k: words for (t, k), words in faults.items() if t == table}
+            if table in self.forms:
+                self.forms[table].show_faults(keys)
+            said |= {(table, k) for k in keys if k in SECTIONS[table].model_fields}
+            mark = "✗ " if keys else ""
+            self.tabs.setTabText(i, f"{mark}{table}")
+        rest = [words for place, words in faults.items() if place not in said]
+        many = f"{len(faults)} thing{'s' if len(faults) > 1 else ''} to mend; until then the rig "
+        head = f"{many}file is used as it was before" if faults else ""
+        self.state.say("\n".join([head, *rest]).strip(), "bad")
+        path = self.session.rig_path
+        unsaved = " (not saved)" if self.text != self._saved else ""
+        self.file_name.setText(f"{path.name if path else 'the thesis rig, in no file'}{unsaved}")
+        self.file_name.setToolTip("" if path is None else str(path))
+        self.save_button.setEnabled(not faults)
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802
+        if any(url.toLocalFile().endswith(".toml") for url in event.mimeData().urls()):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:  # noqa: N802
+        names = [url.toLocalFile() for url in event.mimeData().urls()]
+        if names and not self.session.running:
+            self.open_file(Path(names[0]))
+        event.acceptProposedAction()
+
+    # what is shown
+
+    @Slot()
+    def _show_outcome(self) -> None:
+        outcome, theme = self.outcome, self.session.theme
+        self.findings.setRowCount(0 if outcome is None else len(outcome.findings))
+        if outcome is None:
+            self.summary.say(
+                f"{self.session.address} was not looked at yet: Check looks at every instrument, "
+                f"and puts out nothing but 0 V",
+                "muted",
+            )
+            return
+        colours = {
+            "ok": theme.good, "warning": theme.warn, "wrong": theme.bad, "not wired": theme.muted
+        }  # fmt: skip
+        for row, finding in enumerate(outcome.findings):
+            verdict = f"{_SHAPES[finding.verdict]} {_WORDS[finding.verdict]}"
+            found = finding.found
+            if finding.verdict != "ok" and finding.wanted:
+                found += f"; {finding.wanted} is wanted"
+            if finding.advice:
+                found += f"; {finding.advice}"
+            for column, text in enumerate((verdict, finding.instrument, finding.item, found)):
+                item = QTableWidgetItem(text)
+                item.setToolTip(finding.sentence)
+                item.setFlags(Qt.ItemFlag.ItemIsSelectable | Qt.ItemFlag.ItemIsEnabled)
+                if column == 0:
+                    item.setForeground(QColor(colours[finding.verdict]))
+                self.findings.setItem(row, column, item)
+        wrong = any(f.verdict == "wrong" for f in outcome.findings)
+        self.summary.say(outcome.summary, "bad" if wrong else "good")
+
+    def _show_address(self) -> None:
+        address = self.session.address
+        body = address.partition(":")[2]
+        kind = "remote" if "@" in body else "local" if address.startswith("daqmx:") else "sim"
+        if address.startswith("sim:"):
+            kind = "hidden"
+            before = self.seed.blockSignals(True)  # it is shown, not chosen
+            self.seed.setValue(int(body) if body.isdigit() else 0)
+            self.seed.blockSignals(before)
+        if kind in ("local", "remote"):
+            device, _, server = body.partition("@")
+            self.device.setText(device)
+            if server:
+                self.server.setText(server)
+        self.kinds.button(_KINDS.index(kind)).setChecked(True)
+        self.seed.setEnabled(kind == "hidden")
+        self.device.setEnabled(kind in ("local", "remote"))
+        self.server.setEnabled(kind == "remote")
+
+    # how it is laid out
+
+    def _build(self) -> None:
+        outer = QHBoxLayout(self)
+        outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
+        outer.setSpacing(SPACE)
+        left = QVBoxLayout()
+        left.setSpacing(SPACE)
+        self.which = self._which()
+        left.addWidget(self.which)
+        left.addWidget(self._look(), 1)
+        outer.addLayout(left, 1)
+        self.editor = self._editor()
+        outer.addWidget(self.editor, 1)
+
+    def _which(self) -> QWidget:
+        grid = QGridLayout()
+        grid.addWidget(label("The rig", "heading"), 0, 0, 1, 3)
+        self.kinds = QButtonGroup(self)
+        self.seed = QSpinBox()
+        self.seed.setRange(0, 999_999)
+        self.seed.setValue(7)
+        self.seed.setToolTip("Which film: each number hides something else, or nothing")
+        self.device = QLineEdit(self.session.rig_file.card.device)
+        self.device.setToolTip("Name of the card in NI MAX, such as Dev1")
+        self.server = QLineEdit("localhost:31763")
+        self.server.setToolTip("HOST:PORT of NI's device server")
+        for i, (words, tip, field) in enumerate(
+            (
+                ("&Simulated", "Obeys the model exactly; nothing can break", None),
+                ("Simulated, &hiding something", "A film with an effect that the model lacks",
+                 self.seed),
+                ("&Card in this computer", "NI-DAQmx", self.device),
+                ("Card &behind a server", "NI-DAQmx over the network", self.server),
+            )
+        ):  # fmt: skip
+            choice = QRadioButton(words)
+            choice.setToolTip(tip)
+            self.kinds.addButton(choice, i)
+            grid.addWidget(choice, i + 1, 0)
+            if field is not None:
+                grid.addWidget(field, i + 1, 1)
+        grid.setColumnStretch(1, 1)
+        self.kinds.idClicked.connect(self.choose)
+        self.seed.valueChanged.connect(self.choose)
+        self.device.editingFinished.connect(self.choose)
+        self.server.editingFinished.connect(self.choose)
+        return card(grid)
+
+    def _look(self) -> QWidget:
+        column = QVBoxLayout()
+        row = QHBoxLayout()
+        row.addWidget(label("The instruments", "heading"))
+        row.addStretch(1)
+        self.check_button = button(
+            "Chec&k", "Look at every instrument; nothing but 0 V is put out (F7)", primary=True
+        )
+        self.check_button.setShortcut("F7")
+        self.check_button.clicked.connect(self.check)
+        row.addWidget(self.check_button)
+        column.addLayout(row)
+        self.summary = Sentence()
+        column.addWidget(self.summary)
+        self.findings = QTableWidget(0, 4)
+        self.findings.setHorizontalHeaderLabels(("", "Instrument", "What", "Found"))
+        self.findings.verticalHeader().hide()
+        self.findings.setShowGrid(False)
+        self.findings.setWordWrap(True)
+        self.findings.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.findings.setTabKeyNavigation(False)
+        self.findings.setAccessibleName("Findings")
+        header = self.findings.horizontalHeader()
+        for i in (0, 2):
+            header.setSectionResizeMode(i, QHeaderView.ResizeMode.ResizeToContents)
+        header.resizeSection(1, 120)  # a long name is cut, and whole in the tip
+        header.setSectionResizeMode(3, QHeaderView.ResizeMode.Stretch)
+        self.findings.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        column.addWidget(self.findings, 1)
+        return card(column)
+
+    def _editor(self) -> QWidget:
+        column = QVBoxLayout()
+        row = QHBoxLayout()
+        row.addWidget(label("The rig file", "heading"))
+        self.file_name = label("", "muted")
+        row.addWidget(self.file_name, 1)
+        open_button = button(
+            "&Open …", "Read a rig file; it may be dropped here too (Ctrl+Shift+O)"
+        )
+        open_button.setShortcut(QKeySequence("Ctrl+Shift+O"))
+        open_button.clicked.connect(self._ask_open)
+        self.save_button = button("Save &as …", "Write the rig file as it stands here")
+        self.save_button.clicked.connect(self._ask_save)
+        defaults = button("&Thesis's", "Back to the rig of the thesis, in no file")
+        defaults.clicked.connect(self._ask_defaults)
+        for made in (open_button, self.save_button, defaults):
+            row.addWidget(made)
+        column.addLayout(row)
+        self.trouble = Sentence()
+        column.addWidget(self.trouble)
+        self.state = Sentence()
+        column.addWidget(self.state)
+        self.tabs = QTabWidget()
+        self.tabs.setUsesScrollButtons(True)
+        for table in SECTIONS:
+            area = QScrollArea()
+            area.setWidgetResizable(True)
+            area.setFrameShape(QScrollArea.Shape.NoFrame)
+            area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+            self.tabs.addTab(area, table)
+            self._areas[table] = area
+        self.tabs.currentChanged.connect(self._tab_changed)
+        self.form("film")
+        column.addWidget(self.tabs, 1)
+        return card(column)
+
+    def form(self, table: str) -> Form:
+        """The form of one table of the rig file."""
+        if table not in self.forms:
+            values = section_values(self.text, table)
+            form = Form(form_fields(SECTIONS[table]), values, explain=True)
+            form.changed.connect(lambda key, value: self.set_value(table, key, value))
+            form.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
+            self._areas[table].setWidget(form)
+            self.forms[table] = form
+        return self.forms[table]
+
+    def show_table(self, table: str) -> None:
+        """Bring a table of the rig file to the front."""
+        self.tabs.setCurrentIndex(list(SECTIONS).index(table))
+
+    @Slot(int)
+    def _tab_changed(self, place: int) -> None:
+        self.form(list(SECTIONS)[place])
+        self._show_faults(faults_of(self.text))
+
+    @Slot()
+    def _ask_open(self) -> None:
+        name, _ = QFileDialog.getOpenFileName(self, "Rig file", "", "Rig files (*.toml)")
+        if name:
+            self.open_file(Path(name))
+
+    @Slot()
+    def _ask_save(self) -> None:
+        start = "" if self.session.rig_path is None else str(self.session.rig_path)
+        name, _ = QFileDialog.getSaveFileName(
+            self, "Save the rig file", start, "Rig files (*.toml)"
+        )
+        if name:
+            path = Path(name)
+            self.save_file(path if path.suffix else path.with_suffix(".toml"))
+
+    @Slot()
+    def _ask_defaults(self) -> None:
+        if self.text != self._saved:
+            answer = QMessageBox.question(
+                self, "The rig of the thesis", "What was changed here is not saved. Drop it?"
+            )
+            if answer is not QMessageBox.StandardButton.Yes:
+                return
+        self._saved = ""
+        self._take("", None)
+        self._show_all()

@@ -1,0 +1,195 @@
+"""What the pages of the window share, and the news when it changes; nothing is computed here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from PySide6.QtCore import QObject, QSettings, Signal
+
+from app.plan import Plan
+from app.presets import PRESETS
+from app.rigfile import RigFile
+from app.sequencefile import LoadedSequence
+from app.window.theme import LIGHT, Theme
+from model.actuator import Actuator
+from model.material import TABLE_3
+
+__all__ = ["Breach", "OverlayModel", "Preview", "Session"]
+
+_RECENT_MAX = 8
+FIRST_SEQUENCE = "thesis"
+
+
+@dataclass(frozen=True)
+class OverlayModel:
+    """A model that runs beside the measurement; ``path`` is None for the thesis's own."""
+
+    name: str
+    actuator: Actuator
+    path: Path | None = None
+
+
+@dataclass(frozen=True)
+class Breach:
+    """Where a plan breaks a limit: from ``first`` to ``last`` s, ``quantity`` in words."""
+
+    quantity: str
+    first: float
+    last: float
+
+
+@dataclass(frozen=True)
+class Preview:
+    """A sequence's text and what became of it: a plan, or a ``sentence`` why there is none.
+
+    ``curves`` are (time in s, value in SI units) of voltage, displacement and field, thinned for a
+    plot with their extremes kept; ``segments`` are label, begin and end in s, with the quiet ends.
+    """
+
+    toml: str
+    loaded: LoadedSequence | None = None
+    plan: Plan | None = None
+    sentence: str = ""
+    curves: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    breaches: tuple[Breach, ...] = ()
+    segments: tuple[tuple[str, float, float], ...] = ()
+
+    @property
+    def playable(self) -> bool:
+        """True when it has passed the gate."""
+        return self.plan is not None and self.plan.waveform is not None
+
+
+class Session(QObject):
+    """The rig, the sequence, the overlays, the folder and what is noted with a run.
+
+    ``rig_changed``: address or rig file; ``sequence_changed``: its text; ``preview_changed``: its
+    plan is there; ``recorded``: a new recording lies in the folder; ``running_changed``: a run has
+    begun (True) or ended, and while it goes on nothing that it uses may be changed.
+    """
+
+    rig_changed = Signal()
+    sequence_changed = Signal()
+    preview_changed = Signal()
+    overlays_changed = Signal()
+    folder_changed = Signal()
+    notes_changed = Signal()
+    theme_changed = Signal()
+    recent_changed = Signal()
+    recorded = Signal(Path)
+    running_changed = Signal(bool)
+    message = Signal(str)  #: one line for the status bar
+
+    def __init__(
+        self,
+        folder: Path,
+        settings: QSettings,
+        *,
+        address: str = "sim",
+        theme: Theme = LIGHT,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.settings = settings
+        self.address = address
+        self.rig_path: Path | None = None
+        self.rig_text = ""
+        self.rig_file = RigFile()
+        self.sequence_toml = PRESETS[FIRST_SEQUENCE]
+        self.sequence_folder = Path()
+        self.sequence_path: Path | None = None
+        self.preview: Preview | None = None
+        self.overlays: tuple[OverlayModel, ...] = (self.thesis_model,)
+        self.overlay_drive = "command"
+        self.folder = folder
+        self.operator = str(settings.value("operator", ""))
+        self.film = str(settings.value("film", ""))
+        self.notes = ""
+        self.theme = theme
+        self.running = False
+
+    def set_address(self, address: str) -> None:
+        """Another rig: ``sim``, ``sim:7``, ``daqmx:Dev1``, ``daqmx:Dev1@HOST:PORT``."""
+        if address != self.address:
+            self.address = address
+            self.rig_changed.emit()
+
+    def set_rig_file(self, path: Path | None, text: str, rig_file: RigFile) -> None:
+        """Another rig file; ``text`` goes into every recording, ``path`` is None for none yet."""
+        self.rig_path, self.rig_text, self.rig_file = path, text, rig_file
+        self.preview = None  # it was made under other limits
+        self.rig_changed.emit()
+        if any(model.path is None for model in self.overlays):
+            thesis = self.thesis_model
+            overlays = tuple(thesis if m.path is None else m for m in self.overlays)
+            self.set_overlays(overlays, self.overlay_drive)
+
+    def set_sequence(self, toml: str, folder: Path, path: Path | None = None) -> None:
+        """Another sequence, as text; its CSV files lie in ``folder``."""
+        if (toml, folder, path) == (self.sequence_toml, self.sequence_folder, self.sequence_path):
+            return
+        self.sequence_toml, self.sequence_folder, self.sequence_path = toml, folder, path
+        self.preview = None  # the old plan is not this one's
+        self.sequence_changed.emit()
+
+    def set_preview(self, preview: Preview) -> None:
+        """The plan of the present sequence."""
+        self.preview = preview
+        self.preview_changed.emit()
+
+    def set_overlays(self, overlays: tuple[OverlayModel, ...], drive: str = "command") -> None:
+        """The models beside the measurement, two at most, and what drives them."""
+        self.overlays, self.overlay_drive = overlays[:2], drive
+        self.overlays_changed.emit()
+
+    @property
+    def thesis_model(self) -> OverlayModel:
+        """The thesis's springs (Table 3) in the film and under the load of the rig file."""
+        film, load = self.rig_file.as_film(), self.rig_file.as_load()
+        return OverlayModel("thesis (Table 3)", Actuator(film, load, TABLE_3))
+
+    def set_folder(self, folder: Path) -> None:
+        """Where recordings are made and looked for."""
+        if folder != self.folder:
+            self.folder = folder
+            self.settings.setValue("folder", str(folder))
+            self.folder_changed.emit()
+
+    def set_notes(self, operator: str, film: str, notes: str) -> None:
+        """Who runs which film; remembered, all but the notes."""
+        film_before, self.operator, self.film, self.notes = self.film, operator, film, notes
+        self.settings.setValue("operator", operator)
+        self.settings.setValue("film", film)
+        self.notes_changed.emit()
+        if film != film_before and self.rig_file.film.name:  # its limits are those of one film
+            self.preview = None
+            self.sequence_changed.emit()
+
+    def set_theme(self, theme: Theme) -> None:
+        """Light or dark."""
+        if theme != self.theme:
+            self.theme = theme
+            self.theme_changed.emit()
+
+    def set_running(self, running: bool) -> None:
+        """A run has begun or ended."""
+        if running != self.running:
+            self.running = running
+            self.running_changed.emit(running)
+
+    @property
+    def recent(self) -> list[Path]:
+        """Sequence files used lately, the newest first."""
+        found = self.settings.value("recent", [])
+        if isinstance(found, str):  # one comes back bare
+            found = [found]
+        return [Path(str(name)) for name in found] if isinstance(found, list) else []
+
+    def used(self, path: Path) -> None:
+        """Put ``path`` first among the recent sequence files."""
+        names = [str(path), *(str(p) for p in self.recent if p != path)]
+        self.settings.setValue("recent", names[:_RECENT_MAX])
+        self.recent_changed.emit()

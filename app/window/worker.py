@@ -1,0 +1,228 @@
+"""Work in a process of its own: progress, time left, cancel; the window never waits for it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import Any
+
+from PySide6.QtCore import QObject, Qt, Signal, Slot
+
+from app.window.workbench import Answer, Ask, Stop, serve
+
+__all__ = ["Estimate", "Job", "Worker"]
+
+
+class Estimate:
+    """How long a stage will still take, from how long its part took until now."""
+
+    #: Below this part of the stage, or this many s, nothing can be said.
+    PART_MIN, SECONDS_MIN = 0.02, 1.0
+
+    def __init__(self) -> None:
+        self._stage: str | None = None
+        self._began = 0.0
+        self._first = 0.0
+
+    def left(self, stage: str, fraction: float, now: float) -> float | None:
+        """Seconds to the end of ``stage``; None while that cannot be told. ``now`` is in s."""
+        if stage != self._stage:
+            self._stage, self._began, self._first = stage, now, fraction
+            return None
+        done, took = fraction - self._first, now - self._began
+        if done < self.PART_MIN or took < self.SECONDS_MIN:
+            return None
+        return took * (1.0 - fraction) / done
+
+
+class Job(QObject):
+    """One piece of work. Exactly one of ``finished``, ``failed`` and ``cancelled`` ends it."""
+
+    #: stage, its fraction, and s left (NaN where that is not known)
+    progressed = Signal(str, float, float)
+    finished = Signal(object)
+    failed = Signal(str)
+    cancelled = Signal()
+
+    def __init__(self, worker: Worker, ask: Ask, whole: bool) -> None:
+        super().__init__()  # no parent: it lives as long as somebody cares for it
+        self._worker = worker
+        self.ask = ask
+        self.whole = whole
+        self.asked_to_stop = False
+
+    @Slot()
+    def cancel(self) -> None:
+        """End it: the first time as it wants to end, the second time at once."""
+        self._worker.cancel(self)
+
+
+class Worker(QObject):
+    """Does jobs one after another, in a process that is spawned with the first."""
+
+    _arrived = Signal(int, object)
+
+    def __init__(
+        self,
+        parent: QObject | None = None,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        super().__init__(parent)
+        self._clock = clock
+        self._process: BaseProcess | None = None
+        self._connection: Connection | None = None
+        self._reader: threading.Thread | None = None
+        self._life = 0  # of the process: what an earlier one said late is not heard
+        self._number = 0
+        self._current: Job | None = None
+        self._urgent: deque[Job] = deque()
+        self._waiting: deque[Job] = deque()
+        self._estimate = Estimate()
+        self._arrived.connect(self._take, Qt.ConnectionType.QueuedConnection)
+
+    def submit(
+        self, function: Callable[..., Any], *given: Any, first: bool = False, whole: bool = False
+    ) -> Job:
+        """Have ``function(*given, progress=...)`` called; ``first`` before those that are not.
+
+        ``whole``: it tells the fraction of all its work, not of each of its stages.
+        The function stands at the top of a module, and everything that goes in and comes out can
+        be pickled. A ``DearigError`` becomes ``failed`` with its sentence.
+        """
+        self._number += 1
+        job = Job(self, Ask(self._number, function, given), whole)
+        (self._urgent if first else self._waiting).append(job)
+        self._next()
+        return job
+
+    @property
+    def busy(self) -> bool:
+        """True while something is under way or waits."""
+        return self._current is not None or bool(self._urgent or self._waiting)
+
+    def cancel(self, job: Job) -> None:
+        """End ``job``, whether it waits or is under way."""
+        for queue in (self._urgent, self._waiting):
+            if job in queue:
+                queue.remove(job)
+                self._end(job, "stopped", None)
+        if job is self._current:
+            if job.asked_to_stop:
+                self._kill()
+                self._current = None
+                self._end(job, "stopped", None)
+                self._next()
+            else:
+                job.asked_to_stop = True
+                self._send(Stop(job.ask.number))
+
+    def clear(self) -> None:
+        """Cancel everything that waits and is not urgent, not what is under way."""
+        while self._waiting:
+            self._end(self._waiting.popleft(), "stopped", None)
+
+    def close(self) -> None:
+        """End the process and wait for it; nothing is signalled any more."""
+        self._urgent.clear()
+        self._waiting.clear()
+        self._current = None
+        self._kill()
+
+    # ------------------------------------------------------------ the process
+
+    def _next(self) -> None:
+        queue = self._urgent or self._waiting
+        if self._current is not None or not queue:
+            return
+        self._current = queue.popleft()
+        self._estimate = Estimate()
+        if self._process is None:
+            self._start()
+        self._send(self._current.ask)
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        self._process = context.Process(
+            target=serve, args=(theirs,), name="dearig worker", daemon=True
+        )
+        self._process.start()
+        theirs.close()  # so that the end of the process is the end of the connection
+        self._connection = ours
+        self._reader = threading.Thread(
+            target=self._read, args=(ours, self._life), name="dearig worker's answers", daemon=True
+        )
+        self._reader.start()
+
+    def _send(self, message: Ask | Stop) -> None:
+        if self._connection is None:
+            return
+        try:
+            self._connection.send(message)
+        except OSError:
+            return  # it is gone; the reader sees that too, and says so
+
+    def _read(self, connection: Connection, life: int) -> None:
+        """Unpickle in a thread: a result can be large, and may import what the window lacks."""
+        while True:
+            try:
+                message = connection.recv()
+            except (EOFError, OSError):
+                self._arrived.emit(life, None)
+                return
+            self._arrived.emit(life, message)
+
+    def _kill(self) -> None:
+        self._life += 1
+        process, self._process = self._process, None
+        connection, self._connection = self._connection, None
+        reader, self._reader = self._reader, None
+        if process is None or connection is None or reader is None:
+            return
+        process.kill()
+        process.join()
+        reader.join()  # the other end of the connection is closed: it returns
+        connection.close()
+        process.close()
+
+    # ------------------------------------------------------------ its answers
+
+    @Slot(int, object)
+    def _take(self, life: int, answer: Answer | None) -> None:
+        if life != self._life:
+            return
+        job = self._current
+        if answer is None:
+            code = self._process.exitcode if self._process is not None else None
+            self._kill()
+            self._current = None
+            if job is not None:
+                words = f"the process that did this work ended by itself (exit code {code})"
+                self._end(job, "broken", f"{words}; start the work again")
+            self._next()
+            return
+        if job is None or answer.number != job.ask.number:
+            return
+        if answer.kind == "progress":
+            stage, fraction = answer.value
+            # of the whole work one estimate holds, whatever its stage is called
+            left = self._estimate.left("" if job.whole else stage, fraction, self._clock())
+            job.progressed.emit(stage, fraction, float("nan") if left is None else left)
+            return
+        self._current = None
+        self._end(job, answer.kind, answer.value)
+        self._next()
+
+    def _end(self, job: Job, kind: str, value: Any) -> None:
+        if kind == "done":
+            job.finished.emit(value)
+        elif kind == "stopped":
+            job.cancelled.emit()
+        else:
+            job.failed.emit(value)

@@ -1,0 +1,143 @@
+"""A window for a test, with a rig that is simulated, and a word from Qt that fails it."""
+
+from __future__ import annotations
+
+import gc
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # before Qt is loaded
+
+from PySide6.QtCore import (
+    QCoreApplication,
+    QEvent,
+    QMessageLogContext,
+    QSettings,
+    QtMsgType,
+    qInstallMessageHandler,
+)
+from PySide6.QtWidgets import QApplication, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.rigfile import RigFile
+from app.window.frame import MainWindow
+from app.window.planner import Planner
+from app.window.run_page import RunPage
+from app.window.session import Session
+from app.window.theme import LIGHT, prepare_plots
+from drivers.settings import LimitsSettings
+
+# the offscreen platform says this of every window that it shows, and means nothing by it
+_ALLOWED = ("This plugin does not support propagateSizeHints()",)
+
+SHORT = """\
+name = "one lobe"
+lead_in_s = 0.3
+tail_s = 0.2
+[[segment]]
+kind = "half_sine"
+amplitude_kV = 6.0
+frequency_Hz = 2.0
+"""
+
+
+@pytest.fixture(autouse=True)
+def _garbage_is_collected_here(qapp: QApplication) -> Iterator[None]:
+    """As in the program: never in another thread, where a widget must not be destroyed."""
+    gc.disable()
+    yield
+    # what was closed is deleted before the next test, and in this thread
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
+    gc.collect()
+    gc.enable()
+
+
+@pytest.fixture(autouse=True)
+def _no_word_from_qt() -> Iterator[None]:
+    said: list[str] = []
+
+    def hear(kind: QtMsgType, context: QMessageLogContext, message: str) -> None:
+        if message not in _ALLOWED:
+            said.append(f"{kind.name}: {message}")
+
+    before = qInstallMessageHandler(hear)
+    yield
+    qInstallMessageHandler(before)
+    assert said == []
+
+
+@pytest.fixture
+def session(tmp_path: Path, qapp: QApplication) -> Session:
+    prepare_plots()
+    settings = QSettings(str(tmp_path / "settings.ini"), QSettings.Format.IniFormat)
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    return Session(folder, settings, theme=LIGHT)
+
+
+@pytest.fixture
+def quick_ramp(session: Session) -> Session:
+    """A rig that is at 0 V a tenth of a second after STOP."""
+    session.set_rig_file(None, "", RigFile(limits=LimitsSettings(ramp_down_s=0.1)))
+    return session
+
+
+@pytest.fixture
+def keep(qtbot: QtBot) -> Iterator[Callable[[QWidget], None]]:
+    """Show a page or window of its own, and end its threads and processes after the test."""
+    kept: list[QWidget] = []
+
+    def show(widget: QWidget) -> None:
+        qtbot.addWidget(widget)
+        kept.append(widget)
+        with qtbot.waitActive(widget):  # keys go to the window that is active
+            widget.show()
+            widget.activateWindow()
+
+    yield show
+    for widget in kept:
+        if isinstance(widget, MainWindow):
+            widget.close()
+        else:
+            widget.close_work()  # type: ignore[attr-defined]
+
+
+@pytest.fixture
+def window(session: Session, keep: Callable[[QWidget], None], qtbot: QtBot) -> MainWindow:
+    """The whole window with its first plan made; its simulated rig does not take its time."""
+    shown = MainWindow(session)
+    shown.resize(1366, 768)
+    keep(shown)
+    qtbot.waitUntil(lambda: session.preview is not None, timeout=120_000)
+    shown.run_page.paced.setChecked(False)
+    return shown
+
+
+@pytest.fixture
+def run_page(session: Session, keep: Callable[[QWidget], None], qtbot: QtBot) -> Iterator[RunPage]:
+    """The page alone, with its first plan made."""
+    planner, page = Planner(session), RunPage(session)
+    page.resize(1200, 700)
+    keep(page)
+    planner.renew()
+    qtbot.waitUntil(lambda: session.preview is not None, timeout=120_000)
+    page.paced.setChecked(False)
+    yield page
+    page.close_work()
+    planner.close()
+
+
+@pytest.fixture
+def plan_of(session: Session, qtbot: QtBot) -> Callable[[str], None]:
+    """Put another sequence in, and wait for its plan."""
+
+    def put(toml: str) -> None:
+        session.set_sequence(toml, Path())
+        qtbot.waitUntil(
+            lambda: session.preview is not None and session.preview.toml == toml, timeout=120_000
+        )
+
+    return put

@@ -1,0 +1,140 @@
+"""A real window on an X server, driven by the server's own mouse and keys.
+
+``python -m tests.window.real_window FOLDER``: writes what it saw as JSON to standard output. Every
+event goes the long way, through the X server (XTEST), as if a hand had made it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import QEventLoop, QPoint, QSettings, QTimer
+from PySide6.QtWidgets import QApplication, QWidget
+
+from app.window.frame import MainWindow
+from app.window.session import Session
+from app.window.theme import LIGHT, prepare_plots
+
+PATIENCE = 120_000  # ms
+KEYSYMS = {"Escape": 0xFF1B, "Control": 0xFFE3, "Alt": 0xFFE9, "Tab": 0xFF09, " ": 0x20}
+
+
+class Hand:
+    """Mouse and keys at the X server."""
+
+    def __init__(self) -> None:
+        self._x = ctypes.CDLL("libX11.so.6")
+        self._test = ctypes.CDLL("libXtst.so.6")
+        self._x.XOpenDisplay.restype = ctypes.c_void_p
+        self._x.XKeysymToKeycode.argtypes = (ctypes.c_void_p, ctypes.c_ulong)
+        self._x.XKeysymToKeycode.restype = ctypes.c_ubyte
+        self._x.XFlush.argtypes = (ctypes.c_void_p,)
+        number, flag, delay = ctypes.c_uint, ctypes.c_int, ctypes.c_ulong
+        self._test.XTestFakeMotionEvent.argtypes = (
+            ctypes.c_void_p, ctypes.c_int, ctypes.c_int, ctypes.c_int, delay,
+        )  # fmt: skip
+        for name in ("XTestFakeButtonEvent", "XTestFakeKeyEvent"):
+            getattr(self._test, name).argtypes = (ctypes.c_void_p, number, flag, delay)
+        self._display = self._x.XOpenDisplay(None)
+        if not self._display:
+            raise SystemExit("no X server")
+
+    def click(self, at: QPoint) -> None:
+        self._test.XTestFakeMotionEvent(self._display, -1, at.x(), at.y(), 0)
+        for pressed in (1, 0):
+            self._test.XTestFakeButtonEvent(self._display, 1, pressed, 0)
+        self._x.XFlush(self._display)
+
+    def key(self, *names: str) -> None:
+        """Press them one after another, and let go."""
+        codes = [
+            self._x.XKeysymToKeycode(self._display, KEYSYMS.get(name) or ord(name))
+            for name in names
+        ]
+        for code in codes:
+            self._test.XTestFakeKeyEvent(self._display, code, 1, 0)
+        for code in reversed(codes):
+            self._test.XTestFakeKeyEvent(self._display, code, 0, 0)
+        self._x.XFlush(self._display)
+
+
+def until(condition: Callable[[], bool], what: str) -> None:
+    loop, late = QEventLoop(), QTimer()
+    look = QTimer(interval=10)
+    look.timeout.connect(lambda: condition() and loop.quit())
+    late.setSingleShot(True)
+    late.timeout.connect(loop.quit)
+    look.start()
+    late.start(PATIENCE)
+    loop.exec()
+    if not condition():
+        raise SystemExit(f"waited in vain: {what}")
+
+
+def main() -> None:
+    application = QApplication(sys.argv[:1])
+    prepare_plots()
+    folder = Path(sys.argv[1])
+    settings = QSettings(str(folder / "settings.ini"), QSettings.Format.IniFormat)
+    session = Session(folder, settings, theme=LIGHT)
+    window = MainWindow(session)
+    window.setGeometry(0, 0, 1366, 768)
+    window.show()
+    window.activateWindow()
+    hand, page = Hand(), window.run_page
+    saw: dict[str, object] = {"platform": application.platformName()}
+
+    def click(widget: QWidget) -> None:
+        hand.click(widget.mapToGlobal(widget.rect().center()))
+
+    until(window.isActiveWindow, "the window becomes active")
+    until(lambda: page.arm_button.isEnabled(), "a plan")
+    item = window.list.visualItemRect(window.list.item(1)).center()
+    hand.click(window.list.viewport().mapToGlobal(item))
+    until(window.sequence_page.isVisible, "the page of the sequence")
+    hand.key("Control", "3")
+    until(page.isVisible, "the page of the run")
+    click(page.operator)
+    until(page.operator.hasFocus, "the field of the operator")
+    for letter in "ada":
+        hand.key(letter)
+    until(lambda: page.operator.text() == "ada", "the operator's name")
+    saw["operator"] = session.operator
+    click(page.arm_button)
+    until(page.start_button.isEnabled, "armed")
+    saw["armed"] = window.badge.state.name
+    click(page.start_button)
+    until(lambda: page.runner.running, "started")
+    saw["started"] = window.badge.state.name
+
+    def seconds() -> float:
+        now = None if page.live is None else page.live.now()
+        return 0.0 if now is None else now.samples / now.rate
+
+    until(lambda: seconds() > 2.5, "half a second of the first lobe")
+    screen = application.primaryScreen().grabWindow(0).toImage()
+    screen.save(str(folder / "screen.png"))
+    corner = page.stop_button.mapToGlobal(QPoint(12, 46))
+    saw["stop"] = screen.pixelColor(corner).name()
+    hand.key("Escape")
+    until(lambda: not page.runner.running, "stopped by the key")
+    saw["ended"] = window.badge.state.name
+    saw["result"] = page.result.text()
+    # and once more, stopped with the mouse
+    click(page.arm_button)
+    until(page.start_button.isEnabled, "armed again")
+    click(page.start_button)
+    until(lambda: page.runner.running and seconds() > 0.0, "started again")
+    click(page.stop_button)
+    until(lambda: not page.runner.running, "stopped by the mouse")
+    saw["recordings"] = sorted(path.name for path in folder.glob("*.h5"))
+    window.close()
+    print(json.dumps(saw))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,226 @@
+"""Pictures of every page: ``python -m tests.window.screenshots --out DIR [--guide DIR]``.
+
+Everything in them is real: recordings made on simulated rigs, a diagnosis of one of them, a run
+that goes on while it is photographed. ``--guide`` writes the few pictures of the guide, each once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # before Qt is loaded
+
+from PIL import Image
+from PySide6.QtCore import QEventLoop, QSettings, QTimer
+from PySide6.QtGui import QPixmap
+from PySide6.QtWidgets import QApplication
+
+from app.presets import PRESETS
+from app.rigfile import RigFile
+from app.run import record
+from app.sequencefile import load_sequence
+from app.window.frame import MainWindow
+from app.window.session import Session
+from app.window.theme import LIGHT, prepare_plots
+
+SIZES = ((1366, 768), (1920, 1080))
+LOOKS = ("light", "dark")
+#: It leaks, which the thesis's run alone cannot tell from a permittivity: so there is something to
+#: propose.
+LEAKING = "sim:2000"
+PATIENCE = 600_000  # ms
+
+REFUSED = """\
+name = "too much"
+[[segment]]
+kind = "half_sine"
+amplitude_kV = 7.0
+frequency_Hz = 0.5
+[[segment]]
+kind = "steps"
+levels_kV = [4.0, 12.5, 0.0]
+dwell_s = 1.0
+rise_s = 0.02
+"""
+
+#: Pictures of the guide: file to (what is seen, look).
+GUIDE = {
+    "run.png": ("run-going", "light"),
+    "sequence.png": ("sequence-refused", "light"),
+    "rig.png": ("rig", "light"),
+    "recordings.png": ("recordings-several", "light"),
+    "study.png": ("study-residual", "light"),
+    "dark.png": ("run-going", "dark"),
+}
+
+
+def until(condition: Callable[[], bool], what: str) -> None:
+    """Let the window work until ``condition``; ends the command where it never comes."""
+    late = QTimer(singleShot=True, interval=PATIENCE)
+    late.start()
+    while not condition():
+        if not late.isActive():
+            sys.exit(f"waited in vain for {what}")
+        _work(20)
+
+
+def settled() -> None:
+    """Let everything be laid out and drawn."""
+    for _ in range(3):
+        _work(40)
+
+
+def _work(milliseconds: int) -> None:
+    """Let the window work for a while."""
+    loop = QEventLoop()
+    QTimer.singleShot(milliseconds, loop.quit)
+    loop.exec()
+
+
+def make_recordings(folder: Path) -> None:
+    """Runs of the thesis's rig, and of rigs that hide something."""
+    rig_file = RigFile()
+    runs = (
+        ("sim", "thesis", "thesis-001", "Ada", "VHB 4910, no. 3"),
+        ("sim", "validation-b-7.0", "b-7.0-001", "Ada", "VHB 4910, no. 3"),
+        ("sim:11", "thesis", "thesis-002", "Grace", "VHB 4910, no. 11"),
+        ("sim:3", "thesis", "thesis-003", "Grace", "VHB 4910, no. 7"),
+        (LEAKING, "thesis", "thesis-004", "Grace", "VHB 4910, no. 8"),
+        (LEAKING, "validation-a-0.6", "a-0.6-001", "Grace", "VHB 4910, no. 8"),
+    )
+    for seed, (address, preset, name, operator, film) in enumerate(runs):
+        record(
+            load_sequence(preset), address, rig_file, "", folder / f"{name}.h5", seed=seed,
+            operator=operator, film_id=film,
+        )  # fmt: skip
+
+
+def views(window: MainWindow) -> Iterator[str]:
+    """Bring one view after another to the screen; its name is what the picture is called."""
+    session, run = window.session, window.run_page
+    recordings, study = window.recordings_page, window.study_page
+    folder = session.folder
+    window.show_page(window.rig_page)
+    yield "rig"
+    window.show_page(window.sequence_page)
+    yield "sequence"
+    planned(session, REFUSED)
+    yield "sequence-refused"
+    window.show_page(run)
+    yield "run-refused"
+    planned(session, PRESETS["thesis"])
+    yield "run-ready"
+
+    run.operator.setText("Ada")
+    run.film.setText("VHB 4910, no. 3")
+    run.paced.setChecked(True)
+    run.arm_button.click()
+    yield "run-armed"
+    run.start_button.click()
+    until(lambda: run.live is not None and far(run, 9.0), "the run")
+    yield "run-going"
+    run.stop_button.click()
+    until(lambda: not run.runner.running, "the end of the run")
+    settled()
+    yield "run-stopped"
+
+    window.show_page(recordings)
+    until(
+        lambda: (
+            len(recordings._library.files) == 7
+            and set(recordings._library.glances) == set(recordings._library.files)
+        ),
+        "the recordings",
+    )
+    recordings.choose([folder / "thesis-003.h5"])
+    until(lambda: [c.name for c in recordings.plot.shown] == ["thesis-003"], "a recording")
+    yield "recordings"
+    recordings.choose([folder / f"thesis-00{n}.h5" for n in (1, 2, 3)])
+    until(
+        lambda: len(recordings.plot.shown) == 3 and recordings.differences.rowCount() > 0,
+        "the differences",
+    )
+    yield "recordings-several"
+
+    window.show_page(study)
+    yield "study"
+    study.tick([folder / "thesis-004.h5"], [folder / "a-0.6-001.h5"])
+    study.begin()
+    until(lambda: study.bar.value() > 250, "the search")
+    yield "study-searching"
+    until(lambda: study._shown is not None or bool(study.saying.text()), "the diagnosis")
+    if study.saying.text():
+        sys.exit(study.saying.text())
+    for index in range(study.tabs.count()):
+        study.tabs.setCurrentIndex(index)
+        yield f"study-{study.tabs.tabText(index).lower()}"
+
+
+def planned(session: Session, toml: str) -> None:
+    """Put a sequence in, and wait for its plan."""
+    session.set_sequence(toml, Path())
+    until(lambda: session.preview is not None and session.preview.toml == toml, "a sequence's plan")
+
+
+def far(run: object, seconds: float) -> bool:
+    """True once a run has come that far."""
+    now = run.live.now()  # type: ignore[attr-defined]
+    return now is not None and now.samples / now.rate > seconds
+
+
+def small(picture: QPixmap, path: Path) -> None:
+    """Save ``picture`` with no more colours than a window has: a third of the bytes."""
+    picture.save(str(path))
+    with Image.open(path) as image:
+        few = image.convert("RGB").quantize(128, dither=Image.Dither.NONE)
+    few.save(path, optimize=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, help="where every view goes, in all sizes and looks")
+    parser.add_argument("--guide", type=Path, help="where the pictures of the guide go")
+    parser.add_argument("--only", default="", help="views whose name begins so")
+    asked = parser.parse_args()
+    if asked.out is None and asked.guide is None:
+        parser.error("give --out DIR, --guide DIR, or both")
+    for folder in filter(None, (asked.out, asked.guide)):
+        folder.mkdir(parents=True, exist_ok=True)
+
+    application = QApplication(sys.argv[:1])
+    prepare_plots()
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / "recordings"
+        folder.mkdir()
+        make_recordings(folder)
+        settings = QSettings(str(Path(scratch) / "window.ini"), QSettings.Format.IniFormat)
+        session = Session(folder, settings, theme=LIGHT)
+        window = MainWindow(session)
+        window.show()
+        until(lambda: session.preview is not None, "the first plan")
+        for name in views(window):
+            if not name.startswith(asked.only):
+                continue
+            for look in LOOKS:
+                window.set_look(look)
+                for width, height in SIZES if asked.out else SIZES[:1]:
+                    window.resize(width, height)
+                    settled()
+                    picture = window.grab()
+                    if asked.out:
+                        picture.save(str(asked.out / f"{name}-{look}-{width}x{height}.png"))
+                    if asked.guide and (width, height) == SIZES[0]:
+                        for file, view in GUIDE.items():
+                            if view == (name, look):
+                                small(picture, asked.guide / file)
+        window.close()
+    application.quit()
+
+
+if __name__ == "__main__":
+    main()

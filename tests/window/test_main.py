@@ -1,0 +1,96 @@
+"""The command ``dearig gui``: opens, ends when it is told to, and says why it cannot open."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.recording import open_recording
+
+
+def gui(*arguments: object, code: str = "", **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run the command with ``code`` before it, in a process of its own."""
+    base = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    base.pop("QT_QPA_PLATFORM", None)
+    script = f"{code}\nimport sys\nfrom app.cli import main\nsys.exit(main())"
+    return subprocess.run(
+        [sys.executable, "-c", script, "gui", *map(str, arguments)],
+        env={**base, **environment},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems have a screen")
+def test_without_a_screen_it_says_so() -> None:
+    done = gui()
+    assert done.returncode == 2
+    assert "there is no screen" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("missing", ["PySide6", "pyqtgraph"])
+def test_without_its_packages_it_says_how_to_get_them(missing: str) -> None:
+    code = (
+        "import importlib.abc, sys\n"
+        "class Missing(importlib.abc.MetaPathFinder):\n"
+        "    def find_spec(self, name, path, target=None):\n"
+        f"        if name.partition('.')[0] == {missing!r}:\n"
+        "            raise ModuleNotFoundError(name, name=name)\n"
+        "sys.meta_path.insert(0, Missing())\n"
+    )
+    done = gui(code=code, QT_QPA_PLATFORM="offscreen")
+    assert done.returncode == 2
+    assert f"needs {missing}, which is not installed" in done.stderr
+    assert "dearig[gui]" in done.stderr
+
+
+def test_a_rig_file_that_is_none_is_told_in_the_terminal(tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text("[film]\nlength_mm = -1.0\n")
+    done = gui("--rig-file", tmp_path / "rig.toml", QT_QPA_PLATFORM="offscreen")
+    assert done.returncode == 2
+    assert "film.length_mm = -1.0 is not allowed" in done.stderr
+
+
+# arms and starts a run as soon as there is a plan, and raises the signal half a second into it
+RUN = """\
+import signal
+from PySide6.QtCore import QTimer
+import app.window.main as main
+from app.window.frame import MainWindow
+shown = MainWindow.show
+def show(self):
+    shown(self)
+    page, timer = self.run_page, QTimer(self)
+    def look():
+        if page.live is None:
+            if page.arm_button.isEnabled():
+                page.arm_button.click()
+                page.start_button.click()
+        elif (now := page.live.now()) is not None and now.samples > 2500:
+            timer.stop()
+            signal.raise_signal(signal.SIGTERM)
+    timer.timeout.connect(look)
+    timer.start(20)
+MainWindow.show = show
+"""
+
+
+def test_told_to_end_it_makes_safe_first(tmp_path: Path) -> None:
+    done = gui(
+        "--folder", tmp_path, code=RUN, QT_QPA_PLATFORM="offscreen",
+        XDG_CONFIG_HOME=str(tmp_path / "config"),
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    (path,) = tmp_path.glob("*.h5")
+    recording = open_recording(path)
+    assert "interrupted by the operator" in recording.outcome
+    assert recording.voltage_command is not None
+    assert recording.voltage_command.max() > 1000.0
+    assert abs(recording.voltage_command[-1]) < 1.0

@@ -1,0 +1,70 @@
+"""A real window on a real X server, with a real mouse and keys."""
+
+from __future__ import annotations
+
+import ctypes.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.recording import open_recording
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not (shutil.which("Xvfb") and ctypes.util.find_library("Xtst")),
+        reason="needs Xvfb and libXtst",
+    ),
+]
+
+
+@pytest.fixture
+def display() -> Iterator[str]:
+    """An X server of its own."""
+    read, write = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1366x768x24", "-nolisten", "tcp"],
+        pass_fds=(write,),
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(write)
+    try:
+        with os.fdopen(read) as told:
+            number = told.readline().strip()
+        assert number, "the X server did not start"
+        yield f":{number}"
+    finally:
+        server.terminate()
+        server.wait()
+
+
+def test_a_run_by_mouse_and_keys(display: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.window.real_window", str(tmp_path)],
+        env={**os.environ, "DISPLAY": display, "QT_QPA_PLATFORM": "xcb"},
+        capture_output=True,
+        text=True,
+        timeout=280,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    # the run tells that it was stopped; nothing from Qt
+    words = [line for line in done.stderr.splitlines() if "interrupted by the operator" not in line]
+    assert words == []
+    saw = json.loads(done.stdout)
+    assert saw["platform"] == "xcb"
+    assert saw["operator"] == "ada"
+    assert (saw["armed"], saw["started"], saw["ended"]) == ("ARMED", "ON", "SAFE")
+    assert saw["stop"] == "#b3001b"  # large and red, on the screen
+    assert "ramped down to 0 V" in saw["result"]
+    assert len(saw["recordings"]) == 2
+    recording = open_recording(tmp_path / saw["recordings"][0])
+    assert recording.provenance["operator"] == "ada"
+    assert recording.voltage_command is not None
+    assert abs(recording.voltage_command[-1]) < 1.0

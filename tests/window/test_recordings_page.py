@@ -1,0 +1,194 @@
+"""The page Recordings as its user meets it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QWidget
+from pytestqt.qtbot import QtBot
+
+from app.modelfile import save_model
+from app.window.folder_table import COLUMNS
+from app.window.recordings_page import RecordingsPage
+from app.window.report_table import ReportTable
+from app.window.session import Session
+from app.window.theme import DARK
+from model.actuator import Actuator
+from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Network
+from tests.window.recordings import killed, made
+
+# a process has to start, on a machine that may be busy
+_PATIENCE = 120_000
+
+Keep = Callable[[QWidget], None]
+
+
+def open_page(session: Session, keep: Keep, qtbot: QtBot) -> RecordingsPage:
+    """The page, with all files of the folder looked at."""
+    page = RecordingsPage(session)
+    page.resize(1190, 690)
+    keep(page)
+    looked_at(page, qtbot)
+    return page
+
+
+def looked_at(page: RecordingsPage, qtbot: QtBot) -> None:
+    library = page._library
+    qtbot.waitUntil(
+        lambda: bool(library.files) and set(library.glances) == set(library.files),
+        timeout=_PATIENCE,
+    )
+
+
+def drawn(page: RecordingsPage, qtbot: QtBot, *names: str) -> None:
+    """Wait until just these are drawn."""
+    qtbot.waitUntil(lambda: {c.name for c in page.plot.shown} == set(names), timeout=_PATIENCE)
+
+
+def cells(page: RecordingsPage, column: str) -> dict[str, str]:
+    """Name of every row to its text in ``column``."""
+    at, model = [name for name, _ in COLUMNS].index(column), page.table.model()
+    return {
+        model.index(row, 1).data(): model.index(row, at).data() for row in range(model.rowCount())
+    }
+
+
+def rows(table: ReportTable) -> dict[str, list[str]]:
+    """First cell of every row to the others."""
+    return {
+        table.item(row, 0).text(): [
+            table.item(row, column).text() for column in range(1, table.columnCount())
+        ]
+        for row in range(table.rowCount())
+    }
+
+
+def click(qtbot: QtBot, widget: QWidget) -> None:
+    assert widget.isEnabled()
+    qtbot.mouseClick(widget, Qt.MouseButton.LeftButton)
+
+
+@pytest.fixture
+def folder(session: Session) -> Path:
+    made(session.folder, "low", 4.0, operator="Ada", film_id="film 1")
+    made(session.folder, "high", 6.0, operator="Grace", film_id="film 2")
+    return session.folder
+
+
+def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
+    page = open_page(session, keep, qtbot)
+    # what is there, with something drawn at once
+    assert cells(page, "Sequence") == {"low": "lobes of 4.0 kV", "high": "lobes of 6.0 kV"}
+    assert cells(page, "Film") == {"low": "film 1", "high": "film 2"}
+    noise = cells(page, "RMS")
+    for text in noise.values():
+        number, unit = text.split()
+        assert unit == "µm"
+        assert float(number) == pytest.approx(1.0, abs=0.2)  # the simulated noise
+    assert set(cells(page, "State").values()) == {"✓ finished"}
+    qtbot.waitUntil(lambda: len(page.plot.shown) == 1, timeout=_PATIENCE)
+    assert rows(page.about)["ended"] == ["finished"]
+
+    # words find a recording
+    qtbot.keyClicks(page.filter, "grace film")
+    assert set(cells(page, "Sequence")) == {"high"}
+    page.filter.clear()
+    assert set(cells(page, "Sequence")) == {"low", "high"}
+
+    # several on one plot, and their conditions set side by side
+    page.choose([folder / "low.h5", folder / "high.h5"])
+    drawn(page, qtbot, "low", "high")
+    qtbot.waitUntil(lambda: page.differences.rowCount() > 0, timeout=_PATIENCE)
+    order = [page.differences.horizontalHeaderItem(i).text() for i in (1, 2)]
+    operators = rows(page.differences)["operator"]
+    assert dict(zip(order, operators, strict=True)) == {"low": "Ada", "high": "Grace"}
+    assert page.sides.currentWidget() is page.differences
+    assert len(page.plot.plots[1].listDataItems()) == 4
+    click(qtbot, page.model_shown)
+    assert len(page.plot.plots[1].listDataItems()) == 2
+    assert not page.plot.plots[2].isVisible()
+    click(qtbot, page.model_shown)
+
+    # another model has other errors, and what was known of the first is not shown as its own
+    stiff = save_model(
+        tmp_path / "stiff.toml", "stiff",
+        Actuator(THESIS_FILM, THESIS_LOAD, Network(TABLE_3.equilibrium)), {},
+    )  # fmt: skip
+    page.compare_with(stiff)
+    assert set(cells(page, "RMS").values()) == {""}
+    qtbot.waitUntil(lambda: all(cells(page, "RMS").values()), timeout=_PATIENCE)
+    of_stiff = cells(page, "RMS")
+    assert all(float(of_stiff[n].split()[0]) > 10 * float(noise[n].split()[0]) for n in noise)
+    assert page.model_box.currentText() == "stiff"
+
+    # export, with a word where it went or why not
+    page.export(folder / "low.h5", "csv", folder / "low.csv")
+    qtbot.waitUntil(lambda: "was written" in page.saying.text(), timeout=_PATIENCE)
+    assert (folder / "low.csv").read_text().startswith("time_s,")
+    page.export(folder / "low.h5", "csv", folder / "gone" / "low.csv")
+    qtbot.waitUntil(lambda: "there is no folder" in page.saying.text(), timeout=_PATIENCE)
+
+    # the sequence of one of them, to be played again
+    page.choose([folder / "low.h5"])
+    drawn(page, qtbot, "low")
+    with qtbot.waitSignal(page.open_sequence) as told:
+        click(qtbot, page.again_button)
+    assert 'name = "lobes of 4.0 kV"' in told.args[0]
+
+    # at night
+    session.set_theme(DARK)
+    measured = page.plot.plots[1].listDataItems()[0]
+    assert measured.opts["pen"].color().name() == DARK.measured
+
+
+def test_what_is_broken_is_said_and_what_can_be_mended_is_mended(session, keep, qtbot):
+    path = killed(session.folder, "torn")
+    (session.folder / "letter.h5").write_text("dear reader")
+    page = open_page(session, keep, qtbot)
+    assert cells(page, "State") == {"torn": "! incomplete", "letter": "✕ cannot be read"}
+    page.choose([session.folder / "letter.h5"])
+    qtbot.waitUntil(lambda: "is not an HDF5 file" in page.saying.text(), timeout=_PATIENCE)
+    assert page.plot.shown == ()
+    assert not page.recover_button.isEnabled()
+    page.choose([path])
+    drawn(page, qtbot, "torn")
+    assert page.saying.text() == ""
+    click(qtbot, page.recover_button)
+    qtbot.waitUntil(lambda: "recovered" in page.saying.text(), timeout=_PATIENCE)
+    assert "2000 samples" in page.saying.text()
+    with h5py.File(path) as file:  # as any program opens it
+        assert file["entry/data/time"].size == 2000
+
+
+def test_the_list_follows_the_folder(session, folder, keep, qtbot, tmp_path):
+    page = open_page(session, keep, qtbot)
+    qtbot.waitUntil(lambda: not page._library._worker.busy, timeout=_PATIENCE)
+    # while a run goes on no file is opened: it may be the one that is being written
+    session.set_running(True)
+    path = made(folder, "new", 5.0)
+    page.choose([path])
+    page._library.refresh()
+    assert not page._library._worker.busy
+    assert not page._library._listing.busy
+    session.set_running(False)
+    session.recorded.emit(path)
+    # it was asked for before it was listed
+    drawn(page, qtbot, "new")
+    assert page.chosen() == [path]
+
+    path.unlink()
+    page._library.refresh()
+    qtbot.waitUntil(lambda: set(cells(page, "Sequence")) == {"low", "high"}, timeout=_PATIENCE)
+
+    other = tmp_path / "other"
+    other.mkdir()
+    made(other, "elsewhere")
+    session.set_folder(other)
+    qtbot.waitUntil(lambda: set(cells(page, "Sequence")) == {"elsewhere"}, timeout=_PATIENCE)
+    session.set_folder(tmp_path / "gone")
+    qtbot.waitUntil(lambda: "gone cannot be read" in page.saying.text(), timeout=_PATIENCE)
+    assert cells(page, "Sequence") == {}

@@ -1,0 +1,157 @@
+"""A sequence is written, read, saved, imported; with the mouse, and with keys alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import QWidget
+from pytestqt.qtbot import QtBot
+
+from app.presets import PRESETS
+from app.window.planner import Planner
+from app.window.sequence_page import SequencePage
+from app.window.session import Session
+
+WAIT = 60_000
+
+
+@pytest.fixture
+def page(session: Session, keep: Callable[[QWidget], None], qtbot: QtBot):
+    planner, made = Planner(session), SequencePage(session)
+    made.resize(1200, 700)
+    keep(made)
+    planner.renew()
+    settled(qtbot, session)
+    yield made
+    planner.close()
+
+
+def settled(qtbot: QtBot, session: Session) -> None:
+    qtbot.waitUntil(
+        lambda: session.preview is not None and session.preview.toml == session.sequence_toml,
+        timeout=WAIT,
+    )
+
+
+def kinds(page: SequencePage) -> list[str]:
+    return [str(table["kind"]) for table in page.draft.segments]
+
+
+def test_a_preset_is_taken_and_drawn(qtbot: QtBot, page: SequencePage) -> None:
+    page.preset("rich")
+    settled(qtbot, page.session)
+    assert page.table.rowCount() == 6
+    assert page.heads["name"].text() == "rich"
+    assert "Passes the gate: 40.92 s" in page.state.text()
+    assert page.table.item(0, 3).text() == "11.4"
+    voltage, bar = page.margins[0]
+    assert voltage.text() == "voltage: 8 of 8.5 kV"
+    assert bar.value() == 94
+
+
+def test_segments_are_added_moved_and_taken_back_by_keys(qtbot: QtBot, page: SequencePage) -> None:
+    page.preset("rich")
+    before = kinds(page)
+    page.choose(1)
+    page.add("hold")
+    assert kinds(page) == [*before[:2], "hold", *before[2:]]
+    assert page.table.currentRow() == 2
+    alt, ctrl = Qt.KeyboardModifier.AltModifier, Qt.KeyboardModifier.ControlModifier
+
+    def press(key: Qt.Key, with_: Qt.KeyboardModifier, then: list[str]) -> None:
+        qtbot.keyClick(page, key, with_)  # the button is seen to go down before it acts
+        qtbot.waitUntil(lambda: kinds(page) == then)
+
+    lower = [*before[:3], "hold", *before[3:]]
+    press(Qt.Key.Key_Down, alt, lower)
+    press(Qt.Key.Key_D, ctrl, [*lower[:4], "hold", *lower[4:]])
+    press(Qt.Key.Key_Delete, ctrl, lower)
+    press(Qt.Key.Key_Up, alt, [*before[:2], "hold", *before[2:]])
+    press(Qt.Key.Key_Z, ctrl, lower)
+    page.undo()
+    page.undo()
+    page.undo()
+    press(Qt.Key.Key_Z, ctrl, before)
+    press(
+        Qt.Key.Key_Z, ctrl | Qt.KeyboardModifier.ShiftModifier, [*before[:2], "hold", *before[2:]]
+    )
+    settled(qtbot, page.session)
+    assert page.session.preview is not None
+    assert page.session.preview.playable
+
+
+def test_a_file_is_saved_read_again_and_remembered(
+    qtbot: QtBot, page: SequencePage, tmp_path: Path
+) -> None:
+    page.preset("rich")
+    page.draft.set_head("tail_s", 4.0)
+    page._fill(0)
+    page._send()
+    text = page.session.sequence_toml
+    with qtbot.waitSignal(page.session.message):
+        page.save_file(tmp_path / "mine.toml")
+    page.preset("thesis")
+    page.open_file(tmp_path / "mine.toml")
+    qtbot.waitUntil(lambda: page.session.sequence_path == tmp_path / "mine.toml")
+    assert page.session.sequence_toml == text
+    assert page.file_name.text() == "mine.toml"
+    assert page.session.recent == [tmp_path / "mine.toml"]
+    assert [action.text() for action in page.recent.actions()] == [str(tmp_path / "mine.toml")]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"), [(None, "cannot be read"), ("name = [", "line 1"), ("segment = 3", "[[seg")]
+)
+def test_a_file_that_is_none_is_told_and_nothing_is_lost(
+    qtbot: QtBot, page: SequencePage, tmp_path: Path, text: str | None, words: str
+) -> None:
+    if text is not None:
+        (tmp_path / "bad.toml").write_text(text)
+    page.open_file(tmp_path / "bad.toml")
+    qtbot.waitUntil(lambda: words in page.trouble.text())
+    assert page.session.sequence_toml == PRESETS["thesis"]
+
+
+def drop(page: SequencePage, path: Path) -> None:
+    mime = QMimeData()
+    mime.setUrls([QUrl.fromLocalFile(str(path))])
+    buttons, keys = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    enter = QDragEnterEvent(QPoint(50, 50), Qt.DropAction.CopyAction, mime, buttons, keys)
+    page.dragEnterEvent(enter)
+    assert enter.isAccepted()
+    page.dropEvent(QDropEvent(QPointF(50, 50), Qt.DropAction.CopyAction, mime, buttons, keys))
+
+
+def test_files_are_dropped(qtbot: QtBot, page: SequencePage, tmp_path: Path) -> None:
+    (tmp_path / "rich.toml").write_text(PRESETS["rich"])
+    drop(page, tmp_path / "rich.toml")
+    qtbot.waitUntil(lambda: page.table.rowCount() == 6)
+    (tmp_path / "w.csv").write_text("time_s,voltage_kV\n0,0\n1,5\n2,0\n")
+    page.choose(5)
+    drop(page, tmp_path / "w.csv")
+    settled(qtbot, page.session)
+    assert page.draft.segments[6] == {"kind": "csv", "file": "w.csv"}  # beside rich.toml
+    assert page.session.preview is not None
+    assert page.session.preview.playable
+
+
+def test_a_csv_that_is_none_is_told_at_its_segment(
+    qtbot: QtBot, page: SequencePage, tmp_path: Path
+) -> None:
+    (tmp_path / "w.csv").write_text("t,v\n0,0\n1,5\n")
+    page.add_csv(tmp_path / "w.csv")
+    settled(qtbot, page.session)
+    assert "a waveform takes time_s" in page.state.text()
+    assert page.table.item(1, 0).text() == "✗ 2"
+
+
+def test_what_another_page_proposes_is_shown(qtbot: QtBot, page: SequencePage) -> None:
+    page.session.set_sequence(PRESETS["rich"], Path())
+    assert page.table.rowCount() == 6
+    page.undo()
+    assert page.session.sequence_toml == page.draft.toml
+    assert kinds(page) == ["thesis"]

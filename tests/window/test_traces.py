@@ -1,0 +1,96 @@
+"""What a live plot shows: fixed bins, nothing lost, nothing that grows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.window.traces import Pyramid, RunningErrors
+
+
+def pushed(values: np.ndarray, cuts: list[int], capacity: int = 64) -> Pyramid:
+    pyramid = Pyramid(values.size, capacity)
+    for part in np.split(values, cuts):
+        pyramid.push(part)
+    return pyramid
+
+
+def test_the_end_of_a_run_is_shown_sample_by_sample() -> None:
+    values = np.arange(50.0)
+    x, y = pushed(values, [7, 30]).view(0, 50)
+    np.testing.assert_array_equal(x, values)
+    np.testing.assert_array_equal(y, values)
+
+
+@pytest.mark.parametrize("cuts", [[], [1, 2, 3], [100, 333, 900], list(range(50, 1000, 50))])
+def test_blocks_of_any_length_give_the_same_picture(cuts: list[int]) -> None:
+    values = np.random.default_rng(1).standard_normal(1000)
+    whole, cut = pushed(values, []).view(0, 1000), pushed(values, cuts).view(0, 1000)
+    np.testing.assert_array_equal(whole[0], cut[0])
+    np.testing.assert_array_equal(whole[1], cut[1])
+
+
+@pytest.mark.parametrize("at", [0, 3, 517, 999])
+def test_no_spike_is_lost(at: int) -> None:
+    values = np.zeros(1000)
+    values[at] = 1.0
+    x, y = pushed(values, [400, 401]).view(0, 1000)
+    assert y.max() == 1.0
+    assert abs(x[np.argmax(y)] - at) <= 16  # the bin it is in
+    assert x.size < 2 * 64 + 16
+
+
+def test_bins_stand_still_while_a_run_goes_on() -> None:
+    values = np.random.default_rng(2).standard_normal(900)
+    pyramid = Pyramid(10_000, 64)
+    pyramid.push(values[:600])
+    x, y = pyramid.view(0, 500)
+    pyramid.push(values[600:601])
+    again = pyramid.view(0, 500)
+    np.testing.assert_array_equal(x, again[0])
+    np.testing.assert_array_equal(y, again[1])
+
+
+def test_x_goes_forward_and_what_is_new_is_there_at_once() -> None:
+    values = np.arange(1003.0)
+    x, y = pushed(values, [10, 500]).view(100, 1003)
+    assert (np.diff(x) > 0).all()
+    assert (x[-1], y[-1]) == (1002.0, 1002.0)
+
+
+def test_gaps_are_drawn_as_gaps() -> None:
+    values = np.full(1000, np.nan)
+    values[500:] = 2.0
+    x, y = pushed(values, [333]).view(0, 1000)
+    assert np.isnan(y[x < 480]).all()
+    assert (y[x > 520] == 2.0).all()
+
+
+def test_memory_does_not_grow_with_the_run() -> None:
+    pyramid = Pyramid(10**9, 64)
+    assert sum(level.low.size for level in pyramid._levels) <= 64 * 26
+
+
+def test_nothing_pushed_is_nothing_to_draw() -> None:
+    x, y = Pyramid(100).view(0, 100)
+    assert x.size == y.size == 0
+
+
+def test_errors_so_far_and_of_the_last_moment() -> None:
+    running = RunningErrors(window=100)
+    measured = np.linspace(0.0, 1.0, 400)
+    residual = np.concatenate((np.full(300, 0.3), np.full(100, 0.1)))
+    for part in np.split(np.arange(400), [30, 155, 390]):
+        running.push(measured[part], measured[part] - residual[part])
+    errors = running.now()
+    assert errors.rms == pytest.approx(np.sqrt(np.mean(residual**2)))
+    assert errors.recent == pytest.approx(0.1)
+    assert errors.nrmse_pct == pytest.approx(100.0 * errors.rms)
+
+
+def test_errors_leave_out_what_the_model_does_not_know() -> None:
+    running = RunningErrors(window=10)
+    running.push(np.ones(4), np.full(4, np.nan))
+    assert np.isnan(running.now().rms)
+    running.push(np.array([1.0, 2.0]), np.array([np.nan, 1.5]))
+    assert running.now().rms == pytest.approx(0.5)

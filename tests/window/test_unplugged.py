@@ -1,0 +1,56 @@
+"""A rig behind the real driver: a run that goes well, and one whose rig is unplugged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from app.recording import open_recording
+from app.rigfile import RigFile
+from app.window.hv import HighVoltage
+from app.window.run_page import RunPage
+from sim_backend.clock import PacedClock
+from tests.daqmx_tools import served
+from tests.window.conftest import SHORT
+
+RIG_FILE = RigFile.model_validate(
+    {"film": {"name": "film 3"}, "guardian": {"link_timeout_s": 1.0, "timeout_s": 1.0}}
+)
+WAIT = 120_000
+
+
+def play(qtbot: QtBot, page: RunPage, port: int) -> None:
+    session = page.session
+    page.film.setText("film 3")
+    session.set_rig_file(None, "", RIG_FILE)
+    session.set_sequence(SHORT, Path())
+    session.set_address(f"daqmx:Dev1@127.0.0.1:{port}")
+    qtbot.waitUntil(lambda: page.arm_button.isEnabled(), timeout=WAIT)
+    assert page.paced.isHidden()  # a real rig takes its time
+    qtbot.mouseClick(page.arm_button, Qt.MouseButton.LeftButton)
+    with qtbot.waitSignal(page.runner.ended, timeout=WAIT):
+        qtbot.mouseClick(page.start_button, Qt.MouseButton.LeftButton)
+
+
+def test_a_run_on_a_card(qtbot: QtBot, run_page: RunPage) -> None:
+    with served(RIG_FILE, clock=PacedClock()) as there:
+        play(qtbot, run_page, there.server.port)
+    assert run_page.result.text().startswith("Finished"), run_page.result.text()
+    assert run_page.runner.state is HighVoltage.SAFE
+    assert run_page.badge.state is HighVoltage.SAFE
+    recording = open_recording(next(run_page.session.folder.glob("*.h5")))
+    assert recording.outcome == "finished"
+
+
+@pytest.mark.parametrize("fault", ["server-gone@0.5", "server-frozen@0.5"])
+def test_a_rig_that_is_unplugged_in_mid_run(qtbot: QtBot, run_page: RunPage, fault: str) -> None:
+    with served(RIG_FILE, clock=PacedClock(), faults=(fault,)) as there:
+        play(qtbot, run_page, there.server.port)
+    assert run_page.result.text().startswith("Instrument fault"), run_page.result.text()
+    # nobody can say what is on the wire now
+    assert run_page.runner.state is HighVoltage.UNCONFIRMED
+    assert "by hand" in run_page.badge.toolTip()
+    assert run_page.arm_button.isEnabled()
