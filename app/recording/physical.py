@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -90,9 +89,9 @@ def _backed(counts: h5py.Dataset) -> int:
     """
     claimed = int(counts.shape[0])
     claimed = min(claimed, counts.id.get_storage_size() // counts.dtype.itemsize)
-    if counts.chunks is None or counts.file.driver != "sec2":
+    if counts.chunks is None:
         return claimed
-    chunk, end = int(counts.chunks[0]), os.fstat(counts.file.id.get_vfd_handle()).st_size
+    chunk, end = int(counts.chunks[0]), counts.file.id.get_filesize()
     last = -(-claimed // chunk)
     for i in range(last - 1, max(last - BACK, 0) - 1, -1):
         info = counts.id.get_chunk_info_by_coord((i * chunk,))

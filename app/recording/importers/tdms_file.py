@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.errors import InputError
+from app.recording.files import one_line
 from app.recording.importers.source import PARSER_FAILURES, no_such_column
 
 if TYPE_CHECKING:
@@ -89,5 +90,5 @@ def _load(path: Path) -> tuple[dict[str, np.ndarray], set[tuple[float, float, in
                         start = float(channel.properties.get("wf_start_offset", 0.0))
                         timing.add((start, step, values.size))
     except PARSER_FAILURES as error:
-        raise InputError(f"{path} cannot be read as a TDMS file: {error}") from error
+        raise InputError(f"{path} cannot be read as a TDMS file: {one_line(error)}") from error
     return columns, timing
