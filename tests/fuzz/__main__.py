@@ -27,12 +27,13 @@ def run(name: str, seed: int, count: int, deadline: float, folder: Path) -> tupl
     at = failures = 0
     while at < count and time.monotonic() < deadline:
         command = [sys.executable, "-m", "tests.fuzz.worker", name, str(seed), str(at), str(count)]
+        errors = (folder / "errors.txt").open("w+", encoding="utf-8")
         worker = subprocess.Popen(
-            [*command, str(folder)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            text=True,
-        )  # fmt: skip
+            [*command, str(folder)], cwd=ROOT, stdout=subprocess.PIPE, stderr=errors, text=True
+        )
         lines: queue.SimpleQueue[str] = queue.SimpleQueue()
-        threading.Thread(target=_pump, args=(worker, lines), daemon=True).start()
+        pump = threading.Thread(target=_pump, args=(worker, lines))
+        pump.start()
         why = ""
         while True:
             try:
@@ -47,9 +48,12 @@ def run(name: str, seed: int, count: int, deadline: float, folder: Path) -> tupl
                 break
         worker.kill()
         code = worker.wait()
+        pump.join()
+        errors.seek(0)
+        said = errors.read()
+        errors.close()
         if not why and at < count and time.monotonic() < deadline:
-            assert worker.stderr is not None
-            why = f"ended with {code}: {worker.stderr.read()[-2000:]}"
+            why = f"ended with {code}: {said[-2000:]}"
         if why:
             failures += 1
             suffix = TARGETS[name].suffix
@@ -64,8 +68,9 @@ def run(name: str, seed: int, count: int, deadline: float, folder: Path) -> tupl
 
 def _pump(worker: subprocess.Popen[str], lines: queue.SimpleQueue[str]) -> None:
     assert worker.stdout is not None
-    for line in worker.stdout:
-        lines.put(line)
+    with worker.stdout:
+        for line in worker.stdout:
+            lines.put(line)
     lines.put("")
 
 
@@ -89,7 +94,7 @@ def main() -> None:
         folder.mkdir(exist_ok=True)
         done, failures = run(name, asked.seed, count, deadline, folder)
         total += done
-        found = len(list(folder.glob("*.txt")))
+        found = len(list(folder.glob(f"*{TARGETS[name].suffix}"))) - 1
         print(
             f"{name}: {done} inputs in {time.monotonic() - began:.0f} s, "
             f"{failures} crashes or hangs, {found} findings in {folder}",

@@ -128,7 +128,6 @@ def models(folder: Path) -> list[bytes]:
 
 
 TARGETS: dict[str, Target] = {
-    "recordings": Target(".h5", recordings, mutated_hdf5, read_recording, 0.02),
     "sequences": Target(".toml", sequences, mutated_text, load_sequence, 0.2),
     "rig files": Target(".toml", rig_files, mutated_text, load_rig_file, 0.12),
     "model files": Target(".toml", models, mutated_text, load_model, 0.2),
@@ -136,6 +135,7 @@ TARGETS: dict[str, Target] = {
     "MAT": Target(".mat", exported("mat"), mutated_bytes, read_table, 0.2),
     "Parquet": Target(".parquet", exported("parquet"), mutated_bytes, read_table, 0.03),
     "TDMS": Target(".tdms", tdms_files, mutated_bytes, read_table, 0.03),
+    "recordings": Target(".h5", recordings, mutated_hdf5, read_recording, 0.01),
 }
 
 
