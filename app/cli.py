@@ -456,6 +456,27 @@ def recover(
         write_json({**describe(recording), "recovered": mended}, json)
 
 
+@app.command("index")
+def index_(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Of recordings.")],
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """List the recordings in a folder and the folders in it, oldest first."""
+    from app.recording.index import index_folder, lines
+    from app.terminal import progress, write_json
+
+    _check_files(force, (), json=json)
+    with progress("dearig") as report:
+        found = index_folder(folder, lambda part: report("looking", part))
+    found.sort(key=lambda entry: (entry.start_time, entry.path))
+    if json != "-":
+        _print(_console(), "\n".join(lines(found)))
+    if json is not None:
+        listed = [asdict(entry) for entry in found]
+        write_json({"format": "dearig-index/1", "folder": str(folder), "recordings": listed}, json)
+
+
 @app.command(cls=_ManyToValidate)
 def identify(
     train: Annotated[list[Path], typer.Argument(metavar="TRAIN.h5...", help="Recordings to fit.")],
