@@ -371,6 +371,20 @@ def test_tdms_waveforms_carry_their_time(tmp_path: Path) -> None:
     np.testing.assert_allclose(taken(path).time, np.arange(50) * 0.01)
 
 
+def test_a_tdms_file_that_was_cut_short_is_not_taken(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    n = np.arange(50.0)
+    path = tdms(
+        tmp_path / "in.tdms",
+        *(ChannelObject("rig", name, n) for name in ("time_s", "voltage_V", "displacement_m")),
+    )
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(InputError, match=r"in\.tdms is truncated: Last segment"):
+        taken(path)
+    assert capfd.readouterr() == ("", "")
+
+
 def test_tdms_files_that_cannot_be_read(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read as a TDMS file"):
         taken(csv(tmp_path, b"junk" * 100, "in.tdms"))

@@ -15,7 +15,7 @@ from platformdirs import user_cache_path
 from app.errors import InputError
 from app.recording.files import in_words, replaced_when_done
 from app.recording.layout import FORMAT
-from app.recording.opening import UNREADABLE, damage, opened
+from app.recording.opening import read_from
 from app.recording.physical import read_channels, sample_count
 from app.recording.safe import Refused, dataset, group
 from app.recording.text import text_of
@@ -99,12 +99,9 @@ def _files(folder: Path) -> Iterator[tuple[str, int, int]]:
 def glance(path: Path, name: str, size: int) -> Entry:
     """What can be said of the file at ``path`` without its samples."""
     try:
-        with opened(path) as file:
-            return _entry(file, name, size)
-    except (InputError, Refused) as error:
+        return read_from(path, lambda file: _entry(file, name, size))
+    except InputError as error:
         return Entry(name, size, trouble=str(error))
-    except UNREADABLE as error:
-        return Entry(name, size, trouble=str(damage(path, error)))
 
 
 def _entry(file: h5py.File, name: str, size: int) -> Entry:

@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 import h5py
 
 from app.errors import InputError
 from app.recording.files import in_words, one_line
 from app.recording.journal import Patched, whole_journal
+from app.recording.safe import Refused
 from app.recording.superblock import SIZE, flags_of, mend_superblock
 
 #: The flag of a file that is written so that it can be read at any time.
 WRITTEN_IN_ORDER = 4
+#: Beyond the end of every file.
+FAR = 2**60
 BEING_WRITTEN = "is being written by another program, or was killed before its first sample"
 
-__all__ = ["UNREADABLE", "damage", "opened"]
+__all__ = ["UNREADABLE", "damage", "opened", "read_from"]
+
+T = TypeVar("T")
+
+#: How often a file that is being written is looked at before it counts as damaged.
+LOOKS = 5
 
 #: What HDF5 raises for damage, and what items of another type than this layout's lead to.
 UNREADABLE = (
@@ -25,6 +34,7 @@ UNREADABLE = (
     LookupError,
     MemoryError,
     OSError,
+    EOFError,
     OverflowError,
     RuntimeError,
     TypeError,
@@ -38,6 +48,24 @@ def damage(path: Path, error: Exception) -> InputError:
     if "filter returned failure" in text:
         text = "a checksum is wrong: the file was changed, or its disk fails"
     return InputError(f"{path} is damaged: {text}")
+
+
+def read_from(path: Path, look: Callable[[h5py.File], T]) -> T:
+    """What ``look`` makes of the file at ``path``; ``InputError`` for one that cannot be read.
+
+    A file that is being written is looked at again: a look may fall between two of its writes.
+    """
+    for left in reversed(range(LOOKS)):
+        with opened(path) as file:
+            growing = file.driver == "fileobj"
+            try:
+                return look(file)
+            except Refused as error:
+                raise InputError(f"{path}: {error}") from error
+            except UNREADABLE as error:
+                if not (growing and left):
+                    raise damage(path, error) from error
+    raise InputError(f"{path} cannot be read")
 
 
 @contextmanager
@@ -83,8 +111,9 @@ def _as_closed(patched: Patched) -> Patched:
     """A file that is being written, or was when its run was killed, as if it had been closed.
 
     HDF5 has a mode for this (SWMR). In it what is damaged is read again and again, with pauses that
-    grow without end; here it is an error at once.
+    grow without end; here it is an error at once, and ``UNREADABLE`` may be worth another look.
     """
-    patched.edge = max(patched.edge, SIZE)
+    # while it is looked at it may grow, and its end with it
+    patched.end = FAR
     mend_superblock(patched)
     return patched

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,12 +13,16 @@ import numpy as np
 
 from app.errors import InputError
 from app.recording.files import one_line
-from app.recording.importers.source import PARSER_FAILURES, no_such_column
+from app.recording.importers.source import PARSER_FAILURES, no_such_column, printable
 
 if TYPE_CHECKING:
     from nptdms import TdmsFile
 
 __all__ = ["TdmsChannels"]
+
+
+#: What the library says of a file that was not written to its end.
+CUT_SHORT = "Last segment"
 
 
 class TdmsChannels:
@@ -75,7 +81,7 @@ def _load(path: Path) -> tuple[dict[str, np.ndarray], set[tuple[float, float, in
     columns: dict[str, np.ndarray] = {}
     timing: set[tuple[float, float, int]] = set()
     try:
-        with path.open("rb") as stream, warnings.catch_warnings():
+        with path.open("rb") as stream, warnings.catch_warnings(), _told() as told:
             warnings.simplefilter("ignore")
             _check_claims(path, TdmsFile.read_metadata(stream))
             stream.seek(0)
@@ -84,11 +90,33 @@ def _load(path: Path) -> tuple[dict[str, np.ndarray], set[tuple[float, float, in
                     values = np.asarray(channel[:])
                     if values.dtype.kind not in "fiu" or values.size == 0:
                         continue
-                    columns[f"{group.name}/{channel.name}"] = values.astype(np.float64)
+                    columns[printable(f"{group.name}/{channel.name}")] = values.astype(np.float64)
                     step = float(channel.properties.get("wf_increment", 0.0))
                     if step > 0.0:
                         start = float(channel.properties.get("wf_start_offset", 0.0))
                         timing.add((start, step, values.size))
     except PARSER_FAILURES as error:
         raise InputError(f"{path} cannot be read as a TDMS file: {one_line(error)}") from error
+    cut = [text for text in told if CUT_SHORT in text]
+    if cut:
+        raise InputError(f"{path} is truncated: {cut[0]}")
     return columns, timing
+
+
+@contextmanager
+def _told() -> Iterator[list[str]]:
+    """What the library says in its log, meanwhile kept from the terminal."""
+    told: list[str] = []
+
+    def keep(record: logging.LogRecord) -> bool:
+        told.append(one_line(Exception(record.getMessage())))
+        return False
+
+    handlers = logging.getLogger("nptdms").handlers
+    for handler in handlers:
+        handler.addFilter(keep)
+    try:
+        yield told
+    finally:
+        for handler in handlers:
+            handler.removeFilter(keep)
