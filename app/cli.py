@@ -176,8 +176,19 @@ def demo(
 
 @app.command()
 def record(
-    sequence: Annotated[str, typer.Argument(metavar="SEQUENCE", help="A TOML file or a preset.")],
     out: Annotated[Path, typer.Option("--out", metavar="FILE.h5", help="The recording.")],
+    sequence: Annotated[
+        str | None,
+        typer.Argument(metavar="SEQUENCE", help="A TOML file or a preset.", show_default=False),
+    ] = None,
+    like: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.h5",
+            help="Repeat that run: its sequence, rig file, simulated rig, and seed (if none is "
+            "given).",
+        ),
+    ] = None,
     rig: Annotated[
         str,
         typer.Option(
@@ -206,6 +217,7 @@ def record(
     force: Force = False,
 ) -> None:
     """Play a sequence on a rig and record it; ctrl-C ramps down to 0 V and keeps the recording."""
+    from app.like import original_of
     from app.modelfile import load_actuator
     from app.rigfile import load_rig_file
     from app.run import record as run
@@ -215,20 +227,34 @@ def record(
     from app.toml_input import read_text
     from sim_backend.faults import FaultPlan
 
-    _check_files(force, (sequence, rig_file, model), out, json=json, recording=out)
-    settings = load_rig_file(rig_file)
-    text = "" if rig_file is None else read_text(rig_file, "rig file")
+    _check_files(force, (sequence, rig_file, model, like), out, json=json, recording=out)
+    if (sequence is None) == (like is None):
+        raise InputError(
+            "give a sequence to play, or a recording to repeat with --like: one of them"
+        )
+    if like is not None and rig_file is not None:
+        raise InputError(f"--like {like} brings its own rig file; leave --rig-file out")
+    original = None if like is None else original_of(like)
+    if original is None:
+        settings = load_rig_file(rig_file)
+        text = "" if rig_file is None else read_text(rig_file, "rig file")
+        loaded = load_sequence(str(sequence))
+    else:
+        settings, text, loaded = original.rig_file, original.configuration, original.sequence
+        rig, seed = original.on(rig), seed or original.seed
     actuator = None
     if model is not None:
         actuator = load_actuator(model)
         settings = of_rig(settings, actuator.film, actuator.load)
+    if original is not None:
+        original.check_film(settings)
     try:
         faults = FaultPlan.parse(fault or ())
     except ValueError as error:
         raise InputError(str(error)) from error
     with _working(json) as (console, progress):
         result = run(
-            load_sequence(sequence), rig, settings, text, out, seed=seed, paced=paced,
+            loaded, rig, settings, text, out, seed=seed, paced=paced,
             actuator=actuator, faults=faults, operator=operator, film_id=film, notes=notes,
             overwrite=force, progress=progress,
         )  # fmt: skip
@@ -489,6 +515,27 @@ def recover(
     )
     if json is not None:
         write_json({**describe(recording), "recovered": mended}, json)
+
+
+@app.command("index")
+def index_(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Of recordings.")],
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """List the recordings in a folder and the folders in it, oldest first."""
+    from app.recording.index import index_folder, lines
+    from app.terminal import progress, write_json
+
+    _check_files(force, (), json=json)
+    with progress("dearig") as report:
+        found = index_folder(folder, lambda part: report("looking", part))
+    found.sort(key=lambda entry: (entry.start_time, entry.path))
+    if json != "-":
+        _print(_console(), "\n".join(lines(found)))
+    if json is not None:
+        listed = [asdict(entry) for entry in found]
+        write_json({"format": "dearig-index/1", "folder": str(folder), "recordings": listed}, json)
 
 
 @app.command(cls=_ManyToValidate)

@@ -126,6 +126,10 @@ def load_model(path: str | Path) -> ModelFile:
         return ModelFile(file.name, model, file.history)
     except ModelError as error:
         raise InputError(f"{name}: {error}") from error
+    except ArithmeticError as error:
+        raise InputError(
+            f"{name}: its numbers are too small or too large to compute with: {error}"
+        ) from error
 
 
 def load_actuator(path: str | Path) -> Actuator:

@@ -341,7 +341,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     "recover of none": ("recover {s}/text.h5", ["is not an HDF5 file"]),
     # import
     "nothing to import": ("import no.csv --out o.h5", ["no.csv is not there"]),
-    "an unknown format": ("import {s}/rig.toml --out o.h5", [".csv, .mat and .tdms"]),
+    "an unknown format": ("import {s}/rig.toml --out o.h5", [".csv, .mat, .parquet and .tdms"]),
     "import onto itself": ("import {s}/film.csv --out {s}/film.csv --force", ["that is read"]),
     "column nonsense": (
         "import {s}/film.csv --out o.h5 --column nonsense",

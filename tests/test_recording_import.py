@@ -193,7 +193,9 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
 def test_files_it_cannot_take(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.csv is not there"):
         taken(tmp_path / "none.csv")
-    with pytest.raises(InputError, match=r"named \.csv, \.mat, \.parquet and \.tdms .* not '\.xlsx'"):
+    with pytest.raises(
+        InputError, match=r"named \.csv, \.mat, \.parquet and \.tdms .* not '\.xlsx'"
+    ):
         taken(csv(tmp_path, "x", "in.xlsx"))
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(InputError, match="is a folder"):
@@ -367,6 +369,22 @@ def test_tdms_waveforms_carry_their_time(tmp_path: Path) -> None:
         ChannelObject("a", "displacement_um", np.arange(50.0), timing),
     )
     np.testing.assert_allclose(taken(path).time, np.arange(50) * 0.01)
+
+
+def test_a_tdms_file_that_was_cut_short_is_not_taken(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    n = np.arange(50.0)
+    path = tdms(
+        tmp_path / "in.tdms",
+        *(ChannelObject("rig", name, n) for name in ("time_s", "voltage_V", "displacement_m")),
+    )
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(
+        InputError, match=r"in\.tdms is truncated: its segment at byte 0 has no end"
+    ):
+        taken(path)
+    assert capfd.readouterr() == ("", "")
 
 
 def test_tdms_files_that_cannot_be_read(tmp_path: Path) -> None:

@@ -12,7 +12,8 @@ import pytest
 
 from app.errors import InputError
 from app.recording import open_recording, save_recording
-from tests.recording_tools import Clock, write_run
+from drivers.rig import Block
+from tests.recording_tools import Clock, run_counts, write_run, writer
 
 N = 200
 
@@ -153,6 +154,28 @@ def test_a_damaged_first_block_never_reaches_the_library(tmp_path: Path, run: Pa
         path.write_bytes(raw)
         with pytest.raises(InputError, match=r"bad\.h5 (is damaged|is not an HDF5|cannot be read)"):
             open_recording(path)
+
+
+def test_damage_to_a_killed_run_is_told_at_once(tmp_path: Path) -> None:
+    # the library's mode for such files would read the damaged place again for ever
+    path, copy = tmp_path / "run.h5", tmp_path / "copy.h5"
+    recorder = writer(path)
+    recorder.append(Block(0, run_counts(200)))
+    recorder._file.flush()
+    whole = path.read_bytes()
+    recorder.close()
+    at, damaged = whole.find(b"OHDR"), 0
+    while at >= 0:
+        raw = bytearray(whole)
+        raw[at + 30] ^= 0x10
+        copy.write_bytes(raw)
+        try:
+            open_recording(copy)
+        except InputError as error:
+            assert "copy.h5" in str(error)  # noqa: PT017
+            damaged += 1
+        at = whole.find(b"OHDR", at + 1)
+    assert damaged > 10
 
 
 def test_bytes_turned_anywhere_are_a_sentence_or_harmless(tmp_path: Path, film: Path) -> None:

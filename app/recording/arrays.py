@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import h5py
 import numpy as np
@@ -13,13 +13,15 @@ import numpy as np
 from app.errors import InputError
 from app.recording.clockwork import not_forward
 from app.recording.layout import UNITS
-from app.recording.opening import UNREADABLE, damage, opened
+from app.recording.opening import read_from
 from app.recording.physical import Counts, Rest
 from app.recording.pyramid import reduced
 from app.recording.quiet import lead_in
-from app.recording.safe import Refused, dataset, group
+from app.recording.safe import dataset, group
 
 __all__ = ["Arrays", "Overview"]
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,18 +71,22 @@ class Arrays:
         start, stop = max(start, 0), min(stop, self.samples)
         if name in self._read:
             return self._read[name][start:stop]
-        with self._entry() as entry:
+
+        def cut(entry: h5py.Group) -> np.ndarray:
             if name in self.stored:
                 values: np.ndarray = self._row(entry, name)[start:stop].astype(np.float64)
                 return values
             return self._counts(entry).window(name, start, stop)
 
+        return self._of_entry(cut)
+
     def overview(self, name: str, points: int, start: int, stop: int) -> Overview:
         """``name`` between two samples in at most about ``points`` bins."""
         start, stop = max(start, 0), min(stop, self.samples)
         if name != "time" and name in self._derived:
-            with self._entry() as entry:
-                return Overview(*self._counts(entry).overview(name, start, stop, points))
+            return self._of_entry(
+                lambda entry: Overview(*self._counts(entry).overview(name, start, stop, points))
+            )
         time, values = self.window("time", start, stop), self.window(name, start, stop)
         if time.size > points:
             time = time[(np.arange(points) * time.size) // points]
@@ -89,22 +95,17 @@ class Arrays:
     def lead_in(self, step: float) -> int:
         """Samples at 0 V at the start, where a voltage below ``step`` V cannot be resolved."""
         if "voltage_command" in self._derived:
-            with self._entry() as entry:
-                return self._counts(entry).lead_in()
+            return self._of_entry(lambda entry: self._counts(entry).lead_in())
         return lead_in(self.read("voltage_command"), step)
 
-    @contextmanager
-    def _entry(self) -> Iterator[h5py.Group]:
-        with opened(self.path) as file:
-            try:
-                entry = group(file, "entry")
-                if entry is None:
-                    raise InputError(f"{self.path}: the group /entry is missing")
-                yield entry
-            except Refused as error:
-                raise InputError(f"{self.path}: {error}") from error
-            except UNREADABLE as error:
-                raise damage(self.path, error) from error
+    def _of_entry(self, look: Callable[[h5py.Group], T]) -> T:
+        def look_at(file: h5py.File) -> T:
+            entry = group(file, "entry")
+            if entry is None:
+                raise InputError(f"{self.path}: the group /entry is missing")
+            return look(entry)
+
+        return read_from(self.path, look_at)
 
     def _row(self, entry: h5py.Group, name: str) -> h5py.Dataset:
         data = group(entry, "data")

@@ -16,6 +16,7 @@ __all__ = [
     "errno_of",
     "file_sha256",
     "in_words",
+    "one_line",
     "put_back",
     "replaced_when_done",
     "set_aside",
@@ -74,7 +75,13 @@ def errno_of(error: Exception) -> int | None:
 def in_words(error: Exception) -> str:
     """What the operating system says of ``error``, without its number and without the path."""
     number = errno_of(error)
-    return " ".join(str(error).split()) if number is None else os.strerror(number)
+    return one_line(error) if number is None else os.strerror(number)
+
+
+def one_line(error: Exception, most: int = 300) -> str:
+    """The text of another library's ``error``, fit for a sentence: printable, and not too long."""
+    text = " ".join("".join(c if c.isprintable() else " " for c in str(error)).split())
+    return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
 @contextmanager

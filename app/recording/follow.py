@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import h5py
 import numpy as np
 
 from app.errors import InputError
-from app.recording.opening import UNREADABLE, damage, opened
+from app.recording.opening import read_from
 from app.recording.physical import Counts, Rest
 from app.recording.reader import read_events
 from app.recording.recording import RecordedEvent
-from app.recording.safe import Refused, group
+from app.recording.safe import group
 
 __all__ = ["Follower", "News"]
 
@@ -49,25 +50,22 @@ class Follower:
         A flush makes new samples visible, four times a second. Raises ``InputError`` for what is
         no recording of a run.
         """
-        with opened(self.path) as file:
-            try:
-                entry = group(file, "entry")
-                if entry is None or group(entry, "data") is None:
-                    raise InputError(f"{self.path}: the group /entry/data is missing")
-                ended = "samples" in entry.attrs
-                counts = Counts(entry, rest=self._rest)
-                if not counts.channels:
-                    raise InputError(f"{self.path} is not of a run: it has no counts")
-                start, stop = self._samples, counts.samples
-                if most is not None:
-                    stop = min(stop, start + most)
-                rest = counts.rest
-                values = {name: counts.window(name, start, stop) for name in counts.names}
-                events = read_events(self.path, entry)
-            except Refused as error:
-                raise InputError(f"{self.path}: {error}") from error
-            except UNREADABLE as error:
-                raise damage(self.path, error) from error
+        return read_from(self.path, lambda file: self._look(file, most))
+
+    def _look(self, file: h5py.File, most: int | None) -> News:
+        entry = group(file, "entry")
+        if entry is None or group(entry, "data") is None:
+            raise InputError(f"{self.path}: the group /entry/data is missing")
+        ended = "samples" in entry.attrs
+        counts = Counts(entry, rest=self._rest)
+        if not counts.channels:
+            raise InputError(f"{self.path} is not of a run: it has no counts")
+        start, stop = self._samples, counts.samples
+        if most is not None:
+            stop = min(stop, start + most)
+        rest = counts.rest
+        values = {name: counts.window(name, start, stop) for name in counts.names}
+        events = read_events(self.path, entry)
         if rest.samples < counts.samples:
             self._rest = rest
         fresh = events[self._events :]

@@ -72,8 +72,7 @@ class Patched(io.RawIOBase):
         stop = min(start + len(view), self.end)
         if stop <= start:
             return 0
-        self._file.seek(start)
-        self._fill(view[: stop - start])
+        self._fill(start, view[: stop - start])
         for number in self._numbers(start, min(stop, self.edge)):
             page = self.pages.get(number)
             if page is None:
@@ -83,11 +82,14 @@ class Patched(io.RawIOBase):
         self._at = stop
         return stop - start
 
-    def _fill(self, view: memoryview) -> None:
+    def _fill(self, at: int, view: memoryview) -> None:
+        self._file.seek(at)
         got = 0
         while got < len(view):
             more = self._file.readinto(view[got:])
             if not more:
+                if at + len(view) > self.edge:
+                    raise EOFError(f"the file ends before byte {at + len(view)}")
                 # what was truncated away and grown again reads as nothing written
                 view[got:] = bytes(len(view) - got)
                 return
@@ -132,8 +134,7 @@ class Patched(io.RawIOBase):
         """What stands in the file in the place of page ``number``, up to the edge."""
         size = min(PAGE, self.edge - number * PAGE)
         held = bytearray(size)
-        self._file.seek(number * PAGE)
-        self._fill(memoryview(held))
+        self._fill(number * PAGE, memoryview(held))
         return bytes(held)
 
     @staticmethod

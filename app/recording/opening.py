@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 import h5py
 
 from app.errors import InputError
-from app.recording.files import in_words
+from app.recording.files import in_words, one_line
 from app.recording.journal import Patched, whole_journal
-from app.recording.superblock import SIZE, flags_of
+from app.recording.safe import Refused
+from app.recording.superblock import SIZE, flags_of, mend_superblock
 
-__all__ = ["UNREADABLE", "damage", "opened"]
+#: The flag of a file that is written so that it can be read at any time.
+WRITTEN_IN_ORDER = 4
+#: Beyond the end of every file.
+FAR = 2**60
+BEING_WRITTEN = "is being written by another program, or was killed before its first sample"
+
+__all__ = ["UNREADABLE", "damage", "opened", "read_from"]
+
+T = TypeVar("T")
+
+#: How often a file that is being written is looked at before it counts as damaged.
+LOOKS = 5
 
 #: What HDF5 raises for damage, and what items of another type than this layout's lead to.
 UNREADABLE = (
@@ -21,6 +34,7 @@ UNREADABLE = (
     LookupError,
     MemoryError,
     OSError,
+    EOFError,
     OverflowError,
     RuntimeError,
     TypeError,
@@ -30,29 +44,44 @@ UNREADABLE = (
 
 def damage(path: Path, error: Exception) -> InputError:
     """What to tell of an ``UNREADABLE`` that came while ``path`` was read."""
-    text = " ".join(str(error).split())
+    text = one_line(error)
     if "filter returned failure" in text:
         text = "a checksum is wrong: the file was changed, or its disk fails"
     return InputError(f"{path} is damaged: {text}")
+
+
+def read_from(path: Path, look: Callable[[h5py.File], T]) -> T:
+    """What ``look`` makes of the file at ``path``; ``InputError`` for one that cannot be read.
+
+    A file that is being written is looked at again: a look may fall between two of its writes.
+    """
+    for left in reversed(range(LOOKS)):
+        with opened(path) as file:
+            growing = file.driver == "fileobj"
+            try:
+                return look(file)
+            except Refused as error:
+                raise InputError(f"{path}: {error}") from error
+            except UNREADABLE as error:
+                if not (growing and left):
+                    raise damage(path, error) from error
+    raise InputError(f"{path} cannot be read")
 
 
 @contextmanager
 def opened(path: Path) -> Iterator[h5py.File]:
     """The HDF5 file at ``path`` open for reading; ``InputError`` where it cannot be."""
     with ExitStack() as stack:
-        through: Patched | None = None
+        flags: int | None = 0
         try:
             if not path.is_file():
                 raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")
-            if (journal := whole_journal(path)) is not None:
-                before, after, pages = journal
-                raw = stack.enter_context(path.open("rb", buffering=0))
-                through = Patched(raw, before, {n: bytearray(p) for n, p in pages.items()})
-                through.end = after
-                flags = flags_of(through.read(SIZE) or b"")
-            else:
-                with path.open("rb") as stream:
-                    flags = flags_of(stream.read(SIZE))
+            journal = whole_journal(path)
+            raw = stack.enter_context(path.open("rb", buffering=0))
+            before, after, pages = journal or (raw.seek(0, 2), raw.tell(), {})
+            patched = Patched(raw, before, {n: bytearray(p) for n, p in pages.items()})
+            patched.end = after
+            flags = flags_of(patched.read(SIZE) or b"")
         except OSError as error:
             raise InputError(f"{path} cannot be read: {in_words(error)}") from error
         except ValueError as error:
@@ -62,22 +91,29 @@ def opened(path: Path) -> Iterator[h5py.File]:
                 f"{path} is not an HDF5 file, as recordings are; bring data made elsewhere in with "
                 f"dearig import"
             )
+        if flags and not flags & WRITTEN_IN_ORDER:
+            raise InputError(f"{path} {BEING_WRITTEN}")
         try:
-            # a plain open is refused after a kill and during a run; SWMR sees what was flushed. Not
-            # SWMR always: it does not look whether the file has been cut short
-            if through is None:
-                file = h5py.File(path, "r", swmr=flags != 0)
-            else:
-                file = h5py.File(through, "r")
-        except (OSError, RuntimeError) as error:
+            file = h5py.File(_as_closed(patched) if flags else patched if journal else path, "r")
+        except (OSError, RuntimeError, ValueError) as error:
             if "truncated" in str(error):
                 reason = "is truncated: it was not copied or downloaded to its end"
             elif flags:
-                reason = (
-                    "is being written by another program, or was killed before its first sample"
-                )
+                reason = BEING_WRITTEN
             else:
-                reason = f"cannot be read: {error}"
+                reason = f"cannot be read: {one_line(error)}"
             raise InputError(f"{path} {reason}") from error
         with file:
             yield file
+
+
+def _as_closed(patched: Patched) -> Patched:
+    """A file that is being written, or was when its run was killed, as if it had been closed.
+
+    HDF5 has a mode for this (SWMR). In it what is damaged is read again and again, with pauses that
+    grow without end; here it is an error at once, and ``UNREADABLE`` may be worth another look.
+    """
+    # while it is looked at it may grow, and its end with it
+    patched.end = FAR
+    mend_superblock(patched)
+    return patched

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -32,7 +31,7 @@ KELVIN = 273.15
 #: Samples that are gone through at a time: memory stays the same however long a run was.
 SLICE = 2**20
 #: Chunks from the end that are looked at one by one: more than any flush writes.
-BACK = 64
+BACK = 8
 #: Samples of the lead-in whose mean is the rest: more would not make it any better.
 REST_MAX = 2**22
 
@@ -90,15 +89,26 @@ def _backed(counts: h5py.Dataset) -> int:
     """
     claimed = int(counts.shape[0])
     claimed = min(claimed, counts.id.get_storage_size() // counts.dtype.itemsize)
-    if counts.chunks is None or counts.file.driver != "sec2":
+    if counts.chunks is None or "samples" in counts.parent.parent.attrs:
         return claimed
-    chunk, end = int(counts.chunks[0]), os.fstat(counts.file.id.get_vfd_handle()).st_size
+    chunk = int(counts.chunks[0])
     last = -(-claimed // chunk)
     for i in range(last - 1, max(last - BACK, 0) - 1, -1):
-        info = counts.id.get_chunk_info_by_coord((i * chunk,))
-        if info.byte_offset is None or info.byte_offset + info.size > end:
+        if not _readable(counts, i * chunk):
             claimed = i * chunk
     return claimed
+
+
+def _readable(counts: h5py.Dataset, at: int) -> bool:
+    """Whether the chunk with sample ``at`` lies in the file."""
+    if counts.id.get_chunk_info_by_coord((at,)).byte_offset is None:
+        return False
+    try:
+        # all of it is read for one
+        counts[at]
+    except (OSError, RuntimeError, EOFError):
+        return False
+    return True
 
 
 def resolution(channel: Channel) -> float:

@@ -18,11 +18,11 @@ from app.recording.layout import (
     ZERO_ORDER,
     counts_name,
 )
-from app.recording.opening import UNREADABLE, damage, opened
+from app.recording.opening import opened, read_from
 from app.recording.physical import Counts, Rest, read_channels, resolution
 from app.recording.provenance import read_provenance
 from app.recording.recording import RecordedEvent, Recording
-from app.recording.safe import Refused, dataset, group, item
+from app.recording.safe import dataset, group, item
 from app.recording.sample import read_film, read_load
 from app.recording.text import text_of
 from drivers.rig import Instrument
@@ -42,13 +42,7 @@ def open_recording(path: str | Path) -> Recording:
     Raises ``InputError`` with one sentence, what and where, for everything it does not understand.
     """
     path = Path(path)
-    with opened(path) as file:
-        try:
-            recording = _Reader(path, file).read()
-        except Refused as error:
-            raise InputError(f"{path}: {error}") from error
-        except UNREADABLE as error:
-            raise damage(path, error) from error
+    recording = read_from(path, lambda file: _Reader(path, file).read())
     if recording.samples <= EAGER:
         for name in recording.arrays.stored:
             recording.arrays.read(name)

@@ -10,6 +10,7 @@ from app.errors import InputError
 from app.recording.files import in_words
 from app.recording.finish import finish
 from app.recording.journal import carry_out
+from app.recording.opening import UNREADABLE
 from app.recording.reader import is_finished, open_recording
 from app.recording.superblock import mend_superblock
 
@@ -50,8 +51,6 @@ def recover(path: str | Path, now: Callable[[], float] = time.time) -> bool:
             mend=mend_superblock,
             fsync=True,
         )
-    except OSError as error:
+    except UNREADABLE as error:
         raise InputError(f"{path} cannot be mended: {in_words(error)}") from error
-    except ValueError as error:
-        raise InputError(f"{path} cannot be mended: {error}") from error
     return True

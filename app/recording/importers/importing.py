@@ -25,7 +25,7 @@ from drivers.rig import Event
 from model.kinematics import KINEMATICS
 from model.material import Film, Load
 
-__all__ = ["import_file"]
+__all__ = ["import_file", "source_at"]
 
 
 def import_file(
@@ -64,7 +64,7 @@ def import_file(
     for name, given in (("gauge length", gauge_length_mm), ("area", area_mm2)):
         if given is not None and not 0.0 < given < float("inf"):
             raise InputError(f"the {name} is {given!r}; it must be a finite number above 0")
-    opened = _open(path)
+    opened = source_at(path)
     was = exported(opened.about)
     chosen = Chosen(opened, columns or {})
     warnings: list[str] = []
@@ -112,7 +112,8 @@ def import_file(
     return warnings
 
 
-def _open(path: Path) -> Source:
+def source_at(path: Path) -> Source:
+    """What the file at ``path`` offers, by the ending of its name. Raises ``InputError``."""
     try:
         if not path.is_file():
             raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")

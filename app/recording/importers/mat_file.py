@@ -15,7 +15,7 @@ import numpy as np
 from app.errors import InputError
 from app.recording.files import in_words
 from app.recording.importers.mat5 import Damaged, Value, columns, variables
-from app.recording.importers.source import no_such_column
+from app.recording.importers.source import no_such_column, printable
 
 __all__ = ["MatFile"]
 
@@ -27,7 +27,9 @@ class MatFile:
         self.path = path
         found = _load(path)
         self._columns = {
-            name: column for top, value in found.items() for name, column in columns(top, value)
+            printable(name): column
+            for top, value in found.items()
+            for name, column in columns(top, value)
         }
         about = found.get("about")
         self.about = (

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from app.errors import InputError
+from app.recording.files import one_line
 from app.recording.importers.source import PARSER_FAILURES, no_such_column
 
 __all__ = ["ParquetFile"]
@@ -45,8 +46,7 @@ class ParquetFile:
         }
 
     def _unreadable(self, error: Exception) -> InputError:
-        words = " ".join(str(error).split())
-        return InputError(f"{self.path} cannot be read as a Parquet file: {words}")
+        return InputError(f"{self.path} cannot be read as a Parquet file: {one_line(error)}")
 
     def named(self, name: str) -> list[str]:
         """The columns called ``name``."""

@@ -13,7 +13,7 @@ import numpy as np
 from app.errors import InputError
 from app.recording.importers.columns import suggestion
 
-__all__ = ["PARSER_FAILURES", "Source", "listing", "no_such_column"]
+__all__ = ["PARSER_FAILURES", "Source", "listing", "no_such_column", "printable"]
 
 #: What the libraries that parse binary formats were seen to raise, or may, on damaged files.
 PARSER_FAILURES = (
@@ -75,9 +75,14 @@ class Source(Protocol):
         ...
 
 
+def printable(name: str) -> str:
+    """``name`` with a question mark for what would break a line or a terminal."""
+    return "".join(c if c.isprintable() else "?" for c in name)
+
+
 def listing(names: Sequence[str]) -> str:
     """``names`` for a message, the first dozen."""
-    shown = ", ".join(names[:LISTED]) or "none"
+    shown = ", ".join(printable(name) for name in names[:LISTED]) or "none"
     return shown if len(names) <= LISTED else f"{shown} and {len(names) - LISTED} more"
 
 

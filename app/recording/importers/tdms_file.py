@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import logging
+import struct
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
 from app.errors import InputError
-from app.recording.importers.source import PARSER_FAILURES, no_such_column
+from app.recording.files import one_line
+from app.recording.importers.source import PARSER_FAILURES, no_such_column, printable
 
 if TYPE_CHECKING:
     from nptdms import TdmsFile
 
 __all__ = ["TdmsChannels"]
+
+
+#: Every segment begins with this, its contents, a version, and the sizes of all and of the head.
+LEAD_IN = struct.Struct("<4sIIQQ")
+#: The size of a segment whose writing was never ended.
+NOT_ENDED = 2**64 - 1
 
 
 class TdmsChannels:
@@ -58,6 +67,23 @@ class TdmsChannels:
         return {name: self._columns[name] for name in names}
 
 
+def _check_whole(path: Path, stream: BinaryIO) -> None:
+    """Raise ``InputError`` unless every segment has its end: the library reads what there is."""
+    end, at = path.stat().st_size, 0
+    while at < end:
+        stream.seek(at)
+        lead_in = stream.read(LEAD_IN.size)
+        if len(lead_in) < LEAD_IN.size or lead_in[:4] != b"TDSm":
+            break  # the library has words for this
+        size = LEAD_IN.unpack(lead_in)[3]
+        if size == NOT_ENDED or at + LEAD_IN.size + size > end:
+            raise InputError(
+                f"{path} is truncated: its segment at byte {at} has no end; copy it again, or "
+                f"save it anew with the program that made it"
+            )
+        at += LEAD_IN.size + size
+
+
 def _check_claims(path: Path, metadata: TdmsFile) -> None:
     """Raise ``InputError`` where the channels claim more values than the file has bytes."""
     claimed = sum(len(channel) for group in metadata.groups() for channel in group.channels())
@@ -70,12 +96,17 @@ def _check_claims(path: Path, metadata: TdmsFile) -> None:
 
 def _load(path: Path) -> tuple[dict[str, np.ndarray], set[tuple[float, float, int]]]:
     from nptdms import TdmsFile
+    from nptdms.log import log_manager
 
+    # what it complains of is told in the error, not on the terminal
+    log_manager.set_level(logging.ERROR)
     columns: dict[str, np.ndarray] = {}
     timing: set[tuple[float, float, int]] = set()
     try:
         with path.open("rb") as stream, warnings.catch_warnings():
             warnings.simplefilter("ignore")
+            _check_whole(path, stream)
+            stream.seek(0)
             _check_claims(path, TdmsFile.read_metadata(stream))
             stream.seek(0)
             for group in TdmsFile.read(stream).groups():
@@ -83,11 +114,11 @@ def _load(path: Path) -> tuple[dict[str, np.ndarray], set[tuple[float, float, in
                     values = np.asarray(channel[:])
                     if values.dtype.kind not in "fiu" or values.size == 0:
                         continue
-                    columns[f"{group.name}/{channel.name}"] = values.astype(np.float64)
+                    columns[printable(f"{group.name}/{channel.name}")] = values.astype(np.float64)
                     step = float(channel.properties.get("wf_increment", 0.0))
                     if step > 0.0:
                         start = float(channel.properties.get("wf_start_offset", 0.0))
                         timing.add((start, step, values.size))
     except PARSER_FAILURES as error:
-        raise InputError(f"{path} cannot be read as a TDMS file: {error}") from error
+        raise InputError(f"{path} cannot be read as a TDMS file: {one_line(error)}") from error
     return columns, timing

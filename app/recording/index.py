@@ -1,0 +1,196 @@
+"""What lies in a folder of recordings, quickly: a glance at each, kept until the file changes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import h5py
+from platformdirs import user_cache_path
+
+from app.errors import InputError
+from app.recording.files import in_words, replaced_when_done
+from app.recording.layout import FORMAT
+from app.recording.opening import read_from
+from app.recording.physical import read_channels, sample_count
+from app.recording.safe import Refused, dataset, group
+from app.recording.text import text_of
+
+__all__ = ["ENDINGS", "Entry", "glance", "index_folder", "lines"]
+
+ENDINGS = (".h5", ".hdf5", ".nxs")
+#: Of the kept glances; another one is not read.
+KEPT = "dearig-index/1"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One file: what a person looks for it by. ``trouble`` says why it is no recording, or ""."""
+
+    path: str
+    bytes: int
+    kind: str = ""
+    title: str = ""
+    start_time: str = ""
+    samples: int = 0
+    duration_s: float | None = None
+    complete: bool = False
+    outcome: str = ""
+    rig: str = ""
+    film_id: str = ""
+    operator: str = ""
+    trouble: str = ""
+
+
+def index_folder(
+    folder: str | Path, progress: Callable[[float], None] | None = None, cache: Path | None = None
+) -> list[Entry]:
+    """The recordings in ``folder`` and the folders in it, by their paths from there.
+
+    A file that has the size and the time of the last look is not opened again; what was seen is
+    kept in ``cache``, by default in the user's own folder for such things. ``progress`` is called
+    with the part that is done. Raises ``InputError`` if there is no such folder.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"{folder} is {'no folder' if folder.exists() else 'not there'}")
+    cache = _cache_of(folder) if cache is None else cache
+    kept = _load(cache)
+    found = sorted(_files(folder))
+    entries: dict[str, Entry] = {}
+    stamps: dict[str, tuple[int, int]] = {}
+    fresh = 0
+    for i, (name, size, changed) in enumerate(found):
+        stamp, entry = kept.get(name, ((-1, -1), None))
+        if entry is None or stamp != (size, changed):
+            entry = glance(folder / name, name, size)
+            fresh += 1
+            if progress is not None:
+                progress((i + 1) / len(found))
+        entries[name], stamps[name] = entry, (size, changed)
+    if fresh or len(kept) != len(entries):
+        _save(cache, entries, stamps)
+    return list(entries.values())
+
+
+def _files(folder: Path) -> Iterator[tuple[str, int, int]]:
+    """Path from ``folder``, size and time of change in ns of every file that may be a recording."""
+    # texts, not paths: there may be ten thousand
+    waiting = [""]
+    while waiting:
+        here = waiting.pop()
+        try:
+            with os.scandir(folder / here) as items:
+                for item in items:
+                    name = f"{here}{item.name}"
+                    if item.is_dir(follow_symlinks=False):
+                        waiting.append(f"{name}/")
+                    elif name.lower().endswith(ENDINGS) and item.is_file():
+                        about = item.stat()
+                        yield name, about.st_size, about.st_mtime_ns
+        except OSError as error:
+            raise InputError(f"{folder / here} cannot be read: {in_words(error)}") from error
+
+
+def glance(path: Path, name: str, size: int) -> Entry:
+    """What can be said of the file at ``path`` without its samples."""
+    try:
+        return read_from(path, lambda file: _entry(file, name, size))
+    except InputError as error:
+        return Entry(name, size, trouble=str(error))
+
+
+def _entry(file: h5py.File, name: str, size: int) -> Entry:
+    if text_of(file.attrs.get("format", "")) != FORMAT:
+        raise Refused(f"it is not of format {FORMAT}")
+    entry = group(file, "entry")
+    data = None if entry is None else group(entry, "data")
+    if entry is None or data is None:
+        raise Refused("the group /entry/data is missing")
+    facts = entry.attrs
+    rate = data.attrs.get("rate_Hz")
+    duration: float | None = None
+    time = dataset(data, "time")
+    if "samples" in facts:
+        samples = int(facts["samples"])
+    else:
+        samples = sample_count(data, read_channels(data)) if time is None else time.shape[0]
+    if rate is not None:
+        duration = max(samples - 1, 0) / float(rate)
+    elif time is not None and time.shape[0]:
+        duration = float(time[-1]) - float(time[0])
+    noted = group(entry, "provenance")
+    said = {} if noted is None else noted.attrs
+    sample = group(entry, "sample")
+    complete = bool(facts.get("complete", False))
+    return Entry(
+        path=name,
+        bytes=size,
+        kind=text_of(facts.get("kind", "")),
+        title=_text(entry, "title"),
+        start_time=_text(entry, "start_time"),
+        samples=samples,
+        duration_s=duration,
+        complete=complete,
+        outcome=text_of(facts.get("outcome", "" if complete else "killed, or still running")),
+        rig=text_of(said.get("rig", "")),
+        film_id="" if sample is None else _text(sample, "name"),
+        operator=text_of(said.get("operator", "")),
+    )
+
+
+def _text(parent: h5py.Group, name: str) -> str:
+    found = dataset(parent, name)
+    return "" if found is None else text_of(found[()])
+
+
+def _cache_of(folder: Path) -> Path:
+    key = hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:24]
+    return user_cache_path("dearig") / f"index-{key}.json"
+
+
+def _load(cache: Path) -> dict[str, tuple[tuple[int, int], Entry]]:
+    """What was kept; nothing, where that is gone, of another version, or not in order."""
+    try:
+        kept = json.loads(cache.read_text("utf-8"))
+        if kept["format"] != KEPT:
+            return {}
+        return {
+            name: ((size, changed), Entry(**facts)) for name, size, changed, facts in kept["files"]
+        }
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return {}
+
+
+def _save(cache: Path, entries: dict[str, Entry], stamps: dict[str, tuple[int, int]]) -> None:
+    files = [[name, *stamps[name], asdict(entry)] for name, entry in entries.items()]
+    try:
+        cache.parent.mkdir(parents=True, exist_ok=True)
+        with replaced_when_done(cache) as partial:
+            partial.write_text(json.dumps({"format": KEPT, "files": files}), encoding="utf-8")
+    except (OSError, InputError):
+        # a home that may not be written makes the next look slower, and is no reason to fail
+        return
+
+
+def lines(entries: Sequence[Entry]) -> list[str]:
+    """A line for each of ``entries``: start, length, what it is, and where."""
+    if not entries:
+        return ["no recordings"]
+    shown = []
+    for entry in entries:
+        if entry.trouble:
+            shown.append(f"{'not read':<19}  {'':>10}  {entry.path}: {entry.trouble}")
+            continue
+        length = "" if entry.duration_s is None else f"{entry.duration_s:.6g} s"
+        facts = [entry.title, entry.rig, entry.film_id, entry.operator]
+        if not entry.complete:
+            facts.append(f"INCOMPLETE: {entry.outcome}")
+        start = entry.start_time[:19].replace("T", " ")
+        told = ", ".join(fact for fact in facts if fact)
+        shown.append(f"{start:<19}  {length:>10}  {entry.path}: {told}")
+    return shown

@@ -1,0 +1,145 @@
+"""Every reader of files: good files to begin with, and what is done with a file."""
+
+from __future__ import annotations
+
+import random
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from nptdms import ChannelObject, TdmsWriter
+from scipy.io import savemat
+
+from app.modelfile import load_model
+from app.presets import PRESETS
+from app.recording import export_recording, open_recording, save_recording
+from app.recording.importers.chosen import Chosen
+from app.recording.importers.importing import source_at
+from app.rigfile import load_rig_file, write_default
+from app.sequencefile import load_sequence
+from drivers.rig import Block
+from tests.command import LOBE, film_model, thesis_model
+from tests.fuzz.mutate import mutated_bytes, mutated_hdf5, mutated_text
+from tests.recording_tools import Clock, run_counts, write_run, writer
+
+__all__ = ["TARGETS", "Target"]
+
+Mutate = Callable[[random.Random, Sequence[bytes]], bytes]
+
+
+@dataclass(frozen=True)
+class Target:
+    """One reader: the ending of its files, good ones, how they are damaged, and the reading.
+
+    ``share`` of all inputs are for it.
+    """
+
+    suffix: str
+    seeds: Callable[[Path], list[bytes]]
+    mutate: Mutate
+    read: Callable[[Path], object]
+    share: float
+
+
+def read_recording(path: Path) -> None:
+    recording = open_recording(path)
+    for name in recording.values:
+        recording.overview(name, 10)
+        recording.window(name, 3, 9)
+
+
+def read_table(path: Path) -> None:
+    chosen = Chosen(source_at(path), {})
+    if chosen.kind([]) == "actuator":
+        chosen.actuator()
+    else:
+        chosen.film(80.0, 22.0, [])
+
+
+def recordings(folder: Path) -> list[bytes]:
+    run, killed = folder / "run.h5", folder / "killed.h5"
+    write_run(run, run_counts(200, quiet=100), block=100)
+    recorder = writer(folder / "other.h5")
+    recorder.append(Block(0, run_counts(150, quiet=50)))
+    recorder._file.flush()
+    killed.write_bytes((folder / "other.h5").read_bytes())
+    recorder.close()
+    time = np.linspace(0.0, 1.0, 50)
+    film = save_recording(
+        folder / "film.h5", "film", {"time": time, "stretch": 1 + time, "nominal_stress": time},
+        title="film", now=Clock(),
+    )  # fmt: skip
+    return [path.read_bytes() for path in (run, killed, film)]
+
+
+def exported(to: str) -> Callable[[Path], list[bytes]]:
+    def made(folder: Path) -> list[bytes]:
+        run = folder / "run.h5"
+        write_run(run, run_counts(60, quiet=30), block=30)
+        seeds = [export_recording(run, to, folder / f"run.{to}").read_bytes()]
+        n = np.arange(20.0)
+        if to == "csv":
+            seeds += [
+                b"time_s,stretch,nominal_stress_kPa\n0,1,0\n1,1.1,10\n3,1.2,20\n",
+                b"# comment\ntime_s;voltage_kV;displacement_um\n0,0;0;0\n0,5;1;2\n1,0;2;3\n",
+                b"time_s\tforce_N\tdisplacement_mm\n0\t1\t2\n1\t2\t3\n",
+            ]
+        if to == "mat":
+            path = folder / "plain.mat"
+            content = {"time_s": n, "rig": {"voltage_kV": n, "c": [1, "a"]}, "displacement_m": n}
+            savemat(path, content)
+            seeds.append(path.read_bytes())
+        return seeds
+
+    return made
+
+
+def tdms_files(folder: Path) -> list[bytes]:
+    n = np.arange(20.0)
+    first, second = folder / "a.tdms", folder / "b.tdms"
+    with TdmsWriter(str(first)) as file:
+        for name in ("time_s", "voltage_V", "displacement_mm"):
+            file.write_segment([ChannelObject("g", name, n)])
+    timing = {"wf_increment": 0.1, "wf_start_offset": 0.0}
+    with TdmsWriter(str(second)) as file:
+        file.write_segment(
+            [ChannelObject("g", c, n.astype(t), timing)
+             for c, t in (("voltage_kV", "f4"), ("displacement_um", "i2"))]
+        )  # fmt: skip
+    return [first.read_bytes(), second.read_bytes()]
+
+
+def sequences(folder: Path) -> list[bytes]:
+    return [LOBE.encode(), *(text.encode() for text in PRESETS.values())]
+
+
+def rig_files(folder: Path) -> list[bytes]:
+    write_default(folder / "rig.toml")
+    return [(folder / "rig.toml").read_bytes(), b"[card]\nsample_rate_Hz = 200.0\n"]
+
+
+def models(folder: Path) -> list[bytes]:
+    return [
+        thesis_model(folder / "thesis.toml").read_bytes(),
+        film_model(folder / "film.toml").read_bytes(),
+    ]
+
+
+TARGETS: dict[str, Target] = {
+    "sequences": Target(".toml", sequences, mutated_text, load_sequence, 0.2),
+    "rig files": Target(".toml", rig_files, mutated_text, load_rig_file, 0.12),
+    "model files": Target(".toml", models, mutated_text, load_model, 0.2),
+    "CSV": Target(".csv", exported("csv"), mutated_text, read_table, 0.2),
+    "MAT": Target(".mat", exported("mat"), mutated_bytes, read_table, 0.2),
+    "Parquet": Target(".parquet", exported("parquet"), mutated_bytes, read_table, 0.03),
+    "TDMS": Target(".tdms", tdms_files, mutated_bytes, read_table, 0.03),
+    "recordings": Target(".h5", recordings, mutated_hdf5, read_recording, 0.01),
+}
+
+
+def seeds_of(name: str) -> list[bytes]:
+    """Good files of a target."""
+    with tempfile.TemporaryDirectory() as made:
+        return TARGETS[name].seeds(Path(made))
