@@ -201,6 +201,16 @@ def record(
         Path | None,
         typer.Option(metavar="MODEL.toml", help="What the simulated rig sim is made of."),
     ] = None,
+    overlay: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="MODEL.toml",
+            help="A model to run in step with the data; kept in the recording.",
+        ),
+    ] = None,
+    fsync: Annotated[
+        bool, typer.Option("--fsync", help="Let what is flushed outlive a power cut too.")
+    ] = False,
     paced: Annotated[bool, typer.Option("--paced", help="Simulate in real time.")] = False,
     fault: Annotated[
         list[str] | None,
@@ -220,6 +230,7 @@ def record(
     from app.like import original_of
     from app.modelfile import load_actuator
     from app.rigfile import load_rig_file
+    from app.run import Beside
     from app.run import record as run
     from app.sequencefile import load_sequence
     from app.terminal import write_json
@@ -227,7 +238,7 @@ def record(
     from app.toml_input import read_text
     from sim_backend.faults import FaultPlan
 
-    _check_files(force, (sequence, rig_file, model, like), out, json=json, recording=out)
+    _check_files(force, (sequence, rig_file, model, overlay, like), out, json=json, recording=out)
     if (sequence is None) == (like is None):
         raise InputError(
             "give a sequence to play, or a recording to repeat with --like: one of them"
@@ -252,11 +263,14 @@ def record(
         faults = FaultPlan.parse(fault or ())
     except ValueError as error:
         raise InputError(str(error)) from error
+    beside = None
+    if overlay is not None:
+        beside = Beside(load_actuator(overlay), read_text(overlay, "model file"))
     with _working(json) as (console, progress):
         result = run(
             loaded, rig, settings, text, out, seed=seed, paced=paced,
             actuator=actuator, faults=faults, operator=operator, film_id=film, notes=notes,
-            overwrite=force, progress=progress,
+            overwrite=force, progress=progress, beside=beside, fsync=fsync,
         )  # fmt: skip
     seconds = result.samples / result.rate_Hz
     _print(

@@ -9,11 +9,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from app.errors import DearigError, DiskFault, InputError, InstrumentFault, Interrupted, SafetyStop
 from app.interrupts import Interrupts
+from app.overlay import Overlay
 from app.plan import Plan, plan
 from app.progress import Progress, quiet
 from app.recording.files import check_output
+from app.recording.room import check_room
 from app.recording.writer import RecordingWriter
 from app.rigfile import RigFile
 from app.sequencefile import LoadedSequence
@@ -25,11 +29,19 @@ from model.actuator import Actuator
 from sim_backend.factory import is_simulated, open_simulated_rig
 from sim_backend.faults import FaultPlan
 
-__all__ = ["Onlooker", "RunResult", "open_rig", "record"]
+__all__ = ["Beside", "Onlooker", "RunResult", "open_rig", "record"]
 
 log = logging.getLogger(__name__)
 
 _DISK_INTERVAL = 1.0  # s between two looks at the room on the disk
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A model that runs beside the measurement: ``actuator``, and its ``toml`` to be kept."""
+
+    actuator: Actuator
+    toml: str
 
 
 @dataclass(frozen=True)
@@ -133,6 +145,8 @@ def record(
     notes: str = "",
     overwrite: bool = False,
     progress: Progress = quiet,
+    beside: Beside | None = None,
+    fsync: bool = False,
     onlooker: Onlooker | None = None,
     interrupts: Interrupts | None = None,
     clock: Callable[[], float] = time.monotonic,
@@ -140,8 +154,9 @@ def record(
     """Play ``loaded`` on the rig at ``address`` and record it to ``out``.
 
     ``configuration`` is the text of the rig file, kept with the recording; ``actuator`` is what the
-    simulated rig ``sim`` is made of, where it is not Table 3's film. ``interrupts`` is how another
-    thread ends the run; by default ctrl-C does.
+    simulated rig ``sim`` is made of, where it is not Table 3's film. ``beside`` is a model that
+    runs in step with the data and is recorded with them. With ``fsync``, what is flushed outlives a
+    power cut. ``interrupts`` is how another thread ends the run; by default ctrl-C does.
 
     Raises ``InputError`` before anything is touched; after the rig was made safe and the recording
     was closed, ``SafetyStop`` where an interlock ended it, ``InstrumentFault`` or ``DiskFault`` for
@@ -161,18 +176,23 @@ def record(
                 raise InputError(f"the rig refuses the sequence: {error}") from error
             except RigError as error:
                 raise InstrumentFault(str(error)) from error
+            check_room(out, len(identity.channels), rate, waveform.voltage.size)
             writer = RecordingWriter(
                 out, identity, rate, waveform.voltage.size, loaded.toml, rig_file.as_film(),
                 rig_file.as_load(), configuration, operator=operator,
                 film_id=film_id or rig_file.film.name, notes=notes,
-                seed=seed if is_simulated(address) else None, overwrite=overwrite,
+                seed=seed if is_simulated(address) else None, overwrite=overwrite, fsync=fsync,
             )  # fmt: skip
             onlooker = onlooker or Onlooker()
             onlooker.started(planned, identity, rate)
             interlocks = Interlocks(
                 rig_file, identity.channels, rate, planned.displacement_of_samples, planned.voltage
             )
-            run = _Run(rig, writer, interlocks, interrupts, onlooker, clock)
+            overlay = None
+            if beside is not None:
+                overlay = Overlay(beside.actuator, identity.channels, rate)
+            model = beside.toml if beside is not None else ""
+            run = _Run(rig, writer, interlocks, interrupts, onlooker, clock, overlay, model)
             events = run.follow(waveform.voltage.size, progress)
         return RunResult(out, writer.samples, rate, "finished", events, waveform.margins)
     finally:
@@ -190,6 +210,8 @@ class _Run:
         interrupts: Interrupts,
         onlooker: Onlooker,
         clock: Callable[[], float],
+        overlay: Overlay | None,
+        model_toml: str,
     ) -> None:
         self._rig = rig
         self._writer = writer
@@ -199,6 +221,9 @@ class _Run:
         self._clock = clock
         self._looked = clock()  # at the disk
         self._events: list[str] = []
+        self._overlay = overlay
+        self._model_toml = model_toml
+        self._beside: list[np.ndarray] = []  # what the overlay gave, in single precision
         self._trip: Trip | None = None  # the first one: what came after it follows from it
 
     def follow(self, samples: int, progress: Progress) -> tuple[str, ...]:
@@ -212,35 +237,35 @@ class _Run:
                 self._interrupts.close()
                 _make_safe(self._rig)
             if self._trip is not None:
-                kept = _end(writer, f"stopped by an interlock: {self._trip.message}")
+                kept = self._end(f"stopped by an interlock: {self._trip.message}")
                 raise SafetyStop(
                     f"{self._trip.message}; {_DONE[self._trip.action]} to 0 V, and {kept}"
                 )
             if self._interrupts.asked():
-                kept = _end(writer, "interrupted by the operator; ramped down to 0 V")
+                kept = self._end("interrupted by the operator; ramped down to 0 V")
                 raise Interrupted(f"interrupted: the voltage was ramped down to 0 V, and {kept}")
             if writer.samples == 0:
-                raise InstrumentFault(f"the rig gave no samples; {_end(writer, 'no samples')}")
-            writer.close("finished")
+                raise InstrumentFault(f"the rig gave no samples; {self._end('no samples')}")
+            self._close_file("finished")
         except KeyboardInterrupt as error:
-            kept = _end(
-                writer, "interrupted by the operator", "interrupted by the operator: 0 V at once"
+            kept = self._end(
+                "interrupted by the operator", "interrupted by the operator: 0 V at once"
             )
             raise Interrupted(
                 f"interrupted: the output was taken to 0 V at once, and {kept}"
             ) from error
         except RigError as error:
-            kept = _end(writer, f"instrument fault: {error}", f"instrument fault: {error}", "fault")
+            kept = self._end(f"instrument fault: {error}", f"instrument fault: {error}", "fault")
             raise InstrumentFault(f"{error}; the rig was made safe, and {kept}") from error
         except DearigError as error:
             if writer.closed:
                 raise
-            kept = _end(writer, f"ended early: {error}", f"ended early: {error}", "fault")
+            kept = self._end(f"ended early: {error}", f"ended early: {error}", "fault")
             safe = "" if isinstance(error, _NotSafe) else "the rig was made safe, and "
             raise type(error)(f"{error}; {safe}{kept}") from error
         finally:
             # only what nobody foresaw comes here with an open file
-            _end(writer, "ended early by a fault of the program")
+            self._end("ended early by a fault of the program")
         return tuple(self._events)
 
     def _play(self, samples: int, progress: Progress) -> None:
@@ -275,6 +300,8 @@ class _Run:
 
     def _take(self, block: Block) -> None:
         self._writer.append(block)
+        if self._overlay is not None:
+            self._beside.append(self._overlay.advance(block).astype(np.float32))
         self._onlooker.block(block)
         for event in block.events:
             self._tell(event)
@@ -310,6 +337,40 @@ class _Run:
         self._writer.event(sample, level, message)
         self._tell(event)
 
+    def _end(self, outcome: str, event: str = "", level: str = "warning") -> str:
+        """Close the recording of a run that ended early; where it is, in words.
+
+        A disk that fails here too is one more thing to say, and must not hide what ended the run.
+        """
+        writer = self._writer
+        if writer.closed:
+            return f"what was recorded is in {writer.path}"
+        if writer.samples == 0:
+            writer.discard()
+            return "nothing was recorded"
+        trouble = ""
+        try:
+            if event:
+                writer.event(writer.samples - 1, level, event)
+        except DearigError as error:
+            trouble = str(error)
+        try:
+            self._close_file(outcome)
+        except DearigError as error:
+            trouble = str(error)
+        where = f"what was recorded is in {writer.path} ({writer.samples} samples)"
+        return f"{where}; {trouble}" if trouble else where
+
+    def _close_file(self, outcome: str) -> None:
+        """Finish the recording, with what the model beside it gave."""
+        modelled = None
+        if self._overlay is not None and self._beside:
+            modelled = np.concatenate(self._beside)[: self._writer.samples]
+        if modelled is not None and modelled.size < self._writer.samples:
+            modelled = None  # the model failed in a block that was written
+        model = "" if modelled is None else self._model_toml
+        self._writer.close(outcome, displacement_model=modelled, model_toml=model)
+
     def _tell(self, event: Event) -> None:
         self._events.append(f"{event.level}: {event.message}")
         log.log(_LEVELS.get(event.level, logging.INFO), "%s", event.message)
@@ -343,30 +404,6 @@ def _close(rig: Rig) -> None:
         raise InstrumentFault(
             f"THE RIG COULD NOT BE CLOSED ({error}): see that the amplifier is at 0 V"
         ) from error
-
-
-def _end(writer: RecordingWriter, outcome: str, event: str = "", level: str = "warning") -> str:
-    """Close the recording of a run that ended early; where it is, in words.
-
-    A disk that fails here too is one more thing to say, and must not hide what ended the run.
-    """
-    if writer.closed:
-        return f"what was recorded is in {writer.path}"
-    if writer.samples == 0:
-        writer.discard()
-        return "nothing was recorded"
-    trouble = ""
-    try:
-        if event:
-            writer.event(writer.samples - 1, level, event)
-    except DearigError as error:
-        trouble = str(error)
-    try:
-        writer.close(outcome)
-    except DearigError as error:
-        trouble = str(error)
-    where = f"what was recorded is in {writer.path} ({writer.samples} samples)"
-    return f"{where}; {trouble}" if trouble else where
 
 
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "fault": logging.ERROR}

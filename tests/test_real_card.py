@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(
 class TestRealCard(RigContract):
     MONITOR_TOLERANCE = 100.0
 
-    def open_rig(self, *, block_samples=None, seed=0):
+    def open_rig(self, *, block_samples=None, seed=0):  # noqa: ARG002  (a film has none)
         rig_file = load_rig_file(os.environ.get("DEARIG_RIG_FILE"))
         return open_daqmx_rig(os.environ["DEARIG_CARD"], rig_file, block_samples=block_samples)
 

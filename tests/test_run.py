@@ -20,16 +20,19 @@ from app.errors import (
     SafetyStop,
 )
 from app.interrupts import Interrupts
+from app.modelfile import save_model
 from app.plan import Plan, plan
 from app.recording import open_recording
 from app.recording.writer import RecordingWriter
 from app.rigfile import RigFile
-from app.run import Onlooker, open_rig, record
+from app.run import Beside, Onlooker, open_rig, record
 from app.sequencefile import parse_sequence
 from drivers.errors import RigError
 from drivers.gate import GatedWaveform
 from drivers.rig import Block, Event, RigIdentity, RigState
 from drivers.settings import CardSettings
+from model.actuator import Actuator
+from model.material import TABLE_3
 from sim_backend.faults import FaultPlan
 from sim_backend.rig import SimulatedRig
 from tests.command import LOBE, dearig, names, write
@@ -283,7 +286,7 @@ def test_a_disk_that_gets_full_ends_the_run_before_it_is(
     command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ticks = iter(np.arange(0.0, 100.0, 0.15))
-    monkeypatch.setattr("app.run.shutil.disk_usage", lambda _: SimpleNamespace(free=50_000_000))
+    monkeypatch.setattr("app.run.shutil.disk_usage", lambda _: SimpleNamespace(free=80_000_000))
     rig = Troubled("", lambda: None)
     monkeypatch.setattr("app.run.open_rig", lambda *_, **__: rig)
     with pytest.raises(SafetyStop, match=r"free.*ramped down to 0 V"):
@@ -322,6 +325,45 @@ def test_whoever_looks_on_is_told_of_every_sample_and_event(tmp_path: Path) -> N
     assert tuple(diary.events) == result.events
     assert diary.planned is not None
     assert diary.planned.voltage.size == result.samples
+
+
+def test_a_model_runs_beside_the_measurement_and_is_kept(tmp_path: Path) -> None:
+    model = Actuator(RIG_FILE.as_film(), RIG_FILE.as_load(), TABLE_3)
+    save_model(tmp_path / "m.toml", "beside", model, {})
+    answer = dearig(
+        "record", write(tmp_path / "s.toml", LOBE), "--out", tmp_path / "run.h5",
+        "--overlay", tmp_path / "m.toml", "--fsync",
+    )  # fmt: skip
+    assert answer.code == 0
+    run = open_recording(tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5") as file:
+        beside = file["entry/data/displacement_model"][:]
+        kept = file["entry/model"][()].decode()
+    assert kept == (tmp_path / "m.toml").read_text(encoding="utf-8")
+    # the simulated film is the model: what is left is the laser's noise
+    assert run.displacement is not None
+    residual = run.displacement - beside
+    assert 0.5e-6 < residual.std() < 1.5e-6
+    assert np.ptp(beside) > 1e-4
+
+
+def test_an_interrupted_run_keeps_what_the_model_gave_until_then(tmp_path: Path) -> None:
+    beside = Beside(Actuator(RIG_FILE.as_film(), RIG_FILE.as_load(), TABLE_3), "name = 'x'")
+    interrupts = Interrupts()
+
+    class Hasty(Onlooker):
+        def block(self, block: Block) -> None:
+            if block.start > 500:
+                interrupts.ask()
+
+    with pytest.raises(Interrupted):
+        record(
+            LOADED, "sim", RIG_FILE, "", tmp_path / "run.h5", beside=beside,
+            interrupts=interrupts, onlooker=Hasty(),
+        )  # fmt: skip
+    run = open_recording(tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert file["entry/data/displacement_model"].shape == (run.samples,)
 
 
 def full_disk(*_: object) -> None:
