@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -15,7 +17,7 @@ from app.errors import InputError
 from app.identify import identify_recordings
 from app.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome
 from app.progress import Progress, quiet
-from app.recording.files import in_words
+from app.recording.files import in_words, replaced_when_done
 from app.recording.reader import open_recording
 from app.report.diagnosis_page import write_diagnosis_report
 from app.report.html import write_identify_report
@@ -99,49 +101,56 @@ def study(
     """Do ``task`` in a new folder within ``folder``: study-1, study-2, ...
 
     A first ctrl-C during a diagnosis keeps what had been found. Raises ``InputError`` for what
-    cannot be done; then no folder is left.
+    cannot be done; the folder is made only when there is something to put into it.
     """
     if not task.train:
         raise InputError("no recording was chosen to fit; choose one or more")
-    with _new_folder(folder) as where:
-        model, report = where / "model.toml", where / "report.html"
+    if not (folder.is_dir() and os.access(folder, os.W_OK)):
+        raise InputError(f"{folder} cannot be written to; choose another folder for the results")
+    found: IdentifyOutcome | DiagnoseOutcome
+    # elsewhere until it is done: who ends it by force finds nothing half made beside the recordings
+    with TemporaryDirectory() as scratch:
+        made = Path(scratch) / "model.toml"
         if task.diagnose:
             found = diagnose_recordings(
-                task.train, validation=task.validation, model_out=model, branches=task.branches,
+                task.train, validation=task.validation, model_out=made, branches=task.branches,
                 drive=task.drive, rig_file=_rig_of(task), clock=clock, progress=progress,
             )  # fmt: skip
-            progress("report", 1.0)
-            write_diagnosis_report(found, report)
-            return Study(task, found, _diagnosed(found), model, report)
-        fitted = identify_recordings(
-            task.train, model, validation=task.validation, branches=(task.branches,),
-            spring=task.spring, drive=task.drive, clock=clock, progress=progress,
-        )  # fmt: skip
-        progress("report", 1.0)
-        write_identify_report(fitted, report)
-        residuals = tuple(_compared(c) for c in (*fitted.train, *fitted.validation))
-        return Study(task, fitted, residuals, model, report)
+        else:
+            found = identify_recordings(
+                task.train, made, validation=task.validation, branches=(task.branches,),
+                spring=task.spring, drive=task.drive, clock=clock, progress=progress,
+            )  # fmt: skip
+        where = _new_folder(folder)
+        model, report = where / "model.toml", where / "report.html"
+        with replaced_when_done(model) as partial:
+            shutil.copyfile(made, partial)
+    found = replace(found, model_path=str(model))
+    progress("report", 1.0)
+    if isinstance(found, DiagnoseOutcome):
+        write_diagnosis_report(found, report)
+        return Study(task, found, _diagnosed(found), model, report)
+    write_identify_report(found, report)
+    residuals = tuple(_compared(c) for c in (*found.train, *found.validation))
+    return Study(task, found, residuals, model, report)
 
 
-@contextmanager
-def _new_folder(folder: Path) -> Iterator[Path]:
-    """A new folder for what the body writes, which goes again if it wrote nothing."""
+def _new_folder(folder: Path) -> Path:
+    """A folder that nobody else has: study-1, or the next that is free."""
     where = folder
     try:
         for number in range(1, _STUDIES_MAX):
             where = folder / f"study-{number}"
             try:
                 where.mkdir()
-                break
             except FileExistsError:
                 continue
+            return where
     except OSError as error:
         raise InputError(f"{where} cannot be made: {in_words(error)}") from error
-    try:
-        yield where
-    finally:
-        if not any(where.iterdir()):
-            where.rmdir()
+    raise InputError(
+        f"{folder} holds {_STUDIES_MAX} studies; choose another folder for the results"
+    )
 
 
 def _rig_of(task: Task) -> RigFile | None:

@@ -91,8 +91,8 @@ class CurvesPlot(QWidget):
             add_curve(both, time, model * shown.factor, beside, name, dashed=not alone)
             time, left = curves.residual
             add_curve(residual, time, left * shown.error_factor, beside)
-            if alone:
-                self._events(curves)
+        if alone:
+            self._events(self._shown[0])
 
     def _events(self, curves: Curves) -> None:
         theme = self._session.theme

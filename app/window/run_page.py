@@ -215,11 +215,11 @@ class RunPage(QWidget):
             if preview.playable:
                 rate = preview.plan.rate
                 self.about.say(f"{name}: {seconds:.1f} s at {rate:g} Hz on {session.address}", "")
-                if self.live is None:
-                    self.plots.foresee(preview)
             else:
                 self.about.say(f"{name} is refused: {'; '.join(preview.plan.reasons)}", "bad")
         self.to_sequence.setVisible(preview is not None and not preview.playable)
+        if preview is not None and self.live is None:
+            self.plots.foresee(preview)
 
     @Slot()
     def _draw(self) -> None:

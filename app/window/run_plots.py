@@ -106,7 +106,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
             for name in ("voltage", "displacement"):
                 x, y = preview.curves[name]
                 self._include(name, y)
-                self._planned[name].setData(x, y * _SCALE[name])
+                self._planned[name].setData(x, y * _SCALE[name], connect="finite")
         self._scale()
         self._show(0.0, self._duration)
 
@@ -146,11 +146,10 @@ class RunPlots(pg.GraphicsLayoutWidget):
 
     def _include(self, name: str, values: np.ndarray) -> bool:
         """Let the range of a plot hold ``values``; True where it had to grow."""
+        values = values[np.isfinite(values)]
         if not values.size:
             return False
-        low, high = float(np.nanmin(values)), float(np.nanmax(values))
-        if math.isnan(low):
-            return False
+        low, high = float(values.min()), float(values.max())
         grown = low < self._low[name] or high > self._high[name]
         if name == "residual":
             size = max(-low, high)

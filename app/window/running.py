@@ -66,13 +66,14 @@ class RunOrder:
 class RunEnd:
     """How a run ended: a ``headline``, a ``sentence``, and the recording if there is one.
 
-    ``safe`` is True where the program knows that its output is at 0 V.
+    ``safe`` is True where the program knows that its output is at 0 V, False where it does not, and
+    None where nothing was played: then it is as it was before.
     """
 
     headline: str
     sentence: str
     path: Path | None
-    safe: bool
+    safe: bool | None
     result: RunResult | None = None
 
 
@@ -90,6 +91,7 @@ class Runner(QObject):
         super().__init__(parent)
         self._thread: _RunThread | None = None
         self._state = HighVoltage.SAFE
+        self._before = HighVoltage.SAFE  # what it was when it was armed
 
     @property
     def state(self) -> HighVoltage:
@@ -103,8 +105,11 @@ class Runner(QObject):
 
     def arm(self, armed: bool) -> None:
         """The first step of two, or back."""
-        if not self.running:
-            self._set_state(HighVoltage.ARMED if armed else HighVoltage.SAFE)
+        if self.running or armed == (self._state is HighVoltage.ARMED):
+            return
+        if armed:
+            self._before = self._state
+        self._set_state(HighVoltage.ARMED if armed else self._before)
 
     def start(self, order: RunOrder, live: Live) -> bool:
         """The second step: begins a run that was armed; False where it was not."""
@@ -137,7 +142,8 @@ class Runner(QObject):
             return
         thread.deleteLater()
         end = thread.end
-        self._set_state(HighVoltage.SAFE if end.safe else HighVoltage.UNCONFIRMED)
+        after = {None: self._before, True: HighVoltage.SAFE, False: HighVoltage.UNCONFIRMED}
+        self._set_state(after[end.safe])
         self.ended.emit(end)
 
     def _set_state(self, state: HighVoltage) -> None:
@@ -165,7 +171,7 @@ class _RunThread(QThread):
                 f"the folder {order.folder} cannot be used: {error.strerror or error}; choose "
                 f"another one; nothing was played",
                 None,
-                safe=True,
+                safe=None,
             )
             return
         try:
@@ -176,7 +182,8 @@ class _RunThread(QThread):
                 interrupts=self.interrupts, clock=time.monotonic,
             )  # fmt: skip
         except DearigError as error:
-            self.end = _early_end(error, out)
+            played = self._live.now() is not None
+            self.end = _early_end(error, out, played)
         else:
             seconds = result.samples / result.rate_Hz
             self.end = RunEnd(
@@ -188,9 +195,10 @@ class _RunThread(QThread):
             )
 
 
-def _early_end(error: DearigError, out: Path) -> RunEnd:
+def _early_end(error: DearigError, out: Path, played: bool) -> RunEnd:
     """An instrument that failed is believed to be safe only where it says so."""
-    safe = not isinstance(error, InstrumentFault) or "was made safe" in str(error)
+    said = not isinstance(error, InstrumentFault) or "was made safe" in str(error)
+    safe = said if played else None
     headline = next((words for kind, words in _ENDS.items() if isinstance(error, kind)), "Ended")
     sentence = str(error).removeprefix("interrupted: ")
     return RunEnd(headline, sentence, out if out.exists() else None, safe)

@@ -63,6 +63,7 @@ def test_a_look_at_the_instruments_is_told_in_words(qtbot: QtBot, page: RigPage)
 
 
 def test_a_card_that_is_not_there_is_told(qtbot: QtBot, page: RigPage) -> None:
+    qtbot.waitUntil(lambda: page.outcome is not None, timeout=60_000)  # of the simulated one
     page.session.set_address("daqmx:Dev1")
     qtbot.mouseClick(page.check_button, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: page.outcome is not None, timeout=60_000)

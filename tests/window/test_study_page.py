@@ -80,6 +80,8 @@ def test_a_fit_with_its_check_from_ticks_to_files(session, keep, qtbot, tmp_path
     assert len(page.residual.time.listDataItems()) == 1
     assert found.report.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     assert load_model(found.model).model.network.branches
+    assert found.model == session.folder / "study-1" / "model.toml"
+    assert found.outcome.model_path == str(found.model)
 
     page.save(tmp_path / "mine.toml")
     assert load_model(tmp_path / "mine.toml").name == load_model(found.model).name
@@ -112,6 +114,7 @@ def test_what_cannot_be_studied_is_said_and_leaves_nothing(session, keep, qtbot)
     click(qtbot, page.cancel)
     click(qtbot, page.cancel)
     assert page.saying.text() == "Cancelled: nothing was kept."
+    assert not list(session.folder.glob("study-*"))
     assert page.start.isEnabled()
 
 
