@@ -57,6 +57,10 @@ def is_finished(path: Path) -> bool:
 
 def read_events(path: Path, entry: h5py.Group) -> tuple[RecordedEvent, ...]:
     """The events in ``entry`` of the file ``path``, which is for messages."""
+    # those that a full disk did not take are missing, and no reason to give up the rest
+    rows = item(entry, "events", stored=False)
+    if not isinstance(rows, h5py.Dataset) or rows.id.get_storage_size() == 0:
+        return ()
     rows = dataset(entry, "events")
     if rows is None:
         return ()
