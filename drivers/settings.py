@@ -229,7 +229,8 @@ class CardSettings(Section):
         default=100_000,
         ge=1000,
         le=100_000_000,
-        description="samples a channel kept for a late reader",
+        description="samples a channel kept for a late reader, at least; a card keeps four times "
+        "interlocks.late_s",
     )
     ao_fifo_samples: int = Field(
         default=8191, ge=1, le=100_000_000, description="output FIFO of the card"

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Card", "ClockedTasks", "identify_card"]
 
+_READER_BUFFER = 4.0  # times the lateness that ends a run
 _ODD_BUFFER = 4095  # samples: an output buffer of exactly this size misbehaved on a 6361
 
 
@@ -261,13 +262,17 @@ class ClockedTasks:
                 min_val=-ranges[name],
                 max_val=ranges[name],
             )
+        # whatever the rate, a reader that is late is seen by the interlock before samples are lost
+        buffer = max(
+            card.ai_buffer_samples, round(_READER_BUFFER * settings.interlocks.late_s * rate)
+        )
         ai.timing.cfg_samp_clk_timing(
             rate,
             source=f"/{self._device}/ao/SampleClock",
             sample_mode=AcquisitionType.CONTINUOUS,
-            samps_per_chan=card.ai_buffer_samples,
+            samps_per_chan=buffer,
         )
-        ai.in_stream.input_buf_size = card.ai_buffer_samples
+        ai.in_stream.input_buf_size = buffer
         ai.timing.ai_conv_rate = 1e6 / card.convert_interval_us
         ai.timing.delay_from_samp_clk_delay_units = DigitalWidthUnits.SECONDS
         ai.timing.delay_from_samp_clk_delay = card.first_convert_us * 1e-6
