@@ -67,6 +67,9 @@ def test_from_the_first_start_to_the_first_recording(qtbot: QtBot, window: MainW
     assert path.parent == window.session.folder
     assert str(path) in page.result.text()
     assert page.runner.state is HighVoltage.SAFE
+    # the model that ran beside it is kept with it
+    assert recording.displacement_model is not None
+    assert "modulus_Pa" in recording.model_toml
     # what was drawn is what was recorded
     assert page.live is not None
     qtbot.waitUntil(lambda: seconds(page) > recording.duration)
