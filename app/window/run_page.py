@@ -316,7 +316,7 @@ class RunPage(QWidget):
                     )
             choice.addItem(_OPEN, _OPEN)
             chosen = session.overlays[place] if place < len(session.overlays) else None
-            choice.setCurrentIndex(0 if chosen is None else choice.findText(chosen.name))
+            choice.setCurrentIndex(0 if chosen is None else 1 + known.index(chosen))
             choice.blockSignals(False)
         for place in (0, 1):
             there = place < len(session.overlays)
