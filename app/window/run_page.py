@@ -21,6 +21,8 @@ from PySide6.QtWidgets import (
 )
 
 from app.modelfile import load_actuator, load_model
+from app.run import Beside
+from app.toml_input import read_text
 from app.window.background import Background
 from app.window.hv import HighVoltage, HighVoltageBadge
 from app.window.live import Live, Now
@@ -111,6 +113,7 @@ class RunPage(QWidget):
             preview.loaded, session.address, session.rig_file, session.rig_text, session.folder,
             operator=session.operator, film=session.film, notes=session.notes,
             seed=self._seed(), paced=self.paced.isChecked(), faults=self.faults,
+            beside=self._kept(),
         )  # fmt: skip
         if not self.runner.start(order, live):
             return
@@ -313,7 +316,7 @@ class RunPage(QWidget):
                     )
             choice.addItem(_OPEN, _OPEN)
             chosen = session.overlays[place] if place < len(session.overlays) else None
-            choice.setCurrentIndex(0 if chosen is None else choice.findText(chosen.name))
+            choice.setCurrentIndex(0 if chosen is None else 1 + known.index(chosen))
             choice.blockSignals(False)
         for place in (0, 1):
             there = place < len(session.overlays)
@@ -355,9 +358,7 @@ class RunPage(QWidget):
     def _load_next(self) -> None:
         if self._asked and not self._loading.busy:
             _, path = self._asked[0]
-            self._loading.start(
-                lambda: OverlayModel(load_model(path).name or path.stem, load_actuator(path), path)
-            )
+            self._loading.start(lambda: _read_model(path))
 
     @Slot(object)
     def _model_loaded(self, model: OverlayModel) -> None:
@@ -381,6 +382,13 @@ class RunPage(QWidget):
     def _show_last(self) -> None:
         if self._last is not None:
             self.show_recording.emit(self._last)
+
+    def _kept(self) -> Beside | None:
+        """What the recording keeps of the models: the first one, where the command drives it."""
+        first = next(iter(self.session.overlays), None)
+        if first is None or self.session.overlay_drive != "command":
+            return None
+        return Beside(first.actuator, first.toml)
 
     def _seed(self) -> int:
         """Of the simulated noise: another one each time, as on the bench."""
@@ -546,6 +554,12 @@ class RunPage(QWidget):
         self.log.setTabChangesFocus(True)
         column.addWidget(self.log)
         return column
+
+
+def _read_model(path: Path) -> OverlayModel:
+    actuator = load_actuator(path)
+    name = load_model(path).name
+    return OverlayModel(name or path.stem, actuator, path, read_text(path, "model file"))
 
 
 _NUMBERS_SHOWN = {

@@ -19,7 +19,7 @@ from app.errors import (
 )
 from app.interrupts import Interrupts
 from app.rigfile import RigFile
-from app.run import RunResult, record
+from app.run import Beside, RunResult, record
 from app.sequencefile import LoadedSequence
 from app.window.hv import HighVoltage
 from app.window.live import Live
@@ -46,7 +46,7 @@ class RunOrder:
     """Everything that a run needs; ``folder`` gets the recording, in a file named by the sequence.
 
     ``seed`` is of the simulated noise, ``paced`` lets a simulated rig take its time, and ``faults``
-    go wrong in it.
+    go wrong in it. ``beside`` is the model whose displacement the recording keeps.
     """
 
     loaded: LoadedSequence
@@ -60,6 +60,7 @@ class RunOrder:
     seed: int = 0
     paced: bool = True
     faults: FaultPlan | None = None
+    beside: Beside | None = None
 
 
 @dataclass(frozen=True)
@@ -179,7 +180,7 @@ class _RunThread(QThread):
                 order.loaded, order.address, order.rig_file, order.configuration, out,
                 seed=order.seed, paced=order.paced, faults=order.faults, operator=order.operator,
                 film_id=order.film, notes=order.notes, onlooker=self._live,
-                interrupts=self.interrupts, clock=time.monotonic,
+                interrupts=self.interrupts, beside=order.beside, clock=time.monotonic,
             )  # fmt: skip
         except DearigError as error:
             played = self._live.now() is not None

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from PySide6.QtCore import QObject, QSettings, Signal
 
+from app.modelfile import model_toml
 from app.plan import Plan
 from app.presets import PRESETS
 from app.rigfile import RigFile
@@ -25,11 +26,15 @@ FIRST_SEQUENCE = "thesis"
 
 @dataclass(frozen=True)
 class OverlayModel:
-    """A model that runs beside the measurement; ``path`` is None for the thesis's own."""
+    """A model that runs beside the measurement; ``path`` is None for the thesis's own.
+
+    ``toml`` is the text of its file, which a recording keeps.
+    """
 
     name: str
     actuator: Actuator
     path: Path | None = None
+    toml: str = ""
 
 
 @dataclass(frozen=True)
@@ -148,8 +153,9 @@ class Session(QObject):
     @property
     def thesis_model(self) -> OverlayModel:
         """The thesis's springs (Table 3) in the film and under the load of the rig file."""
-        film, load = self.rig_file.as_film(), self.rig_file.as_load()
-        return OverlayModel("thesis (Table 3)", Actuator(film, load, TABLE_3))
+        name = "thesis (Table 3)"
+        actuator = Actuator(self.rig_file.as_film(), self.rig_file.as_load(), TABLE_3)
+        return OverlayModel(name, actuator, toml=model_toml(name, actuator, {}))
 
     def set_folder(self, folder: Path) -> None:
         """Where recordings are made and looked for."""

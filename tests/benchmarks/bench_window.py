@@ -28,6 +28,7 @@ from PySide6.QtWidgets import QApplication
 from app.plan import plan
 from app.rigfile import RigFile
 from app.sequencefile import parse_sequence
+from app.window.collector import Collector
 from app.window.live import Live
 from app.window.planner import foresee
 from app.window.run_plots import RunPlots
@@ -134,7 +135,7 @@ class Plain(pg.GraphicsLayoutWidget):
         super().__init__()
         self.setBackground(LIGHT.window)
         self._tuned = tuned
-        self.size = 0
+        self.held = 0
         self.ring = np.zeros((3, round(WINDOW * RATE)), dtype=np.float64)
         self._time = np.arange(self.ring.shape[1]) / RATE
         self._curves = []
@@ -153,13 +154,13 @@ class Plain(pg.GraphicsLayoutWidget):
         self.ring[:, :-n] = self.ring[:, n:]
         for row, channel in enumerate((0, 1, 3)):
             self.ring[row, -n:] = CHANNELS[channel].scaling.physical(block.counts[channel])
-        self.size = min(self.size + n, self.ring.shape[1])
+        self.held = min(self.held + n, self.ring.shape[1])
 
     def draw(self) -> None:
-        if not self.size:
+        if not self.held:
             return
         for row, curve in enumerate(self._curves):
-            curve.setData(self._time[: self.size], self.ring[row, -self.size :])
+            curve.setData(self._time[: self.held], self.ring[row, -self.held :])
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
         super().paintEvent(event)
@@ -230,6 +231,7 @@ def main() -> None:
     application = QApplication([])
     prepare_plots()
     apply(application, LIGHT)
+    collector = Collector()  # as in the program
     print(f"{RATE / 1e3:.0f} kHz, {len(CHANNELS)} channels, {width} x {height}")
     print("| plots | frames a second | ms of one processor a frame | key, ms: median | worst |")
     print("|---|---|---|---|---|")
@@ -260,6 +262,7 @@ def main() -> None:
         plain = Plain(tuned)
         source = Source(plain.take)
         row(words, measure(plain, plain.draw, source, (width, height), given.seconds))
+    collector.close()
 
 
 if __name__ == "__main__":

@@ -67,6 +67,9 @@ def test_from_the_first_start_to_the_first_recording(qtbot: QtBot, window: MainW
     assert path.parent == window.session.folder
     assert str(path) in page.result.text()
     assert page.runner.state is HighVoltage.SAFE
+    # the model that ran beside it is kept with it
+    assert recording.displacement_model is not None
+    assert "modulus_Pa" in recording.model_toml
     # what was drawn is what was recorded
     assert page.live is not None
     qtbot.waitUntil(lambda: seconds(page) > recording.duration)
@@ -234,6 +237,35 @@ def test_a_folder_that_cannot_be_used(qtbot: QtBot, run_page: RunPage, tmp_path:
         click(qtbot, page.start_button)
     assert "choose another one" in page.result.text()
     assert page.runner.state is HighVoltage.SAFE
+
+
+def test_a_defect_of_the_program_leaves_nothing_taken_for_safe(
+    qtbot: QtBot, run_page: RunPage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise RuntimeError("a defect")
+
+    monkeypatch.setattr("app.window.running.record", broken)
+    click(qtbot, run_page.arm_button)
+    with qtbot.captureExceptions() as caught:
+        with qtbot.waitSignal(run_page.runner.ended, timeout=RUN_MS):
+            click(qtbot, run_page.start_button)
+        qtbot.waitUntil(lambda: bool(caught))
+    assert "a fault of the program" in run_page.result.text()
+    assert run_page.runner.state is HighVoltage.UNCONFIRMED
+    assert not run_page.session.running
+
+
+def test_two_models_of_one_name_stay_apart(qtbot: QtBot, run_page: RunPage, tmp_path: Path) -> None:
+    thesis = run_page.session.thesis_model
+    for place, mass in enumerate((150, 250)):
+        path = tmp_path / f"{mass}.toml"
+        path.write_text(thesis.toml.replace("mass_kg = 0.2", f"mass_kg = 0.{mass}"))
+        run_page.show_model(path, place)
+    qtbot.waitUntil(lambda: [m.path for m in run_page.session.overlays if m.path] != [])
+    qtbot.waitUntil(lambda: len(run_page.session.overlays) == 2)
+    masses = [choice.currentData().actuator.load.mass for choice in run_page.models]
+    assert masses == [0.15, 0.25]
 
 
 def answer(button: str) -> None:

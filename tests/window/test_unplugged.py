@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,6 +15,7 @@ from app.recording import open_recording
 from app.rigfile import RigFile
 from app.window.hv import HighVoltage
 from app.window.run_page import RunPage
+from drivers.daqmx.guardian import GuardianProcess
 from sim_backend.clock import PacedClock
 from tests.daqmx_tools import served
 from tests.window.conftest import SHORT
@@ -20,6 +24,27 @@ RIG_FILE = RigFile.model_validate(
     {"film": {"name": "film 3"}, "guardian": {"link_timeout_s": 1.0, "timeout_s": 1.0}}
 )
 WAIT = 120_000
+
+
+@pytest.fixture(autouse=True)
+def _guardians_end(monkeypatch: pytest.MonkeyPatch, qtbot: QtBot) -> Iterator[None]:
+    """A guardian whose card is gone goes on trying to reach it; here nobody will plug it in."""
+    left: list[subprocess.Popen[str]] = []
+    close = GuardianProcess.close
+
+    def close_and_tell(self: GuardianProcess) -> None:
+        close(self)
+        left.append(self._process)
+
+    monkeypatch.setattr(GuardianProcess, "close", close_and_tell)
+    yield
+    for process in left:
+        process.kill()
+        process.wait()
+    qtbot.waitUntil(lambda: all(t.name != "guardian" for t in threading.enumerate()))
+    for process in left:
+        if process.stdout is not None:
+            process.stdout.close()
 
 
 def play(qtbot: QtBot, page: RunPage, port: int) -> None:
