@@ -8,6 +8,7 @@ __all__ = [
     "InputError",
     "InstrumentFault",
     "Interrupted",
+    "NotSafe",
     "SafetyStop",
 ]
 
@@ -34,6 +35,10 @@ class InstrumentFault(DearigError):  # noqa: N818
     """An instrument failed or is not there."""
 
     exit_code = 4
+
+
+class NotSafe(InstrumentFault):
+    """The voltage may still be up: neither the run nor its guardian could bring it down."""
 
 
 class DiskFault(DearigError):  # noqa: N818

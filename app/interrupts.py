@@ -25,7 +25,7 @@ class Interrupts:
     """
 
     def __init__(self) -> None:
-        self._asked = False
+        self._asked = self._at_once = False
         self._raises = True
         self._before: dict[int, _Handler] = {}
 
@@ -36,6 +36,14 @@ class Interrupts:
     def ask(self) -> None:
         """End the run, as the first ctrl-C does; may be called from any thread."""
         self._asked = True
+
+    def ask_at_once(self) -> None:
+        """End the run at 0 V at once, without a ramp; may be called from any thread."""
+        self._asked = self._at_once = True
+
+    def at_once(self) -> bool:
+        """True once the run is to end without a ramp."""
+        return self._at_once
 
     def close(self) -> None:
         """Raise no more: the rig is being made safe, and nothing is quicker than that."""

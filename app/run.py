@@ -11,7 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from app.errors import DearigError, DiskFault, InputError, InstrumentFault, Interrupted, SafetyStop
+from app.errors import (
+    DearigError,
+    DiskFault,
+    InputError,
+    InstrumentFault,
+    Interrupted,
+    NotSafe,
+    SafetyStop,
+)
 from app.interrupts import Interrupts
 from app.overlay import Overlay
 from app.plan import Plan, plan
@@ -26,6 +34,7 @@ from drivers.gate import Margin
 from drivers.interlocks import Interlocks, Trip
 from drivers.rig import Block, Event, Rig, RigIdentity
 from model.actuator import Actuator
+from model.errors import ModelError
 from sim_backend.factory import is_simulated, open_simulated_rig
 from sim_backend.faults import FaultPlan
 
@@ -74,10 +83,6 @@ class Onlooker:
 
     def event(self, event: Event) -> None:
         """Something happened; it is in the recording."""
-
-
-class _NotSafe(InstrumentFault):
-    """The voltage may still be up."""
 
 
 def open_rig(
@@ -190,7 +195,10 @@ def record(
             )
             overlay = None
             if beside is not None:
-                overlay = Overlay(beside.actuator, identity.channels, rate)
+                try:
+                    overlay = Overlay(beside.actuator, identity.channels, rate)
+                except ModelError as error:
+                    raise InputError(f"the model beside the run: {error}") from error
             model = beside.toml if beside is not None else ""
             run = _Run(rig, writer, interlocks, interrupts, onlooker, clock, overlay, model)
             events = run.follow(waveform.voltage.size, progress)
@@ -241,6 +249,8 @@ class _Run:
                 raise SafetyStop(
                     f"{self._trip.message}; {_DONE[self._trip.action]} to 0 V, and {kept}"
                 )
+            if self._interrupts.at_once():
+                raise self._ended_at_once()
             if self._interrupts.asked():
                 kept = self._end("interrupted by the operator; ramped down to 0 V")
                 raise Interrupted(f"interrupted: the voltage was ramped down to 0 V, and {kept}")
@@ -248,12 +258,7 @@ class _Run:
                 raise InstrumentFault(f"the rig gave no samples; {self._end('no samples')}")
             self._close_file("finished")
         except KeyboardInterrupt as error:
-            kept = self._end(
-                "interrupted by the operator", "interrupted by the operator: 0 V at once"
-            )
-            raise Interrupted(
-                f"interrupted: the output was taken to 0 V at once, and {kept}"
-            ) from error
+            raise self._ended_at_once() from error
         except RigError as error:
             kept = self._end(f"instrument fault: {error}", f"instrument fault: {error}", "fault")
             raise InstrumentFault(f"{error}; the rig was made safe, and {kept}") from error
@@ -261,12 +266,16 @@ class _Run:
             if writer.closed:
                 raise
             kept = self._end(f"ended early: {error}", f"ended early: {error}", "fault")
-            safe = "" if isinstance(error, _NotSafe) else "the rig was made safe, and "
+            safe = "" if isinstance(error, NotSafe) else "the rig was made safe, and "
             raise type(error)(f"{error}; {safe}{kept}") from error
         finally:
             # only what nobody foresaw comes here with an open file
             self._end("ended early by a fault of the program")
         return tuple(self._events)
+
+    def _ended_at_once(self) -> Interrupted:
+        kept = self._end("interrupted by the operator", "interrupted by the operator: 0 V at once")
+        return Interrupted(f"interrupted: the output was taken to 0 V at once, and {kept}")
 
     def _play(self, samples: int, progress: Progress) -> None:
         rig, interrupts = self._rig, self._interrupts
@@ -281,6 +290,8 @@ class _Run:
                 progress("recording", self._writer.samples / samples)
                 trip = self._watch(block)
                 if trip is not None and trip.action == "at once":
+                    return
+                if interrupts.at_once():
                     return
                 if (trip is not None or interrupts.asked()) and not stopping:
                     stopping = True
@@ -391,7 +402,7 @@ def _make_safe(rig: Rig) -> None:
     try:
         rig.make_safe()
     except RigError as error:
-        raise _NotSafe(
+        raise NotSafe(
             f"THE RIG COULD NOT BE MADE SAFE ({error}): switch the amplifier's high voltage off "
             f"by hand"
         ) from error
@@ -401,7 +412,7 @@ def _close(rig: Rig) -> None:
     try:
         rig.close()
     except RigError as error:
-        raise InstrumentFault(
+        raise NotSafe(
             f"THE RIG COULD NOT BE CLOSED ({error}): see that the amplifier is at 0 V"
         ) from error
 

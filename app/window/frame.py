@@ -110,10 +110,12 @@ class MainWindow(QMainWindow):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
         """STOP by a key, whatever has the focus; but a space may still be typed into a text."""
         if event.type() == QEvent.Type.KeyPress and self.run_page.runner.running:
-            key = cast(QKeyEvent, event).key()
+            pressed = cast(QKeyEvent, event)
+            key = pressed.key()
             typing = isinstance(QApplication.focusWidget(), QLineEdit | QPlainTextEdit | QComboBox)
             if key == Qt.Key.Key_Escape or (key == Qt.Key.Key_Space and not typing):
-                self.run_page.stop()
+                if not pressed.isAutoRepeat():  # the second press means something else
+                    self.run_page.stop()
                 return True
         return super().eventFilter(watched, event)
 

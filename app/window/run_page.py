@@ -133,7 +133,10 @@ class RunPage(QWidget):
 
     @Slot()
     def stop(self) -> None:
-        """Ramp down to 0 V, or take the first step back."""
+        """Ramp down to 0 V, the second time at once; or take the first step back."""
+        if self.runner.state is HighVoltage.RAMPING:
+            self.runner.stop_at_once()
+            return
         self.runner.stop()
         if not self.runner.running:
             self._disarmed()
@@ -180,6 +183,8 @@ class RunPage(QWidget):
     @Slot(object)
     def _state_changed(self, state: HighVoltage) -> None:
         self.badge.show_state(state, self._kind())
+        ramping = state is HighVoltage.RAMPING
+        self.stop_button.setText(_STOP_AGAIN if ramping else _STOP)
 
     def _kind(self) -> str:
         return "simulated" if simulated(self.session.address) else ""
@@ -570,9 +575,13 @@ _NUMBERS_SHOWN = {
 }
 
 
+_STOP = "⬣  STOP"
+_STOP_AGAIN = "⬣  0 V NOW"
+
+
 def _stop_button() -> QPushButton:
     """Large, red, and octagonal in its words: nothing else in the window looks like it."""
-    made = QPushButton("⬣  STOP")
+    made = QPushButton(_STOP)
     made.setObjectName("stop")
     made.setMinimumHeight(92)
     made.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -580,7 +589,9 @@ def _stop_button() -> QPushButton:
     font.setPointSize(26)
     font.setBold(True)
     made.setFont(font)
-    made.setToolTip("Ramp down to 0 V and end the run (Esc, or the space bar)")
+    made.setToolTip(
+        "Ramp down to 0 V and end the run (Esc, or the space bar); again: 0 V at once, no ramp"
+    )
     made.setAccessibleName("STOP: ramp down to 0 V")
     made.setStyleSheet(
         "QPushButton { background: #b3001b; color: white; border: 3px solid #7a0012;"

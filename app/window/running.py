@@ -15,6 +15,7 @@ from app.errors import (
     InputError,
     InstrumentFault,
     Interrupted,
+    NotSafe,
     SafetyStop,
 )
 from app.interrupts import Interrupts
@@ -131,6 +132,11 @@ class Runner(QObject):
         self._thread.interrupts.ask()
         self._set_state(HighVoltage.RAMPING)
 
+    def stop_at_once(self) -> None:
+        """0 V without a ramp: for whoever pressed STOP and finds the ramp too slow."""
+        if self._thread is not None:
+            self._thread.interrupts.ask_at_once()
+
     def wait(self) -> None:
         """Wait until the run has ended; for a window that closes."""
         if self._thread is not None:
@@ -198,8 +204,7 @@ class _RunThread(QThread):
 
 def _early_end(error: DearigError, out: Path, played: bool) -> RunEnd:
     """An instrument that failed is believed to be safe only where it says so."""
-    said = not isinstance(error, InstrumentFault) or "was made safe" in str(error)
-    safe = said if played else None
+    safe = not isinstance(error, NotSafe) if played else None
     headline = next((words for kind, words in _ENDS.items() if isinstance(error, kind)), "Ended")
     sentence = str(error).removeprefix("interrupted: ")
     return RunEnd(headline, sentence, out if out.exists() else None, safe)

@@ -176,6 +176,23 @@ def test_stop_by_key_from_another_page(qtbot: QtBot, window: MainWindow, key: Qt
     assert ended.args[0].headline == "Stopped"
 
 
+def test_a_second_stop_is_0_volts_at_once(qtbot: QtBot, window: MainWindow) -> None:
+    page = window.run_page
+    page.paced.setChecked(True)
+    click(qtbot, page.arm_button)
+    click(qtbot, page.start_button)
+    qtbot.waitUntil(lambda: seconds(page) > 2.3, timeout=RUN_MS)
+    with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
+        click(qtbot, page.stop_button)
+        assert "NOW" in page.stop_button.text()
+        click(qtbot, page.stop_button)
+    assert "at once" in ended.args[0].sentence
+    assert page.runner.state is HighVoltage.SAFE
+    assert page.stop_button.text().endswith("STOP")
+    recording = open_recording(ended.args[0].path)
+    assert recording.outcome == "interrupted by the operator"
+
+
 def test_a_space_may_be_typed_while_a_run_goes_on(qtbot: QtBot, window: MainWindow) -> None:
     page, search = window.run_page, QLineEdit(window)
     search.show()
