@@ -11,6 +11,7 @@ from model.actuator import Actuator
 from model.diagnosis.bench import Bench, Trial, information
 from model.diagnosis.findings import (
     EXPLAINED,
+    NOISE_RMS,
     NOTHING_MISSING,
     PARTLY_EXPLAINED,
     UNEXPLAINED,
@@ -33,6 +34,7 @@ __all__ = ["diagnose"]
 Progress = Callable[[str, float], None]
 
 _EFFECTS_MAX = 3  # more at once no record of this kind tells apart
+_TURNS = 3  # of searching on and pruning: what is pruned makes room
 _DECISIVE = 12.0  # of the information criterion: odds of e^6, over some forty candidates
 _ALIKE = 10.0  # of the same: candidates nearer than that are not told apart
 _MATTERS = 0.01  # of the noise's mean square: less is not worth an effect
@@ -44,9 +46,6 @@ _UNNAMED_MARGIN = (
     20.0  # of the criterion, by which an unnamed effect must be better than named ones
 )
 _FOLLOWED = 6  # candidates refitted in later rounds, the most promising ones
-_NOISE_RMS = (
-    1.08  # residual over noise that still is noise: the noise itself is known to some per cent
-)
 _EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
 
@@ -123,11 +122,25 @@ class _Search:
         baseline = self._timed(baseline)
         self.found[frozenset()] = baseline
         try:
-            best = self._pruned(self._search(baseline))
+            best = self._explained(self._ended(baseline))
         except _Interrupted:
             self.interrupted = True
             best = self._leading()
         return self._finding(baseline, best)
+
+    def _explained(self, best: Trial) -> Trial:
+        """``best`` with what it lacks, and without what it does not need.
+
+        What was found first may turn out needless when another is there, and then there is room
+        for what a search with it in the way could not see.
+        """
+        been = {frozenset(best.effects)}
+        for _ in range(_TURNS):
+            best = self._pruned(self._search(best))
+            if frozenset(best.effects) in been or self._is_noise(best):
+                break
+            been.add(frozenset(best.effects))
+        return best
 
     def _timed(self, baseline: Trial) -> Trial:
         """The baseline of a voltage that stands between samples, where that is all that is missing.
@@ -154,15 +167,15 @@ class _Search:
         self.bench, self.held = bench, True
         return trial
 
-    def _search(self, baseline: Trial) -> Trial:
-        """The best explanation of up to ``_EFFECTS_MAX`` effects.
+    def _search(self, start: Trial) -> Trial:
+        """The best explanation of up to ``_EFFECTS_MAX`` effects, those of ``start`` among them.
 
         Where none alone explains enough to be believed, the leading ones are followed on once: of
         two effects each may leave so much of the other that only both are a finding.
         """
-        best, beam = baseline, [baseline]
+        best, beam = start, [start]
         looking_on = False
-        for depth in range(_EFFECTS_MAX):
+        for depth in range(len(start.effects), _EFFECTS_MAX):
             tried: list[_Tried] = []
             for i, parent in enumerate(beam):
                 span = (0.1 + 0.28 * (depth + i / len(beam)), 0.28 / len(beam))
@@ -271,7 +284,7 @@ class _Search:
             starts.append((simpler, None))
         fixed = np.concatenate([parent.fixed, np.zeros(len(effect.parameters), dtype=bool)])
         leader = min(t.cost for t in self.found.values())
-        return self.bench.fit(model, starts, fixed, leader)
+        return self.bench.fit(model, starts, fixed, leader, self._is_noise(parent))
 
     def _settled(self, best: Trial, fitted: list[_Tried]) -> tuple[list[_Tried], float]:
         """The candidates, best first, the leading ones fitted to the end of their valleys.
@@ -370,6 +383,28 @@ class _Search:
             self.found[key] = min(known, fresh, key=lambda t: t.cost)
         return self.found[key]
 
+    def _for_others(self, trial: Trial) -> Trial:
+        """``trial`` as it predicts other recordings: without what may not happen again.
+
+        A moment or a walk is of one recording, unless several of these show it alike: all are
+        fitted with one set of numbers, and each must be the better for it. What is left out is
+        fitted without: then whoever has found nothing else predicts as before, and no worse.
+        """
+        once = [
+            n
+            for n in trial.effects
+            if not EFFECTS[n].recurs and not self._recurred(trial, self._without(trial, n))
+        ]
+        return self._with_only(trial, [n for n in trial.effects if n not in once])
+
+    def _recurred(self, trial: Trial, without: Trial) -> bool:
+        """Whether each of several recordings is decisively better explained than ``without``."""
+        sizes = [r.measured.size for r in trial.problem.records]
+        gained = without.residuals**2 - trial.residuals**2
+        parts = np.split(gained, np.cumsum(sizes)[:-1])
+        correlation = self._correlation([trial])
+        return len(parts) > 1 and all(float(p.sum()) / correlation > _DECISIVE for p in parts)
+
     # -- judgement
 
     def _criterion(self, trial: Trial, correlation: float) -> float:
@@ -380,7 +415,7 @@ class _Search:
         return max(1.0, min(t.correlation for t in trials))
 
     def _is_noise(self, trial: Trial) -> bool:
-        return trial.cost < _NOISE_RMS**2 and trial.correlation < 2.0
+        return trial.cost < NOISE_RMS**2 and trial.correlation < 2.0
 
     def _leading(self) -> Trial:
         trials = list(self.found.values())
@@ -447,7 +482,12 @@ class _Search:
         last = self.bench.polished(best) if best.effects else first
         correlation = max(1.0, last.correlation)
         stage0 = self.bench.stage(first, correlation, estimates=True)
-        final = self.bench.stage(last, correlation, estimates=True)
+        others = self._for_others(best)
+        if others is not best:
+            others = self.bench.polished(others) if others.effects else first
+        else:
+            others = last
+        final = self.bench.stage(last, correlation, estimates=True, for_others=others)
         steps, rivals = self._steps(best, last, final.estimates, correlation)
         before = signatures(self.bench.full, first)
         after = signatures(self.bench.full, last)
@@ -467,6 +507,14 @@ class _Search:
         if verdict in (UNEXPLAINED, PARTLY_EXPLAINED) or any(s.family == "unknown" for s in steps):
             unnamed = describe_unnamed(missing_after, after, steps)
         notes = []
+        if self.interrupted and not self.rounds:
+            notes.append("interrupted before any round was over: what is missing was not found out")
+        gone = [n for n in best.effects if n not in {name for name, _ in others.model.effects}]
+        if gone:
+            notes.append(
+                f"{', '.join(gone)}: of these recordings alone, as far as they can show; other "
+                "recordings are predicted without it"
+            )
         if not is_noise and verdict in (NOTHING_MISSING, EXPLAINED):
             notes.append("what is left is not quite white noise, but too small to name")
         if self.held:
@@ -516,7 +564,8 @@ class _Search:
             alike = self._alike(best, name, correlation_thin)
             rivals += [(EFFECTS[n].family, t.model) for n, t in alike]
             families = tuple(dict.fromkeys(EFFECTS[n].family for n, _ in alike))
-            with_it = last if i == len(order) - 1 else self._with_only(best, order[: i + 1])
+            on_bench = self._with_only(best, order[: i + 1])
+            with_it = last if i == len(order) - 1 else on_bench
             without = self._with_only(best, [n for n in order if n != name])
             own = tuple(
                 replace(e, name=e.name.split(": ", 1)[1])
@@ -537,7 +586,9 @@ class _Search:
                     effect=name,
                     family=effect.family,
                     acts_on=effect.acts_on,
-                    stage=self.bench.stage(with_it, correlation),
+                    stage=self.bench.stage(
+                        with_it, correlation, for_others=self._for_others(on_bench)
+                    ),
                     estimates=own,
                     indistinguishable_from=families,
                     evidence=tuple(evidence),
