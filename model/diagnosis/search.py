@@ -101,7 +101,8 @@ class _Search:
     ) -> None:
         self.bench = Bench(records, workers)
         self.base = base
-        self.report = progress
+        self._progress = progress
+        self._reached = 0.0
         self.stop = stop
         self.effects = [e for e in EFFECTS.values() if is_of(e, self.bench)]
         self.rounds: list[Round] = []
@@ -110,6 +111,11 @@ class _Search:
         self.ended: set[frozenset[str]] = set()
         self.interrupted = False
         self.held = False
+
+    def report(self, stage: str, fraction: float) -> None:
+        """Progress, which never goes back: how often what is pruned is made up for is not known."""
+        self._reached = max(self._reached, fraction)
+        self._progress(stage, self._reached)
 
     # -- the course of things
 
@@ -136,10 +142,12 @@ class _Search:
         """
         been = {frozenset(best.effects)}
         for _ in range(_TURNS):
-            best = self._pruned(self._search(best))
-            if frozenset(best.effects) in been or self._is_noise(best):
+            grown = self._search(best)
+            best = self._pruned(grown)
+            names = frozenset(best.effects)
+            if best is grown or names in been or self._is_noise(best):
                 break
-            been.add(frozenset(best.effects))
+            been.add(names)
         return best
 
     def _timed(self, baseline: Trial) -> Trial:
