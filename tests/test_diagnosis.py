@@ -261,6 +261,16 @@ def test_a_voltage_that_stands_between_samples_is_recognised():
     assert not diagnose([record], PLAIN, workers=1).held
 
 
+def test_a_voltage_that_stands_between_samples_is_recognised_beside_an_effect():
+    drive = thesis_drive()
+    record = record_of(plant("load inertia"), replace(drive, hold=True))
+    found = diagnose([replace(record, drive=drive)], PLAIN, workers=1)
+    require_consistent(found)
+    assert found.held
+    assert [s.effect for s in found.steps] == ["load inertia"]
+    assert found.final.cost == pytest.approx(1.0, abs=0.1)
+
+
 def test_rubbish_that_is_masked_is_not_seen():
     # two effects: the second is refitted only if its sensitivity promises something
     both = (*plant("sensor curvature").effects, *plant("mains interference").effects)

@@ -128,11 +128,11 @@ class _Search:
         baseline = self._timed(baseline)
         self.found[frozenset()] = baseline
         try:
-            best = self._explained(self._ended(baseline))
+            best = self._retimed(self._explained(self._ended(baseline)))
         except _Interrupted:
             self.interrupted = True
             best = self._leading()
-        return self._finding(baseline, best)
+        return self._finding(self.found[frozenset()], best)
 
     def _explained(self, best: Trial) -> Trial:
         """``best`` with what it lacks, and without what it does not need.
@@ -156,16 +156,9 @@ class _Search:
         A table does not say what the voltage did between its rows. Half a sample too early, the
         model would be found to lack a lag of half a sample.
         """
-        records = self.bench.full
-        if self._is_noise(baseline) or not all(
-            isinstance(r, ActuatorRecord) and not r.drive.hold for r in records
-        ):
+        held = self._if_held()
+        if self._is_noise(baseline) or held is None:
             return baseline
-        held = [
-            replace(r, drive=replace(r.drive, hold=True))
-            for r in records
-            if isinstance(r, ActuatorRecord)
-        ]
         bench = Bench(held, self.bench.workers)
         trial = bench.baseline(self.base, lambda *_: self.report("baseline", 0.1))
         self.bench.simulations += bench.simulations
@@ -174,6 +167,38 @@ class _Search:
         bench.simulations = self.bench.simulations
         self.bench, self.held = bench, True
         return trial
+
+    def _retimed(self, best: Trial) -> Trial:
+        """``best`` under a voltage that stands between samples, where that spares an effect.
+
+        Beside something else the half sample shows as one more lag; or it explains more.
+        """
+        held = self._if_held()
+        if held is None or not best.effects:
+            return best
+        before = (self.bench, self.found, self.settled, self.ended)
+        bench = Bench(held, self.bench.workers)
+        bench.simulations = self.bench.simulations
+        fits = [bench.fit(t.model, [(t.x, None)], t.fixed) for t in (self.found[frozenset()], best)]
+        self.bench, self.settled, self.ended = bench, set(), set()
+        self.found = {frozenset(t.effects): t for t in fits}
+        try:
+            trial = self._pruned(self._ended(fits[1]))
+            correlation = self._correlation([best, trial])
+            gain = self._criterion(best, correlation) - self._criterion(trial, correlation)
+            self.held = gain > (0.0 if len(trial.effects) < len(best.effects) else _DECISIVE)
+        finally:
+            if not self.held:
+                before[0].simulations = bench.simulations
+                self.bench, self.found, self.settled, self.ended = before
+        return trial if self.held else best
+
+    def _if_held(self) -> list[ActuatorRecord] | None:
+        """The records with a voltage that stands between samples; None where it is no question."""
+        records = [r for r in self.bench.full if isinstance(r, ActuatorRecord)]
+        if len(records) < len(self.bench.full) or any(r.drive.hold for r in records):
+            return None
+        return [replace(r, drive=replace(r.drive, hold=True)) for r in records]
 
     def _search(self, start: Trial) -> Trial:
         """The best explanation of up to ``_EFFECTS_MAX`` effects, those of ``start`` among them.
@@ -308,10 +333,13 @@ class _Search:
 
         correlation = self._correlation([best, *(t.trial for t in fitted)])
         order = sorted(fitted, key=rank)
+        lead = order[0].trial.cost
         for tried in order[:_SETTLED]:
             self._check()
             key = frozenset(tried.trial.effects)
-            if key not in self.settled:
+            lead = min(lead, self.found[key].cost)
+            # who lies so far behind does not come to lead by the last steps
+            if key not in self.settled and tried.trial.cost < _BEAM_COST * lead:
                 self.settled.add(key)
                 self.found[key] = self.bench.settled(tried.trial)
         order = [replace(t, trial=self.found[frozenset(t.trial.effects)]) for t in order]
