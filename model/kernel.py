@@ -185,11 +185,13 @@ def rest_stretch(c: np.ndarray, field2: float) -> tuple[int, float]:
 
 
 @jit
-def _speeds(c: np.ndarray, y: np.ndarray) -> tuple[float, float, float, float]:
+def _speeds(
+    c: np.ndarray, y: np.ndarray, branches: np.ndarray
+) -> tuple[float, float, float, float]:
     """What limits a step at ``y``: (1/s^2, 1/s^2, 1/s, 1/s), all over the inertia.
 
     The stiffness of the springs, what effects may add to it, their drag, and the fastest flow of a
-    branch.
+    branch. ``branches`` (n,) is filled with the stiffness of each branch, 1/s^2.
     """
     held = int(c[HELD])
     lam = y[0]
@@ -201,7 +203,8 @@ def _speeds(c: np.ndarray, y: np.ndarray) -> tuple[float, float, float, float]:
         k = HEAD + WIDTH * (i + 1)
         e = lam / y[2 + i]
         bend = nominal_pull_slope(held, int(c[k + KIND]), c[k + LIMIT], c[k + LOCKING], e)
-        stiffness += c[k + MODULUS] * bend / (y[2 + i] * y[2 + i])
+        branches[i] = c[k + MODULUS] * bend / (y[2 + i] * y[2 + i]) / c[INERTIA]
+        stiffness += branches[i] * c[INERTIA]
         fastest = max(fastest, c[k + RATE] * bend * e / y[2 + i])
     more, drag = _stiffness(c, y[2 + branch_count(c) :], lam, math.inf)
     inertia = c[INERTIA]
@@ -518,10 +521,10 @@ def _effect_steps(
 def _lean_table(c: np.ndarray, springs: np.ndarray) -> np.ndarray:
     """What ``_lean_steps`` reads: load and field over the inertia, then three numbers a spring.
 
-    Those are modulus over inertia, 1/J and 1/T; springs that are missing are there as zeros. Last
-    is the inertia.
+    Those are modulus over inertia, 1/J and 1/T; springs that are missing are there as zeros. Then
+    the inertia, and the stiffness of each branch, which ``_speeds`` fills in.
     """
-    table = np.zeros(15)
+    table = np.zeros(18)
     table[14] = c[INERTIA]
     table[0], table[1] = c[FORCE] / c[INERTIA], c[ELECTRIC] / c[INERTIA]
     for i in range(springs.shape[1]):
@@ -637,6 +640,7 @@ def _lean_steps(
     e11, e12, e21, e22 = swing[0], swing[1], swing[2], swing[3]
     p1, p2, w1, w2 = swing[4], swing[5], swing[6], swing[7]
     a1, a2, b1, b2, c1, c2 = swing[8], swing[9], swing[10], swing[11], swing[12], swing[13]
+    k1, k2, k3 = table[15], table[16], table[17]
     k, d, q1, q2 = swing[14], swing[15], swing[17], swing[18]
     x1 = y[2] if n > 0 else 1.0
     x2 = y[3] if n > 1 else 1.0
@@ -674,11 +678,12 @@ def _lean_steps(
                 acting, c, memory, t, half, lam, speed, z, v - speed, now, va, vm, vb
             )  # fmt: skip
         em, e1 = electric_gain * fm, electric_gain * fb
-        # the field's force is known ahead, and in a stage it need not stand still
-        rise, later = lam * (em - electric_gain * f0), lam * (e1 - em)
+        f1, f2, f3 = r1 * t1, r2 * t2, r3 * t3
+        # how the field grows and the branches flow is known ahead: no stage need take it as still
+        yielding = half * (k1 * f1 + k2 * f2 + k3 * f3)
+        rise, later = lam * (em - electric_gain * f0) + yielding, lam * (e1 - em) + yielding
         slope = rise / half
         z, v = z + q1 * slope, v + q2 * slope
-        f1, f2, f3 = r1 * t1, r2 * t2, r3 * t3
         sum_1, sum_2, sum_3 = f1, f2, f3
         first, sum_w, sum_v = push, w1 * speed + a1 * push, w2 * speed + a2 * push
         there_w, there_v = z, v
@@ -946,6 +951,7 @@ def drive_by_voltage(
     work = np.zeros((15, y.shape[0]))
     before = np.empty(y.shape[0])
     trace = np.zeros(3)
+    branches = table[15:] if lean else np.zeros(springs.shape[1])
     phi, swings = np.empty((4, 2)), np.zeros(19)
     status = OK
     reached = samples
@@ -974,7 +980,7 @@ def drive_by_voltage(
         # the film's stiffness follows the stretch slowly, and time is mostly even
         if k % 64 == 0 or abs(dt - step_before) > 1e-6 * dt:
             if k % 64 == 0:
-                springy, more, drag, fastest = _speeds(c, y)
+                springy, more, drag, fastest = _speeds(c, y, branches)
                 swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
                 lean_bound = _lean_bound(springy, more, fastest, quick)
                 lam_seen = y[0]
@@ -1052,7 +1058,7 @@ def drive_by_voltage(
             if explicit and abs(y[0] - lam_seen) > _MOVED * lam_seen:
                 # far enough for springs to have stiffened: then this step was too long
                 bound_before = bound
-                springy, more, drag, fastest = _speeds(c, y)
+                springy, more, drag, fastest = _speeds(c, y, branches)
                 swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
                 lean_bound = _lean_bound(springy, more, fastest, quick)
                 lam_seen, step_before = y[0], 0.0

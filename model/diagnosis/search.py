@@ -48,6 +48,7 @@ _UNNAMED_MARGIN = (
 _FOLLOWED = 6  # candidates refitted in later rounds, the most promising ones
 _EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
+_TRUSTED = 0.8  # of the same: what explains less may be a disguise, and predicts nothing else
 
 
 def _quiet(stage: str, fraction: float) -> None:
@@ -518,11 +519,15 @@ class _Search:
         last = self.bench.polished(best) if best.effects else first
         correlation = max(1.0, last.correlation)
         stage0 = self.bench.stage(first, correlation, estimates=True)
+        excess = max(first.cost - 1.0, 1e-9)
+        explained = 1.0 - max(last.cost - 1.0, 0.0) / excess
+        small = last.cost < _EXPLAINED_RMS**2
         others = self._for_others(best)
-        if others is not best:
-            others = self.bench.polished(others) if others.effects else first
+        doubtful = not small and explained < _TRUSTED
+        if doubtful or not others.effects:
+            others = first
         else:
-            others = last
+            others = last if others is best else self.bench.polished(others)
         final = self.bench.stage(last, correlation, estimates=True, for_others=others)
         steps, rivals = self._steps(best, last, final.estimates, correlation)
         before = signatures(self.bench.full, first)
@@ -530,9 +535,6 @@ class _Search:
         missing_before = missing_stress(self.bench.full, first.model)
         missing_after = missing_stress(self.bench.full, last.model)
         is_noise = all(s.is_noise for s in after)
-        excess = max(first.cost - 1.0, 1e-9)
-        explained = 1.0 - max(last.cost - 1.0, 0.0) / excess
-        small = last.cost < _EXPLAINED_RMS**2
         if not best.effects:
             verdict = NOTHING_MISSING if small else UNEXPLAINED
         elif small:
@@ -546,7 +548,12 @@ class _Search:
         if self.interrupted and not self.rounds:
             notes.append("interrupted before any round was over: what is missing was not found out")
         gone = [n for n in best.effects if n not in {name for name, _ in others.model.effects}]
-        if gone:
+        if gone and doubtful:
+            notes.append(
+                "what was found explains too little to be trusted elsewhere: other recordings are "
+                "predicted without it"
+            )
+        elif gone:
             notes.append(
                 f"{', '.join(gone)}: of these recordings alone, as far as they can show; other "
                 "recordings are predicted without it"
