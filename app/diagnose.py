@@ -232,7 +232,7 @@ def _outcome(
         Stand(
             tuple(name for name, _ in stage.model.effects),
             _compared(recordings, stage.model, "train", drive, failed),
-            _compared(others, stage.model, "validation", drive, failed),
+            _compared(others, stage.predicting, "validation", drive, failed),
         )
         for stage in models
     )
@@ -308,10 +308,10 @@ def _saved(
     """``outcome`` with its model written."""
     if model_out is None:
         return outcome
-    effects = ", ".join(outcome.after.effects)
+    effects = ", ".join(name for name, _ in outcome.finding.final.predicting.effects)
     name = f"{outcome.title}, with {effects}" if effects else f"{outcome.title}, nothing added"
     path = save_model(
-        model_out, name, outcome.finding.final.model, _history(outcome, recordings), overwrite
+        model_out, name, outcome.finding.final.predicting, _history(outcome, recordings), overwrite
     )
     return replace(outcome, model_path=str(path))
 

@@ -234,12 +234,17 @@ def initial_state(c: np.ndarray, rest: float) -> np.ndarray:
 
 
 def displacements(
-    coefficients: np.ndarray, length: float, drive: Drive, lag: float = 0.0, workers: int = 2
+    coefficients: np.ndarray,
+    length: float,
+    drive: Drive,
+    lag: float = 0.0,
+    workers: int = 2,
+    quick: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """A population under one drive: ``coefficients`` (P, C) to readings (P, N) in m.
 
     ``lag`` s is the known age of a reading. Also returns the statuses (P,). Members run on
-    ``workers`` threads (the kernels release the interpreter).
+    ``workers`` threads (the kernels release the interpreter), ``quick`` as the kernel has it.
     """
     population = coefficients.shape[0]
     readings = np.zeros((population, drive.time.size))
@@ -254,7 +259,7 @@ def displacements(
             if status[p] == kernel.OK:
                 y = initial_state(c, rest)
                 status[p], _ = kernel.drive_by_voltage(
-                    c, drive.time, drive.voltage, drive.hold, temperature, y, x, u
+                    c, drive.time, drive.voltage, drive.hold, temperature, y, x, u, quick
                 )
                 x -= rest
                 x *= length

@@ -2,11 +2,14 @@
 
 State ``y`` = [lam, dlam/dt, xi_1 .. xi_n]. The kernel steps from sample to sample of the record, so
 that its grid and the record's line up exactly; inside one sample interval it takes as many equal
-steps as accuracy asks for. Two methods:
+steps as accuracy asks for. Three methods:
 
-* classical Runge-Kutta of order 4, where the film is not stiff for the record's interval, in finer
-  steps while the film rings after an edge of the drive (its bare ringing at 70 Hz lasts for
-  tens of cycles, and every step adds to the error of its phase);
+* exponential Runge-Kutta of order 4 in the thesis's case (width held, Gent springs, three branches
+  at most): the film's swinging and its drag are in closed form, so that a drag may be as strong as
+  it likes, and only what changes meanwhile asks for short steps;
+* classical Runge-Kutta of order 4 elsewhere, where the film is not stiff for the record's interval;
+  either in finer steps while the film rings after an edge of the drive (its bare ringing at 70 Hz
+  lasts for tens of cycles, and every step adds to the error of its phase);
 * RODAS (Hairer and Wanner, Solving ODEs II, IV.7), an L-stable Rosenbrock method of order 4 with
   an error estimate, where it is: moduli of MPa, relaxation times of microseconds, springs near
   locking. Its Jacobian is an arrow (each branch knows only lam and itself), so a step costs O(n).
@@ -67,6 +70,7 @@ BAD_INPUT = 5  #: not finite, or time that does not increase
 
 _STRETCH_MAX = 100.0  # beyond any elastomer: a runaway, whatever the springs say
 _RK4_STEP_MAX = 2.5e-3  # s; a thesis record is then good to 0.03 um
+_QUICK_STEP_MAX = 5e-3  # s; where quick is what matters
 _RK4_PHASE_MAX = 1.20  # (angular frequency or flow rate) times step
 _RK4_KICK = 5e-8  # in stretch: the error allowed in following one kick of the drive
 _RK4_RINGING = 5e-9  # in stretch a radian of ringing, which lasts for some hundred radians
@@ -78,6 +82,10 @@ _LEAN_SUBSTEPS_MAX = 4  # the same for the quicker form
 # in the longest step; with effects there is no other method, and what is stiffer than that, such as
 # friction that builds up within a nanometre, is given up: no record could tell it apart
 _EFFECT_SUBSTEPS_MAX = 25
+# change of a drag over a step, as a phase: that part is not in closed form
+_GROWN, _GROWN_QUICK = 0.2, 1.5
+_RINGING = 1e-6  # in stretch, from which on steps must see it: 0.075 um on 75 mm
+_DRAG_NEAR = 0.2  # of a drag: as near to the one in closed form it need not be the same
 _RODAS_TOLERANCE = 5e-9  # in stretch, a step: 0.4 nm on 75 mm
 _RODAS_STEP_MAX = 2e-2  # s; the error estimate rules below that
 _RODAS_HALVINGS = 2.0**-17
@@ -89,6 +97,7 @@ _acting = assembly.acting
 _SUPPLY, _POLARISE = assembly.BITS["supply"], assembly.BITS["polarise"]
 _PERMITTIVITY, _SOFTEN = assembly.BITS["permittivity"], assembly.BITS["soften"]
 _STRESS, _COMMIT = assembly.BITS["stress"], assembly.BITS["commit"]
+_STIFFNESS, _TURNS = assembly.BITS["stiffness"], assembly.TURNS
 _MOVING = _SUPPLY | _POLARISE | _PERMITTIVITY | _SOFTEN | _STRESS
 
 _NEO_HOOKEAN, _GENT = SPRINGS.index(neo_hookean.NAME), SPRINGS.index(gent.NAME)
@@ -176,10 +185,13 @@ def rest_stretch(c: np.ndarray, field2: float) -> tuple[int, float]:
 
 
 @jit
-def _speed_limit(c: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Angular frequency of the film at ``y`` (rad/s), and Runge-Kutta steps that it takes a second.
+def _speeds(
+    c: np.ndarray, y: np.ndarray, branches: np.ndarray
+) -> tuple[float, float, float, float]:
+    """What limits a step at ``y``: (1/s^2, 1/s^2, 1/s, 1/s), all over the inertia.
 
-    The latter follow from that frequency, the fastest flow of a branch and the longest step.
+    The stiffness of the springs, what effects may add to it, their drag, and the fastest flow of a
+    branch. ``branches`` (n,) is filled with the stiffness of each branch, 1/s^2.
     """
     held = int(c[HELD])
     lam = y[0]
@@ -191,13 +203,35 @@ def _speed_limit(c: np.ndarray, y: np.ndarray) -> tuple[float, float]:
         k = HEAD + WIDTH * (i + 1)
         e = lam / y[2 + i]
         bend = nominal_pull_slope(held, int(c[k + KIND]), c[k + LIMIT], c[k + LOCKING], e)
-        stiffness += c[k + MODULUS] * bend / (y[2 + i] * y[2 + i])
+        branches[i] = c[k + MODULUS] * bend / (y[2 + i] * y[2 + i]) / c[INERTIA]
+        stiffness += branches[i] * c[INERTIA]
         fastest = max(fastest, c[k + RATE] * bend * e / y[2 + i])
-    more, damping = _stiffness(c, y[2 + branch_count(c) :], lam)
-    swing = math.sqrt(max(stiffness + more, 0.0) / c[INERTIA])
+    more, drag = _stiffness(c, y[2 + branch_count(c) :], lam, math.inf)
+    inertia = c[INERTIA]
+    return max(stiffness, 0.0) / inertia, more / inertia, drag / inertia, fastest
+
+
+@inlined
+def _bound(springy: float, more: float, drag: float, fastest: float) -> float:
+    """Classical Runge-Kutta steps that these take a second."""
     # a motion that drag kills at once need only stay stable: to 2.8 for this method, kept below 2.2
-    fastest = max(fastest, 0.55 * damping / c[INERTIA])
-    return swing, max(max(swing, fastest) / _RK4_PHASE_MAX, 1.0 / _RK4_STEP_MAX)
+    rate = max(max(math.sqrt(springy + more), fastest), 0.55 * drag)
+    return max(rate / _RK4_PHASE_MAX, 1.0 / _RK4_STEP_MAX)
+
+
+@inlined
+def _lean_bound(springy: float, more: float, fastest: float, quick: bool) -> float:
+    """Exponential steps that the same take a second; a drag is in closed form, springs nearly."""
+    if quick:
+        return max(max(math.sqrt(more), fastest) / _RK4_PHASE_MAX, 1.0 / _QUICK_STEP_MAX)
+    return _bound(springy, more, 0.0, fastest)
+
+
+@jit
+def _drag(c: np.ndarray, y: np.ndarray, rate: float) -> float:
+    """Drag of the effects over the inertia, 1/s, at a rate of stretch."""
+    _, drag = _stiffness(c, y[2 + branch_count(c) :], y[0], rate)
+    return drag / c[INERTIA]
 
 
 @jit
@@ -378,7 +412,8 @@ def _supplied(
     half: float,
     lam: float,
     speed: float,
-    gain: float,
+    grown: float,
+    gained: float,
     now: float,
     va: float,
     vm: float,
@@ -386,16 +421,16 @@ def _supplied(
 ) -> tuple[float, float]:
     """Voltage squared that pulls on the film amid and after a step of 2 ``half`` s.
 
-    ``now`` V is at the film when the step begins. What reaches it follows from how it goes on with
-    the acceleration ``gain`` of the start: a film that grows lowers its own voltage.
+    ``now`` V is at the film when the step begins. What reaches it follows from how it goes on: in
+    half of the step it grows by ``grown`` and gains ``gained`` of speed, by what is known when it
+    begins. A film that grows lowers its own voltage.
     """
     if acting & _SUPPLY:
-        early, late = 0.5 * half, 1.5 * half
         _, middle = _supply(
-            c, m, t, va, vm, half, lam + early * speed, speed + early * gain
+            c, m, t, va, vm, half, lam + 0.5 * grown, speed + 0.5 * gained
         )  # fmt: skip
         _, vb = _supply(
-            c, m, t + half, vm, vb, half, lam + late * speed, speed + late * gain
+            c, m, t + half, vm, vb, half, lam + 1.5 * grown, speed + 1.5 * gained
         )  # fmt: skip
         vm = middle
     em, eb = vm * vm, vb * vb
@@ -461,7 +496,8 @@ def _effect_steps(
         lam0 = y[0]
         now, ea = _supplied_now(acting, c, m, t, lam0, y[1], va)
         _pull(acting, c, springs, y, m, ea, warmth, lam0, 0.0, t, k1)
-        em, eb = _supplied(acting, c, m, t, half, lam0, y[1], k1[1], now, va, vm, vb)
+        grown, gained = half * y[1], half * k1[1]
+        em, eb = _supplied(acting, c, m, t, half, lam0, y[1], grown, gained, now, va, vm, vb)
         if step % stride == 0:
             trace[2] = max(trace[2], abs(k1[1] - 2.0 * trace[0] + trace[1]))
             trace[1] = trace[0]
@@ -485,9 +521,11 @@ def _effect_steps(
 def _lean_table(c: np.ndarray, springs: np.ndarray) -> np.ndarray:
     """What ``_lean_steps`` reads: load and field over the inertia, then three numbers a spring.
 
-    Those are modulus over inertia, 1/J and 1/T; springs that are missing are there as zeros.
+    Those are modulus over inertia, 1/J and 1/T; springs that are missing are there as zeros. Then
+    the inertia, and the stiffness of each branch, which ``_speeds`` fills in.
     """
-    table = np.zeros(14)
+    table = np.zeros(18)
+    table[14] = c[INERTIA]
     table[0], table[1] = c[FORCE] / c[INERTIA], c[ELECTRIC] / c[INERTIA]
     for i in range(springs.shape[1]):
         table[2 + 3 * i] = springs[MODULUS, i] / c[INERTIA]
@@ -497,10 +535,81 @@ def _lean_table(c: np.ndarray, springs: np.ndarray) -> np.ndarray:
 
 
 @jit
+def _times(p: float, q: float, r: float, s: float, k: float, d: float) -> tuple[float, float]:
+    """(p + q A)(r + s A) as a number and a multiple of A, with A^2 = -d A - k."""
+    return p * r - q * s * k, p * s + q * r - q * s * d
+
+
+@jit
+def _phis(k: float, d: float, h: float, phi: np.ndarray) -> None:
+    """Fill ``phi`` with exp and phi_1 .. phi_3 of h A, A = [[0, 1], [-k, -d]], as p + q A: (4, 2).
+
+    Functions of a 2 by 2 matrix are that and no more. Taylor's series where it converges at once,
+    then doubled (Hochbruck and Ostermann, Acta Numerica 19, 2010): no drag is too strong.
+    """
+    doublings, norm = 0, h * max(math.sqrt(k), d)
+    while norm > 0.5:
+        norm *= 0.5
+        doublings += 1
+    part = h * 0.5**doublings
+    for j in range(4):
+        phi[j, 0], phi[j, 1] = 0.0, 0.0
+    # x^n/(n + j)! adds up to phi_j
+    p, q, factorial = 1.0, 0.0, 1.0
+    for n in range(12):
+        below = factorial
+        for j in range(4):
+            phi[j, 0] += p / below
+            phi[j, 1] += q / below
+            below *= n + j + 1
+        p, q = _times(p, q, 0.0, part, k, d)
+        factorial *= n + 1
+    for _ in range(doublings):
+        e0, e1 = phi[0, 0], phi[0, 1]
+        for j in range(3, -1, -1):
+            p, q = _times(e0, e1, phi[j, 0], phi[j, 1], k, d)
+            weight = 1.0
+            for i in range(j, 0, -1):
+                p += weight * phi[i, 0]
+                q += weight * phi[i, 1]
+                weight /= j - i + 1
+            phi[j, 0], phi[j, 1] = p * 0.5**j, q * 0.5**j
+
+
+@jit
+def _swings(k: float, d: float, h: float, phi: np.ndarray, swing: np.ndarray) -> None:
+    """What ``_lean_steps`` reads: how a film of stiffness k and drag d goes on over ``h`` s.
+
+    ``swing`` (19,) is filled: the matrices of Cox and Matthews's method for lam'' = -k lam - d lam'
+    + rest, of which only the columns are needed that act on a rate or an acceleration; k, d and h
+    themselves; and what a force does that grows evenly over the first half.
+    """
+    _phis(k, d, 0.5 * h, phi)
+    p, q = phi[0]
+    swing[0], swing[1], swing[2], swing[3] = p, q, -k * q, p - d * q
+    p, q = 0.5 * h * phi[1, 0], 0.5 * h * phi[1, 1]
+    swing[4], swing[5] = q, p - d * q
+    p, q = 0.25 * h * h * phi[2, 0], 0.25 * h * h * phi[2, 1]
+    swing[17], swing[18] = q, p - d * q
+    _phis(k, d, h, phi)
+    p, q = phi[0]
+    swing[6], swing[7] = q, p - d * q
+    first, second, third = phi[1], phi[2], phi[3]
+    p, q = first - 3.0 * second + 4.0 * third
+    swing[8], swing[9] = h * q, h * (p - d * q)
+    p, q = 2.0 * second - 4.0 * third
+    swing[10], swing[11] = h * q, h * (p - d * q)
+    p, q = 4.0 * third - second
+    swing[12], swing[13] = h * q, h * (p - d * q)
+    swing[14], swing[15], swing[16] = k, d, h
+
+
+@jit
 def _lean_steps(
     acting: int,
     c: np.ndarray,
     table: np.ndarray,
+    swing: np.ndarray,
     y: np.ndarray,
     v0: float,
     v1: float,
@@ -511,20 +620,28 @@ def _lean_steps(
     stride: int,
     trace: np.ndarray,
 ) -> None:
-    """As ``_rk4_steps`` for the thesis's case: width held, springs of Gent's kind, n <= 3.
+    """``steps`` steps of ``h`` s for the thesis's case: width held, springs of Gent's kind, n <= 3.
 
-    Twice as fast, because nothing leaves the registers on the way. ``table`` is ``_lean_table``'s.
-    Where effects are ``acting`` it does what ``_effect_steps`` does.
+    Exponential Runge-Kutta of order 4 (Cox and Matthews, J. Comput. Phys. 176, 2002): the film's
+    own swinging and a drag are in closed form, what is left of the forces is slow. So neither
+    ringing nor drag ask for short steps. Branches go as in classical Runge-Kutta, which is the same
+    method for what has no linear part. Nothing leaves the registers on the way. ``table`` is
+    ``_lean_table``'s, ``swing`` is ``_swings``'s. Where effects are ``acting`` it does what
+    ``_effect_steps`` does.
     """
     n = y.shape[0] - 2 - MEMORY
     memory = y[2 + n :]
-    inertia = c[INERTIA]
-    lam0, t = y[0], t0
+    over = table[14]
     load, electric_gain = table[0], table[1]
     m0, g0 = table[2], table[3]
     m1, g1, r1 = table[5], table[6], table[7]
     m2, g2, r2 = table[8], table[9], table[10]
     m3, g3, r3 = table[11], table[12], table[13]
+    e11, e12, e21, e22 = swing[0], swing[1], swing[2], swing[3]
+    p1, p2, w1, w2 = swing[4], swing[5], swing[6], swing[7]
+    a1, a2, b1, b2, c1, c2 = swing[8], swing[9], swing[10], swing[11], swing[12], swing[13]
+    k1, k2, k3 = table[15], table[16], table[17]
+    k, d, q1, q2 = swing[14], swing[15], swing[17], swing[18]
     x1 = y[2] if n > 0 else 1.0
     x2 = y[3] if n > 1 else 1.0
     x3 = y[4] if n > 2 else 1.0
@@ -536,88 +653,106 @@ def _lean_steps(
         va = v0 + dv * m
         vm, vb = va + 0.5 * dv, va + dv
         f0, fm, fb = va * va, vm * vm, vb * vb
-        now = va
+        now, lam0, t = va, lam, t0 + m * h
         if acting:
-            lam0, t = lam, t0 + m * h
             now, f0 = _supplied_now(acting, c, memory, t, lam, speed, va)
-        e0 = electric_gain * f0
         # four times the same, written out: a loop over stages would go through memory
-
         p = lam * lam
         t1, t2 = _lean_pull(p, x1 * x1, g1), _lean_pull(p, x2 * x2, g2)
         t3 = _lean_pull(p, x3 * x3, g3)
-        stress = m0 * _lean_pull(p, 1.0, g0) + m1 * t1 + m2 * t2 + m3 * t3
-        a = e0 * lam - stress / lam
+        stress = (m0 * _lean_pull(p, 1.0, g0) + m1 * t1 + m2 * t2 + m3 * t3) / lam
+        pull = electric_gain * f0 * lam
+        a = pull - stress
         if acting:
             a = _affected(
-                acting, c, memory, lam, speed, warmth, lam0, 0.0, t, f0, e0 * lam,
-                stress / lam, inertia,
+                acting, c, memory, lam, speed, warmth, lam0, 0.0, t, f0, pull, stress, over
             )  # fmt: skip
         a += load
-        if acting:
-            fm, fb = _supplied(acting, c, memory, t, half, lam, speed, a, now, va, vm, vb)
-        em, e1 = electric_gain * fm, electric_gain * fb
         if m % stride == 0:
             bend = max(bend, abs(a - 2.0 * last + last_but_one))
             last_but_one, last = last, a
+        push = a + d * speed
+        z, v = e12 * speed + p1 * push, e22 * speed + p2 * push
+        if acting:
+            fm, fb = _supplied(
+                acting, c, memory, t, half, lam, speed, z, v - speed, now, va, vm, vb
+            )  # fmt: skip
+        em, e1 = electric_gain * fm, electric_gain * fb
         f1, f2, f3 = r1 * t1, r2 * t2, r3 * t3
-        sum_v, sum_a = speed, a
+        # how the field grows and the branches flow is known ahead: no stage need take it as still
+        yielding = half * (k1 * f1 + k2 * f2 + k3 * f3)
+        rise, later = lam * (em - electric_gain * f0) + yielding, lam * (e1 - em) + yielding
+        slope = rise / half
+        z, v = z + q1 * slope, v + q2 * slope
         sum_1, sum_2, sum_3 = f1, f2, f3
+        first, sum_w, sum_v = push, w1 * speed + a1 * push, w2 * speed + a2 * push
+        there_w, there_v = z, v
 
-        v, z = speed + half * a, lam + half * speed
         z1, z2, z3 = x1 + half * f1, x2 + half * f2, x3 + half * f3
-        p = z * z
+        now = lam + z
+        p = now * now
         t1, t2 = _lean_pull(p, z1 * z1, g1), _lean_pull(p, z2 * z2, g2)
         t3 = _lean_pull(p, z3 * z3, g3)
-        stress = m0 * _lean_pull(p, 1.0, g0) + m1 * t1 + m2 * t2 + m3 * t3
-        a = em * z - stress / z
+        stress = (m0 * _lean_pull(p, 1.0, g0) + m1 * t1 + m2 * t2 + m3 * t3) / now
+        pull = em * now
+        a = pull - stress
         if acting:
             a = _affected(
-                acting, c, memory, z, v, warmth, lam0, half, t, fm, em * z,
-                stress / z, inertia,
+                acting, c, memory, now, v, warmth, lam0, half, t, fm, pull, stress, over
             )  # fmt: skip
         a += load
+        push = a + k * z + d * v
+        less = push - rise
+        z = e12 * speed + p1 * less + q1 * slope
+        v = e22 * speed + p2 * less + q2 * slope
         f1, f2, f3 = r1 * t1, r2 * t2, r3 * t3
-        sum_v, sum_a = sum_v + 2.0 * v, sum_a + 2.0 * a
+        sum_w, sum_v = sum_w + b1 * push, sum_v + b2 * push
         sum_1, sum_2, sum_3 = sum_1 + 2.0 * f1, sum_2 + 2.0 * f2, sum_3 + 2.0 * f3
 
-        z, v = lam + half * v, speed + half * a
         z1, z2, z3 = x1 + half * f1, x2 + half * f2, x3 + half * f3
-        p = z * z
+        now = lam + z
+        p = now * now
         t1, t2 = _lean_pull(p, z1 * z1, g1), _lean_pull(p, z2 * z2, g2)
         t3 = _lean_pull(p, z3 * z3, g3)
-        stress = m0 * _lean_pull(p, 1.0, g0) + m1 * t1 + m2 * t2 + m3 * t3
-        a = em * z - stress / z
+        stress = (m0 * _lean_pull(p, 1.0, g0) + m1 * t1 + m2 * t2 + m3 * t3) / now
+        pull = em * now
+        a = pull - stress
         if acting:
             a = _affected(
-                acting, c, memory, z, v, warmth, lam0, half, t, fm, em * z,
-                stress / z, inertia,
+                acting, c, memory, now, v, warmth, lam0, half, t, fm, pull, stress, over
             )  # fmt: skip
         a += load
+        push = a + k * z + d * v
+        sum_w, sum_v = sum_w + b1 * push, sum_v + b2 * push
+        push = 2.0 * push - first - rise
+        slope = later / half
+        z = e11 * there_w + e12 * there_v + p1 * push + q1 * slope
+        v = e21 * there_w + e22 * there_v + p2 * push + q2 * slope
         f1, f2, f3 = r1 * t1, r2 * t2, r3 * t3
-        sum_v, sum_a = sum_v + 2.0 * v, sum_a + 2.0 * a
         sum_1, sum_2, sum_3 = sum_1 + 2.0 * f1, sum_2 + 2.0 * f2, sum_3 + 2.0 * f3
 
-        z, v = lam + h * v, speed + h * a
         z1, z2, z3 = x1 + h * f1, x2 + h * f2, x3 + h * f3
-        p = z * z
+        now = lam + z
+        p = now * now
         t1, t2 = _lean_pull(p, z1 * z1, g1), _lean_pull(p, z2 * z2, g2)
         t3 = _lean_pull(p, z3 * z3, g3)
-        stress = m0 * _lean_pull(p, 1.0, g0) + m1 * t1 + m2 * t2 + m3 * t3
-        a = e1 * z - stress / z
+        stress = (m0 * _lean_pull(p, 1.0, g0) + m1 * t1 + m2 * t2 + m3 * t3) / now
+        pull = e1 * now
+        a = pull - stress
         if acting:
             a = _affected(
-                acting, c, memory, z, v, warmth, lam0, h, t, fb, e1 * z,
-                stress / z, inertia,
+                acting, c, memory, now, v, warmth, lam0, h, t, fb, pull, stress, over
             )  # fmt: skip
         a += load
-        lam += sixth * (sum_v + v)
-        speed += sixth * (sum_a + a)
+        push = a + k * z + d * v
+        lam += sum_w + c1 * push
+        speed = sum_v + c2 * push
         if acting & _COMMIT:
             _commit(c, memory, lam, speed, lam0, h, t)
         x1 += sixth * (sum_1 + r1 * t1)
         x2 += sixth * (sum_2 + r2 * t2)
         x3 += sixth * (sum_3 + r3 * t3)
+    trace[0], trace[1], trace[2] = last, last_but_one, bend
     y[0], y[1] = lam, speed
     if n > 0:
         y[2] = x1
@@ -625,7 +760,6 @@ def _lean_steps(
         y[3] = x2
     if n > 2:
         y[4] = x3
-    trace[0], trace[1], trace[2] = last, last_but_one, bend
 
 
 @jit
@@ -749,6 +883,32 @@ def _rodas(
     return OK, min(h, _RODAS_STEP_MAX)
 
 
+@inlined
+def _refined(
+    kick_gain: float,
+    ring_gain: float,
+    kick: float,
+    kick_before: float,
+    ring: float,
+    treads: bool,
+    trace: np.ndarray,
+) -> tuple[int, float]:
+    """How many times finer steps must be while the film rings; and what is no ringing."""
+    # a step of phase p gets an oscillation wrong by p^5/120 of its amplitude: once, where
+    # the drive kicks the film, and again at each step while the film rings on
+    kicked, ringing = kick_gain * abs(kick), ring_gain * ring
+    refine, forced = 1, 0.0
+    if kicked > 1.0 or ringing > 1.0:
+        more = max(kicked**0.2, math.sqrt(math.sqrt(ringing)))
+        refine = math.ceil(min(more, _RK4_REFINE_MAX))
+    # a slow staircase rings within each of its long treads, but it does not ring on
+    if treads:
+        trace[0] += kick
+        trace[1] += kick
+        forced = 3.0 * min(abs(kick), kick_before)
+    return refine, forced
+
+
 @jit
 def drive_by_voltage(
     c: np.ndarray,
@@ -759,14 +919,17 @@ def drive_by_voltage(
     y: np.ndarray,
     stretch: np.ndarray,
     rate: np.ndarray,
+    quick: bool = False,
 ) -> tuple[int, int]:
     """Carry state ``y`` (2 + n + MEMORY,) along a record; fill ``stretch`` and ``rate`` (N,).
 
     ``time`` s and ``voltage`` V are (N,), increasing and not necessarily even. With ``hold`` each
     voltage stands until the next sample (a converter's output), else the voltage is linear between
     samples. ``warmth`` (N,) K is the temperature above that of the start, or (0,) where none was
-    recorded. Element 0 is the state as given, so a record can be cut and continued. ``c`` must know
-    the stretch at rest (``model.actuator.at_rest``).
+    recorded. ``quick`` takes the longest steps that are good to a tenth of a micrometre, for a
+    search that tries thousands of models; else they are good to some hundredths. Element 0 is the
+    state as given, so a record can be cut and continued. ``c`` must know the stretch at rest
+    (``model.actuator.at_rest``).
 
     Returns ``(status, reached)``: on any status but ``OK`` the samples from ``reached`` on are
     filled with the last stretch that was reached, never with NaN.
@@ -784,15 +947,18 @@ def drive_by_voltage(
     most = _LEAN_SUBSTEPS_MAX if lean else _RK4_SUBSTEPS_MAX
     if moves:
         most = _EFFECT_SUBSTEPS_MAX
+    drags, turns = acting & _STIFFNESS != 0, acting & _TURNS != 0
     work = np.zeros((15, y.shape[0]))
     before = np.empty(y.shape[0])
     trace = np.zeros(3)
+    branches = table[15:] if lean else np.zeros(springs.shape[1])
+    phi, swings = np.empty((4, 2)), np.zeros(19)
     status = OK
     reached = samples
     h = _RODAS_STEP_MAX
-    swing, bound, steps, step_before, gentle = 0.0, 0.0, 1, 0.0, True
+    springy, swing, bound, steps, step_before, gentle = 0.0, 0.0, 0.0, 1, 0.0, True
     kick_gain, ring_gain, fading, per_phase2 = 0.0, 0.0, 1.0, 1.0
-    ring, kick, lam_seen = 0.0, 0.0, y[0]
+    ring, kick, lam_seen, rate_before, drag = 0.0, 0.0, y[0], y[1], 0.0
     fresh = True
     last = voltage[0]
     for k in range(samples):
@@ -814,12 +980,16 @@ def drive_by_voltage(
         # the film's stiffness follows the stretch slowly, and time is mostly even
         if k % 64 == 0 or abs(dt - step_before) > 1e-6 * dt:
             if k % 64 == 0:
-                swing, bound = _speed_limit(c, y)
+                springy, more, drag, fastest = _speeds(c, y, branches)
+                swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
+                lean_bound = _lean_bound(springy, more, fastest, quick)
                 lam_seen = y[0]
             step_before = dt
-            wanted = dt * bound - 1e-6
+            wanted = dt * (lean_bound if lean and moves else bound) - 1e-6
             # a bound that is not finite is not gentle either, and cannot be counted in steps
             gentle = wanted <= max(most, most * dt / _RK4_STEP_MAX)
+            if lean:
+                wanted = dt * lean_bound - 1e-6
             steps = max(math.ceil(wanted), 1) if gentle else 1
             step = dt / steps
             phase = max(swing * step, 1e-6)
@@ -829,49 +999,71 @@ def drive_by_voltage(
             per_phase2 = 1.0 / phase**2
         explicit = gentle
         if explicit:
-            # a step of phase p gets an oscillation wrong by p^5/120 of its amplitude: once, where
-            # the drive kicks the film, and again at each step while the film rings on
             field2 = v0 * v0 - last * last if hold else v1 * v1 - 2.0 * v0 * v0 + last * last
             kick_before = abs(kick)
             kick = c[ELECTRIC] * field2 * electric(held, y[0]) / c[INERTIA]
-            kicked, ringing = kick_gain * abs(kick), ring_gain * ring
-            refine = 1
-            if kicked > 1.0 or ringing > 1.0:
-                more = max(kicked**0.2, math.sqrt(math.sqrt(ringing)))
-                refine = math.ceil(min(more, _RK4_REFINE_MAX))
-            fine = steps * refine
-            # a slow staircase rings within each of its long treads, but it does not ring on
-            forced = 0.0
-            if hold and steps > 1:
-                trace[0] += kick
-                trace[1] += kick
-                forced = 3.0 * min(abs(kick), kick_before)
             for j in range(y.shape[0]):
                 before[j] = y[j]
             theta = warmth[k] if warm else 0.0
-            if lean:
-                _lean_steps(
-                    acting if moves else 0, c, table, y, v0, v1, time[k], theta, dt / fine, fine,
-                    refine, trace,
-                )  # fmt: skip
-            elif moves:
+        if explicit and lean:
+            fine, refine = steps, 1
+            # ringing asks for steps that see it, more so where a path is followed from turn to turn
+            forced = 0.0
+            if not quick:
+                refine, forced = _refined(
+                    kick_gain, ring_gain, kick, kick_before, ring, hold and steps > 1, trace
+                )
+                fine = steps * refine
+            elif max(ring * fading, abs(kick)) > _RINGING * springy:
+                finer = swing * dt / _RK4_PHASE_MAX
+                if turns:
+                    finer *= 2.0 if ring < 200.0 * _RINGING * springy else 4.0
+                fine = max(fine, math.ceil(min(finer - 1e-6, _EFFECT_SUBSTEPS_MAX)))
+            if drags:
+                # a drag may change with the rate: where it does within the sample, in finer steps
+                change = abs(y[1] - rate_before) + abs(kick) * dt
+                most_drag = _drag(c, y, abs(y[1]) + change)
+                least_drag = _drag(c, y, max(abs(y[1]) - change, 0.0))
+                drag = 0.5 * (most_drag + least_drag)
+                growth = (most_drag - least_drag) * dt
+                growth /= _GROWN_QUICK if quick else _GROWN
+                fine = max(fine, math.ceil(min(growth, 4 * _EFFECT_SUBSTEPS_MAX)))
+                if abs(drag - swings[15]) < _DRAG_NEAR * drag:
+                    drag = swings[15]
+                rate_before = y[1]
+            h_fine = dt / fine
+            off = abs(springy - swings[14]) > 1e-9 * springy or drag != swings[15]
+            if off or abs(h_fine - swings[16]) > 1e-6 * h_fine:
+                _swings(springy, drag, h_fine, phi, swings)
+            _lean_steps(
+                acting if moves else 0, c, table, swings, y, v0, v1, time[k], theta, h_fine, fine,
+                max(fine // steps, 1), trace,
+            )  # fmt: skip
+            ring = max(ring * fading, trace[2] * per_phase2 - forced)
+        elif explicit:
+            refine, forced = _refined(
+                kick_gain, ring_gain, kick, kick_before, ring, hold and steps > 1, trace
+            )
+            fine = steps * refine
+            h_fine = dt / fine
+            if moves:
                 _effect_steps(
-                    acting, c, springs, y, v0, v1, time[k], theta, dt / fine, fine, refine, work,
-                    trace,
-                )  # fmt: skip
+                    acting, c, springs, y, v0, v1, time[k], theta, h_fine, fine, refine, work, trace
+                )
             else:
-                h_fine = dt / fine
                 _rk4_steps(held, uniform, c, springs, y, v0, v1, h_fine, fine, refine, work, trace)
+            ring = max(ring * fading, trace[2] * per_phase2 - forced)
+        if explicit:
             explicit = _admissible(springs, y)
             if explicit and abs(y[0] - lam_seen) > _MOVED * lam_seen:
                 # far enough for springs to have stiffened: then this step was too long
                 bound_before = bound
-                swing, bound = _speed_limit(c, y)
+                springy, more, drag, fastest = _speeds(c, y, branches)
+                swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
+                lean_bound = _lean_bound(springy, more, fastest, quick)
                 lam_seen, step_before = y[0], 0.0
                 explicit = moves or bound <= _STIFFER * bound_before
-            if explicit:
-                ring = max(ring * fading, trace[2] * per_phase2 - forced)
-            else:
+            if not explicit:
                 for j in range(y.shape[0]):
                     y[j] = before[j]
         last = v0

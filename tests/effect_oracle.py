@@ -163,12 +163,15 @@ def extra(name, p, film, drive):
             ),
         )
 
-    def charging():
+    def charging(gauge=0.0):
+        def resistance(lam):
+            return p["resistance"] * math.exp(gauge * (lam - rest))
+
         return Extra(
             states=1,
             voltage=lambda t, lam, u, z, v: z[0],
             slopes=lambda t, lam, u, z, v: (
-                (v - z[0]) / (p["resistance"] * film.capacitance * lam**2) - 2.0 * u / lam * z[0],
+                (v - z[0]) / (resistance(lam) * film.capacitance * lam**2) - 2.0 * u / lam * z[0],
             ),
         )
 
@@ -213,6 +216,7 @@ def extra(name, p, film, drive):
         "dry friction": lambda: hysteresis(p["friction"], p["presliding"]),
         "elastoplastic hysteresis": lambda: hysteresis(p["yield_stress"], p["reach"]),
         "electrode resistance": charging,
+        "strained electrode": lambda: charging(p["gauge"]),
         "stress beyond a displacement": lambda: Extra(
             stress=lambda t, lam, u, z, v: (
                 p["stiffness"] * max(lam - rest - p["onset"] / film.length, 0.0)

@@ -191,6 +191,7 @@ def test_every_family_was_tried(name):
     chosen = first.candidates[0]
     assert chosen.gained > 0.7
     assert chosen.gain > 100.0
+    assert of_hidden(name).final.predicting == of_hidden(name).final.model
     # none that would do as well was passed over
     for c in first.candidates[1:]:
         assert c.verdict != "indistinguishable"
@@ -232,6 +233,9 @@ def test_what_no_family_covers_is_described():
     assert numbers["stress"] == pytest.approx(30.0, rel=0.03)
     assert "sudden change of force" in found.unnamed.expression
     assert found.unnamed.acts_on == "load"
+    # one recording does not show that it will happen again
+    assert found.final.predicting.effects == ()
+    assert any("of these recordings alone" in n for n in found.notes)
 
 
 def test_a_slack_strip_is_found():
@@ -259,6 +263,16 @@ def test_a_voltage_that_stands_between_samples_is_recognised():
     assert any("stands between samples" in n for n in found.notes)
     # and where it is known, there is nothing to recognise
     assert not diagnose([record], PLAIN, workers=1).held
+
+
+def test_a_voltage_that_stands_between_samples_is_recognised_beside_an_effect():
+    drive = thesis_drive()
+    record = record_of(plant("load inertia"), replace(drive, hold=True))
+    found = diagnose([replace(record, drive=drive)], PLAIN, workers=1)
+    require_consistent(found)
+    assert found.held
+    assert [s.effect for s in found.steps] == ["load inertia"]
+    assert found.final.cost == pytest.approx(1.0, abs=0.1)
 
 
 def test_rubbish_that_is_masked_is_not_seen():

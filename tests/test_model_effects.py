@@ -284,6 +284,14 @@ def shown_by_lag(p, time):
     ).y[0]  # fmt: skip
 
 
+def shown_by_two_lags(p, time):
+    tau = p["time_constant"]
+    return solve_ivp(
+        lambda t, y: [(moved(t)[0] - y[0]) / tau, (y[0] - y[1]) / tau],
+        (0.0, time[-1]), [0.0, 0.0], t_eval=time, method="DOP853", rtol=1e-10, atol=1e-14,
+    ).y[1]  # fmt: skip
+
+
 def mains(p, t):
     turn = 2.0j * math.pi * p["frequency"] * t
     first = (p["cosine"] - 1j * p["sine"]) * np.exp(turn)
@@ -306,8 +314,11 @@ SHOWN = {
     "settling drift": lambda p, t: (
         moved(t)[0] + p["drift"] * (1.0 - np.exp(-t / p["time_constant"]))
     ),
+    "sensor double lag": shown_by_two_lags,
     "wandering drift": lambda p, t: (
-        moved(t)[0] + np.polyval([p["cubic"], p["quadratic"], p["linear"], 0.0], t / 30.0)
+        moved(t)[0]
+        + np.polynomial.chebyshev.chebval(t / 15.0 - 1.0, [0.0, *p.values()])
+        - np.polynomial.chebyshev.chebval(-1.0, [0.0, *p.values()])
     ),
     "sudden change of reading": lambda p, t: (
         moved(t)[0] + p["jump"] * np.clip((t - p["moment"]) / 0.02 + 0.5, 0.0, 1.0)

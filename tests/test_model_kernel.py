@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import expm
 
 from model import coefficients as at
 from model import kernel
@@ -300,7 +301,7 @@ SOME_EFFECTS = (
 
 
 @pytest.mark.parametrize("effects", [(), SOME_EFFECTS], ids=["without", "with effects"])
-def test_the_two_runge_kuttas_are_one(effects):
+def test_the_exponential_method_is_the_plain_one(effects):
     c = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, effects).coefficients()
     _, rest = at_rest(c)
     springs = kernel._spring_table(c)
@@ -310,16 +311,48 @@ def test_the_two_runge_kuttas_are_one(effects):
     traces = np.zeros((2, 3))
     work = np.zeros((15, plain.size))
     table = kernel._lean_table(c, springs)
+    phi, swings = np.empty((4, 2)), np.zeros(19)
+    kernel._swings(2e5, 30.0, 1e-4, phi, swings)
     for v0, v1, t0 in ((0.0, 8e3, 0.0), (8e3, 6e3, 0.04)):
         if effects:
             kernel._effect_steps(
-                acting, c, springs, plain, v0, v1, t0, 0.0, 1e-3, 40, 4, work, traces[0]
+                acting, c, springs, plain, v0, v1, t0, 0.0, 1e-4, 400, 40, work, traces[0]
             )
         else:
-            kernel._rk4_steps(0, 1, c, springs, plain, v0, v1, 1e-3, 40, 4, work, traces[0])
-        kernel._lean_steps(acting, c, table, lean, v0, v1, t0, 0.0, 1e-3, 40, 4, traces[1])
-    np.testing.assert_allclose(lean, plain, rtol=1e-11, atol=1e-11)
-    np.testing.assert_allclose(traces[1], traces[0], rtol=1e-7)
+            kernel._rk4_steps(0, 1, c, springs, plain, v0, v1, 1e-4, 400, 40, work, traces[0])
+        kernel._lean_steps(
+            acting, c, table, swings, lean, v0, v1, t0, 0.0, 1e-4, 400, 40, traces[1]
+        )
+    # both are of order 4, and differ by what each of them leaves out
+    np.testing.assert_allclose(lean, plain, rtol=1e-7, atol=1e-6)
+    np.testing.assert_allclose(traces[1], traces[0], rtol=1e-3)
+
+
+@pytest.mark.parametrize("drag", [0.0, 40.0, 2e4])
+def test_swinging_and_dragging_in_closed_form(drag):
+    stiffness, h = 2e5, 5e-3
+    swings = np.zeros(19)
+    kernel._swings(stiffness, drag, h, np.empty((4, 2)), swings)
+    matrix = np.array([[0.0, 1.0], [-stiffness, -drag]])
+    half = expm(0.5 * h * matrix)
+    np.testing.assert_allclose(swings[:4], half.ravel(), rtol=1e-9, atol=1e-9)
+    # a force that stands still, or grows evenly, over half a step: rows of one larger exponential
+    larger = np.zeros((4, 4))
+    larger[:2, :2], larger[1, 2], larger[2, 3] = matrix, 1.0, 1.0
+    forced = expm(0.5 * h * larger)
+    np.testing.assert_allclose(swings[4:6], forced[:2, 2], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(swings[17:], forced[:2, 3], rtol=1e-9, atol=1e-12)
+    # over a whole step, with a force 1, t and t^2 at its start, middle and end
+    whole = expm(h * matrix)
+    np.testing.assert_allclose(swings[6:8], whole[:, 1], rtol=1e-9, atol=1e-9)
+    larger = np.zeros((5, 5))
+    larger[:2, :2], larger[1, 2], larger[2, 3], larger[3, 4] = matrix, 1.0, 1.0, 1.0
+    forced = expm(h * larger)
+    weights = swings[8:14].reshape(3, 2) * [[1.0], [2.0], [1.0]]
+    for power, column, scale in ((0, 2, 1.0), (1, 3, 1.0), (2, 4, 2.0)):
+        at_nodes = np.array([0.0**power, (0.5 * h) ** power, h**power])
+        exact = scale * forced[:2, column]
+        np.testing.assert_allclose(at_nodes @ weights, exact, rtol=1e-8, atol=1e-12)
 
 
 def test_rest_states_of_the_thesis():

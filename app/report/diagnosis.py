@@ -16,7 +16,7 @@ from app.report.words import listed, pooled_rms
 
 if TYPE_CHECKING:
     from app.outcomes import Comparison, DiagnoseOutcome
-    from model.diagnosis.findings import Round, Step
+    from model.diagnosis.findings import Diagnosis, Round, Step
     from model.fitting import Estimate
     from model.measures import Errors
 
@@ -28,6 +28,7 @@ __all__ = [
     "effect_table",
     "estimate_table",
     "experiment_table",
+    "headline",
     "kin",
     "pooled",
     "ranking",
@@ -81,6 +82,13 @@ def pooled(comparisons: Sequence[Comparison]) -> Errors | None:
 # ---------------------------------------------------------------- sentences
 
 
+def headline(finding: Diagnosis) -> str:
+    """The verdict as a headline."""
+    if finding.interrupted and not finding.rounds:
+        return "Interrupted before anything was tried"
+    return HEADLINES[finding.verdict]
+
+
 def kin(family: str) -> str:
     """A family as words."""
     return "of no known family" if family == "unknown" else family.replace("_", " ")
@@ -128,6 +136,8 @@ def readable(text: str) -> str:
 
 def _verdict(outcome: DiagnoseOutcome) -> str:
     finding = outcome.finding
+    if finding.interrupted and not finding.rounds:
+        return "The search was interrupted before anything was tried: nothing is known yet."
     if finding.verdict == "nothing_missing":
         return (
             "Nothing is missing: the thesis's model explains these recordings down to the noise, "

@@ -13,13 +13,13 @@ import numpy as np
 from app.report import diagnosis_figures as drawn
 from app.report import figures
 from app.report.diagnosis import (
-    HEADLINES,
     before_after,
     called,
     dropped,
     effect_table,
     estimate_table,
     experiment_table,
+    headline,
     kin,
     ranking,
     readable,
@@ -131,7 +131,7 @@ def _page(outcome: DiagnoseOutcome, title: str, names: Iterator[str]) -> Diagnos
     worst = sorted(finding.before, key=lambda s: -s.rms / s.noise)[:_DRAWN_MAX]
     return DiagnosisPage(
         title=title,
-        headline=HEADLINES[finding.verdict],
+        headline=headline(finding),
         summary=summary(outcome),
         warnings=warnings(outcome),
         errors=tuple(errors),

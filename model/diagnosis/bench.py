@@ -38,6 +38,7 @@ _STARTS = 5  # of the baseline, from the global search
 _BASELINE = 20  # iterations of its descents
 _SCOUTING = 3  # iterations from each start
 _NOT_WORTH = 0.02  # of what a fit lies behind: promising less, it is left where it is
+_FAR_BEHIND = 0.1  # of its own misfit: such a fit will not lead, and need not be sure of its end
 _ENDING = 25  # iterations of a fit that others build on
 _ALIKE = 0.5  # of the logarithm of relaxation times: a factor of 1.6
 _ELSEWHERE = (1.0, 4.0, 16.0)  # s, where a branch that is spare may be of use
@@ -117,7 +118,11 @@ class Bench:
     def problem(self, model: Actuator | Strip, full: bool = False) -> Problem:
         """The records, all samples or thinned, with ``model``'s numbers free."""
         layout = Layout(model, self.times)
-        return Problem(self.full if full else self.records, layout, self.workers)
+        records = self.full if full else self.records
+        return Problem(records, layout, self.workers, not full, self._count)
+
+    def _count(self, simulations: int) -> None:
+        self.simulations += simulations
 
     def baseline(self, base: Actuator | Strip, progress: Callable[[str, float], None]) -> Trial:
         """``base`` fitted from a global search.
@@ -140,7 +145,6 @@ class Bench:
             fits = [descend(problem, f.x, fixed, iterations=_BASELINE) for f in leaders]
             fit = min(fits, key=lambda f: f.cost)
         progress("descents", 1.0)
-        self.simulations += problem.simulations
         return _trial(problem, fit, fixed)
 
     def fit(
@@ -149,11 +153,13 @@ class Bench:
         starts: Sequence[tuple[np.ndarray, np.ndarray | None]],
         fixed: np.ndarray,
         leader: float = 0.0,
+        noise: bool = False,
     ) -> Trial:
         """``model`` fitted from the best of several starts: coordinates and a Jacobian near them.
 
         ``leader`` is the cost to beat: a fit that promises no more than a small part of what it
-        lies behind is not followed to its end.
+        lies behind is not followed to its end. ``noise`` is True where there is but noise to
+        explain: then what a Jacobian from nearby promises is believed.
         """
         problem = self.problem(model)
         scouts = [
@@ -168,8 +174,8 @@ class Bench:
             fixed,
             best.jacobian,
             gain=max(0.5, _NOT_WORTH * behind, _WORTH * best.cost * problem.samples),
+            sure=not noise and behind < _FAR_BEHIND * problem.samples * best.cost,
         )
-        self.simulations += problem.simulations
         return _trial(problem, best, fixed)
 
     def settled(self, trial: Trial, iterations: int = 10) -> Trial:
@@ -208,11 +214,19 @@ class Bench:
         problem = self.problem(trial.model, full=True)
         gain = max(0.5, _WORTH * trial.cost * problem.samples)
         fit = descend(problem, trial.x, trial.fixed, iterations=8, gain=gain, damping=1e-4)
-        self.simulations += problem.simulations
         return _trial(problem, fit, trial.fixed)
 
-    def stage(self, trial: Trial, correlation: float, estimates: bool = False) -> Stage:
-        """What the trial comes to, with the correlation time by which samples count."""
+    def stage(
+        self,
+        trial: Trial,
+        correlation: float,
+        estimates: bool = False,
+        for_others: Trial | None = None,
+    ) -> Stage:
+        """What the trial comes to, with the correlation time by which samples count.
+
+        ``for_others`` is the trial by which other recordings are predicted, where it is another.
+        """
         jac = trial.jacobian(quick=not estimates)
         predicted = _left_out(trial, jac)
         scale = trial.problem.sigma
@@ -230,6 +244,7 @@ class Bench:
             selection_max=float(np.max(np.abs(left_out))),
             criterion=information(trial.cost, trial.free, samples),
             estimates=self.estimates(trial, jac) if estimates else (),
+            for_others=(for_others or trial).model,
         )
 
     def _noise_lost(self) -> float:

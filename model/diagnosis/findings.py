@@ -15,6 +15,7 @@ from model.fitting import Estimate
 
 __all__ = [
     "EXPLAINED",
+    "NOISE_RMS",
     "NOTHING_MISSING",
     "PARTLY_EXPLAINED",
     "UNEXPLAINED",
@@ -28,6 +29,9 @@ __all__ = [
     "Step",
     "Unnamed",
 ]
+
+#: Residual over noise that still is noise: the noise itself is known to some per cent.
+NOISE_RMS = 1.08
 
 NOTHING_MISSING = "nothing_missing"
 EXPLAINED = "explained"
@@ -109,6 +113,8 @@ class Stage:
     fit to the others), are pooled over the training records, in the measured unit. ``criterion`` is
     the Bayesian information criterion, counting correlated residuals as what they are worth; only
     differences mean something. ``estimates`` are the model's numbers with their intervals.
+    ``for_others`` is the model by which other recordings are predicted: the same without what
+    happened in these recordings only, fitted again.
     """
 
     model: Actuator | Strip
@@ -118,6 +124,12 @@ class Stage:
     selection_max: float
     criterion: float
     estimates: tuple[Estimate, ...] = ()
+    for_others: Actuator | Strip | None = None
+
+    @property
+    def predicting(self) -> Actuator | Strip:
+        """The model by which other recordings are predicted."""
+        return self.for_others or self.model
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from scipy.signal import welch
 from scipy.stats import chi2, norm
 
 from model.diagnosis.bench import Trial
-from model.diagnosis.findings import Dependence, Signature
+from model.diagnosis.findings import NOISE_RMS, Dependence, Signature
 from model.fitting.intervals import correlation_time
 from model.records import ActuatorRecord, Record
 
@@ -18,7 +18,6 @@ __all__ = ["signatures"]
 
 _LAGS = 20  # of the Ljung-Box test
 _BINS = 24
-_NOISE = 1.08  # residual over noise that still is noise: the noise is known to some per cent
 _SHARE = 0.03  # of the residual's variance, beyond what noise gives: less is no dependence
 _TELLING = 0.1  # the same, for a sentence
 
@@ -77,7 +76,7 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
     difference = along.loading - along.unloading
     loops = float(np.nanmean(difference)) if np.isfinite(difference).any() else 0.0
     repeats = _first_less_repeats(record, residual, good)
-    is_noise = rms < _NOISE * noise and all(d.explained < _SHARE for d in dependences)
+    is_noise = rms < NOISE_RMS * noise and all(d.explained < _SHARE for d in dependences)
     return Signature(
         record=record.name,
         time=time,

@@ -18,13 +18,12 @@ from model.actuator import Actuator
 from model.diagnosis.bench import Bench, Trial
 from model.effects import EFFECTS, Effect, EffectValues, Parameter
 from model.film import Strip
-from model.fitting.parameters import Layout
-from model.fitting.problem import Problem
 from model.records import ActuatorRecord, FilmRecord
 
 __all__ = ["Promise", "Screen", "with_effect"]
 
-_MOMENTS = 40  # sought along the longest record
+_MOMENTS = 20  # sought along the longest record
+_CLOSER = ((1.0, 9), (0.3, 9), (0.1, 9))  # parts of their distance, and how many there
 _LINES = 400  # frequencies within an effect's bounds
 
 
@@ -72,11 +71,12 @@ class Screen:
         shapes = list(product(*(self._starts(p) for p in effect.shapes)))
         found = self._scored(effect, shapes)
         if found and any(p.part_of == "duration" for p in effect.shapes):
-            best = max(found, key=lambda p: p.share)
-            moment = best.model.effects[-1][1][-1][1]
-            step = self._duration() / _MOMENTS
-            finer = [(moment + f * step,) for f in np.linspace(-1.0, 1.0, 21)]
-            found += self._scored(effect, [s for s in finer if s[0] > 0.0])
+            for part, count in _CLOSER:
+                best = max(found, key=lambda p: p.share)
+                moment = best.model.effects[-1][1][-1][1]
+                step = part * self._duration() / _MOMENTS
+                finer = [(moment + f * step,) for f in np.linspace(-1.0, 1.0, count)]
+                found += self._scored(effect, [s for s in finer if s[0] > 0.0])
         return sorted(found, key=lambda p: -p.share)
 
     def _duration(self) -> float:
@@ -127,7 +127,6 @@ class Screen:
     def _scored(self, effect: Effect, shapes: list[tuple[float, ...]]) -> list[Promise]:
         sizes = effect.sizes
         rows, models = [], []
-        layout: Layout | None = None
         for shape in shapes:
             for i in range(len(sizes)):
                 values = tuple(
@@ -136,16 +135,14 @@ class Screen:
                 )
                 model = with_effect(self.trial.model, effect.name, (*values, *shape))
                 models.append(model)
-                if layout is None:
-                    layout = Layout(model, self.bench.times)
                 rows.append(np.array((*values, *shape)))
-        if layout is None:
+        if not models:
             return []
-        problem = Problem(self.bench.records, layout, self.bench.workers)
+        problem = self.bench.problem(models[0])
+        layout = problem.layout
         base_values = self.trial.problem.layout.values(self.trial.x)
         population = np.array([np.concatenate([base_values, row]) for row in rows])
         predicted, status = problem.predict(population)
-        self.bench.simulations += problem.simulations
         there = (predicted - problem.measured) - self._base
         total = float(self._residual @ self._residual)
         found = []

@@ -11,6 +11,7 @@ from model.actuator import Actuator
 from model.diagnosis.bench import Bench, Trial, information
 from model.diagnosis.findings import (
     EXPLAINED,
+    NOISE_RMS,
     NOTHING_MISSING,
     PARTLY_EXPLAINED,
     UNEXPLAINED,
@@ -33,6 +34,7 @@ __all__ = ["diagnose"]
 Progress = Callable[[str, float], None]
 
 _EFFECTS_MAX = 3  # more at once no record of this kind tells apart
+_TURNS = 3  # of searching on and pruning: what is pruned makes room
 _DECISIVE = 12.0  # of the information criterion: odds of e^6, over some forty candidates
 _ALIKE = 10.0  # of the same: candidates nearer than that are not told apart
 _MATTERS = 0.01  # of the noise's mean square: less is not worth an effect
@@ -44,11 +46,9 @@ _UNNAMED_MARGIN = (
     20.0  # of the criterion, by which an unnamed effect must be better than named ones
 )
 _FOLLOWED = 6  # candidates refitted in later rounds, the most promising ones
-_NOISE_RMS = (
-    1.08  # residual over noise that still is noise: the noise itself is known to some per cent
-)
 _EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
+_TRUSTED = 0.8  # of the same: what explains less may be a disguise, and predicts nothing else
 
 
 def _quiet(stage: str, fraction: float) -> None:
@@ -102,7 +102,8 @@ class _Search:
     ) -> None:
         self.bench = Bench(records, workers)
         self.base = base
-        self.report = progress
+        self._progress = progress
+        self._reached = 0.0
         self.stop = stop
         self.effects = [e for e in EFFECTS.values() if is_of(e, self.bench)]
         self.rounds: list[Round] = []
@@ -111,6 +112,11 @@ class _Search:
         self.ended: set[frozenset[str]] = set()
         self.interrupted = False
         self.held = False
+
+    def report(self, stage: str, fraction: float) -> None:
+        """Progress, which never goes back: how often what is pruned is made up for is not known."""
+        self._reached = max(self._reached, fraction)
+        self._progress(stage, self._reached)
 
     # -- the course of things
 
@@ -123,11 +129,27 @@ class _Search:
         baseline = self._timed(baseline)
         self.found[frozenset()] = baseline
         try:
-            best = self._pruned(self._search(baseline))
+            best = self._retimed(self._explained(self._ended(baseline)))
         except _Interrupted:
             self.interrupted = True
             best = self._leading()
-        return self._finding(baseline, best)
+        return self._finding(self.found[frozenset()], best)
+
+    def _explained(self, best: Trial) -> Trial:
+        """``best`` with what it lacks, and without what it does not need.
+
+        What was found first may turn out needless when another is there, and then there is room
+        for what a search with it in the way could not see.
+        """
+        been = {frozenset(best.effects)}
+        for _ in range(_TURNS):
+            grown = self._search(best)
+            best = self._pruned(grown)
+            names = frozenset(best.effects)
+            if best is grown or names in been or self._is_noise(best):
+                break
+            been.add(names)
+        return best
 
     def _timed(self, baseline: Trial) -> Trial:
         """The baseline of a voltage that stands between samples, where that is all that is missing.
@@ -135,16 +157,9 @@ class _Search:
         A table does not say what the voltage did between its rows. Half a sample too early, the
         model would be found to lack a lag of half a sample.
         """
-        records = self.bench.full
-        if self._is_noise(baseline) or not all(
-            isinstance(r, ActuatorRecord) and not r.drive.hold for r in records
-        ):
+        held = self._if_held()
+        if self._is_noise(baseline) or held is None:
             return baseline
-        held = [
-            replace(r, drive=replace(r.drive, hold=True))
-            for r in records
-            if isinstance(r, ActuatorRecord)
-        ]
         bench = Bench(held, self.bench.workers)
         trial = bench.baseline(self.base, lambda *_: self.report("baseline", 0.1))
         self.bench.simulations += bench.simulations
@@ -154,15 +169,47 @@ class _Search:
         self.bench, self.held = bench, True
         return trial
 
-    def _search(self, baseline: Trial) -> Trial:
-        """The best explanation of up to ``_EFFECTS_MAX`` effects.
+    def _retimed(self, best: Trial) -> Trial:
+        """``best`` under a voltage that stands between samples, where that spares an effect.
+
+        Beside something else the half sample shows as one more lag; or it explains more.
+        """
+        held = self._if_held()
+        if held is None or not best.effects:
+            return best
+        before = (self.bench, self.found, self.settled, self.ended)
+        bench = Bench(held, self.bench.workers)
+        bench.simulations = self.bench.simulations
+        fits = [bench.fit(t.model, [(t.x, None)], t.fixed) for t in (self.found[frozenset()], best)]
+        self.bench, self.settled, self.ended = bench, set(), set()
+        self.found = {frozenset(t.effects): t for t in fits}
+        try:
+            trial = self._pruned(self._ended(fits[1]))
+            correlation = self._correlation([best, trial])
+            gain = self._criterion(best, correlation) - self._criterion(trial, correlation)
+            self.held = gain > (0.0 if len(trial.effects) < len(best.effects) else _DECISIVE)
+        finally:
+            if not self.held:
+                before[0].simulations = bench.simulations
+                self.bench, self.found, self.settled, self.ended = before
+        return trial if self.held else best
+
+    def _if_held(self) -> list[ActuatorRecord] | None:
+        """The records with a voltage that stands between samples; None where it is no question."""
+        records = [r for r in self.bench.full if isinstance(r, ActuatorRecord)]
+        if len(records) < len(self.bench.full) or any(r.drive.hold for r in records):
+            return None
+        return [replace(r, drive=replace(r.drive, hold=True)) for r in records]
+
+    def _search(self, start: Trial) -> Trial:
+        """The best explanation of up to ``_EFFECTS_MAX`` effects, those of ``start`` among them.
 
         Where none alone explains enough to be believed, the leading ones are followed on once: of
         two effects each may leave so much of the other that only both are a finding.
         """
-        best, beam = baseline, [baseline]
+        best, beam = start, [start]
         looking_on = False
-        for depth in range(_EFFECTS_MAX):
+        for depth in range(len(start.effects), _EFFECTS_MAX):
             tried: list[_Tried] = []
             for i, parent in enumerate(beam):
                 span = (0.1 + 0.28 * (depth + i / len(beam)), 0.28 / len(beam))
@@ -271,7 +318,7 @@ class _Search:
             starts.append((simpler, None))
         fixed = np.concatenate([parent.fixed, np.zeros(len(effect.parameters), dtype=bool)])
         leader = min(t.cost for t in self.found.values())
-        return self.bench.fit(model, starts, fixed, leader)
+        return self.bench.fit(model, starts, fixed, leader, self._is_noise(parent))
 
     def _settled(self, best: Trial, fitted: list[_Tried]) -> tuple[list[_Tried], float]:
         """The candidates, best first, the leading ones fitted to the end of their valleys.
@@ -287,10 +334,13 @@ class _Search:
 
         correlation = self._correlation([best, *(t.trial for t in fitted)])
         order = sorted(fitted, key=rank)
+        lead = order[0].trial.cost
         for tried in order[:_SETTLED]:
             self._check()
             key = frozenset(tried.trial.effects)
-            if key not in self.settled:
+            lead = min(lead, self.found[key].cost)
+            # who lies so far behind does not come to lead by the last steps
+            if key not in self.settled and tried.trial.cost < _BEAM_COST * lead:
                 self.settled.add(key)
                 self.found[key] = self.bench.settled(tried.trial)
         order = [replace(t, trial=self.found[frozenset(t.trial.effects)]) for t in order]
@@ -370,6 +420,28 @@ class _Search:
             self.found[key] = min(known, fresh, key=lambda t: t.cost)
         return self.found[key]
 
+    def _for_others(self, trial: Trial) -> Trial:
+        """``trial`` as it predicts other recordings: without what may not happen again.
+
+        A moment or a walk is of one recording, unless several of these show it alike: all are
+        fitted with one set of numbers, and each must be the better for it. What is left out is
+        fitted without: then whoever has found nothing else predicts as before, and no worse.
+        """
+        once = [
+            n
+            for n in trial.effects
+            if not EFFECTS[n].recurs and not self._recurred(trial, self._without(trial, n))
+        ]
+        return self._with_only(trial, [n for n in trial.effects if n not in once])
+
+    def _recurred(self, trial: Trial, without: Trial) -> bool:
+        """Whether each of several recordings is decisively better explained than ``without``."""
+        sizes = [r.measured.size for r in trial.problem.records]
+        gained = without.residuals**2 - trial.residuals**2
+        parts = np.split(gained, np.cumsum(sizes)[:-1])
+        correlation = self._correlation([trial])
+        return len(parts) > 1 and all(float(p.sum()) / correlation > _DECISIVE for p in parts)
+
     # -- judgement
 
     def _criterion(self, trial: Trial, correlation: float) -> float:
@@ -380,7 +452,7 @@ class _Search:
         return max(1.0, min(t.correlation for t in trials))
 
     def _is_noise(self, trial: Trial) -> bool:
-        return trial.cost < _NOISE_RMS**2 and trial.correlation < 2.0
+        return trial.cost < NOISE_RMS**2 and trial.correlation < 2.0
 
     def _leading(self) -> Trial:
         trials = list(self.found.values())
@@ -447,16 +519,22 @@ class _Search:
         last = self.bench.polished(best) if best.effects else first
         correlation = max(1.0, last.correlation)
         stage0 = self.bench.stage(first, correlation, estimates=True)
-        final = self.bench.stage(last, correlation, estimates=True)
+        excess = max(first.cost - 1.0, 1e-9)
+        explained = 1.0 - max(last.cost - 1.0, 0.0) / excess
+        small = last.cost < _EXPLAINED_RMS**2
+        others = self._for_others(best)
+        doubtful = not small and explained < _TRUSTED
+        if doubtful or not others.effects:
+            others = first
+        else:
+            others = last if others is best else self.bench.polished(others)
+        final = self.bench.stage(last, correlation, estimates=True, for_others=others)
         steps, rivals = self._steps(best, last, final.estimates, correlation)
         before = signatures(self.bench.full, first)
         after = signatures(self.bench.full, last)
         missing_before = missing_stress(self.bench.full, first.model)
         missing_after = missing_stress(self.bench.full, last.model)
         is_noise = all(s.is_noise for s in after)
-        excess = max(first.cost - 1.0, 1e-9)
-        explained = 1.0 - max(last.cost - 1.0, 0.0) / excess
-        small = last.cost < _EXPLAINED_RMS**2
         if not best.effects:
             verdict = NOTHING_MISSING if small else UNEXPLAINED
         elif small:
@@ -467,6 +545,19 @@ class _Search:
         if verdict in (UNEXPLAINED, PARTLY_EXPLAINED) or any(s.family == "unknown" for s in steps):
             unnamed = describe_unnamed(missing_after, after, steps)
         notes = []
+        if self.interrupted and not self.rounds:
+            notes.append("interrupted before any round was over: what is missing was not found out")
+        gone = [n for n in best.effects if n not in {name for name, _ in others.model.effects}]
+        if gone and doubtful:
+            notes.append(
+                "what was found explains too little to be trusted elsewhere: other recordings are "
+                "predicted without it"
+            )
+        elif gone:
+            notes.append(
+                f"{', '.join(gone)}: of these recordings alone, as far as they can show; other "
+                "recordings are predicted without it"
+            )
         if not is_noise and verdict in (NOTHING_MISSING, EXPLAINED):
             notes.append("what is left is not quite white noise, but too small to name")
         if self.held:
@@ -516,7 +607,8 @@ class _Search:
             alike = self._alike(best, name, correlation_thin)
             rivals += [(EFFECTS[n].family, t.model) for n, t in alike]
             families = tuple(dict.fromkeys(EFFECTS[n].family for n, _ in alike))
-            with_it = last if i == len(order) - 1 else self._with_only(best, order[: i + 1])
+            on_bench = self._with_only(best, order[: i + 1])
+            with_it = last if i == len(order) - 1 else on_bench
             without = self._with_only(best, [n for n in order if n != name])
             own = tuple(
                 replace(e, name=e.name.split(": ", 1)[1])
@@ -537,7 +629,9 @@ class _Search:
                     effect=name,
                     family=effect.family,
                     acts_on=effect.acts_on,
-                    stage=self.bench.stage(with_it, correlation),
+                    stage=self.bench.stage(
+                        with_it, correlation, for_others=self._for_others(on_bench)
+                    ),
                     estimates=own,
                     indistinguishable_from=families,
                     evidence=tuple(evidence),

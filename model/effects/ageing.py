@@ -32,6 +32,7 @@ EFFECT = Effect(
         ),
     ),
     memory=1,
+    turns=True,
     drives=("voltage", "stretch"),
 )
 

@@ -23,6 +23,7 @@ from model.jit import cache_folder
 __all__ = [
     "BITS",
     "HOOKS",
+    "TURNS",
     "acting",
     "commit",
     "felt",
@@ -49,7 +50,7 @@ __all__ = [
 #: * ``stress`` Pa is added to the network's: at stretch ``lam`` and rate ``rate``, ``since`` s
 #:   after the step began at ``lam0``, the memory being that of the beginning; ``commit`` carries
 #:   the memory to the end of the step;
-#: * ``stiffness`` says what ``stress`` adds: (Pa, Pa s), for the length of steps;
+#: * ``stiffness`` says what ``stress`` adds at a rate, (Pa, Pa s) at most: for the length of steps;
 #: * ``felt`` is what a sample feels of the stress in it;
 #: * ``sense`` is what the sensor makes of displacement ``x`` m and velocity ``u`` m/s, ``dt`` s
 #:   after the reading before.
@@ -63,7 +64,7 @@ HOOKS = MappingProxyType(
         "permittivity": ("lam, field2", "product"),
         "soften": ("lam, since, t, warmth", "product"),
         "stress": ("lam, rate, lam0, since, t", "sum"),
-        "stiffness": ("lam", "sums"),
+        "stiffness": ("lam, rate", "sums"),
         "commit": ("lam, rate, lam0, h, t", ""),
         "felt": ("sigma", "sigma"),
         "sense": ("t, dt, x, u", "x"),
@@ -71,6 +72,8 @@ HOOKS = MappingProxyType(
 )
 #: ``acting(c)`` is the sum of these over the hooks of all effects that are not neutral.
 BITS = MappingProxyType({hook: 1 << i for i, hook in enumerate(HOOKS)})
+#: One more: some effect depends on turning points.
+TURNS = 1 << len(HOOKS)
 
 # how the answers of several effects are put together: what to begin with, what to do with each (an
 # answer is {}), what to return; any other word is an argument that goes from one to the next
@@ -122,7 +125,8 @@ def _text() -> str:
         lines.append(f"    return {last}")
     lines += ["", "", "@jit", "def acting(c):", "    found = 0"]
     for name in names:
-        bits = sum(1 << i for i, hook in enumerate(HOOKS) if hasattr(PLACES[name].module, hook))
+        bits = sum(BITS[hook] for hook in HOOKS if hasattr(PLACES[name].module, hook))
+        bits += TURNS * EFFECTS[name].turns
         lines += [f"    if {_active(name)}:", f"        found |= {bits}"]
     lines += ["    return found", ""]
     return "\n".join(lines)

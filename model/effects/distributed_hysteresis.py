@@ -31,6 +31,7 @@ EFFECT = Effect(
         ),
     ),
     memory=8,
+    turns=True,
     drives=("voltage", "stretch"),
 )
 
@@ -48,7 +49,7 @@ def stress(c, k, m, j, lam, rate, lam0, since, t):
 
 
 @jit
-def stiffness(c, k, m, j, lam):
+def stiffness(c, k, m, j, lam, rate):
     return c[k], 0.0
 
 

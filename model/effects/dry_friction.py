@@ -32,6 +32,7 @@ EFFECT = Effect(
         ),
     ),
     memory=1,
+    turns=True,
 )
 
 
@@ -41,7 +42,7 @@ def stress(c, k, m, j, lam, rate, lam0, since, t):
 
 
 @jit
-def stiffness(c, k, m, j, lam):
+def stiffness(c, k, m, j, lam, rate):
     return c[k] / c[k + 1], 0.0
 
 

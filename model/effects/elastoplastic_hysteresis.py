@@ -34,5 +34,6 @@ EFFECT = Effect(
         ),
     ),
     memory=1,
+    turns=True,
     drives=("voltage", "stretch"),
 )

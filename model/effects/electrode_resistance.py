@@ -11,7 +11,7 @@ from model.coefficients import CAPACITANCE, HELD
 from model.effects.description import Effect, Parameter
 from model.filters import lagged
 from model.jit import jit
-from model.kinematics import thinning_squared, thinning_squared_slope
+from model.kinematics import thinning_squared
 
 __all__ = ["EFFECT", "supply"]
 
@@ -28,15 +28,17 @@ EFFECT = Effect(
 
 
 @jit
-def supply(c, k, m, j, t, start, end, h, lam, rate):
-    held = int(c[HELD])
-    squared = thinning_squared(held, lam)
-    charging = 1.0 / (c[k] * c[CAPACITANCE] * squared)
-    # dV/dt = charging (V_amplifier - V) - growing V: one lag, behind a part of what is supplied
-    both = charging + rate * thinning_squared_slope(held, lam) / squared
-    if abs(both) < 1e-6 * charging:
-        both = 1e-6 * charging
-    part = charging / both
+def charged(c, m, j, resistance, start, end, h, lam, rate):
+    """Voltage at the film before and after ``h`` s behind a ``resistance`` in ohm."""
+    # what is carried along is the charge, as voltage times (Z/z)^2: it knows no rate of stretch
+    held, half = int(c[HELD]), 0.5 * h * rate
+    first, last = thinning_squared(held, lam - half), thinning_squared(held, lam + half)
     before = m[j]
-    m[j] = lagged(before, part * start, part * end, h, 1.0 / both)
-    return before, m[j]
+    tau = resistance * c[CAPACITANCE] * thinning_squared(held, lam)
+    m[j] = lagged(before, first * start, last * end, h, tau)
+    return before / first, m[j] / last
+
+
+@jit
+def supply(c, k, m, j, t, start, end, h, lam, rate):
+    return charged(c, m, j, c[k], start, end, h, lam, rate)

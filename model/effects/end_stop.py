@@ -39,5 +39,5 @@ def stress(c, k, m, j, lam, rate, lam0, since, t):
 
 
 @jit
-def stiffness(c, k, m, j, lam):
+def stiffness(c, k, m, j, lam, rate):
     return (c[k], 0.0) if c[k] > 0.0 and lam - c[REST] > 0.5 * c[k + 1] / c[LENGTH] else (0.0, 0.0)

@@ -35,6 +35,7 @@ EFFECT = Effect(
         ),
     ),
     memory=1,
+    turns=True,
     drives=("voltage", "stretch"),
 )
 

@@ -34,7 +34,8 @@ def stress(c, k, m, j, lam, rate, lam0, since, t):
 
 
 @jit
-def stiffness(c, k, m, j, lam):
-    # at the greatest rate: that of a fast edge, or the one at which drag alone holds the drive
+def stiffness(c, k, m, j, lam, rate):
+    # no faster than a fast edge, or than the rate at which drag alone holds the drive
     greatest = min(0.5, _REFERENCE * (_DRIVE / max(c[k], 1e-3)) ** (1.0 / c[k + 1]))
-    return 0.0, c[k] * c[k + 1] / _REFERENCE * (greatest / _REFERENCE) ** (c[k + 1] - 1.0)
+    there = min(rate, greatest) / _REFERENCE
+    return 0.0, c[k] * c[k + 1] / _REFERENCE * there ** (c[k + 1] - 1.0)

@@ -70,7 +70,7 @@ def stress(c, k, m, j, lam, rate, lam0, since, t):
 
 
 @jit
-def stiffness(c, k, m, j, lam):
+def stiffness(c, k, m, j, lam, rate):
     a = c[k + 1]
     return _first_share(c[k], a) / (1.0 - math.exp(-a * _DECADE)), 0.0
 

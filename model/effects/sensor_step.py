@@ -22,6 +22,7 @@ EFFECT = Effect(
             "moment", "s", (0.0, 1e5), "at which it comes", 0.5, starts=(0.5,), part_of="duration"
         ),
     ),
+    recurs=False,
 )
 
 

@@ -40,7 +40,7 @@ def stress(c, k, m, j, lam, rate, lam0, since, t):
 
 
 @jit
-def stiffness(c, k, m, j, lam):
+def stiffness(c, k, m, j, lam, rate):
     return c[k], 0.0
 
 

@@ -1,7 +1,8 @@
 """Drift of the sensor's zero that wanders: a mount or a room that warms and cools.
 
-A smooth walk over a record of half a minute is little more than a cubic in time: the reading is
-moved by a s + b s^2 + c s^3, s = t/30 s.
+A smooth walk over a record of half a minute is little more than a polynomial of the fifth degree.
+The reading is moved by the sum of a_n (T_n(2s - 1) - T_n(-1)), s = t/30 s: Chebyshev's polynomials,
+so that the numbers do not do each other's work. How it goes on is not known.
 """
 
 from __future__ import annotations
@@ -11,16 +12,21 @@ from model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
 
+_WALK = (-1e-2, 1e-2)  # m
+
 EFFECT = Effect(
     name="wandering drift",
     family="drift",
     acts_on="sensor",
     words="the reading wanders with time, whatever the film does",
     parameters=(
-        Parameter("linear", "m", (-1e-2, 1e-2), "in 30 s", 3e-6, 0.0),
-        Parameter("quadratic", "m", (-1e-2, 1e-2), "in 30 s", 3e-6, 0.0),
-        Parameter("cubic", "m", (-1e-2, 1e-2), "in 30 s", 3e-6, 0.0),
+        Parameter("linear", "m", _WALK, "half of its part in 30 s", 3e-6, 0.0),
+        Parameter("quadratic", "m", _WALK, "half of its part there and back", 3e-6, 0.0),
+        Parameter("cubic", "m", _WALK, "half of its part with two turns", 3e-6, 0.0),
+        Parameter("quartic", "m", _WALK, "half of its part with three turns", 3e-6, 0.0),
+        Parameter("quintic", "m", _WALK, "half of its part with four turns", 3e-6, 0.0),
     ),
+    recurs=False,
 )
 
 _SPAN = 30.0  # s
@@ -28,5 +34,9 @@ _SPAN = 30.0  # s
 
 @jit
 def sense(c, k, m, j, t, dt, x, u):
-    s = t / _SPAN
-    return x + s * (c[k] + s * (c[k + 1] + s * c[k + 2]))
+    s = 2.0 * t / _SPAN - 1.0
+    now, before, start = s, 1.0, -1.0
+    for i in range(5):
+        x += c[k + i] * (now - start)
+        now, before, start = 2.0 * s * now - before, now, -start
+    return x

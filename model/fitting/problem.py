@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -22,10 +22,19 @@ class Problem:
 
     ``records`` are all of actuators or all of films, and ``layout`` says what is free. Members of a
     population whose simulation ends early keep the last value they reached: a large but finite
-    residual, which a search walks away from. ``simulations`` counts records simulated.
+    residual, which a search walks away from. ``quick`` is for searches: readings good to a tenth of
+    a micrometre, in half of the time. ``simulations`` counts records simulated, and ``told`` is
+    called with each such number.
     """
 
-    def __init__(self, records: Sequence[Record], layout: Layout, workers: int = 2) -> None:
+    def __init__(
+        self,
+        records: Sequence[Record],
+        layout: Layout,
+        workers: int = 2,
+        quick: bool = False,
+        told: Callable[[int], None] | None = None,
+    ) -> None:
         if not records:
             raise ModelError("a fit needs at least one record")
         driven = {type(r) for r in records}
@@ -36,6 +45,8 @@ class Problem:
         self.records = tuple(records)
         self.layout = layout
         self.workers = workers
+        self.quick = quick
+        self.told = told
         self.simulations = 0
         self.measured = np.concatenate([r.measured for r in records])
         # a reading that must not be used has no weight
@@ -64,11 +75,16 @@ class Problem:
             if isinstance(record, ActuatorRecord):
                 base = self.layout.base
                 length = base.film.length if isinstance(base, Actuator) else 1.0
-                part[:], s = displacements(c, length, record.drive, record.lag, self.workers)
+                part[:], s = displacements(
+                    c, length, record.drive, record.lag, self.workers, self.quick
+                )
             else:
                 s = self._stresses(c, record, part)
             status = np.where(status == kernel.OK, s, status)
-            self.simulations += c.shape[0]
+        simulated = c.shape[0] * len(self.records)
+        self.simulations += simulated
+        if self.told is not None:
+            self.told(simulated)
         return out, status
 
     def _stresses(self, c: np.ndarray, record: FilmRecord, out: np.ndarray) -> np.ndarray:

@@ -1,0 +1,35 @@
+"""Resistance of electrodes that lose contact as they are stretched, or gain it.
+
+As ``electrode resistance``, with R = R_0 exp(g (lam - lam_rest)): carbon black, grease and thin
+metal change their resistance with strain, by a gauge factor g of a few, and of tens near
+percolation.
+"""
+
+from __future__ import annotations
+
+import math
+
+from model.coefficients import REST
+from model.effects.description import Effect, Parameter
+from model.effects.electrode_resistance import charged
+from model.jit import jit
+
+__all__ = ["EFFECT", "supply"]
+
+EFFECT = Effect(
+    name="strained electrode",
+    family="electrode_resistance",
+    acts_on="electrode",
+    words="the film charges through a resistance that changes as the electrode is stretched",
+    parameters=(
+        Parameter("resistance", "ohm", (0.0, 5e9), "between amplifier and film", 1e7, 0.0),
+        Parameter("gauge", "", (-60.0, 60.0), "by which stretch changes it", 5.0, starts=(10.0,)),
+    ),
+    memory=1,
+)
+
+
+@jit
+def supply(c, k, m, j, t, start, end, h, lam, rate):
+    resistance = c[k] * math.exp(c[k + 1] * (lam - c[REST]))
+    return charged(c, m, j, resistance, start, end, h, lam, rate)
