@@ -16,10 +16,10 @@ from rich.text import Text
 
 from app.report.as_json import diagnosis_json, outcome_json, write_json
 from app.report.diagnosis import (
-    HEADLINES,
     before_after,
     effect_table,
     experiment_table,
+    headline,
     ranking,
     road,
     summary,
@@ -104,7 +104,7 @@ _RANKED = 6  # candidates of a round that a terminal shows
 def diagnosis_tables(outcome: DiagnoseOutcome) -> RenderableType:
     """The verdict in words, errors before and after, what was found, and what was tried."""
     finding = outcome.finding
-    pieces: list[_Piece] = [f"{HEADLINES[finding.verdict]}.", *summary(outcome)]
+    pieces: list[_Piece] = [f"{headline(finding)}.", *summary(outcome)]
     for heading, before, after in (
         ("Untouched recordings", outcome.before.validation, outcome.after.validation),
         ("Training recordings", outcome.before.train, outcome.after.train),

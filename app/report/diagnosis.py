@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from model.measures import Errors
 
 __all__ = [
-    "HEADLINES",
     "before_after",
     "called",
     "dropped",
@@ -40,7 +39,7 @@ __all__ = [
 ]
 
 #: The verdicts as headlines.
-HEADLINES = {
+_HEADLINES = {
     "nothing_missing": "Nothing is missing",
     "explained": "Found and explained",
     "partly_explained": "Explained in part",
@@ -86,7 +85,7 @@ def headline(finding: Diagnosis) -> str:
     """The verdict as a headline."""
     if finding.interrupted and not finding.rounds:
         return "Interrupted before anything was tried"
-    return HEADLINES[finding.verdict]
+    return _HEADLINES[finding.verdict]
 
 
 def kin(family: str) -> str:

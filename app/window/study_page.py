@@ -431,8 +431,10 @@ class StudyPage(QWidget):
 
     def _show_diagnosis(self, outcome: DiagnoseOutcome) -> None:
         finding = outcome.finding
-        early = ", in a search that was ended early" if finding.interrupted else ""
-        self.headline.setText(f"{diagnosis.HEADLINES[finding.verdict]}{early}")
+        early = (
+            ", in a search that was ended early" if finding.interrupted and finding.rounds else ""
+        )
+        self.headline.setText(f"{diagnosis.headline(finding)}{early}")
         pieces: list[str | Table] = list(diagnosis.summary(outcome))
         for heading, before, after in (
             ("Untouched recordings", outcome.before.validation, outcome.after.validation),

@@ -31,6 +31,11 @@ name = "bench"
 sample_rate_Hz = {rate}
 first_convert_us = {first}
 convert_interval_us = {interval}
+# a disk that thinks for a second or two must not end a run of gigabytes
+[interlocks]
+late_s = 5.0
+[guardian]
+timeout_s = 5.0
 """
 SEQUENCE = """\
 name = "bench"
@@ -46,7 +51,10 @@ repeats = {lobes}
 def served(rig_file: Path, pace: str) -> Iterator[str]:
     """Address of a simulated card in a process of its own."""
     server = subprocess.Popen(
-        [sys.executable, "-m", "app", "serve-daqmx", "--rig-file", str(rig_file), pace],
+        [
+            sys.executable, "-m", "app", "serve-daqmx", "--rig-file", str(rig_file), pace,
+            "--client-timeout", "6",
+        ],
         stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:
