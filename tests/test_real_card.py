@@ -1,6 +1,6 @@
 """The rig contract on a real card, for whoever has one: it puts up to 8 kV on the film.
 
-    DEARIG_CARD=daqmx:Dev1 DEARIG_RIG_FILE=my-rig.toml python -m pytest tests/test_real_card.py
+DEARIG_CARD=daqmx:Dev1 DEARIG_RIG_FILE=my-rig.toml python -m pytest tests/test_real_card.py
 """
 
 import os

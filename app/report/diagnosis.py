@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from model.measures import Errors
 
 __all__ = [
+    "HEADLINES",
     "before_after",
     "called",
     "dropped",
@@ -39,7 +40,7 @@ __all__ = [
 ]
 
 #: The verdicts as headlines.
-_HEADLINES = {
+HEADLINES = {
     "nothing_missing": "Nothing is missing",
     "explained": "Found and explained",
     "partly_explained": "Explained in part",
@@ -85,7 +86,7 @@ def headline(finding: Diagnosis) -> str:
     """The verdict as a headline."""
     if finding.interrupted and not finding.rounds:
         return "Interrupted before anything was tried"
-    return _HEADLINES[finding.verdict]
+    return HEADLINES[finding.verdict]
 
 
 def kin(family: str) -> str:

@@ -314,7 +314,8 @@ _Act = Callable[[subprocess.Popen[str], list[psutil.Process], Path], None]
 _DO: dict[str, _Act] = {
     "client-killed": lambda run, *_: os.kill(run.pid, signal.SIGKILL),
     "client-frozen": lambda run, *_: os.kill(run.pid, signal.SIGSTOP),
-    "operator-stops": lambda run, *_: os.kill(run.pid, signal.SIGINT),
+    # as ctrl-C, which a program started in the background may have been told to ignore
+    "operator-stops": lambda run, *_: os.kill(run.pid, signal.SIGTERM),
     "guardian-killed": _kill_guardian,
     "disk-full": _fill_disk,
 }
