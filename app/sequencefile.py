@@ -6,7 +6,7 @@ import difflib
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, Self
 
@@ -241,7 +241,14 @@ class _Csv(_Segment):
         from app.recording.importers.csv_file import CsvFile
         from app.recording.importers.source import listing
 
-        source = CsvFile(folder / self.file)
+        # a sequence may come from anybody, in a recording too: it reads nothing but what lies by it
+        place = PurePath(self.file)
+        if place.is_absolute() or place.drive or ".." in place.parts:
+            raise InputError(
+                f"file = {shown(self.file)} leads out of the sequence's folder; put the waveform "
+                f"beside the sequence, and name it without a path"
+            )
+        source = CsvFile(folder / place)
         scale = next((k for k in ("voltage_kV", "voltage_V") if k in source.names), None)
         if scale is None or "time_s" not in source.names:
             raise InputError(

@@ -12,7 +12,9 @@ import pytest
 
 from app.errors import InputError
 from app.recording import open_recording
+from app.recording.importers.csv_file import CsvFile
 from app.recording.verify import verify
+from app.sequencefile import load_sequence
 from drivers.rig import Block
 from tests.fuzz.__main__ import run as fuzz
 from tests.fuzz.targets import TARGETS, seeds_of
@@ -119,6 +121,23 @@ def test_nothing_is_followed_or_believed(
         open_recording(path)
     assert "\n" not in str(caught.value)
     assert verify(path).faults == [str(caught.value)]
+
+
+@pytest.mark.parametrize("file", ["/etc/passwd", "../secret.csv", "a/../../secret.csv"])
+def test_a_sequence_reads_nothing_but_what_lies_by_it(tmp_path: Path, file: str) -> None:
+    (tmp_path / "secret.csv").write_text("time_s,voltage_V\n0,0\n1,100\n")
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    path = folder / "sequence.toml"
+    path.write_text(f'name = "x"\n[[segment]]\nkind = "csv"\nfile = "{file}"\n')
+    with pytest.raises(InputError, match="leads out of the sequence's folder"):
+        load_sequence(path)
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="there is no such device here")
+def test_a_device_is_no_table() -> None:
+    with pytest.raises(InputError, match="/dev/zero cannot be read: it is no ordinary file"):
+        CsvFile(Path("/dev/zero"))
 
 
 def test_a_killed_run_that_claims_more_than_it_has(tmp_path: Path) -> None:

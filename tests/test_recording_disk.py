@@ -202,6 +202,8 @@ def test_the_journal_of_another_file_is_ignored(tmp_path: Path) -> None:
     # its own, found after all of it has been done
     journal_of(first).write_bytes(kept[0])
     assert open_recording(first).complete
+    with pytest.raises(InputError, match="may still be recorded to"):
+        recover(first)
     assert recover(first, now=lambda: LATER)
     assert not journal_of(first).exists()
     assert verify(first).sound
@@ -214,6 +216,8 @@ def test_the_old_recording_stays_until_the_new_one_has_samples(tmp_path: Path) -
     clock = Clock()
     recorder = writer(path, overwrite=True, now=clock)
     assert old.read_bytes() == before
+    with pytest.raises(InputError, match=r"no samples: .* it was to replace is .*run\.h5\.old"):
+        open_recording(path)
     recorder.append(Block(0, run_counts(100)))
     assert old.exists()
     clock.moment += 1.0

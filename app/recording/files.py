@@ -16,6 +16,7 @@ __all__ = [
     "errno_of",
     "file_sha256",
     "in_words",
+    "old_of",
     "one_line",
     "put_back",
     "replaced_when_done",
@@ -101,6 +102,11 @@ def replaced_when_done(path: Path) -> Iterator[Path]:
         partial.unlink(missing_ok=True)
 
 
+def old_of(path: Path) -> Path:
+    """What the file at ``path`` is called until another is in its place."""
+    return path.with_name(f"{path.name}.old")
+
+
 def set_aside(path: Path) -> Path | None:
     """Give the file at ``path`` the name ``FILE.old`` until another is in its place; None if none.
 
@@ -108,7 +114,7 @@ def set_aside(path: Path) -> Path | None:
     """
     if not path.exists():
         return None
-    old = path.with_name(f"{path.name}.old")
+    old = old_of(path)
     if old.exists():
         raise InputError(
             f"{old} is there already, left by a run that ended before its first samples: give it "

@@ -102,13 +102,16 @@ def _write_physical(entry: h5py.Group) -> int:
 
 
 def _trim(entry: h5py.Group, samples: int) -> None:
-    """Take away rows that a kill left ahead of the counts, or without what belongs in them."""
-    for name, told in (("wall_clock", "unix_time"), ("events", "level")):
+    """Take away rows that a kill left without what belongs in them, or moments without samples."""
+    for name in ("wall_clock", "events"):
         rows = entry.get(name)
         if rows is None:
             continue
         there = rows[()]
-        wrong = (there["sample"] > samples) | (there[told] == there[told].dtype.type())
+        if name == "events":
+            wrong = there["level"] == b""
+        else:
+            wrong = (there["sample"] > samples) | (there["unix_time"] == 0.0)
         if wrong.any():
             rows.resize((int(np.argmax(wrong)),))
 

@@ -89,7 +89,7 @@ class Patched(io.RawIOBase):
             more = self._file.readinto(view[got:])
             if not more:
                 if at + len(view) > self.edge:
-                    raise EOFError(f"the file ends before byte {at + len(view)}")
+                    raise OSError(f"the file ends before byte {at + len(view)}")
                 # what was truncated away and grown again reads as nothing written
                 view[got:] = bytes(len(view) - got)
                 return

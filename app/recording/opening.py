@@ -34,7 +34,6 @@ UNREADABLE = (
     LookupError,
     MemoryError,
     OSError,
-    EOFError,
     OverflowError,
     RuntimeError,
     TypeError,
@@ -95,7 +94,7 @@ def opened(path: Path) -> Iterator[h5py.File]:
             raise InputError(f"{path} {BEING_WRITTEN}")
         try:
             file = h5py.File(_as_closed(patched) if flags else patched if journal else path, "r")
-        except (OSError, RuntimeError, ValueError) as error:
+        except UNREADABLE as error:
             if "truncated" in str(error):
                 reason = "is truncated: it was not copied or downloaded to its end"
             elif flags:

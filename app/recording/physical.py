@@ -106,7 +106,7 @@ def _readable(counts: h5py.Dataset, at: int) -> bool:
     try:
         # all of it is read for one
         counts[at]
-    except (OSError, RuntimeError, EOFError):
+    except (OSError, RuntimeError):
         return False
     return True
 

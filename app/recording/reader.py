@@ -9,6 +9,7 @@ import numpy as np
 
 from app.errors import InputError
 from app.recording.arrays import Arrays
+from app.recording.files import old_of
 from app.recording.layout import (
     FORMAT,
     FORMAT_NAME,
@@ -113,9 +114,11 @@ class _Reader:
         else:
             samples = int(data["time"].shape[0])
         if samples == 0:
+            old = old_of(self.path)
             raise InputError(
                 f"{self.path} holds no samples"
                 + ("" if stored else ": the run ended before its first block")
+                + (f"; the recording that it was to replace is {old}" if old.exists() else "")
             )
         self._check_rows(data, stored, samples)
         if stored:

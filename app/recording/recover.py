@@ -9,7 +9,7 @@ from pathlib import Path
 from app.errors import InputError
 from app.recording.files import in_words
 from app.recording.finish import finish
-from app.recording.journal import carry_out
+from app.recording.journal import carry_out, whole_journal
 from app.recording.opening import UNREADABLE
 from app.recording.reader import is_finished, open_recording
 from app.recording.superblock import mend_superblock
@@ -31,18 +31,18 @@ def recover(path: str | Path, now: Callable[[], float] = time.time) -> bool:
     path = Path(path)
     samples = open_recording(path).samples
     age = now() - path.stat().st_mtime
-    still = age < STILL_RUNNING
     try:
-        # a run that was killed while it closed has left this to be done
-        if not still and carry_out(path) and is_finished(path):
-            return True
-        if is_finished(path):
+        left = whole_journal(path) is not None
+        if is_finished(path) and not left:
             return False
-        if still:
+        if age < STILL_RUNNING:
             raise InputError(
                 f"{path} changed {max(age, 0.0):.1f} s ago and may still be recorded to; "
                 f"recover it when the run has ended"
             )
+        # a run that was killed while it closed has left this to be done
+        if carry_out(path):
+            return True
         finish(
             path,
             complete=False,

@@ -17,8 +17,11 @@ __all__ = ["describe", "describe_rows"]
 EVEN = 1e-6
 
 
-def describe(recording: Recording) -> dict[str, Any]:
-    """Everything worth knowing but the arrays, ready for JSON; SI units, and names that say so."""
+def describe(recording: Recording, checksum: bool = True) -> dict[str, Any]:
+    """Everything worth knowing but the arrays, ready for JSON; SI units, and names that say so.
+
+    ``checksum``: of the whole file too, which takes some time for a file of gigabytes.
+    """
     timing: dict[str, Any] = {"even": False, "rate_Hz": None}
     if recording.rate is not None:
         step = 1.0 / recording.rate
@@ -42,7 +45,7 @@ def describe(recording: Recording) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "path": str(recording.path),
-        "sha256": recording.sha256,
+        "sha256": recording.sha256 if checksum else None,
         "name": recording.name,
         "title": recording.title,
         "kind": recording.kind,
@@ -108,7 +111,7 @@ _READABLE = MappingProxyType(
 
 def describe_rows(recording: Recording) -> list[tuple[str, str]]:
     """The same as (what, value) pairs of text, in the order in which a person wants them."""
-    d = describe(recording)
+    d = describe(recording, checksum=False)
     rows = [("recording", f"{d['name']} ({d['kind']}, {d['title']})")]
     ended = d["outcome"] if d["complete"] else f"INCOMPLETE: {d['outcome']}"
     rows.append(("ended", ended))

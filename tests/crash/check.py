@@ -13,7 +13,7 @@ from app.errors import InputError
 from app.recording import open_recording, recover
 from app.recording.opening import opened
 from app.recording.verify import verify
-from tests.crash.victim import pattern
+from tests.recording_victim import pattern
 
 __all__ = ["Told", "check", "told"]
 

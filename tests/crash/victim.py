@@ -13,15 +13,9 @@ import os
 import time
 from pathlib import Path
 
-import numpy as np
-
 from drivers.rig import Block, Event
 from tests.recording_tools import Clock, writer
-
-
-def pattern(start: int, samples: int) -> np.ndarray:
-    n = np.arange(start, start + samples, dtype=np.int64)
-    return np.array([(n * 7 + c) % 30000 for c in range(4)]).astype(np.int16)
+from tests.recording_victim import pattern
 
 
 def main() -> None:

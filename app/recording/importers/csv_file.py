@@ -168,6 +168,9 @@ def _complaint(cell: str, decimal_comma: bool) -> str:
 
 def _decoded(path: Path) -> str:
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            # a device may have no end
+            raise InputError(f"{path} cannot be read: it is no ordinary file")
         raw = path.read_bytes()
     except (OSError, ValueError) as error:  # a name with a zero byte is a ValueError
         raise InputError(f"{path} cannot be read: {in_words(error)}") from error
