@@ -93,7 +93,7 @@ def test_a_run_as_long_as_it_may_be() -> None:
     assert (
         parse_sequence(f"{text}{longest}\n", "x", Path()).sample(10.0)[1].size == longest * 10 + 1
     )
-    with pytest.raises(InputError, match="at most 10,000,000 can be played"):
+    with pytest.raises(InputError, match=f"at most {SAMPLES_MAX:,} can be played"):
         parse_sequence(f"{text}{longest + 1.0}\n", "x", Path()).sample(1000.0)
 
 

@@ -165,5 +165,9 @@ def place_of(sentence: str) -> Place:
 
 
 def relative_csv(path: Path, folder: Path) -> str:
-    """How a sequence in ``folder`` names the CSV file at ``path``: short where it lies beside."""
-    return path.name if path.parent == folder else path.as_posix()
+    """How a sequence in ``folder`` names the CSV file at ``path``; whole where it lies elsewhere.
+
+    A sequence reads nothing but what lies by it, and says so of a file elsewhere.
+    """
+    inside = path.is_relative_to(folder)
+    return (path.relative_to(folder) if inside else path).as_posix()

@@ -101,7 +101,10 @@ class SequencePage(QWidget):
 
     def add_csv(self, path: Path) -> None:
         """Add a measured or computed waveform (time_s, voltage_kV) as a segment."""
-        file = relative_csv(path, self.session.sequence_folder)
+        session = self.session
+        if session.sequence_path is None and 'kind = "csv"' not in session.sequence_toml:
+            session.sequence_folder = path.parent  # it lies nowhere yet: now beside its waveform
+        file = relative_csv(path, session.sequence_folder)
         self._do(lambda: self.draft.add("csv", self._next_row(), file=file), self._next_row())
 
     def preset(self, name: str) -> None:
