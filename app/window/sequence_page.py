@@ -34,7 +34,14 @@ from app.recording.files import check_output, replaced_when_done
 from app.sequencefile import SEGMENT_KINDS
 from app.toml_input import read_text
 from app.window.background import Background
-from app.window.draft import NEW_SEGMENTS, Draft, Place, place_of, relative_csv
+from app.window.draft import (
+    NEW_SEGMENTS,
+    Draft,
+    Place,
+    has_comments,
+    place_of,
+    relative_csv,
+)
 from app.window.fields import FormField, form_fields, shown_value
 from app.window.form import Form
 from app.window.preview_plots import PreviewPlots
@@ -65,6 +72,7 @@ class SequencePage(QWidget):
         self._sent = session.sequence_toml
         self._form: Form | None = None
         self._formed: tuple[int, str] | None = None
+        self._warned: tuple[Path, str] | None = None
         self._files = Background(self)
         self._files.done.connect(self._file_done)
         self._files.failed.connect(self._file_failed)
@@ -88,11 +96,22 @@ class SequencePage(QWidget):
         self._files.start(lambda: (path, read_text(path, "sequence")))
 
     def save_file(self, path: Path) -> None:
-        """Write the sequence; a file of that name is replaced."""
+        """Write the sequence; a file of that name is replaced.
+
+        One with comments, which a changed sequence no longer has, only when it is asked again.
+        """
         text = self.session.sequence_toml
 
         def write() -> tuple[Path, None]:
             out = check_output(path, overwrite=True)
+            if self._warned != (path, text) and not has_comments(text) and out.is_file():
+                there = out.read_text(encoding="utf-8", errors="replace")
+                if has_comments(there):
+                    self._warned = path, text
+                    raise InputError(
+                        f"{out.name} has comments (#), which the changed sequence cannot keep, and "
+                        f"was left as it is: save once more to replace it, or take another name"
+                    )
             with replaced_when_done(out) as partial:
                 partial.write_text(text, encoding="utf-8")
             return out, None
@@ -122,6 +141,7 @@ class SequencePage(QWidget):
     @Slot(object)
     def _file_done(self, answer: tuple[Path, str | None]) -> None:
         path, text = answer
+        self._warned = None
         if text is None:
             self.session.sequence_path = path
             self.session.message.emit(f"saved {path}")

@@ -103,6 +103,33 @@ def test_a_file_is_saved_read_again_and_remembered(
     assert [action.text() for action in page.recent.actions()] == [str(tmp_path / "mine.toml")]
 
 
+def test_comments_are_not_lost_without_a_word(
+    qtbot: QtBot, page: SequencePage, tmp_path: Path
+) -> None:
+    path, noted = tmp_path / "noted.toml", "# slow, for film 7\n" + PRESETS["rich"]
+    path.write_text(noted)
+    page.open_file(path)
+    qtbot.waitUntil(lambda: page.session.sequence_path == path)
+    with qtbot.waitSignal(page.session.message):
+        page._save()  # nothing was changed: it is the same file
+    assert path.read_text() == noted
+    page.choose(1)
+    page.remove()
+    page._save()
+    qtbot.waitUntil(lambda: "noted.toml has comments (#)" in page.trouble.text())
+    assert path.read_text() == noted
+    with qtbot.waitSignal(page.session.message):
+        page.save_file(tmp_path / "other.toml")
+    assert page.trouble.text() == ""
+    page.save_file(path)
+    qtbot.waitUntil(lambda: "noted.toml has comments (#)" in page.trouble.text())
+    with qtbot.waitSignal(page.session.message):
+        page.save_file(path)
+    assert path.read_text() == page.session.sequence_toml == page.draft.toml
+    page.undo()  # and what is undone has them again
+    assert page.session.sequence_toml == noted
+
+
 @pytest.mark.parametrize(
     ("text", "words"), [(None, "cannot be read"), ("name = [", "line 1"), ("segment = 3", "[[seg")]
 )
