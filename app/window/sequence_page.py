@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import Qt, Signal, Slot
+from PySide6.QtCore import Qt, QTimer, Signal, Slot
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -55,6 +55,9 @@ __all__ = ["SequencePage"]
 
 _COLUMNS = ("", "Kind", "What it plays", "Lasts (s)")
 _LEAST_LEFT = 430
+_LATE_MS = (
+    300  # of a plan: until then what was drawn stays, so that nothing flickers while one types
+)
 
 
 class SequencePage(QWidget):
@@ -76,9 +79,12 @@ class SequencePage(QWidget):
         self._files = Background(self)
         self._files.done.connect(self._file_done)
         self._files.failed.connect(self._file_failed)
+        self._late = QTimer(self, singleShot=True, interval=_LATE_MS)
+        self._late.timeout.connect(self._nothing_yet)
         self.setAcceptDrops(True)
         self._build()
         session.sequence_changed.connect(self._sequence_changed)
+        session.rig_changed.connect(self._planning)
         session.preview_changed.connect(self._preview_changed)
         session.recent_changed.connect(self._recent_changed)
         self._recent_changed()
@@ -267,13 +273,23 @@ class SequencePage(QWidget):
             self._take(
                 self.session.sequence_toml, self.session.sequence_folder, self.session.sequence_path
             )
+        self._planning()
+
+    @Slot()
+    def _planning(self) -> None:
         self.state.say("planning …", "muted")
+        self._late.start()
+
+    @Slot()
+    def _nothing_yet(self) -> None:
+        self.plots.show_preview(None)
 
     @Slot()
     def _preview_changed(self) -> None:
         preview = self.session.preview
         if preview is None or preview.toml != self.session.sequence_toml:
             return
+        self._late.stop()
         self.plots.show_preview(preview)
         self._show_faults(preview)
         self._show_lengths(preview)
@@ -310,6 +326,10 @@ class SequencePage(QWidget):
 
     def _show_lengths(self, preview: Preview) -> None:
         if preview.loaded is None:
+            wrong = place_of(preview.sentence).row
+            item = None if wrong is None else self.table.item(wrong, 3)
+            if item is not None:
+                item.setText("")
             return
         segments = iter(preview.loaded.sequence.segments)
         for row, table in enumerate(self.draft.segments):
