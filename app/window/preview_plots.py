@@ -54,7 +54,8 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
     @property
     def drawn(self) -> tuple[str, ...]:
         """Names of the plots with a curve."""
-        return tuple(n for n, c in self._curves.items() if np.isfinite(c.getData()[1]).any())
+        found = {name: curve.getData()[1] for name, curve in self._curves.items()}
+        return tuple(n for n, y in found.items() if y is not None and np.isfinite(y).any())
 
     def show_preview(self, preview: Preview | None) -> None:
         """Draw ``preview``; None stands for one that is still being made.
@@ -69,7 +70,7 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
             curve.setData(x, y * _PLOTS[name][1])
             words = None
             if preview is not None and not planned:
-                words = "not foreseen: the sequence cannot be played"
+                words = "nothing to draw: the sequence cannot be played"
             elif y.size and not np.isfinite(y).any():
                 words = "not foreseen: a limit is broken without it"
             self._plots[name].setTitle(words, color=self._session.theme.muted, size="9pt")

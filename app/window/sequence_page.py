@@ -55,9 +55,8 @@ __all__ = ["SequencePage"]
 
 _COLUMNS = ("", "Kind", "What it plays", "Lasts (s)")
 _LEAST_LEFT = 430
-_LATE_MS = (
-    300  # of a plan: until then what was drawn stays, so that nothing flickers while one types
-)
+#: Of a plan; until then the last one stays, so that nothing flickers while one types.
+_LATE_MS = 300
 
 
 class SequencePage(QWidget):
@@ -600,8 +599,8 @@ class SequencePage(QWidget):
             bar.setTextVisible(False)
             bar.setFixedHeight(6)
             bar.setToolTip("How much of the limit is used")
-            grid.addWidget(words, 2 * (i // 3), i % 3)
-            grid.addWidget(bar, 2 * (i // 3) + 1, i % 3)
+            grid.addWidget(words, 2 * (i // 2), i % 2)
+            grid.addWidget(bar, 2 * (i // 2) + 1, i % 2)
             words.hide()
             bar.hide()
             self.margins.append((words, bar))
