@@ -187,7 +187,7 @@ class RecordingsPage(QWidget):
     @Slot()
     def reset_layout(self) -> None:
         """Give every part the room that it has at the first start."""
-        self.splitter.setSizes([230, 460])
+        self.splitter.setSizes([252, 438])
         self.columns.setSizes([760, 420])
 
     def close_work(self) -> None:
