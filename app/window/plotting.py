@@ -88,9 +88,10 @@ def add_legend(plot: pg.PlotItem, theme: Theme) -> None:
 
 
 def key_of(*entries: tuple[str, str, str]) -> str:
-    """A legend as rich text: (sign, name, colour) of each curve."""
-    return " &nbsp; ".join(
-        f'<span style="color:{colour}">{escape(f"{sign} {name}").replace(" ", "&nbsp;")}</span>'
+    """A legend as rich text: (sign, name, colour) of each curve, which no line breaks."""
+    whole = str.maketrans({" ": "\N{NO-BREAK SPACE}", "-": "\N{NON-BREAKING HYPHEN}"})
+    return " \N{NO-BREAK SPACE} ".join(
+        f'<span style="color:{colour}">{escape(f"{sign} {name}".translate(whole))}</span>'
         for sign, name, colour in entries
     )
 
