@@ -263,6 +263,8 @@ def _conditions(recording: Recording) -> dict[str, str]:
     """Under what a recording was made, one line each: sample, instruments, settings, sequence."""
     rows = describe_rows(recording)
     found = {what: value for what, value in rows if what not in _RESULTS and " at " not in what}
+    if "start time" in found:  # in two words, which a narrow column can break
+        found["start time"] = found["start time"][:19].replace("T", " ")
     found |= {"sequence": recording.title, "events": str(len(recording.events))}
     for what, text in (
         ("rig file", str(recording.provenance.get("configuration", ""))),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -101,6 +102,14 @@ def test_differences_are_those_of_conditions_not_of_results(folder):
     assert found["sequence: segment 1.amplitude_kV"] == ("4.0", "6.0")
     assert not {"displacement", "film", "load", "rig file: load.mass_g"} & set(found)
     assert differences([folder / "low.h5"] * 2) == ()
+
+
+def test_a_moment_is_in_words_that_a_narrow_column_can_break(folder, tmp_path):
+    later = made(tmp_path, "later", 4.0)
+    with h5py.File(later, "r+") as file:
+        file["entry/provenance"].attrs["start_time"] = "2027-01-15T08:00:01.5+00:00"
+    found = {row.what: row.values for row in differences([folder / "low.h5", later])}
+    assert found["start time"][1] == "2027-01-15 08:00:01"
 
 
 def test_a_torn_recording_is_mended_and_a_whole_one_left_alone(folder, tmp_path):

@@ -105,6 +105,46 @@ def test_a_disk_that_refuses_every_write(tmp_path: Path, after: int) -> None:
         assert verify(path).sound
 
 
+@pytest.mark.parametrize("size", [100, 300, 700, 1300])
+@pytest.mark.parametrize("before", [1, 5, 13])
+def test_no_sample_is_made_up_where_the_disk_refuses_a_flush(
+    tmp_path: Path, before: int, size: int
+) -> None:
+    resource = pytest.importorskip("resource", reason="files have no limit of size here")
+    path, counts, clock = tmp_path / "run.h5", run_counts(60_000, quiet=10), Clock()
+    recorder = writer(path, now=clock)
+    blocks = iter([Block(i, counts[:, i : i + size]) for i in range(0, 60_000, size)])
+
+    def append() -> None:
+        clock.moment += 1.0
+        recorder.append(next(blocks))
+
+    def fill() -> None:
+        while True:
+            append()
+
+    for _ in range(before):
+        append()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    # as on a full disk, what lies in the file already may still be written again
+    resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size, hard))
+    try:
+        with pytest.raises(DiskFault, match="the disk, or a limit"):
+            fill()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    safe = recorder.samples
+    found = verify(path)
+    assert found.sound, found.faults
+    assert recover(path, now=lambda: LATER)
+    found = verify(path)
+    assert found.sound, found.faults
+    run = open_recording(path)
+    assert safe <= run.samples <= safe + size  # the refused one, where all of it fitted
+    expected = CHANNELS[3].scaling.physical(counts[3, : run.samples])
+    np.testing.assert_array_equal(run.displacement + run.rest_reading, expected)
+
+
 class Full:
     """A file on a disk that takes so many bytes more."""
 

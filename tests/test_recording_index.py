@@ -26,7 +26,7 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     save_recording(folder / "film.h5", "film", film_values(), title="pull", now=Clock(1.7e9))
     recorder = writer(folder / "other.h5")
     recorder.append(Block(0, run_counts(500)))
-    recorder._file.flush()
+    recorder._flush_all(1.8e9)
     shutil.copyfile(folder / "other.h5", folder / "killed.nxs")
     recorder.discard()
     (folder / "text.h5").write_text("no recording")

@@ -109,7 +109,7 @@ def test_a_run_can_be_looked_at_while_it_goes_on(tmp_path: Path) -> None:
     path, copy = tmp_path / "run.h5", tmp_path / "copy.h5"
     recorder = writer(path)
     recorder.append(Block(0, run_counts(2000)))
-    recorder._file.flush()
+    recorder._flush_all(1.8e9)
     copy.write_bytes(path.read_bytes())
     recorder.close()
     run = open_recording(copy)

@@ -161,7 +161,7 @@ def test_damage_to_a_killed_run_is_told_at_once(tmp_path: Path) -> None:
     path, copy = tmp_path / "run.h5", tmp_path / "copy.h5"
     recorder = writer(path)
     recorder.append(Block(0, run_counts(200)))
-    recorder._file.flush()
+    recorder._flush_all(1.8e9)
     whole = path.read_bytes()
     recorder.close()
     at, damaged = whole.find(b"OHDR"), 0

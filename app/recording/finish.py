@@ -11,6 +11,7 @@ import numpy as np
 from app.errors import InputError
 from app.recording.checksums import complete_checksums
 from app.recording.files import in_words
+from app.recording.flushes import flush_notes
 from app.recording.journal import Patched, changed_in_place
 from app.recording.layout import (
     LIBVER,
@@ -103,17 +104,14 @@ def _write_physical(entry: h5py.Group) -> int:
 
 def _trim(entry: h5py.Group, samples: int) -> None:
     """Take away rows that a kill left without what belongs in them, or moments without samples."""
-    for name in ("wall_clock", "events"):
-        rows = entry.get(name)
-        if rows is None:
-            continue
-        there = rows[()]
-        if name == "events":
-            wrong = there["level"] == b""
-        else:
-            wrong = (there["sample"] > samples) | (there["unix_time"] == 0.0)
-        if wrong.any():
-            rows.resize((int(np.argmax(wrong)),))
+    notes = flush_notes(entry)
+    if notes is not None:
+        entry["wall_clock"].resize((int(np.sum(notes["sample"] <= samples)),))
+    events = entry.get("events")
+    if events is not None:
+        empty = events[()]["level"] == b""
+        if empty.any():
+            events.resize((int(np.argmax(empty)),))
 
 
 def _write_overview(entry: h5py.Group, counts: Counts) -> None:

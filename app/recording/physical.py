@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import h5py
 import numpy as np
 
+from app.recording.flushes import flush_notes
 from app.recording.layout import UNITS, counts_name
 from app.recording.pyramid import levels, reduced
 from app.recording.quiet import NEGLIGIBLE
@@ -78,8 +79,20 @@ def read_channels(data: h5py.Group) -> tuple[Channel, ...]:
 
 
 def sample_count(data: h5py.Group, channels: Sequence[Channel]) -> int:
-    """Samples that every channel has: a kill may have left some one block ahead of others."""
-    return min((_backed(data[counts_name(c.name)]) for c in channels), default=0)
+    """Samples of a run; of one that was not closed, those of its last flush that is whole.
+
+    A kill may have left some channels one block ahead of others, and a full disk room for samples
+    that never reached it, which HDF5 reads as zeros.
+    """
+    there = min((_backed(data[counts_name(c.name)]) for c in channels), default=0)
+    notes = None if _closed(data) else flush_notes(data.parent)
+    if notes is None:
+        return there
+    return int(max((n for n in notes["sample"] if n <= there), default=0))
+
+
+def _closed(data: h5py.Group) -> bool:
+    return "samples" in data.parent.attrs
 
 
 def _backed(counts: h5py.Dataset) -> int:
@@ -89,7 +102,7 @@ def _backed(counts: h5py.Dataset) -> int:
     """
     claimed = int(counts.shape[0])
     claimed = min(claimed, counts.id.get_storage_size() // counts.dtype.itemsize)
-    if counts.chunks is None or "samples" in counts.parent.parent.attrs:
+    if counts.chunks is None or _closed(counts.parent):
         return claimed
     chunk = int(counts.chunks[0])
     last = -(-claimed // chunk)

@@ -15,6 +15,7 @@ import numpy as np
 from app.errors import InputError
 from app.recording.checksums import wrong_blocks
 from app.recording.finish import OVERVIEW
+from app.recording.flushes import flush_notes
 from app.recording.journal import whole_journal
 from app.recording.layout import SIGNALS, counts_name
 from app.recording.opening import UNREADABLE, damage, opened
@@ -90,6 +91,7 @@ class _Check:
         self.entry = entry
         self.data: h5py.Group = entry["data"]
         self.samples = recording.samples
+        self.finished = "samples" in entry.attrs
 
     def all(self) -> None:
         self.stored()
@@ -147,18 +149,19 @@ class _Check:
             self.done(f"{len(arrays.stored)} rows of stored values, {self.samples} samples each")
 
     def counts_shapes(self) -> None:
-        claimed = self.entry.attrs.get("samples")
-        finished = claimed is not None
-        for channel in self.recording.channels:
-            there = int(self.data[counts_name(channel.name)].shape[0])
-            if finished and there != self.samples:
-                self.fault(f"{channel.name} has {there} counts, not {self.samples}")
-            elif there > self.samples:
-                self.found.notes.append(
-                    f"{channel.name} has {there - self.samples} counts more than every channel has"
-                )
-        if finished and int(claimed) != self.samples:
-            self.fault(f"/entry claims {int(claimed)} samples and holds {self.samples}")
+        claimed = int(self.entry.attrs.get("samples", self.samples))
+        there = {c.name: self.data[counts_name(c.name)].shape[0] for c in self.recording.channels}
+        if self.finished:
+            for name, many in there.items():
+                if many != self.samples:
+                    self.fault(f"{name} has {many} counts, not {self.samples}")
+        elif max(there.values()) > self.samples:
+            self.found.notes.append(
+                f"what came after sample {self.samples - 1} is left out: the run ended while it "
+                f"was being written, and not all of it has reached the disk"
+            )
+        if claimed != self.samples:
+            self.fault(f"/entry claims {claimed} samples and holds {self.samples}")
         expected, outcome = self.recording.samples_expected, self.recording.outcome
         if outcome == "finished" and expected is not None and expected != self.samples:
             self.fault(
@@ -181,7 +184,7 @@ class _Check:
             self.fault(f"{len(wrong) - LISTED} more blocks of counts have another checksum")
         if compared < self.samples:
             rest = f"the last {self.samples - compared} samples have no checksum"
-            if "samples" in self.entry.attrs:
+            if self.finished:
                 self.fault(rest)
             else:
                 self.found.notes.append(f"{rest} yet: the run was killed before")
@@ -194,7 +197,7 @@ class _Check:
         for size in BINS:
             level = stored[f"bins_of_{size}"]
             rows = min(level.shape[0], self.samples // size)
-            if "samples" in self.entry.attrs and level.shape[0] != self.samples // size:
+            if self.finished and level.shape[0] != self.samples // size:
                 self.fault(
                     f"/entry/pyramid has {level.shape[0]} bins of {size} samples, not "
                     f"{self.samples // size}"
@@ -257,10 +260,12 @@ class _Check:
         self.done("the overview for viewers")
 
     def wall_clock(self) -> None:
-        rows = dataset(self.entry, "wall_clock")
-        if rows is None:
+        notes = flush_notes(self.entry)
+        if notes is None:
             return
-        at, moments = (rows[()][name] for name in ("sample", "unix_time"))
+        if not self.finished:
+            notes = notes[notes["sample"] <= self.samples]  # the others are left out too
+        at, moments = notes["sample"], notes["unix_time"]
         if (np.diff(at) < 0).any() or (at.size and int(at[-1]) > self.samples):
             self.fault("/entry/wall_clock notes samples that go back, or that are not there")
             return
@@ -317,7 +322,7 @@ class _Check:
         if plot is None:
             self.fault(f"/entry names {shown!r} as its default plot, which is not there")
             return
-        if "samples" not in self.entry.attrs and self.recording.channels:
+        if not self.finished and self.recording.channels:
             return  # what was killed has no plot before it is recovered
         signal = text_of(plot.attrs.get("signal", ""))
         if signal != SIGNALS[self.recording.kind] or signal not in plot or "time" not in plot:

@@ -159,11 +159,13 @@ class RecordingWriter:
         self._events = entry.create_dataset(
             "events", shape=(0,), maxshape=(None,), chunks=(32,), dtype=EVENT_TYPE
         )
+        self._pyramid = PyramidWriter(entry, len(self._channels), self._rate)
+        self._checksums = ChecksumWriter(entry, len(self._channels), self._rate)
+        # made last: a flush writes datasets in this order and stops where the disk refuses one, so
+        # that its note is in the file only with all that it speaks of
         self._wall_clock = entry.create_dataset(
             "wall_clock", shape=(0,), maxshape=(None,), chunks=(256,), dtype=WALL_CLOCK_TYPE
         )
-        self._pyramid = PyramidWriter(entry, len(self._channels), self._rate)
-        self._checksums = ChecksumWriter(entry, len(self._channels), self._rate)
 
         instruments = entry.create_group("instrument")
         instruments.attrs["NX_class"] = fixed("NXcollection")

@@ -11,9 +11,10 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.browse import Curves
 from app.report.units import SHOWN
-from app.window.plotting import add_curve, add_legend, emptied, stacked
+from app.window.plotting import add_curve, emptied, key_of, stacked
 from app.window.session import Session
 from app.window.theme import pen
+from app.window.widgets import label
 
 __all__ = ["CurvesPlot"]
 
@@ -27,11 +28,18 @@ class CurvesPlot(QWidget):
         self._shown: tuple[Curves, ...] = ()
         self._with_model = True
         # the measurement matters most
-        self._area, self.plots = stacked((2, 4, 3))
+        self._area, self.plots = stacked((3, 5, 4))
         self._area.setAccessibleName("Curves of the chosen recordings")
+        # above the plots and wrapped: names of six recordings would cover half of a plot
+        self.key = label("")
+        self.key.setTextFormat(Qt.TextFormat.RichText)
+        self.key.setWordWrap(True)
+        self.key.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(0, 0, 0, 0)
-        outer.addWidget(self._area)
+        outer.setSpacing(2)
+        outer.addWidget(self.key)
+        outer.addWidget(self._area, 1)
         session.theme_changed.connect(self._draw)
         self._draw()
 
@@ -71,9 +79,10 @@ class CurvesPlot(QWidget):
         self.plots[-1].setLabel("bottom", "Time (s)")
         residual.setVisible(self._with_model)
         both.getAxis("bottom").setStyle(showValues=not self._with_model)
+        self.key.setVisible(bool(self._shown))
         if not self._shown:
             return
-        add_legend(both, theme)
+        named: list[tuple[str, str, str]] = []
         alone = len(self._shown) == 1
         zero = pg.InfiniteLine(0.0, angle=0, pen=pen(theme.muted, dashed=True))
         residual.addItem(zero, ignoreBounds=True)
@@ -81,16 +90,20 @@ class CurvesPlot(QWidget):
             colour = theme.measured if alone else theme.curves[i % len(theme.curves)]
             driven = theme.command if alone else colour
             add_curve(drive, curves.drive[0], curves.drive[1] * shown.drive_factor, driven)
-            name = "measured" if alone else curves.name
-            add_curve(both, curves.measured[0], curves.measured[1] * shown.factor, colour, name)
+            named.append(("—", "measured" if alone else curves.name, colour))
+            add_curve(both, curves.measured[0], curves.measured[1] * shown.factor, colour)
             if not self._with_model or curves.model is None or curves.residual is None:
                 continue
             beside = theme.models[0] if alone else colour
             time, model = curves.model
-            name = "model" if alone else ""
-            add_curve(both, time, model * shown.factor, beside, name, dashed=not alone)
+            if alone:
+                named.append(("—", "model", beside))
+            elif i == len(self._shown) - 1:
+                named.append(("- -", "model of each", theme.muted))
+            add_curve(both, time, model * shown.factor, beside, dashed=not alone)
             time, left = curves.residual
             add_curve(residual, time, left * shown.error_factor, beside)
+        self.key.setText(key_of(*named))
         if alone:
             self._events(self._shown[0])
 

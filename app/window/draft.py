@@ -14,7 +14,7 @@ from app.errors import InputError
 from app.sequencefile import SEGMENT_KINDS
 from app.toml_input import parse_toml
 
-__all__ = ["NEW_SEGMENTS", "Draft", "Place", "place_of", "relative_csv"]
+__all__ = ["NEW_SEGMENTS", "Draft", "Place", "has_comments", "place_of", "relative_csv"]
 
 _STEPS_MAX = 200
 
@@ -40,14 +40,14 @@ class Draft:
     """
 
     def __init__(self, toml: str) -> None:
-        self._states: list[dict[str, Any]] = [_tables(toml)]
+        self._states: list[tuple[dict[str, Any], str]] = [(_tables(toml), toml)]
         self._at = 0
         self._last: tuple[object, ...] = ()
 
     @property
     def data(self) -> dict[str, Any]:
         """The tables as they stand; not to be changed but by the methods here."""
-        return self._states[self._at]
+        return self._states[self._at][0]
 
     @property
     def segments(self) -> list[dict[str, Any]]:
@@ -57,8 +57,8 @@ class Draft:
 
     @property
     def toml(self) -> str:
-        """The sequence as the text of a file."""
-        return tomli_w.dumps(self.data)
+        """The sequence as the text of a file: as it was given, or written anew once changed."""
+        return self._states[self._at][1]
 
     @property
     def can_undo(self) -> bool:
@@ -82,7 +82,7 @@ class Draft:
 
     def replace(self, toml: str) -> None:
         """Another sequence altogether; raises ``InputError`` where it is not TOML."""
-        self._push(_tables(toml))
+        self._push(_tables(toml), toml)
 
     def set_head(self, key: str, value: Any) -> None:
         """``name``, ``lead_in_s`` or ``tail_s``; None leaves it out."""
@@ -116,13 +116,13 @@ class Draft:
         if data == self.data:
             return
         if what and what == self._last and not self.can_redo:
-            self._states[self._at] = data
+            self._states[self._at] = (data, tomli_w.dumps(data))
             return
-        self._push(data)
+        self._push(data, tomli_w.dumps(data))
         self._last = what
 
-    def _push(self, data: dict[str, Any]) -> None:
-        self._states = [*self._states[: self._at + 1], data][-_STEPS_MAX:]
+    def _push(self, data: dict[str, Any], toml: str) -> None:
+        self._states = [*self._states[: self._at + 1], (data, toml)][-_STEPS_MAX:]
         self._at = len(self._states) - 1
         self._last = ()
 
@@ -143,6 +143,17 @@ def _tables(toml: str) -> dict[str, Any]:
             "the keys of each"
         )
     return {"name": "", **{k: v for k, v in data.items() if k != "segment"}, "segment": segments}
+
+
+# texts first: a # in one of them begins no comment, nor does a quotation mark in a comment a text
+_TEXT_OR_COMMENT = re.compile(
+    r'''"""(?:\\.|[^\\])*?"""|"(?:\\.|[^"\\\n])*"''' r"|'''.*?'''|'[^'\n]*'|#[^\n]*", re.DOTALL
+)
+
+
+def has_comments(toml: str) -> bool:
+    """True where ``toml`` holds what its tables do not: a change writes these anew."""
+    return any(found[0].startswith("#") for found in _TEXT_OR_COMMENT.finditer(toml))
 
 
 @dataclass(frozen=True)

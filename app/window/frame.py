@@ -56,7 +56,7 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.session = session
         self.setWindowTitle("dearig")
-        self.setMinimumSize(1000, 640)
+        self.setMinimumHeight(680)  # how wide it is at least the pages say, with their fonts
         self.planner = Planner(session, self)
         self.rig_page = RigPage(session)
         self.sequence_page = SequencePage(session)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -15,6 +16,13 @@ __all__ = ["run_window"]
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 _HEARD = 200  # ms
 _INSTALL = "install it with: pip install 'dearig[gui]'"
+# where Qt finds no way to a screen it aborts: so another process tries, and leaves no core behind
+_TRY = (
+    "import resource; resource.setrlimit(resource.RLIMIT_CORE, (0, 0)); "
+    "from PySide6.QtGui import QGuiApplication; QGuiApplication([])"
+)
+_TRY_FOR = 30.0  # s, for a screen at the other end of a slow line
+_NO_SCREEN = ("offscreen", "minimal")
 
 
 def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Path()) -> int:
@@ -88,11 +96,32 @@ def _require_qt() -> None:
 
 def _require_screen() -> None:
     """Raises ``InputError`` where Qt would end the program for want of a screen."""
-    asked = os.environ.get("QT_QPA_PLATFORM")
-    if asked or not sys.platform.startswith("linux"):
+    asked = os.environ.get("QT_QPA_PLATFORM", "")
+    if asked.startswith(_NO_SCREEN) or not sys.platform.startswith("linux"):
         return
-    if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise InputError(
-            "there is no screen (DISPLAY and WAYLAND_DISPLAY are empty); run dearig gui in a "
-            "graphical session, or use dearig record"
+    instead = "run dearig gui in a graphical session, or use dearig record"
+    screens = [os.environ[n] for n in ("WAYLAND_DISPLAY", "DISPLAY") if os.environ.get(n)]
+    if not asked and not screens:
+        raise InputError(f"there is no screen (DISPLAY and WAYLAND_DISPLAY are empty); {instead}")
+    screen = f"the screen {' or '.join(screens)}".rstrip()
+    try:
+        tried = subprocess.run(  # noqa: S603
+            [sys.executable, "-P", "-c", _TRY],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_TRY_FOR,
+            check=False,
         )
+    except subprocess.TimeoutExpired as error:
+        raise InputError(f"{screen} does not answer; {instead}") from error
+    if tried.returncode:
+        raise InputError(f"{screen} cannot be used: {_why(tried.stderr)}; {instead}")
+
+
+def _why(said: str) -> str:
+    """The cause, of all the lines that Qt says before it aborts."""
+    lines = [line.strip().rstrip(".") for line in said.splitlines() if line.strip()]
+    causes = [line for line in lines if "even though it was found" not in line]
+    first = (causes or lines or ["Qt ended without a word"])[0]
+    return first.partition(": ")[2] if first.startswith("qt.") else first

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from html import escape
 
 import numpy as np
 import pyqtgraph as pg
@@ -10,7 +11,16 @@ from PySide6.QtGui import QColor
 
 from app.window.theme import Theme, pen, style_plot
 
-__all__ = ["DecadeAxis", "add_curve", "add_legend", "add_noise", "emptied", "set_key", "stacked"]
+__all__ = [
+    "DecadeAxis",
+    "add_curve",
+    "add_legend",
+    "add_noise",
+    "emptied",
+    "key_of",
+    "set_key",
+    "stacked",
+]
 
 
 _FEW = 2.5  # decades, below which powers of ten alone would be too few marks
@@ -48,10 +58,6 @@ def emptied(plot: pg.PlotItem, theme: Theme) -> None:
     """Take everything out of ``plot``, and give it the colours of ``theme``."""
     plot.clear()
     style_plot(plot, theme)
-    for name in ("left", "bottom"):
-        axis = plot.getAxis(name)
-        if axis.autoSIPrefix:  # switched off again it would scale once more, and for good
-            axis.enableAutoSIPrefix(False)  # the units are what people say: kV, mm
     if plot.legend is not None:
         plot.legend.scene().removeItem(plot.legend)
         plot.legend = None
@@ -81,10 +87,18 @@ def add_legend(plot: pg.PlotItem, theme: Theme) -> None:
     )  # fmt: skip
 
 
+def key_of(*entries: tuple[str, str, str]) -> str:
+    """A legend as rich text: (sign, name, colour) of each curve, which no line breaks."""
+    whole = str.maketrans({" ": "\N{NO-BREAK SPACE}", "-": "\N{NON-BREAKING HYPHEN}"})
+    return " \N{NO-BREAK SPACE} ".join(
+        f'<span style="color:{colour}">{escape(f"{sign} {name}".translate(whole))}</span>'
+        for sign, name, colour in entries
+    )
+
+
 def set_key(plot: pg.PlotItem, *entries: tuple[str, str, str]) -> None:
-    """A legend above the plot, for curves that leave no room: (sign, name, colour) of each."""
-    spans = (f'<span style="color:{colour}">{sign} {name}</span>' for sign, name, colour in entries)
-    plot.setTitle("&nbsp;&nbsp;&nbsp;".join(spans), size="9pt")
+    """A legend above the plot, for curves that leave no room."""
+    plot.setTitle(key_of(*entries), size="9pt")
 
 
 def add_noise(plot: pg.PlotItem, theme: Theme, *levels: float) -> None:

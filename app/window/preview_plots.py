@@ -51,21 +51,31 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
         """How many stretches of time are marked as refused."""
         return sum(isinstance(item, _Refused) for _, item in self._marks)
 
-    def show_preview(self, preview: Preview) -> None:
-        """Draw ``preview``; one without a plan leaves what was there, faded."""
+    @property
+    def drawn(self) -> tuple[str, ...]:
+        """Names of the plots with a curve."""
+        found = {name: curve.getData()[1] for name, curve in self._curves.items()}
+        return tuple(n for n, y in found.items() if y is not None and np.isfinite(y).any())
+
+    def show_preview(self, preview: Preview | None) -> None:
+        """Draw ``preview``; None stands for one that is still being made.
+
+        Where nothing is foreseen nothing is drawn: a curve that was there is of another sequence.
+        """
         self._preview = preview
-        planned = preview.plan is not None
+        planned = preview is not None and preview.plan is not None
+        curves = {} if preview is None else preview.curves
         for name, curve in self._curves.items():
-            curve.setOpacity(1.0 if planned else 0.3)  # what was drawn last, as a thing of the past
-            if not planned:
-                continue
-            x, y = preview.curves.get(name, (np.empty(0), np.empty(0)))
+            x, y = curves.get(name, (np.empty(0), np.empty(0)))
             curve.setData(x, y * _PLOTS[name][1])
-            unknown = bool(y.size) and not np.isfinite(y).any()
-            words = "not foreseen: a limit is broken without it" if unknown else None
+            words = None
+            if preview is not None and not planned:
+                words = "nothing to draw: the sequence cannot be played"
+            elif y.size and not np.isfinite(y).any():
+                words = "not foreseen: a limit is broken without it"
             self._plots[name].setTitle(words, color=self._session.theme.muted, size="9pt")
         self._mark()
-        if preview.plan is None:
+        if preview is None or preview.plan is None:
             return
         self._plots["voltage"].setXRange(0.0, float(preview.plan.time[-1]), padding=0.01)
         for plot in self._plots.values():

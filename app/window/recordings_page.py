@@ -49,7 +49,7 @@ from app.window.worker import Job
 
 __all__ = ["RecordingsPage"]
 
-_TOGETHER_MAX = 7  # as many as there are colours to tell them apart by
+_TOGETHER_MAX = 6  # as many as there are colours to tell them apart by
 _CHOOSE_MS = 80  # after which a choice is read: arrow keys pass over many
 _ANOTHER = "Another model…"
 
@@ -187,7 +187,7 @@ class RecordingsPage(QWidget):
     @Slot()
     def reset_layout(self) -> None:
         """Give every part the room that it has at the first start."""
-        self.splitter.setSizes([260, 430])
+        self.splitter.setSizes([252, 438])
         self.columns.setSizes([760, 420])
 
     def close_work(self) -> None:
@@ -489,7 +489,8 @@ def _table(model: QSortFilterProxyModel, session: Session) -> QTableView:
     table.verticalHeader().setDefaultSectionSize(32)
     header = table.horizontalHeader()
     header.setHighlightSections(False)
-    for column, width in enumerate((88, 170, 170, 130, 126, 64, 84, 74, 84, 116)):
+    for column, width in enumerate((88, 170, 170, 120, 126, 64, 84, 74, 84, 110)):
         table.setColumnWidth(column, width)
-    header.setSectionResizeMode(2, QHeaderView.ResizeMode.Stretch)
+    for column in (1, 2):
+        header.setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
     return table

@@ -172,7 +172,7 @@ class ResidualPlots(QWidget):
         set_key(
             plot, ("\N{BLACK CIRCLE}", "rising", theme.command),
             ("\N{BLACK SQUARE}", "falling", theme.monitor),
-            ("\N{FULL BLOCK}", "chance", theme.line),
+            ("\N{FULL BLOCK}", "chance", theme.muted),
         )  # fmt: skip
         chance = 2.0 * found.error * scale
         band = QColor(theme.muted)

@@ -280,9 +280,9 @@ class RigPage(QWidget):
         self.which = self._which()
         left.addWidget(self.which)
         left.addWidget(self._look(), 1)
-        outer.addLayout(left, 1)
+        outer.addLayout(left, 10)
         self.editor = self._editor()
-        outer.addWidget(self.editor, 1)
+        outer.addWidget(self.editor, 11)  # all its tabs are seen at 1366 px
 
     def _which(self) -> QWidget:
         grid = QGridLayout()
@@ -291,6 +291,7 @@ class RigPage(QWidget):
         self.seed = QSpinBox()
         self.seed.setRange(0, 999_999)
         self.seed.setValue(7)
+        self.seed.setMinimumHeight(24)  # as its neighbours
         self.seed.setToolTip("Which film: each number hides something else, or nothing")
         self.device = QLineEdit(self.session.rig_file.card.device)
         self.device.setToolTip("Name of the card in NI MAX, such as Dev1")

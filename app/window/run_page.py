@@ -514,7 +514,7 @@ class RunPage(QWidget):
             choice.setSizeAdjustPolicy(
                 QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
             )
-            choice.setMinimumContentsLength(18)
+            choice.setMinimumContentsLength(12)
             choice.activated.connect(lambda _, place=place: self._model_chosen(place))
             row.addWidget(choice, 1)
         self.drive = QComboBox()

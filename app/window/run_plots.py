@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QRectF
+from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QWidget
 
 from app.window.live import Live
@@ -19,9 +20,10 @@ _SCALE = {"voltage": 1e-3, "displacement": 1e3, "residual": 1e6}  # kV, mm, um
 _PLOTS = {
     "voltage": ("Voltage (kV)", ("monitor", "command")),
     "displacement": ("Displacement (mm)", ("displacement", "model 0", "model 1")),
-    "residual": ("Measured - model (µm)", ("residual 0", "residual 1", "rms 0", "rms 1")),
+    "residual": ("Residual (µm)", ("residual 0", "residual 1", "rms 0", "rms 1")),
 }
 _NAMES = {"command": "commanded", "monitor": "monitor", "displacement": "measured"}
+_KEY_ROOM = 0.25  # of the range of a plot: above its curves, for their names
 _RESIDUAL_LEAST = 5e-6  # m: noise shall not fill the plot
 
 
@@ -33,6 +35,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
         self._session = session
         self.window: float | None = 10.0
         self._duration = 1.0
+        self._foreseen: set[str] = set()
         self._low: dict[str, float] = {}
         self._high: dict[str, float] = {}
         self._plots: dict[str, pg.PlotItem] = {}
@@ -75,26 +78,38 @@ class RunPlots(pg.GraphicsLayoutWidget):
             **{f"rms {i}": theme.text for i in (0, 1)},
         }
         for curve in self._planned.values():
-            curve.setPen(pen(theme.line))
+            curve.setPen(pen(theme.muted))
+        for signal, curve in self._curves.items():
+            # where two lie on each other, the upper one lets the lower one through
+            dashed = signal in ("command", "model 1") or signal.startswith("rms")
+            curve.setPen(pen(colours[signal], dashed))
+        for plot in self._plots.values():
+            style_plot(plot, theme)
+        self._name()
+
+    def _name(self) -> None:
+        """Say beside the curves what they are."""
+        theme = self._session.theme
+        ground = QColor(theme.surface)
+        ground.setAlpha(200)  # what lies under the words is seen still
         for legend in self._legends:
             legend.scene().removeItem(legend)
         self._legends = []
         for name, plot in self._plots.items():
-            style_plot(plot, theme)
             legend = pg.LegendItem(
-                offset=(-6, 2), colCount=4, labelTextColor=theme.text, verSpacing=-4
+                offset=(-6, 2), colCount=4, labelTextColor=theme.text, verSpacing=-4, brush=ground
             )
             legend.setParentItem(plot.getViewBox())
             self._legends.append(legend)
+            if name in self._foreseen:
+                legend.addItem(self._planned[name], "foreseen")
             for signal in _PLOTS[name][1]:
-                # where two lie on each other, the upper one lets the lower one through
-                dashed = signal in ("command", "model 1") or signal.startswith("rms")
-                self._curves[signal].setPen(pen(colours[signal], dashed))
                 if words := self._words(signal):
                     legend.addItem(self._curves[signal], words)
 
     def foresee(self, preview: Preview | None) -> None:
         """Show what is foreseen, and forget what was drawn."""
+        self._foreseen.clear()
         nothing = np.empty(0)
         for curve in (*self._curves.values(), *self._planned.values()):
             curve.setData(nothing, nothing)
@@ -107,6 +122,9 @@ class RunPlots(pg.GraphicsLayoutWidget):
                 x, y = preview.curves[name]
                 self._include(name, y)
                 self._planned[name].setData(x, y * _SCALE[name], connect="finite")
+                if np.isfinite(y).any():
+                    self._foreseen.add(name)
+        self._name()
         self._scale()
         self._show(0.0, self._duration)
 
@@ -114,6 +132,8 @@ class RunPlots(pg.GraphicsLayoutWidget):
         """Room for the run that begins: what was foreseen is taken away, it would cost frames."""
         for curve in self._planned.values():
             curve.setData(np.empty(0), np.empty(0))
+        self._foreseen.clear()
+        self._name()
         self._roll(0.0)
 
     def draw(self, live: Live, end: float) -> None:
@@ -165,8 +185,9 @@ class RunPlots(pg.GraphicsLayoutWidget):
     def _scale(self) -> None:
         for name, plot in self._plots.items():
             low, high = self._low[name] * _SCALE[name], self._high[name] * _SCALE[name]
-            room = 0.03 * (high - low)
-            plot.setYRange(low - room, high + room, padding=0.0)
+            size = high - low
+            above = _KEY_ROOM if name in self._planned else 0.03
+            plot.setYRange(low - 0.03 * size, high + above * size, padding=0.0)
 
     def _roll(self, end: float) -> None:
         if self.window is None:

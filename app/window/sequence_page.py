@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import Qt, Signal, Slot
+from PySide6.QtCore import Qt, QTimer, Signal, Slot
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -34,7 +34,14 @@ from app.recording.files import check_output, replaced_when_done
 from app.sequencefile import SEGMENT_KINDS
 from app.toml_input import read_text
 from app.window.background import Background
-from app.window.draft import NEW_SEGMENTS, Draft, Place, place_of, relative_csv
+from app.window.draft import (
+    NEW_SEGMENTS,
+    Draft,
+    Place,
+    has_comments,
+    place_of,
+    relative_csv,
+)
 from app.window.fields import FormField, form_fields, shown_value
 from app.window.form import Form
 from app.window.preview_plots import PreviewPlots
@@ -48,6 +55,8 @@ __all__ = ["SequencePage"]
 
 _COLUMNS = ("", "Kind", "What it plays", "Lasts (s)")
 _LEAST_LEFT = 430
+#: Of a plan; until then the last one stays, so that nothing flickers while one types.
+_LATE_MS = 300
 
 
 class SequencePage(QWidget):
@@ -65,12 +74,16 @@ class SequencePage(QWidget):
         self._sent = session.sequence_toml
         self._form: Form | None = None
         self._formed: tuple[int, str] | None = None
+        self._warned: tuple[Path, str] | None = None
         self._files = Background(self)
         self._files.done.connect(self._file_done)
         self._files.failed.connect(self._file_failed)
+        self._late = QTimer(self, singleShot=True, interval=_LATE_MS)
+        self._late.timeout.connect(self._nothing_yet)
         self.setAcceptDrops(True)
         self._build()
         session.sequence_changed.connect(self._sequence_changed)
+        session.rig_changed.connect(self._planning)
         session.preview_changed.connect(self._preview_changed)
         session.recent_changed.connect(self._recent_changed)
         self._recent_changed()
@@ -88,11 +101,22 @@ class SequencePage(QWidget):
         self._files.start(lambda: (path, read_text(path, "sequence")))
 
     def save_file(self, path: Path) -> None:
-        """Write the sequence; a file of that name is replaced."""
+        """Write the sequence; a file of that name is replaced.
+
+        One with comments, which a changed sequence no longer has, only when it is asked again.
+        """
         text = self.session.sequence_toml
 
         def write() -> tuple[Path, None]:
             out = check_output(path, overwrite=True)
+            if self._warned != (path, text) and not has_comments(text) and out.is_file():
+                there = out.read_text(encoding="utf-8", errors="replace")
+                if has_comments(there):
+                    self._warned = path, text
+                    raise InputError(
+                        f"{out.name} has comments (#), which the changed sequence cannot keep, and "
+                        f"was left as it is: save once more to replace it, or take another name"
+                    )
             with replaced_when_done(out) as partial:
                 partial.write_text(text, encoding="utf-8")
             return out, None
@@ -122,6 +146,7 @@ class SequencePage(QWidget):
     @Slot(object)
     def _file_done(self, answer: tuple[Path, str | None]) -> None:
         path, text = answer
+        self._warned = None
         if text is None:
             self.session.sequence_path = path
             self.session.message.emit(f"saved {path}")
@@ -247,13 +272,23 @@ class SequencePage(QWidget):
             self._take(
                 self.session.sequence_toml, self.session.sequence_folder, self.session.sequence_path
             )
+        self._planning()
+
+    @Slot()
+    def _planning(self) -> None:
         self.state.say("planning …", "muted")
+        self._late.start()
+
+    @Slot()
+    def _nothing_yet(self) -> None:
+        self.plots.show_preview(None)
 
     @Slot()
     def _preview_changed(self) -> None:
         preview = self.session.preview
         if preview is None or preview.toml != self.session.sequence_toml:
             return
+        self._late.stop()
         self.plots.show_preview(preview)
         self._show_faults(preview)
         self._show_lengths(preview)
@@ -290,6 +325,10 @@ class SequencePage(QWidget):
 
     def _show_lengths(self, preview: Preview) -> None:
         if preview.loaded is None:
+            wrong = place_of(preview.sentence).row
+            item = None if wrong is None else self.table.item(wrong, 3)
+            if item is not None:
+                item.setText("")
             return
         segments = iter(preview.loaded.sequence.segments)
         for row, table in enumerate(self.draft.segments):
@@ -560,8 +599,8 @@ class SequencePage(QWidget):
             bar.setTextVisible(False)
             bar.setFixedHeight(6)
             bar.setToolTip("How much of the limit is used")
-            grid.addWidget(words, 2 * (i // 3), i % 3)
-            grid.addWidget(bar, 2 * (i // 3) + 1, i % 3)
+            grid.addWidget(words, 2 * (i // 2), i % 2)
+            grid.addWidget(bar, 2 * (i // 2) + 1, i % 2)
             words.hide()
             bar.hide()
             self.margins.append((words, bar))

@@ -56,8 +56,8 @@ class Theme:
 
     @property
     def curves(self) -> tuple[str, ...]:
-        """Colours for any number of curves, in turn."""
-        return (self.command, *self.models, self.monitor, self.field, self.limit, self.measured)
+        """Colours that are told apart, for several curves."""
+        return (self.command, *self.models, self.monitor, self.field, self.measured)
 
 
 LIGHT = Theme(
@@ -231,6 +231,8 @@ def style_plot(plot: pg.PlotItem, theme: Theme) -> None:
         axis.setTickPen(pg.mkPen(QColor(theme.raised)))
         axis.setStyle(maxTickLevel=0, tickAlpha=255)
         axis.setZValue(-1000)
+        if axis.autoSIPrefix:  # switched off again it would scale once more, and for good
+            axis.enableAutoSIPrefix(False)  # the units are what people say: kV, mm
     plot.getAxis("left").setWidth(64)
     plot.setMenuEnabled(False)
     plot.hideButtons()

@@ -63,7 +63,7 @@ def recordings(folder: Path) -> list[bytes]:
     write_run(run, run_counts(200, quiet=100), block=100)
     recorder = writer(folder / "other.h5")
     recorder.append(Block(0, run_counts(150, quiet=50)))
-    recorder._file.flush()
+    recorder._flush_all(1.8e9)
     killed.write_bytes((folder / "other.h5").read_bytes())
     recorder.close()
     time = np.linspace(0.0, 1.0, 50)

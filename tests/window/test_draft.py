@@ -10,7 +10,8 @@ from app.errors import InputError
 from app.presets import PRESETS
 from app.rigfile import RigFile
 from app.sequencefile import SEGMENT_KINDS, parse_sequence
-from app.window.draft import NEW_SEGMENTS, Draft, Place, place_of, relative_csv
+from app.toml_input import parse_toml
+from app.window.draft import NEW_SEGMENTS, Draft, Place, has_comments, place_of, relative_csv
 from app.window.fields import form_fields, shown_value, typed_value
 from app.window.planner import foresee
 
@@ -18,8 +19,30 @@ from app.window.planner import foresee
 @pytest.mark.parametrize("name", PRESETS)
 def test_every_preset_survives_being_edited(name: str) -> None:
     draft = Draft(PRESETS[name])
+    assert draft.toml == PRESETS[name]
     before = parse_sequence(PRESETS[name], name, Path()).sequence
+    for tail in (9.0, draft.data.get("tail_s")):
+        draft.set_head("tail_s", tail)
     assert parse_sequence(draft.toml, name, Path()).sequence == before
+
+
+@pytest.mark.parametrize(
+    ("toml", "there"),
+    [
+        ('name = "a"\n', False),
+        ("# first\nname = 'a'\n", True),
+        ('name = "a" # don\'t\n', True),
+        ('name = "a # b"\n', False),
+        ("name = 'c:\\' # b\n", True),
+        ('name = "\\" # b"\n', False),
+        ('name = """\n# "b"\n"""\n', False),
+        ("name = '''\n# b\n'''\n", False),
+        ('name = "" # "\n', True),
+    ],
+)
+def test_comments_are_told_from_texts(toml: str, there: bool) -> None:
+    assert parse_toml(toml, "it")
+    assert has_comments(toml) is there
 
 
 @pytest.mark.parametrize("kind", [k for k in NEW_SEGMENTS if k != "csv"])

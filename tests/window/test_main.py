@@ -35,6 +35,23 @@ def test_without_a_screen_it_says_so() -> None:
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems have a screen")
+@pytest.mark.parametrize(
+    ("environment", "words"),
+    [
+        ({"DISPLAY": ":77"}, "the screen :77 cannot be used: "),
+        ({"DISPLAY": ":77", "WAYLAND_DISPLAY": "wayland-77"}, "screen wayland-77 or :77 cannot be"),
+        ({"QT_QPA_PLATFORM": "nonsense"}, 'Could not find the Qt platform plugin "nonsense"'),
+    ],
+)
+def test_a_screen_that_is_not_there_is_told(environment: dict[str, str], words: str) -> None:
+    done = gui(**environment)
+    assert done.returncode == 2
+    assert words in " ".join(done.stderr.split())
+    assert "use dearig record" in " ".join(done.stderr.split())
+    assert "This application failed to start" not in done.stderr
+
+
 @pytest.mark.parametrize("missing", ["PySide6", "pyqtgraph"])
 def test_without_its_packages_it_says_how_to_get_them(missing: str) -> None:
     code = (

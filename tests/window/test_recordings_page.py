@@ -108,7 +108,9 @@ def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
     assert dict(zip(order, operators, strict=True)) == {"low": "Ada", "high": "Grace"}
     assert page.sides.currentWidget() is page.differences
     assert len(page.plot.plots[1].listDataItems()) == 4
+    assert all(words in page.plot.key.text() for words in (*order, "model\N{NO-BREAK SPACE}of"))
     click(qtbot, page.model_shown)
+    assert "model" not in page.plot.key.text()
     assert len(page.plot.plots[1].listDataItems()) == 2
     assert not page.plot.plots[2].isVisible()
     click(qtbot, page.model_shown)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
@@ -11,10 +13,11 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
+import app.window.planner as planner_module
 from app.presets import PRESETS
 from app.window.planner import Planner
 from app.window.sequence_page import SequencePage
-from app.window.session import Session
+from app.window.session import Preview, Session
 
 WAIT = 60_000
 
@@ -51,6 +54,45 @@ def test_a_preset_is_taken_and_drawn(qtbot: QtBot, page: SequencePage) -> None:
     voltage, bar = page.margins[0]
     assert voltage.text() == "voltage: 8 of 8.5 kV"
     assert bar.value() == 94
+
+
+def test_no_curve_of_another_sequence_stays(qtbot: QtBot, page: SequencePage) -> None:
+    page.preset("rich")
+    settled(qtbot, page.session)
+    assert page.plots.drawn == ("voltage", "displacement", "field")
+    page.choose(1)
+    page._typed("repeats", 0)
+    settled(qtbot, page.session)
+    assert page.state.text().startswith("✗ ")
+    assert page.plots.drawn == ()
+    assert [bool(page.table.item(row, 3).text()) for row in range(3)] == [True, False, True]
+    page.undo()
+    settled(qtbot, page.session)
+    assert page.plots.drawn == ("voltage", "displacement", "field")
+    page.draft.add("half_sine", 0, amplitude_kV=14.0)  # of which the film is not foreseen
+    page._send()
+    settled(qtbot, page.session)
+    assert page.plots.drawn == ("voltage",)
+
+
+def test_what_is_long_in_planning_is_not_shown_as_planned(
+    qtbot: QtBot, page: SequencePage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go_on = threading.Event()
+    real = planner_module.foresee
+
+    def slow(*given: Any) -> Preview:
+        assert go_on.wait(60.0)
+        return real(*given)
+
+    monkeypatch.setattr(planner_module, "foresee", slow)
+    assert page.plots.drawn
+    page.preset("rich")
+    qtbot.waitUntil(lambda: page.plots.drawn == ())
+    assert page.state.text() == "planning …"
+    go_on.set()
+    settled(qtbot, page.session)
+    assert page.plots.drawn == ("voltage", "displacement", "field")
 
 
 def test_segments_are_added_moved_and_taken_back_by_keys(qtbot: QtBot, page: SequencePage) -> None:
@@ -101,6 +143,33 @@ def test_a_file_is_saved_read_again_and_remembered(
     assert page.file_name.text() == "mine.toml"
     assert page.session.recent == [tmp_path / "mine.toml"]
     assert [action.text() for action in page.recent.actions()] == [str(tmp_path / "mine.toml")]
+
+
+def test_comments_are_not_lost_without_a_word(
+    qtbot: QtBot, page: SequencePage, tmp_path: Path
+) -> None:
+    path, noted = tmp_path / "noted.toml", "# slow, for film 7\n" + PRESETS["rich"]
+    path.write_text(noted)
+    page.open_file(path)
+    qtbot.waitUntil(lambda: page.session.sequence_path == path)
+    with qtbot.waitSignal(page.session.message):
+        page._save()  # nothing was changed: it is the same file
+    assert path.read_text() == noted
+    page.choose(1)
+    page.remove()
+    page._save()
+    qtbot.waitUntil(lambda: "noted.toml has comments (#)" in page.trouble.text())
+    assert path.read_text() == noted
+    with qtbot.waitSignal(page.session.message):
+        page.save_file(tmp_path / "other.toml")
+    assert page.trouble.text() == ""
+    page.save_file(path)
+    qtbot.waitUntil(lambda: "noted.toml has comments (#)" in page.trouble.text())
+    with qtbot.waitSignal(page.session.message):
+        page.save_file(path)
+    assert path.read_text() == page.session.sequence_toml == page.draft.toml
+    page.undo()  # and what is undone has them again
+    assert page.session.sequence_toml == noted
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,26 @@
+"""What every flush of a run says of itself: /entry/wall_clock, the last that HDF5 writes in it."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+
+from app.recording.layout import WALL_CLOCK_TYPE
+from app.recording.safe import item
+
+__all__ = ["flush_notes"]
+
+
+def flush_notes(entry: h5py.Group) -> np.ndarray | None:
+    """``sample`` and ``unix_time`` (n,) of the flushes whose note lies in the file.
+
+    A kill or a full disk leaves room for a note that was never written: it ends there. None where
+    the file has no such notes.
+    """
+    rows = item(entry, "wall_clock", stored=False)
+    if not isinstance(rows, h5py.Dataset) or rows.dtype != WALL_CLOCK_TYPE or rows.ndim != 1:
+        return None
+    there = rows[: rows.id.get_storage_size() // rows.dtype.itemsize]
+    empty = there["unix_time"] == 0.0
+    notes: np.ndarray = there[: int(np.argmax(empty))] if empty.any() else there
+    return notes
