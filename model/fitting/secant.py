@@ -8,6 +8,8 @@ the direction gone, and it is computed anew only where it has led astray or noth
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import cho_solve, cholesky, solve_triangular
+from scipy.optimize import lsq_linear
 
 from model.fitting.levenberg import LocalFit
 from model.fitting.problem import Problem
@@ -24,22 +26,22 @@ _ASTRAY = 0.25  # of the gain that was promised: less, and the Jacobian is compu
 def _boxed(
     normal: np.ndarray, gradient: np.ndarray, damping: float, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """Damped least-squares step (f,) within a box: what would leave it goes to its side.
+    """Damped least-squares step (f,) within a box, the best one there.
 
-    The others then know: clipped afterwards, a step along a narrow valley would leave the valley.
+    Clipped afterwards, a step along a narrow valley would leave the valley.
     """
-    n = gradient.size
-    step = np.zeros(n)
-    inside = np.ones(n, dtype=bool)
-    for _ in range(n):
-        a = normal[np.ix_(inside, inside)] + damping * np.eye(int(inside.sum()))
-        aside = normal[np.ix_(inside, ~inside)] @ step[~inside]
-        step[inside] = -np.linalg.solve(a, gradient[inside] + aside)
-        out = inside & ((step < low) | (step > high))
-        if not out.any():
-            break
-        step[out] = np.clip(step[out], low[out], high[out])
-        inside &= ~out
+    root = cholesky(normal + damping * np.eye(gradient.size))
+    step = -cho_solve((root, False), gradient)
+    if np.all((low <= step) & (step <= high)):
+        return np.asarray(step)
+    # where a bound leaves no room at all there is nothing to solve for
+    open_ = high - low > 1e-12 * (1.0 + np.abs(low) + np.abs(high))
+    step = np.where(open_, 0.0, np.clip(0.0, low, high))
+    if open_.any():
+        # |root step - aim|^2 is the quadratic model, but for a constant
+        aim = -solve_triangular(root, gradient, trans="T") - root @ step
+        found = lsq_linear(root[:, open_], aim, (low[open_], high[open_]), method="bvls")
+        step[open_] = np.clip(found.x, low[open_], high[open_])
     return step
 
 
