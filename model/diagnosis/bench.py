@@ -191,7 +191,13 @@ class Bench:
         # a part of what is left, whatever is left: more would only polish a misfit
         gain = max(0.5, _WORTH * trial.cost * trial.problem.samples)
         fit = descend(
-            trial.problem, trial.x, trial.fixed, iterations=iterations, gain=gain, damping=1e-3
+            trial.problem,
+            trial.x,
+            trial.fixed,
+            iterations=iterations,
+            gain=gain,
+            damping=1e-3,
+            quick=iterations < _ENDING,
         )
         return _trial(trial.problem, fit, trial.fixed)
 
