@@ -14,7 +14,7 @@ from scipy.optimize import lsq_linear
 from model.fitting.levenberg import LocalFit
 from model.fitting.problem import Problem
 
-__all__ = ["descend_by_secants"]
+__all__ = ["boxed_step", "descend_by_secants"]
 
 _DAMPINGS = np.array([3e-3, 1.0])  # tried at once, times the present damping
 _DAMPING_MAX = 1e7
@@ -23,12 +23,13 @@ _CARRIED = 5  # steps by secants, then the Jacobian is computed anew
 _ASTRAY = 0.25  # of the gain that was promised: less, and the Jacobian is computed anew
 
 
-def _boxed(
+def boxed_step(
     normal: np.ndarray, gradient: np.ndarray, damping: float, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """Damped least-squares step (f,) within a box, the best one there.
+    """Damped least-squares step (f,) within a box about 0, the best one there.
 
-    Clipped afterwards, a step along a narrow valley would leave the valley.
+    It minimises 2 gradient.s + s.(normal + damping I).s for low <= s <= high, all (f,). Clipped
+    afterwards, a step along a narrow valley would leave the valley.
     """
     root = cholesky(normal + damping * np.eye(gradient.size))
     step = -cho_solve((root, False), gradient)
@@ -84,7 +85,7 @@ def descend_by_secants(
         finite = np.where(np.isfinite(scale), scale, 0.0)
         low = np.maximum(layout.lower[free] - part, -reach) * finite
         high = np.minimum(layout.upper[free] - part, reach) * finite
-        best_step = _boxed(normal, gradient, _FLAT, low, high)
+        best_step = boxed_step(normal, gradient, _FLAT, low, high)
         if -float(best_step @ (2.0 * gradient + normal @ best_step)) < gain:
             if fresh or not sure:
                 converged = True
@@ -92,7 +93,7 @@ def descend_by_secants(
             jac = None
             continue
         dampings = damping * _DAMPINGS
-        steps = np.array([_boxed(normal, gradient, d, low, high) for d in dampings]) / scale
+        steps = np.array([boxed_step(normal, gradient, d, low, high) for d in dampings]) / scale
         trials = np.tile(x, (dampings.size, 1))
         trials[:, free] = np.clip(part + steps, layout.lower[free], layout.upper[free])
         costs, residuals = problem.evaluate(trials)
