@@ -48,7 +48,7 @@ _UNNAMED_MARGIN = (
     20.0  # of the criterion, by which an unnamed effect must be better than named ones
 )
 _PROMISES = 2  # of one effect, in different shapes, from which a fit sets out
-_FOLLOWED = 6  # candidates refitted in later rounds, the most promising ones
+_FOLLOWED = 12  # candidates refitted in later rounds, the most promising ones
 _EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
 _TRUSTED = 0.8  # of the same: what explains less may be a disguise, and predicts nothing else
