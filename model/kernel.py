@@ -83,7 +83,7 @@ _LEAN_SUBSTEPS_MAX = 4  # the same for the quicker form
 # friction that builds up within a nanometre, is given up: no record could tell it apart
 _EFFECT_SUBSTEPS_MAX = 25
 # change of a drag over a step, as a phase: that part is not in closed form
-_GROWN, _GROWN_QUICK = 0.2, 1.5
+_GROWN, _GROWN_QUICK = 0.2, 4.0
 _RINGING = 1e-6  # in stretch, from which on steps must see it: 0.075 um on 75 mm
 _DRAG_NEAR = 0.2  # of a drag: as near to the one in closed form it need not be the same
 _RODAS_TOLERANCE = 5e-9  # in stretch, a step: 0.4 nm on 75 mm

@@ -6,11 +6,18 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import median_filter
+from scipy.optimize import minimize_scalar
 
 from model.actuator import Drive
 from model.errors import ModelError
 
-__all__ = ["ActuatorRecord", "FilmRecord", "Record", "noise_of"]
+__all__ = ["ActuatorRecord", "FilmRecord", "Record", "noise_at_rest", "noise_of"]
+
+_READINGS_MIN = 4  # to read a noise from
+_READINGS_A_LINE = 4  # a periodic line takes three numbers away, of many more
+_SLOWEST_LINE = 15.0  # Hz; what is slower may be a drift, or noise that a sensor has averaged
+_STANDS_OUT = 30.0  # of the spectrum's median about it: by chance once in a million readings
 
 
 @dataclass(frozen=True)
@@ -144,6 +151,59 @@ def noise_of(values: np.ndarray) -> float:
     From second differences, which no drift or slope disturbs: their variance is six times that of
     white noise.
     """
-    if values.size < 4:
-        raise ModelError(f"{values.size} samples are too few to read a noise from; 4 are needed")
+    if values.size < _READINGS_MIN:
+        raise ModelError(
+            f"{values.size} samples are too few to read a noise from; {_READINGS_MIN} are needed"
+        )
     return float(np.sqrt(np.mean(np.diff(values, 2) ** 2) / 6.0))
+
+
+def noise_at_rest(time: np.ndarray, values: np.ndarray) -> float:
+    """Standard deviation of the noise on readings (N,) at ``time`` (N,) of what hangs still, N >= 4.
+
+    About a straight line, and without what is periodic: mains on a cable is no noise, but something
+    to be found; taken for noise, it would hide everything that is smaller.
+    """
+    n = values.size
+    if n < _READINGS_MIN:
+        raise ModelError(
+            f"{n} samples are too few to read a noise from; {_READINGS_MIN} are needed"
+        )
+    t = time - time.mean()
+    left = values - values.mean()
+    left -= t * (float(t @ left) / float(t @ t))
+    given = 2
+    steps = np.diff(time)
+    even = float(steps.max()) < 1.01 * float(steps.min())
+    while even and given + 3 < n / _READINGS_A_LINE:
+        line = _strongest_line(t, left)
+        if line is None:
+            break
+        left -= line
+        given += 3
+    return math.sqrt(float(left @ left) / (n - given))
+
+
+def _strongest_line(t: np.ndarray, values: np.ndarray) -> np.ndarray | None:
+    """The sine (N,) that stands out most from the spectrum of ``values`` (N,); None if none does."""
+    n = values.size
+    power = np.abs(np.fft.rfft(values)) ** 2
+    about = median_filter(power, 2 * (power.size // 16) + 9, mode="nearest")
+    bin_width = 1.0 / (n * float(t[1] - t[0]))
+    power[: math.ceil(_SLOWEST_LINE / bin_width)] = 0.0
+    peak = int(np.argmax(power))
+    if not power[peak] > _STANDS_OUT * about[peak]:
+        return None
+
+    def sine(frequency: float) -> np.ndarray:
+        turn = 2.0 * np.pi * frequency * t
+        waves = np.column_stack([np.cos(turn), np.sin(turn)])
+        return np.asarray(waves @ np.linalg.lstsq(waves, values, rcond=None)[0])
+
+    best = minimize_scalar(
+        lambda f: float(np.sum((values - sine(f)) ** 2)),
+        bounds=((peak - 1.0) * bin_width, (peak + 1.0) * bin_width),
+        method="bounded",
+        options={"xatol": 1e-5 * bin_width},
+    )
+    return sine(float(best.x))

@@ -183,6 +183,11 @@ def extra(name, p, film, drive):
             ),
             slopes=lambda t, lam, u, z, v: (abs(u),),
         ),
+        "logarithmic ageing": lambda: Extra(
+            states=1,
+            soften=lambda t, lam, u, z, v: 1.0 - p["softening"] * math.log1p(z[0] / p["path"]),
+            slopes=lambda t, lam, u, z, v: (abs(u),),
+        ),
         "amplifier lag": lambda: Extra(
             states=1,
             voltage=lambda t, lam, u, z, v: z[0],

@@ -87,7 +87,10 @@ def test_the_sensitivities_are_those_of_the_model():
         best.columns[:, 0], slope, rtol=0.0, atol=0.1 * np.abs(slope).max()
     )  # fmt: skip
     assert best.model.effects[0][0] == "linear drag"
-    np.testing.assert_array_equal(best.start[:-1], trial.x)
+    # the springs follow: what is promised is there when it is simulated
+    there = screen.bench.problem(best.model).costs(best.start[None])[0]
+    assert best.share > 0.9
+    assert there < 0.1 * trial.cost
 
 
 def test_of_noise_little_is_promised():

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from model.fitting.levenberg import descend
 from model.fitting.parameters import Layout
 from model.fitting.problem import Problem
-from model.fitting.secant import descend_by_secants
+from model.fitting.secant import boxed_step, descend_by_secants
 from model.material import Network
 from tests.engine_tools import PLAIN, effect, record_of
 
@@ -151,3 +152,32 @@ def test_bounds_hold():
     fit = descend_by_secants(problem, outside, held, iterations=0)
     assert fit.x[layout.column("effect")[0]] == layout.lower[layout.column("effect")[0]]
     assert fit.x[0] == layout.upper[0]
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_step_within_a_box_is_the_best_one_there(seed):
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 12))
+    columns = rng.normal(size=(40, n))
+    # two numbers that nearly cancel: without the box they would go far, and opposite ways
+    columns[:, 1] = columns[:, 0] + 1e-4 * columns[:, 1]
+    columns /= np.linalg.norm(columns, axis=0)
+    low, high = -rng.exponential(size=n), rng.exponential(size=n)
+    if seed % 3 == 0:
+        low[0] = 0.0
+    if seed % 5 == 0:
+        low[-1] = high[-1] = 0.0
+    normal, gradient = columns.T @ columns, columns.T @ (3.0 * rng.normal(size=40))
+
+    def model(step):
+        return float(step @ (2.0 * gradient + normal @ step))
+
+    step = boxed_step(normal, gradient, 1e-9, low, high)
+    assert np.all((low <= step) & (step <= high))
+    wanted = minimize(
+        model, np.zeros(n), jac=lambda s: 2.0 * (gradient + normal @ s),
+        bounds=list(zip(low, high, strict=True)), method="L-BFGS-B",
+        options={"maxiter": 5000, "ftol": 1e-15, "gtol": 1e-12},
+    ).fun  # fmt: skip
+    assert model(step) <= wanted + 1e-6 * abs(wanted)
+    assert model(step) < 0.0

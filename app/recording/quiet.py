@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from model.records import noise_at_rest
+
 __all__ = ["MIN_QUIET", "NEGLIGIBLE", "lead_in", "mean_beyond_noise", "noise_floor"]
 
 #: Fewer samples than this say nothing about noise.
@@ -29,14 +31,8 @@ def lead_in(voltage: np.ndarray, step: float = 0.0) -> int:
 
 
 def noise_floor(time: np.ndarray, values: np.ndarray) -> float | None:
-    """Standard deviation of ``values`` (n,) about their straight line; None below 20 samples."""
-    n = values.size
-    if n < MIN_QUIET:
-        return None
-    t = time - time.mean()
-    x = values - values.mean()
-    residual = x - t * (float(t @ x) / float(t @ t))
-    return math.sqrt(float(residual @ residual) / (n - 2))
+    """Noise of ``values`` (n,) as ``model.records`` reads it at rest; None below 20 samples."""
+    return noise_at_rest(time, values) if values.size >= MIN_QUIET else None
 
 
 def mean_beyond_noise(values: np.ndarray) -> float:

@@ -24,11 +24,12 @@ from model.fitting.parameters import Estimate, Layout
 from model.fitting.problem import Problem
 from model.fitting.search import voltage_starts
 from model.fitting.secant import descend_by_secants
-from model.records import ActuatorRecord, FilmRecord, Record
+from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
 __all__ = ["Bench", "Trial", "information"]
 
 _RATE = 200.0  # Hz, to which records are thinned: mains and a load's ringing still show
+_QUIET_MIN = 100  # samples of a lead-in from which a thinned record's noise is read again
 _FILM_SAMPLES = 1500
 _FILM_MODEL_ERROR = 5e-3  # of the largest stress: no model of a rubber is better than that
 #: s; a branch that relaxes faster than the excitation shows is a drag, and is sought as one
@@ -39,6 +40,7 @@ _BASELINE = 20  # iterations of its descents
 _SCOUTING = 3  # iterations from each start
 _NOT_WORTH = 0.02  # of what a fit lies behind: promising less, it is left where it is
 _FAR_BEHIND = 0.1  # of its own misfit: such a fit will not lead, and need not be sure of its end
+_MUCH_EXPLAINED = 0.5  # of the cost without it is left: such a fit must be sure of its end
 _ENDING = 25  # iterations of a fit that others build on
 _ALIKE = 0.5  # of the logarithm of relaxation times: a factor of 1.6
 _ELSEWHERE = (1.0, 4.0, 16.0)  # s, where a branch that is spare may be of use
@@ -153,13 +155,15 @@ class Bench:
         starts: Sequence[tuple[np.ndarray, np.ndarray | None]],
         fixed: np.ndarray,
         leader: float = 0.0,
+        parent: float = 0.0,
         noise: bool = False,
     ) -> Trial:
         """``model`` fitted from the best of several starts: coordinates and a Jacobian near them.
 
-        ``leader`` is the cost to beat: a fit that promises no more than a small part of what it
-        lies behind is not followed to its end. ``noise`` is True where there is but noise to
-        explain: then what a Jacobian from nearby promises is believed.
+        ``leader`` is the cost to beat, ``parent`` that of the model without what is tried here: a
+        fit that lies far behind the one, and not much before the other, is not followed to its end.
+        ``noise`` is True where there is but noise to explain: then what a Jacobian from nearby
+        promises is believed.
         """
         problem = self.problem(model)
         scouts = [
@@ -174,7 +178,11 @@ class Bench:
             fixed,
             best.jacobian,
             gain=max(0.5, _NOT_WORTH * behind, _WORTH * best.cost * problem.samples),
-            sure=not noise and behind < _FAR_BEHIND * problem.samples * best.cost,
+            sure=not noise
+            and (
+                behind < _FAR_BEHIND * problem.samples * best.cost
+                or best.cost < _MUCH_EXPLAINED * parent
+            ),
         )
         return _trial(problem, best, fixed)
 
@@ -183,7 +191,13 @@ class Bench:
         # a part of what is left, whatever is left: more would only polish a misfit
         gain = max(0.5, _WORTH * trial.cost * trial.problem.samples)
         fit = descend(
-            trial.problem, trial.x, trial.fixed, iterations=iterations, gain=gain, damping=1e-3
+            trial.problem,
+            trial.x,
+            trial.fixed,
+            iterations=iterations,
+            gain=gain,
+            damping=1e-3,
+            quick=iterations < _ENDING,
         )
         return _trial(trial.problem, fit, trial.fixed)
 
@@ -326,11 +340,17 @@ def _thinned(record: Record) -> Record:
     if thin is record:
         return record
     moving = np.flatnonzero(thin.drive.voltage)
-    quiet = thin.displacement[: moving[0] - 1] if moving.size and moving[0] > 100 else np.empty(0)
+    if not (moving.size and moving[0] > _QUIET_MIN):
+        return thin
+    quiet = np.zeros(thin.displacement.size, dtype=bool)
+    quiet[: moving[0] - 1] = True
     if thin.valid is not None:
-        quiet = quiet[thin.valid[: quiet.size]]
+        quiet &= thin.valid
+    if np.count_nonzero(quiet) < _QUIET_MIN:
+        return thin
     # a sensor that averages makes noise that thinning does not average away
-    return replace(thin, noise=max(thin.noise, float(quiet.std(ddof=1)))) if quiet.size else thin
+    noise = noise_at_rest(thin.time[quiet], thin.displacement[quiet])
+    return replace(thin, noise=max(thin.noise, noise))
 
 
 def _with_model_error(record: Record) -> Record:

@@ -4,6 +4,10 @@ To first order an effect of size s moves the model's answer by s times its sensi
 baseline's own numbers could do as well is projected away; what is left of the sensitivity is
 compared with what is left of the residual. Shapes (relaxation times, thresholds, moments) are tried
 on a small grid, and each grid point comes with the size that the residual asks for.
+
+First order is no guide to an effect that does nothing until it is large (a slew limit), or changes
+everything as soon as it is there (a mass that turns 70 Hz into 7). So the leading promises are
+simulated, and beside them sizes from small to large; what counts is what is then left.
 """
 
 from __future__ import annotations
@@ -25,6 +29,8 @@ __all__ = ["Promise", "Screen", "with_effect"]
 _MOMENTS = 20  # sought along the longest record
 _CLOSER = ((1.0, 9), (0.3, 9), (0.1, 9))  # parts of their distance, and how many there
 _LINES = 400  # frequencies within an effect's bounds
+_SIMULATED = 2  # leading promises that are held against a simulation
+_SIZES = (0.3, 1.0, 3.0, 10.0)  # times the typical one, tried of effects with a single size
 
 
 @dataclass(frozen=True)
@@ -32,8 +38,8 @@ class Promise:
     """What one effect, in one shape, promises on top of a fitted model.
 
     ``model`` has the effect in it, ``start`` (d,) are the base model's coordinates with the effect
-    at the size that the residual asks for, ``columns`` (N, sizes) the sensitivities to its sizes,
-    ``share`` is the part of the residual's mean square that would go to first order.
+    at some size, ``columns`` (N, sizes) the sensitivities to its sizes, ``share`` is the part of
+    the residual's mean square that goes when the base model's own numbers follow to first order.
     """
 
     model: Actuator | Strip
@@ -57,7 +63,7 @@ class Screen:
         self.trial = trial
         #: (N, f) of the base model
         self.jacobian = trial.jacobian()
-        self._q, _ = np.linalg.qr(self.jacobian)
+        self._q, self._r = np.linalg.qr(self.jacobian)
         self._residual = trial.residuals - self._q @ (self._q.T @ trial.residuals)
         # what must not be used has no residual: 0 times inf would be no number
         sigma = trial.problem.sigma
@@ -65,19 +71,81 @@ class Screen:
             np.isfinite(sigma), trial.residuals * np.where(np.isfinite(sigma), sigma, 0.0), 0.0
         )
         self._weight = 1.0 / trial.problem.sigma
+        self._start = self._base * np.where(np.isfinite(sigma), self._weight, 0.0)
 
     def promises(self, effect: Effect) -> list[Promise]:
         """Promises of ``effect``, best first: one for each shape on its grid."""
         shapes = list(product(*(self._starts(p) for p in effect.shapes)))
         found = self._scored(effect, shapes)
-        if found and any(p.part_of == "duration" for p in effect.shapes):
+        sought = any(p.part_of == "duration" for p in effect.shapes)
+        if found and sought:
             for part, count in _CLOSER:
                 best = max(found, key=lambda p: p.share)
                 moment = best.model.effects[-1][1][-1][1]
                 step = part * self._duration() / _MOMENTS
                 finer = [(moment + f * step,) for f in np.linspace(-1.0, 1.0, count)]
                 found += self._scored(effect, [s for s in finer if s[0] > 0.0])
-        return sorted(found, key=lambda p: -p.share)
+        found.sort(key=lambda p: -p.share)
+        tried = self._simulated(effect, found, several=not sought and len(effect.sizes) == 1)
+        return sorted(tried, key=lambda p: -p.share)
+
+    def _simulated(self, effect: Effect, found: list[Promise], several: bool) -> list[Promise]:
+        """The leading promises as a simulation keeps them, and with ``several`` other sizes too.
+
+        Of a shape the better size is kept: one promise for each shape.
+        """
+        rows: list[tuple[Promise, np.ndarray]] = []
+        first = self.trial.x.size
+        count = len(effect.sizes)
+        for rank, promise in enumerate(found):
+            layout = self.bench.problem(promise.model).layout
+            values = layout.values(promise.start)
+            if rank < _SIMULATED:
+                rows.append((promise, values))
+            for size in self._sizes(effect.sizes[0]) if several else ():
+                other = values.copy()
+                other[first] = size
+                rows.append((promise, other))
+        if not rows:
+            return []
+        problem = self.bench.problem(rows[0][0].model)
+        predicted, status = problem.predict(np.array([values for _, values in rows]))
+        there = np.where(
+            np.isfinite(problem.sigma), (predicted - problem.measured) * self._weight, 0.0
+        )
+        total = float(self._residual @ self._residual)
+        best: dict[int, Promise] = {}
+        for (promise, values), residual, failed in zip(rows, there, status, strict=True):
+            if failed:
+                continue
+            own = self._q.T @ residual
+            left = residual - self._q @ own
+            share = 1.0 - float(left @ left) / max(total, 1e-300)
+            if share <= max(best[id(promise)].share if id(promise) in best else 0.0, 0.0):
+                continue
+            layout = self.bench.problem(promise.model).layout
+            start = layout.coordinates(values)
+            # what the base model's own numbers do about the rest of it, no further than sensible
+            step = np.zeros(first)
+            step[~self.trial.fixed] = -np.linalg.lstsq(self._r, own, rcond=1e-6)[0]
+            reach = layout.reach(start)[:first]
+            start[:first] += step / max(1.0, float(np.max(np.abs(step) / reach)))
+            start = np.clip(start, layout.lower, layout.upper)
+            columns = promise.columns
+            moved = values[first] - (effect.sizes[0].neutral or 0.0)
+            if count == 1 and moved != 0.0:
+                columns = ((residual - self._start) / moved)[:, None]
+            best[id(promise)] = replace(promise, start=start, columns=columns, share=share)
+        return [best.get(id(p), replace(p, share=0.0)) for p in found]
+
+    @staticmethod
+    def _sizes(size: Parameter) -> list[float]:
+        """Sizes from small to large, of both signs where the effect has them."""
+        low, high = size.bounds
+        neutral = size.neutral or 0.0
+        signs = (1.0, -1.0) if low < neutral else (1.0,)
+        steps = [neutral + sign * part * size.typical for sign in signs for part in _SIZES]
+        return [s for s in steps if low <= s <= high]
 
     def _duration(self) -> float:
         return max(float(r.time[-1]) for r in self.bench.records)
@@ -121,7 +189,13 @@ class Screen:
         duration = float(longest.time[-1] - longest.time[0])
         count = int(min(max((high - low) * duration * 2.0, 2), 8 * _LINES))
         frequencies = np.linspace(low, high, count)
-        power = [abs(np.exp(-2j * np.pi * f * longest.time) @ residual) for f in frequencies]
+        # from one frequency to the next every sample turns by so much
+        turn = np.exp(-2j * np.pi * (frequencies[1] - frequencies[0]) * longest.time)
+        wave = np.exp(-2j * np.pi * low * longest.time) * residual
+        power = []
+        for _ in frequencies:
+            power.append(abs(wave.sum()))
+            wave *= turn
         return float(frequencies[int(np.argmax(power))])
 
     def _scored(self, effect: Effect, shapes: list[tuple[float, ...]]) -> list[Promise]:

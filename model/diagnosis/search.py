@@ -35,17 +35,20 @@ Progress = Callable[[str, float], None]
 
 _EFFECTS_MAX = 3  # more at once no record of this kind tells apart
 _TURNS = 3  # of searching on and pruning: what is pruned makes room
+_EXCHANGES = 3  # of one effect for another, when more than one is there
 _DECISIVE = 12.0  # of the information criterion: odds of e^6, over some forty candidates
 _ALIKE = 10.0  # of the same: candidates nearer than that are not told apart
 _MATTERS = 0.01  # of the noise's mean square: less is not worth an effect
 _HOPE = 0.95  # of the cost: who explains less than the rest of it is not followed on
 _BEAM = 2  # how many explanations are followed on
 _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed on
-_SETTLED = 4  # leading candidates that are fitted to the end of their valleys
+_SETTLED = 5  # leading candidates that are fitted to the end of their valleys
+_MAY_LEAD = 6.0  # of the leader's cost: what has come so near may lead by its last steps
 _UNNAMED_MARGIN = (
     20.0  # of the criterion, by which an unnamed effect must be better than named ones
 )
-_FOLLOWED = 6  # candidates refitted in later rounds, the most promising ones
+_PROMISES = 2  # of one effect, in different shapes, from which a fit sets out
+_FOLLOWED = 12  # candidates refitted in later rounds, the most promising ones
 _EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
 _TRUSTED = 0.8  # of the same: what explains less may be a disguise, and predicts nothing else
@@ -144,11 +147,34 @@ class _Search:
         been = {frozenset(best.effects)}
         for _ in range(_TURNS):
             grown = self._search(best)
-            best = self._pruned(grown)
+            best = self._exchanged(self._pruned(grown))
             names = frozenset(best.effects)
-            if best is grown or names in been or self._is_noise(best):
+            if names == frozenset(grown.effects) or names in been or self._is_noise(best):
                 break
             been.add(names)
+        return best
+
+    def _exchanged(self, best: Trial) -> Trial:
+        """``best`` with effects exchanged, one by one, for others that explain more in their place.
+
+        What was found first was found while the others were missing, and may have stood for them.
+        """
+        for _ in range(_EXCHANGES):
+            if len(best.effects) < 2:
+                break
+            tried: list[_Tried] = []
+            for name in best.effects:
+                parent = self._ended(self._without(best, name))
+                tried += self._round(parent, len(parent.effects), (0.8, 0.1))
+            fitted, correlation = self._settled(best, tried)
+            leader = fitted[0]
+            gain = self._demerit(best, correlation) - self._demerit(leader.trial, correlation)
+            if frozenset(leader.trial.effects) == frozenset(best.effects) or gain <= 0.0:
+                break
+            self._record(
+                fitted, correlation, leader, "beside the others explains more than what it replaces"
+            )
+            best = self._pruned(self._ended(leader.trial))
         return best
 
     def _timed(self, baseline: Trial) -> Trial:
@@ -293,32 +319,26 @@ class _Search:
     def _refit(
         self, parent: Trial, name: str, promises: list[Promise], jacobian: np.ndarray
     ) -> Trial:
-        """The best fit of one effect: from two shapes, and from a size beyond the linear guess."""
+        """The best fit of one effect: from nothing, and from where its promises were simulated."""
         effect = EFFECTS[name]
         model = promises[0].model
-        first = promises[0].start.size - len(effect.parameters)
+        first = parent.x.size
         # of shapes, and far from the base model, the sensitivities are not known yet
         shapes = np.full((jacobian.shape[0], len(effect.shapes)), np.nan)
-        sizes = np.full((jacobian.shape[0], len(effect.sizes)), np.nan)
         starts: list[tuple[np.ndarray, np.ndarray | None]] = []
-        for promise in promises[: 2 if effect.shapes else 1]:
-            # from nothing: the first step, which all numbers take together, is the linear guess
-            start = promise.start.copy()
-            start[first : first + len(effect.sizes)] = [p.neutral for p in effect.sizes]
-            starts.append((start, np.column_stack([jacobian, promise.columns, shapes])))
-        larger = promises[0].start.copy()
-        for j, p in enumerate(effect.sizes, start=first):
-            neutral = p.neutral or 0.0
-            reach = max(abs(larger[j] - neutral), p.typical)
-            sign = -1.0 if larger[j] < neutral else 1.0
-            larger[j] = np.clip(neutral + 3.0 * sign * reach, *p.bounds)
-        starts.append((larger, np.column_stack([jacobian, sizes, shapes])))
+        # from nothing: the first step, which all numbers take together, is the linear guess
+        nothing = promises[0].start.copy()
+        nothing[:first] = parent.x
+        nothing[first : first + len(effect.sizes)] = [p.neutral for p in effect.sizes]
+        for start in (nothing, *(p.start for p in promises[:_PROMISES])):
+            columns = promises[max(len(starts) - 1, 0)].columns
+            starts.append((start, np.column_stack([jacobian, columns, shapes])))
         simpler = self._simpler(parent, effect, promises[0].start)
         if simpler is not None:
             starts.append((simpler, None))
         fixed = np.concatenate([parent.fixed, np.zeros(len(effect.parameters), dtype=bool)])
         leader = min(t.cost for t in self.found.values())
-        return self.bench.fit(model, starts, fixed, leader, self._is_noise(parent))
+        return self.bench.fit(model, starts, fixed, leader, parent.cost, self._is_noise(parent))
 
     def _settled(self, best: Trial, fitted: list[_Tried]) -> tuple[list[_Tried], float]:
         """The candidates, best first, the leading ones fitted to the end of their valleys.
@@ -328,9 +348,7 @@ class _Search:
         """
 
         def rank(tried: _Tried) -> float:
-            unnamed = EFFECTS[tried.name].family == "unknown"
-            margin = _UNNAMED_MARGIN if unnamed else 0.0
-            return self._criterion(tried.trial, correlation) + margin
+            return self._demerit(tried.trial, correlation)
 
         correlation = self._correlation([best, *(t.trial for t in fitted)])
         order = sorted(fitted, key=rank)
@@ -339,8 +357,7 @@ class _Search:
             self._check()
             key = frozenset(tried.trial.effects)
             lead = min(lead, self.found[key].cost)
-            # who lies so far behind does not come to lead by the last steps
-            if key not in self.settled and tried.trial.cost < _BEAM_COST * lead:
+            if key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
                 self.settled.add(key)
                 self.found[key] = self.bench.settled(tried.trial)
         order = [replace(t, trial=self.found[frozenset(t.trial.effects)]) for t in order]
@@ -446,6 +463,11 @@ class _Search:
 
     def _criterion(self, trial: Trial, correlation: float) -> float:
         return information(trial.cost, trial.free, self.bench.samples / correlation)
+
+    def _demerit(self, trial: Trial, correlation: float) -> float:
+        """The criterion, and a margin for each effect that names no cause."""
+        unnamed = sum(EFFECTS[name].family == "unknown" for name in trial.effects)
+        return self._criterion(trial, correlation) + _UNNAMED_MARGIN * unnamed
 
     def _correlation(self, trials: Sequence[Trial]) -> float:
         """One count of independent samples for all: by the fit that leaves the least structure."""

@@ -8,11 +8,13 @@ the direction gone, and it is computed anew only where it has led astray or noth
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import cho_solve, cholesky, solve_triangular
+from scipy.optimize import lsq_linear
 
 from model.fitting.levenberg import LocalFit
 from model.fitting.problem import Problem
 
-__all__ = ["descend_by_secants"]
+__all__ = ["boxed_step", "descend_by_secants"]
 
 _DAMPINGS = np.array([3e-3, 1.0])  # tried at once, times the present damping
 _DAMPING_MAX = 1e7
@@ -21,25 +23,26 @@ _CARRIED = 5  # steps by secants, then the Jacobian is computed anew
 _ASTRAY = 0.25  # of the gain that was promised: less, and the Jacobian is computed anew
 
 
-def _boxed(
+def boxed_step(
     normal: np.ndarray, gradient: np.ndarray, damping: float, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """Damped least-squares step (f,) within a box: what would leave it goes to its side.
+    """Damped least-squares step (f,) within a box about 0, the best one there.
 
-    The others then know: clipped afterwards, a step along a narrow valley would leave the valley.
+    It minimises 2 gradient.s + s.(normal + damping I).s for low <= s <= high, all (f,). Clipped
+    afterwards, a step along a narrow valley would leave the valley.
     """
-    n = gradient.size
-    step = np.zeros(n)
-    inside = np.ones(n, dtype=bool)
-    for _ in range(n):
-        a = normal[np.ix_(inside, inside)] + damping * np.eye(int(inside.sum()))
-        aside = normal[np.ix_(inside, ~inside)] @ step[~inside]
-        step[inside] = -np.linalg.solve(a, gradient[inside] + aside)
-        out = inside & ((step < low) | (step > high))
-        if not out.any():
-            break
-        step[out] = np.clip(step[out], low[out], high[out])
-        inside &= ~out
+    root = cholesky(normal + damping * np.eye(gradient.size))
+    step = -cho_solve((root, False), gradient)
+    if np.all((low <= step) & (step <= high)):
+        return np.asarray(step)
+    # where a bound leaves no room at all there is nothing to solve for
+    open_ = high - low > 1e-12 * (1.0 + np.abs(low) + np.abs(high))
+    step = np.where(open_, 0.0, np.clip(0.0, low, high))
+    if open_.any():
+        # |root step - aim|^2 is the quadratic model, but for a constant
+        aim = -solve_triangular(root, gradient, trans="T") - root @ step
+        found = lsq_linear(root[:, open_], aim, (low[open_], high[open_]), method="bvls")
+        step[open_] = np.clip(found.x, low[open_], high[open_])
     return step
 
 
@@ -82,7 +85,7 @@ def descend_by_secants(
         finite = np.where(np.isfinite(scale), scale, 0.0)
         low = np.maximum(layout.lower[free] - part, -reach) * finite
         high = np.minimum(layout.upper[free] - part, reach) * finite
-        best_step = _boxed(normal, gradient, _FLAT, low, high)
+        best_step = boxed_step(normal, gradient, _FLAT, low, high)
         if -float(best_step @ (2.0 * gradient + normal @ best_step)) < gain:
             if fresh or not sure:
                 converged = True
@@ -90,7 +93,7 @@ def descend_by_secants(
             jac = None
             continue
         dampings = damping * _DAMPINGS
-        steps = np.array([_boxed(normal, gradient, d, low, high) for d in dampings]) / scale
+        steps = np.array([boxed_step(normal, gradient, d, low, high) for d in dampings]) / scale
         trials = np.tile(x, (dampings.size, 1))
         trials[:, free] = np.clip(part + steps, layout.lower[free], layout.upper[free])
         costs, residuals = problem.evaluate(trials)
