@@ -159,10 +159,10 @@ def noise_of(values: np.ndarray) -> float:
 
 
 def noise_at_rest(time: np.ndarray, values: np.ndarray) -> float:
-    """Standard deviation of the noise on readings (N,) at ``time`` (N,) of what hangs still, N >= 4.
+    """Standard deviation of the noise on readings (N,) at ``time`` (N,) of what hangs still.
 
-    About a straight line, and without what is periodic: mains on a cable is no noise, but something
-    to be found; taken for noise, it would hide everything that is smaller.
+    N >= 4. About a straight line, and without what is periodic: mains on a cable is no noise, but
+    something to be found; taken for noise, it would hide everything that is smaller.
     """
     n = values.size
     if n < _READINGS_MIN:
@@ -185,7 +185,7 @@ def noise_at_rest(time: np.ndarray, values: np.ndarray) -> float:
 
 
 def _strongest_line(t: np.ndarray, values: np.ndarray) -> np.ndarray | None:
-    """The sine (N,) that stands out most from the spectrum of ``values`` (N,); None if none does."""
+    """The sine (N,) that stands out most from the spectrum of ``values`` (N,), or None."""
     n = values.size
     power = np.abs(np.fft.rfft(values)) ** 2
     about = median_filter(power, 2 * (power.size // 16) + 9, mode="nearest")

@@ -38,9 +38,11 @@ _LONGER_THAN_RECORD = 3.0  # a branch slower than so many records is another equ
 _STARTS = 5  # of the baseline, from the global search
 _BASELINE = 20  # iterations of its descents
 _SCOUTING = 3  # iterations from each start
-_NOT_WORTH = 0.02  # of what a fit lies behind: promising less, it is left where it is
+_NOT_WORTH = 0.05  # of what a fit lies behind: promising less, it is left where it is
 _FAR_BEHIND = 0.1  # of its own misfit: such a fit will not lead, and need not be sure of its end
 _MUCH_EXPLAINED = 0.5  # of the cost without it is left: such a fit must be sure of its end
+_SETTLING = 10  # iterations of a fit that may come to lead
+_NOT_NEARER = 0.05  # of what it lies behind: promising less, it will not
 _ENDING = 25  # iterations of a fit that others build on
 _ALIKE = 0.5  # of the logarithm of relaxation times: a factor of 1.6
 _ELSEWHERE = (1.0, 4.0, 16.0)  # s, where a branch that is spare may be of use
@@ -186,18 +188,19 @@ class Bench:
         )
         return _trial(problem, best, fixed)
 
-    def settled(self, trial: Trial, iterations: int = 10) -> Trial:
-        """``trial`` followed to the end of its valley, on the thinned records."""
+    def settled(self, trial: Trial, leader: float = 0.0) -> Trial:
+        """``trial`` followed towards the end of its valley, on the thinned records.
+
+        No further than it takes to see that it does not come near the cost of the ``leader``.
+        """
+        behind = max(trial.cost - leader, 0.0) if leader else 0.0
+        return self._down(trial, _SETTLING, max(_WORTH * trial.cost, _NOT_NEARER * behind))
+
+    def _down(self, trial: Trial, iterations: int, gain: float) -> Trial:
         # a part of what is left, whatever is left: more would only polish a misfit
-        gain = max(0.5, _WORTH * trial.cost * trial.problem.samples)
+        gain = max(0.5, gain * trial.problem.samples)
         fit = descend(
-            trial.problem,
-            trial.x,
-            trial.fixed,
-            iterations=iterations,
-            gain=gain,
-            damping=1e-3,
-            quick=iterations < _ENDING,
+            trial.problem, trial.x, trial.fixed, iterations, gain, damping=1e-3, quick=True
         )
         return _trial(trial.problem, fit, trial.fixed)
 
@@ -207,7 +210,7 @@ class Bench:
         While something was missing, branches gathered where they could imitate it; two that relax
         alike are one, and the other is of use elsewhere. What others build on must not lack it.
         """
-        best = self.settled(trial, _ENDING)
+        best = self._down(trial, _ENDING, _WORTH * trial.cost)
         layout = best.problem.layout
         starts = _reseeded(layout, best.x)
         if not starts:
@@ -219,7 +222,8 @@ class Bench:
         other = min(fits, key=lambda f: f.cost)
         # a few steps do not reach the bottom: nearly as good is promising
         if other.cost < best.cost * 1.02:
-            again = self.settled(_trial(best.problem, other, best.fixed), _ENDING)
+            again = _trial(best.problem, other, best.fixed)
+            again = self._down(again, _ENDING, _WORTH * again.cost)
             return min(best, again, key=lambda t: t.cost)
         return best
 

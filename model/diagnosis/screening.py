@@ -92,16 +92,14 @@ class Screen:
     def _simulated(self, effect: Effect, found: list[Promise], several: bool) -> list[Promise]:
         """The leading promises as a simulation keeps them, and with ``several`` other sizes too.
 
-        Of a shape the better size is kept: one promise for each shape.
+        Of a shape the best size is kept: one promise for each shape.
         """
         rows: list[tuple[Promise, np.ndarray]] = []
         first = self.trial.x.size
         count = len(effect.sizes)
-        for rank, promise in enumerate(found):
-            layout = self.bench.problem(promise.model).layout
-            values = layout.values(promise.start)
-            if rank < _SIMULATED:
-                rows.append((promise, values))
+        for promise in found[:_SIMULATED]:
+            values = self.bench.problem(promise.model).layout.values(promise.start)
+            rows.append((promise, values))
             for size in self._sizes(effect.sizes[0]) if several else ():
                 other = values.copy()
                 other[first] = size

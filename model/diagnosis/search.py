@@ -48,6 +48,7 @@ _UNNAMED_MARGIN = (
     20.0  # of the criterion, by which an unnamed effect must be better than named ones
 )
 _PROMISES = 2  # of one effect, in different shapes, from which a fit sets out
+_NEARLY = 0.8  # of the best promise of an effect: another shape that is worth a start
 _FOLLOWED = 12  # candidates refitted in later rounds, the most promising ones
 _EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
@@ -330,12 +331,12 @@ class _Search:
         nothing = promises[0].start.copy()
         nothing[:first] = parent.x
         nothing[first : first + len(effect.sizes)] = [p.neutral for p in effect.sizes]
-        for start in (nothing, *(p.start for p in promises[:_PROMISES])):
-            columns = promises[max(len(starts) - 1, 0)].columns
-            starts.append((start, np.column_stack([jacobian, columns, shapes])))
+        worth = [p for p in promises[:_PROMISES] if p.share > _NEARLY * promises[0].share]
+        for start, promise in ((nothing, promises[0]), *((p.start, p) for p in worth)):
+            starts.append((start, np.column_stack([jacobian, promise.columns, shapes])))
         simpler = self._simpler(parent, effect, promises[0].start)
         if simpler is not None:
-            starts.append((simpler, None))
+            starts.append((simpler, starts[0][1]))
         fixed = np.concatenate([parent.fixed, np.zeros(len(effect.parameters), dtype=bool)])
         leader = min(t.cost for t in self.found.values())
         return self.bench.fit(model, starts, fixed, leader, parent.cost, self._is_noise(parent))
@@ -356,10 +357,10 @@ class _Search:
         for tried in order[:_SETTLED]:
             self._check()
             key = frozenset(tried.trial.effects)
-            lead = min(lead, self.found[key].cost)
             if key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
                 self.settled.add(key)
-                self.found[key] = self.bench.settled(tried.trial)
+                self.found[key] = self.bench.settled(tried.trial, lead)
+            lead = min(lead, self.found[key].cost)
         order = [replace(t, trial=self.found[frozenset(t.trial.effects)]) for t in order]
         correlation = self._correlation([best, *(t.trial for t in order)])
         return sorted(order, key=rank), correlation
