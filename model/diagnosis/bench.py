@@ -45,6 +45,8 @@ _SETTLING = 10  # iterations of a fit that may come to lead
 _NOT_NEARER = 0.05  # of what it lies behind: promising less, it will not
 _ENDING = 25  # iterations of a fit that others build on
 _ALIKE = 0.5  # of the logarithm of relaxation times: a factor of 1.6
+_AT_END = 0.05  # of the logarithm of a relaxation time: so near the bound it wants to go further
+_BESIDE = (0.6, 1.6)  # of the relaxation time of the branch that it helps
 _ELSEWHERE = (1.0, 4.0, 16.0)  # s, where a branch that is spare may be of use
 _WORTH = 1e-4  # of chi-square: a descent that promises less has ended
 _RIDGE = 1e-3  # of a number's own curvature, so that no segment alone sets it free
@@ -301,24 +303,46 @@ class Bench:
 
 
 def _reseeded(layout: Layout, x: np.ndarray) -> list[np.ndarray]:
-    """Coordinates with one of two branches that relax alike sent to other relaxation times."""
+    """Coordinates with a branch that is spare sent elsewhere; none where every branch has work.
+
+    Spare is one of two that relax alike, or one that has gone to the end of the times there are. It
+    may be of use at other times, or beside the stiffest, whose relaxation is then broader.
+    """
     values = layout.values(x)
     times, moduli = layout.column("T"), layout.column("mu")
+    if times.size < 2:
+        return []
     offset = moduli.size - times.size  # without mu_0 where the rest length gives it
     order = np.argsort(values[times])
     ratios = np.diff(np.log(values[times][order]))
-    if times.size < 2 or ratios.min() > _ALIKE:
-        return []
     pair = int(np.argmin(ratios))
-    spare, twin = int(order[pair]), int(order[pair + 1])
-    starts = []
-    for time in _ELSEWHERE:
-        moved = values.copy()
-        moved[moduli[offset + twin]] += moved[moduli[offset + spare]]
-        moved[moduli[offset + spare]] = 0.01 * float(values[moduli].sum())
-        moved[times[spare]] = time
-        starts.append(np.clip(layout.coordinates(moved), layout.lower, layout.upper))
-    return starts
+    stray = np.minimum(x[times] - layout.lower[times], layout.upper[times] - x[times]) < _AT_END
+    if stray.any():
+        spare = int(np.argmax(stray))
+    elif ratios[pair] < _ALIKE:
+        spare = int(order[pair])
+    else:
+        return []
+
+    def moved(time: float, twin: int, given: float) -> np.ndarray:
+        there = values.copy()
+        both = there[moduli[offset + twin]]
+        if not stray.any():
+            both += there[moduli[offset + spare]]
+        part = given * both
+        there[moduli[offset + twin]] = both - part
+        there[moduli[offset + spare]] = max(part, 0.01 * float(values[moduli].sum()))
+        there[times[spare]] = time
+        return np.clip(layout.coordinates(there), layout.lower, layout.upper)
+
+    if not stray.any():
+        return [moved(time, int(order[pair + 1]), 0.0) for time in _ELSEWHERE]
+    others = values[moduli[offset:]].copy()
+    others[spare] = -np.inf
+    stiffest = int(np.argmax(others))
+    starts = [moved(time, stiffest, 0.0) for time in _ELSEWHERE]
+    beside = float(values[times[stiffest]])
+    return [*starts, *(moved(beside * ratio, stiffest, 0.5) for ratio in _BESIDE)]
 
 
 def _trial(problem: Problem, fit: LocalFit, fixed: np.ndarray) -> Trial:
