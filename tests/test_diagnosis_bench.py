@@ -13,6 +13,7 @@ import pytest
 from model.diagnosis.bench import Bench, information
 from model.fitting import identify
 from model.fitting.parameters import Layout
+from model.material import Network
 from tests.engine_tools import (
     NOISE,
     PLAIN,
@@ -74,6 +75,31 @@ def test_what_thinning_took_is_put_back_where_errors_are_told():
     assert rough.train_rms == pytest.approx(NOISE, rel=0.04)
     assert rough.train_rms == pytest.approx(full.train_rms, rel=0.04)
     assert rough.selection_rms == pytest.approx(full.selection_rms, rel=0.04)
+
+
+# --- branches that have nothing to do
+
+
+@pytest.mark.parametrize(
+    ("moduli", "times"),
+    [
+        # what it was made with; one of two went to the end of the times; both are where one was
+        ((35e3, 47e3, 35e3, 224.0), (0.21, 0.30, 6.9)),
+        ((35e3, 72e3, 12e3, 231.0), (0.27, 0.1, 6.7)),
+        ((35e3, 41e3, 41e3, 300.0), (0.25, 0.25, 5.0)),
+    ],
+)
+def test_a_spare_branch_finds_its_work(moduli, times):
+    limits = (1e4,) * 4
+    truth = replace(
+        PLAIN, network=Network.gent((35e3, 47e3, 35e3, 224.0), limits, (0.21, 0.3, 6.9))
+    )
+    bench = bench_of(record_of(truth, thesis_drive(200.0, periods=2)))
+    trial = fitted(bench, replace(PLAIN, network=Network.gent(moduli, limits, times)))
+    ended = bench.ended(trial)
+    made = fitted(bench, truth)
+    # three standard deviations of one number above the optimum next to the truth, at most
+    assert (ended.cost - made.cost) * ended.problem.samples < 9.0
 
 
 # --- time that is left out
