@@ -43,6 +43,7 @@ _HOPE = 0.95  # of the cost: who explains less than the rest of it is not follow
 _BEAM = 2  # how many explanations are followed on
 _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed on
 _SETTLED = 5  # leading candidates that are fitted to the end of their valleys
+_ENDED = 4  # the first of them, where no branch must be left without work
 _MAY_LEAD = 6.0  # of the leader's cost: what has come so near may lead by its last steps
 _UNNAMED_MARGIN = (
     20.0  # of the criterion, by which an unnamed effect must be better than named ones
@@ -263,7 +264,7 @@ class _Search:
                 reason += "; the leading ones are tried together with others"
             self._record(fitted, correlation, fitted[0] if taken else None, reason)
             if taken:
-                best, looking_on = self._ended(leader), False
+                best, looking_on = self._restarted(self._ended(leader)), False
                 if self._is_noise(best):
                     break
             elif looking_on or hopeless:
@@ -280,6 +281,12 @@ class _Search:
             self.ended.add(key)
             self.settled.add(key)
             self.found[key] = self.bench.ended(trial)
+        return self.found[key]
+
+    def _restarted(self, trial: Trial) -> Trial:
+        """``trial`` from a new global search, with what its effects do taken off the records."""
+        key = frozenset(trial.effects)
+        self.found[key] = self.bench.restarted(trial)
         return self.found[key]
 
     @staticmethod
@@ -354,10 +361,13 @@ class _Search:
         correlation = self._correlation([best, *(t.trial for t in fitted)])
         order = sorted(fitted, key=rank)
         lead = order[0].trial.cost
-        for tried in order[:_SETTLED]:
+        ended = 0 if self._is_noise(best) else _ENDED
+        for place, tried in enumerate(order[:_SETTLED]):
             self._check()
             key = frozenset(tried.trial.effects)
-            if key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
+            if place < ended and tried.trial.cost < _BEAM_COST * lead:
+                self._ended(tried.trial)
+            elif key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
                 self.settled.add(key)
                 self.found[key] = self.bench.settled(tried.trial, lead)
             lead = min(lead, self.found[key].cost)
