@@ -377,12 +377,14 @@ def _reseeded(layout: Layout, x: np.ndarray) -> list[np.ndarray]:
         there[times[spare]] = time
         return np.clip(layout.coordinates(there), layout.lower, layout.upper)
 
+    # the last is as good as one more equilibrium spring that takes its time
+    elsewhere = (*_ELSEWHERE, 0.8 * math.exp(float(layout.upper[times][spare])))
     if not stray.any():
-        return [moved(time, int(order[pair + 1]), 0.0) for time in _ELSEWHERE]
+        return [moved(time, int(order[pair + 1]), 0.0) for time in elsewhere]
     others = values[moduli[offset:]].copy()
     others[spare] = -np.inf
     stiffest = int(np.argmax(others))
-    starts = [moved(time, stiffest, 0.0) for time in _ELSEWHERE]
+    starts = [moved(time, stiffest, 0.0) for time in elsewhere]
     beside = float(values[times[stiffest]])
     return [*starts, *(moved(beside * ratio, stiffest, 0.5) for ratio in _BESIDE)]
 

@@ -44,6 +44,7 @@ _BEAM = 2  # how many explanations are followed on
 _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed on
 _SETTLED = 5  # leading candidates that are fitted to the end of their valleys
 _ENDED = 4  # the first of them, where no branch must be left without work
+_NEAR_LEAD = 2.0  # of the leader's cost before that: these are
 _MAY_LEAD = 6.0  # of the leader's cost: what has come so near may lead by its last steps
 _UNNAMED_MARGIN = (
     20.0  # of the criterion, by which an unnamed effect must be better than named ones
@@ -360,12 +361,12 @@ class _Search:
 
         correlation = self._correlation([best, *(t.trial for t in fitted)])
         order = sorted(fitted, key=rank)
-        lead = order[0].trial.cost
+        lead = first = order[0].trial.cost
         ended = 0 if self._is_noise(best) else _ENDED
         for place, tried in enumerate(order[:_SETTLED]):
             self._check()
             key = frozenset(tried.trial.effects)
-            if place < ended and tried.trial.cost < _BEAM_COST * lead:
+            if place < ended and tried.trial.cost < _NEAR_LEAD * first:
                 self._ended(tried.trial)
             elif key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
                 self.settled.add(key)
