@@ -32,7 +32,7 @@ SIZES = ((1366, 768), (1920, 1080))
 LOOKS = ("light", "dark")
 #: It leaks, which the thesis's run alone cannot tell from a permittivity: so there is something to
 #: propose.
-LEAKING = "sim:12"
+LEAKING = "sim:30"
 PATIENCE = 600_000  # ms
 
 REFUSED = """\

@@ -123,7 +123,7 @@ def test_what_cannot_be_studied_is_said_and_leaves_nothing(session, keep, qtbot)
 def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
     window: MainWindow, session: Session, qtbot: QtBot
 ) -> None:
-    address = "sim:12"  # it leaks, which the thesis's run cannot tell from a soft permittivity
+    address = "sim:30"  # it leaks, which the thesis's run cannot tell from a soft permittivity
     session.set_rig_file(None, "", SLOW_RIG)
     session.set_address(address)
     path = of_rig(session.folder, "thesis", address)
@@ -135,7 +135,7 @@ def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
     outcome = studied(page, qtbot).outcome
     assert isinstance(outcome, DiagnoseOutcome)
     assert outcome.finding.steps
-    assert outcome.experiment is not None
+    assert outcome.experiment is not None, outcome.experiment_words
     assert outcome.experiment.name in words(page.experiment)
     assert len(page.residual.time.listDataItems()) == 2
 
