@@ -206,6 +206,17 @@ def test_missing_stress_is_there_before_and_gone_after():
     assert np.sqrt(np.mean(after.stress**2)) < 3.0
 
 
+def test_what_happened_once_predicts_nothing_else():
+    # a load that slips by a tenth: whatever is found beside it has taken a part of it over
+    slipped = replace(PLAIN, effects=effect("sudden change of force", stress=-200.0, moment=4.3))
+    found = diagnose([record_of(slipped)], PLAIN, workers=1)
+    assert found.steps[0].effect == "sudden change of force"
+    assert found.verdict == EXPLAINED
+    assert found.final.predicting.effects == ()
+    assert found.final.predicting == found.baseline.model
+    assert any("other recordings are predicted without it" in note for note in found.notes)
+
+
 def test_effects_that_look_the_same_are_named_as_such():
     truth = replace(PLAIN, effects=effect("linear drag", drag=400.0))
     found = diagnose([record_of(truth)], PLAIN, workers=1)

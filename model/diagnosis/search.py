@@ -454,14 +454,19 @@ class _Search:
 
         A moment or a walk is of one recording, unless several of these show it alike: all are
         fitted with one set of numbers, and each must be the better for it. What is left out is
-        fitted without: then whoever has found nothing else predicts as before, and no worse.
+        fitted without: then whoever has found nothing else predicts as before, and no worse. Where
+        the others then take over what happened once, they predict nothing, and the baseline does.
         """
         once = [
             n
             for n in trial.effects
             if not EFFECTS[n].recurs and not self._recurred(trial, self._without(trial, n))
         ]
-        return self._with_only(trial, [n for n in trial.effects if n not in once])
+        kept = self._with_only(trial, [n for n in trial.effects if n not in once])
+        base = self.found[frozenset()]
+        if kept is not trial and base.cost - kept.cost < _TRUSTED * (base.cost - trial.cost):
+            return base
+        return kept
 
     def _recurred(self, trial: Trial, without: Trial) -> bool:
         """Whether each of several recordings is decisively better explained than ``without``."""
