@@ -54,11 +54,19 @@ def prepare(extras: str = "") -> Path:
     return python
 
 
+# the plugin for a real screen needs more libraries than Qt itself
+_LOADS = (
+    "import ctypes, pathlib, PySide6, PySide6.QtGui, PySide6.QtWidgets; "
+    "plugins = pathlib.Path(PySide6.__file__).parent / 'Qt' / 'plugins' / 'platforms'; "
+    "ctypes.CDLL(str(plugins / 'libqxcb.so'))"
+)
+
+
 def prepare_screen(python: Path) -> None:
     """Install what windows need without a screen, and a screen in memory, where Debian lacks it."""
     if not sys.platform.startswith("linux"):
         return
-    loads = [str(python), "-c", "import PySide6.QtGui, PySide6.QtWidgets"]
+    loads = [str(python), "-c", _LOADS]
     missing = subprocess.run(loads, capture_output=True, text=True, check=False)
     if missing.returncode == 0 and shutil.which("Xvfb"):
         return
