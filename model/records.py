@@ -151,10 +151,7 @@ def noise_of(values: np.ndarray) -> float:
     From second differences, which no drift or slope disturbs: their variance is six times that of
     white noise.
     """
-    if values.size < _READINGS_MIN:
-        raise ModelError(
-            f"{values.size} samples are too few to read a noise from; {_READINGS_MIN} are needed"
-        )
+    _require_readings(values)
     return float(np.sqrt(np.mean(np.diff(values, 2) ** 2) / 6.0))
 
 
@@ -164,14 +161,10 @@ def noise_at_rest(time: np.ndarray, values: np.ndarray) -> float:
     N >= 4. About a straight line, and without what is periodic: mains on a cable is no noise, but
     something to be found; taken for noise, it would hide everything that is smaller.
     """
+    _require_readings(values)
     n = values.size
-    if n < _READINGS_MIN:
-        raise ModelError(
-            f"{n} samples are too few to read a noise from; {_READINGS_MIN} are needed"
-        )
     t = time - time.mean()
-    left = values - values.mean()
-    left -= t * (float(t @ left) / float(t @ t))
+    left = _level(t, values)
     given = 2
     steps = np.diff(time)
     even = float(steps.max()) < 1.01 * float(steps.min())
@@ -179,9 +172,22 @@ def noise_at_rest(time: np.ndarray, values: np.ndarray) -> float:
         line = _strongest_line(t, left)
         if line is None:
             break
-        left -= line
+        left = _level(t, left - line)  # a line that ends in mid-period looked like a slope
         given += 3
     return math.sqrt(float(left @ left) / (n - given))
+
+
+def _require_readings(values: np.ndarray) -> None:
+    if values.size < _READINGS_MIN:
+        raise ModelError(
+            f"{values.size} samples are too few to read a noise from; {_READINGS_MIN} are needed"
+        )
+
+
+def _level(t: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """``values`` (N,) about their straight line, at times ``t`` (N,) about their mean."""
+    level = values - values.mean()
+    return np.asarray(level - t * (float(t @ level) / float(t @ t)))
 
 
 def _strongest_line(t: np.ndarray, values: np.ndarray) -> np.ndarray | None:
@@ -197,8 +203,8 @@ def _strongest_line(t: np.ndarray, values: np.ndarray) -> np.ndarray | None:
 
     def sine(frequency: float) -> np.ndarray:
         turn = 2.0 * np.pi * frequency * t
-        waves = np.column_stack([np.cos(turn), np.sin(turn)])
-        return np.asarray(waves @ np.linalg.lstsq(waves, values, rcond=None)[0])
+        waves = np.array([np.cos(turn), np.sin(turn)])
+        return np.asarray(np.linalg.solve(waves @ waves.T, waves @ values) @ waves)
 
     best = minimize_scalar(
         lambda f: float(np.sum((values - sine(f)) ** 2)),

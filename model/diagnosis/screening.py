@@ -71,7 +71,6 @@ class Screen:
             np.isfinite(sigma), trial.residuals * np.where(np.isfinite(sigma), sigma, 0.0), 0.0
         )
         self._weight = 1.0 / trial.problem.sigma
-        self._start = self._base * np.where(np.isfinite(sigma), self._weight, 0.0)
 
     def promises(self, effect: Effect) -> list[Promise]:
         """Promises of ``effect``, best first: one for each shape on its grid."""
@@ -94,34 +93,31 @@ class Screen:
 
         Of a shape the best size is kept: one promise for each shape.
         """
-        rows: list[tuple[Promise, np.ndarray]] = []
+        if not found:
+            return []
+        problem = self.bench.problem(found[0].model)
+        layout = problem.layout
         first = self.trial.x.size
-        count = len(effect.sizes)
-        for promise in found[:_SIMULATED]:
-            values = self.bench.problem(promise.model).layout.values(promise.start)
-            rows.append((promise, values))
+        rows: list[tuple[int, np.ndarray]] = []
+        for place, promise in enumerate(found[:_SIMULATED]):
+            values = layout.values(promise.start)
+            rows.append((place, values))
             for size in self._sizes(effect.sizes[0]) if several else ():
                 other = values.copy()
                 other[first] = size
-                rows.append((promise, other))
-        if not rows:
-            return []
-        problem = self.bench.problem(rows[0][0].model)
+                rows.append((place, other))
         predicted, status = problem.predict(np.array([values for _, values in rows]))
-        there = np.where(
-            np.isfinite(problem.sigma), (predicted - problem.measured) * self._weight, 0.0
-        )
+        there = (predicted - problem.measured) * self._weight
         total = float(self._residual @ self._residual)
-        best: dict[int, Promise] = {}
-        for (promise, values), residual, failed in zip(rows, there, status, strict=True):
+        kept = [replace(promise, share=0.0) for promise in found]
+        for (place, values), residual, failed in zip(rows, there, status, strict=True):
             if failed:
                 continue
             own = self._q.T @ residual
             left = residual - self._q @ own
             share = 1.0 - float(left @ left) / max(total, 1e-300)
-            if share <= max(best[id(promise)].share if id(promise) in best else 0.0, 0.0):
+            if share <= kept[place].share:
                 continue
-            layout = self.bench.problem(promise.model).layout
             start = layout.coordinates(values)
             # what the base model's own numbers do about the rest of it, no further than sensible
             step = np.zeros(first)
@@ -129,12 +125,12 @@ class Screen:
             reach = layout.reach(start)[:first]
             start[:first] += step / max(1.0, float(np.max(np.abs(step) / reach)))
             start = np.clip(start, layout.lower, layout.upper)
-            columns = promise.columns
+            columns = found[place].columns
             moved = values[first] - (effect.sizes[0].neutral or 0.0)
-            if count == 1 and moved != 0.0:
-                columns = ((residual - self._start) / moved)[:, None]
-            best[id(promise)] = replace(promise, start=start, columns=columns, share=share)
-        return [best.get(id(p), replace(p, share=0.0)) for p in found]
+            if len(effect.sizes) == 1 and moved != 0.0:
+                columns = ((residual - self.trial.residuals) / moved)[:, None]
+            kept[place] = replace(found[place], start=start, columns=columns, share=share)
+        return kept
 
     @staticmethod
     def _sizes(size: Parameter) -> list[float]:
