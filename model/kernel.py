@@ -84,8 +84,15 @@ _LEAN_SUBSTEPS_MAX = 4  # the same for the quicker form
 _EFFECT_SUBSTEPS_MAX = 25
 # change of a drag over a step, as a phase: that part is not in closed form
 _GROWN, _GROWN_QUICK = 0.2, 4.0
-_RINGING = 1e-6  # in stretch, from which on steps must see it: 0.075 um on 75 mm
-_DRAG_NEAR = 0.2  # of a drag: as near to the one in closed form it need not be the same
+# in stretch, from which on steps must see it: 7.5 um on 75 mm; and where a path is followed
+_RINGING, _RINGING_TURNS = 1e-4, 1e-6
+# numbers in closed form need not be quite the film's own: what they lack is integrated
+_STIFFNESS_NEAR = 0.005
+_DRAG_NEAR = 0.2
+_DRAG_MIN, _DRAGS = 1e-2, 128  # 1/s; kinds of drag, each so much stronger than the one before
+_COURSES = 256  # of these forms that are kept
+_SWING = 32  # numbers that say how the film goes on
+_K, _D, _W, _H, _KIND = 27, 28, 29, 30, 31  # where those that it follows from stand
 _RODAS_TOLERANCE = 5e-9  # in stretch, a step: 0.4 nm on 75 mm
 _RODAS_STEP_MAX = 2e-2  # s; the error estimate rules below that
 _RODAS_HALVINGS = 2.0**-17
@@ -191,7 +198,8 @@ def _speeds(
     """What limits a step at ``y``: (1/s^2, 1/s^2, 1/s, 1/s), all over the inertia.
 
     The stiffness of the springs, what effects may add to it, their drag, and the fastest flow of a
-    branch. ``branches`` (n,) is filled with the stiffness of each branch, 1/s^2.
+    branch. ``branches`` (2, 3 or more) is filled with the stiffness of each branch, 1/s^2, and with
+    how fast it flows, 1/s.
     """
     held = int(c[HELD])
     lam = y[0]
@@ -203,9 +211,10 @@ def _speeds(
         k = HEAD + WIDTH * (i + 1)
         e = lam / y[2 + i]
         bend = nominal_pull_slope(held, int(c[k + KIND]), c[k + LIMIT], c[k + LOCKING], e)
-        branches[i] = c[k + MODULUS] * bend / (y[2 + i] * y[2 + i]) / c[INERTIA]
-        stiffness += branches[i] * c[INERTIA]
-        fastest = max(fastest, c[k + RATE] * bend * e / y[2 + i])
+        branches[0, i] = c[k + MODULUS] * bend / (y[2 + i] * y[2 + i]) / c[INERTIA]
+        branches[1, i] = c[k + RATE] * bend * e / y[2 + i]
+        stiffness += branches[0, i] * c[INERTIA]
+        fastest = max(fastest, branches[1, i])
     more, drag = _stiffness(c, y[2 + branch_count(c) :], lam, math.inf)
     inertia = c[INERTIA]
     return max(stiffness, 0.0) / inertia, more / inertia, drag / inertia, fastest
@@ -522,9 +531,9 @@ def _lean_table(c: np.ndarray, springs: np.ndarray) -> np.ndarray:
     """What ``_lean_steps`` reads: load and field over the inertia, then three numbers a spring.
 
     Those are modulus over inertia, 1/J and 1/T; springs that are missing are there as zeros. Then
-    the inertia, and the stiffness of each branch, which ``_speeds`` fills in.
+    the inertia.
     """
-    table = np.zeros(18)
+    table = np.zeros(15)
     table[14] = c[INERTIA]
     table[0], table[1] = c[FORCE] / c[INERTIA], c[ELECTRIC] / c[INERTIA]
     for i in range(springs.shape[1]):
@@ -535,73 +544,106 @@ def _lean_table(c: np.ndarray, springs: np.ndarray) -> np.ndarray:
 
 
 @jit
-def _times(p: float, q: float, r: float, s: float, k: float, d: float) -> tuple[float, float]:
-    """(p + q A)(r + s A) as a number and a multiple of A, with A^2 = -d A - k."""
-    return p * r - q * s * k, p * s + q * r - q * s * d
+def _times(a: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
+    """The product of two 3 by 3 matrices, into ``out``."""
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
 
 
 @jit
-def _phis(k: float, d: float, h: float, phi: np.ndarray) -> None:
-    """Fill ``phi`` with exp and phi_1 .. phi_3 of h A, A = [[0, 1], [-k, -d]], as p + q A: (4, 2).
+def _doubled(phi: np.ndarray, room: np.ndarray) -> None:
+    """From exp and phi_1 .. phi_3 of a matrix (4, 3, 3) those of its double, in place.
 
-    Functions of a 2 by 2 matrix are that and no more. Taylor's series where it converges at once,
-    then doubled (Hochbruck and Ostermann, Acta Numerica 19, 2010): no drag is too strong.
+    Hochbruck and Ostermann, Acta Numerica 19, 2010. ``room`` is (3, 3).
     """
-    doublings, norm = 0, h * max(math.sqrt(k), d)
-    while norm > 0.5:
-        norm *= 0.5
-        doublings += 1
-    part = h * 0.5**doublings
-    for j in range(4):
-        phi[j, 0], phi[j, 1] = 0.0, 0.0
+    for j in range(3, -1, -1):
+        _times(phi[0], phi[j], room)
+        weight = 1.0
+        for i in range(j, 0, -1):
+            for m in range(9):
+                room[m // 3, m % 3] += weight * phi[i, m // 3, m % 3]
+            weight /= j - i + 1
+        for m in range(9):
+            phi[j, m // 3, m % 3] = room[m // 3, m % 3] * 0.5**j
+
+
+@jit
+def _phis(a: np.ndarray, doublings: int, room: np.ndarray, phi: np.ndarray) -> None:
+    """Fill ``phi`` (4, 3, 3) with exp and phi_1 .. phi_3 of ``a`` (3, 3) times 2^``doublings``.
+
+    Taylor's series, which converges at once for a small ``a``, then doubled. ``room`` (2, 3, 3).
+    """
+    power, product = room[0], room[1]
+    phi[:] = 0.0
+    power[:] = 0.0
+    power[0, 0] = power[1, 1] = power[2, 2] = 1.0
     # x^n/(n + j)! adds up to phi_j
-    p, q, factorial = 1.0, 0.0, 1.0
+    factorial = 1.0
     for n in range(12):
         below = factorial
         for j in range(4):
-            phi[j, 0] += p / below
-            phi[j, 1] += q / below
+            for m in range(9):
+                phi[j, m // 3, m % 3] += power[m // 3, m % 3] / below
             below *= n + j + 1
-        p, q = _times(p, q, 0.0, part, k, d)
+        _times(power, a, product)
+        power[:] = product
         factorial *= n + 1
     for _ in range(doublings):
-        e0, e1 = phi[0, 0], phi[0, 1]
-        for j in range(3, -1, -1):
-            p, q = _times(e0, e1, phi[j, 0], phi[j, 1], k, d)
-            weight = 1.0
-            for i in range(j, 0, -1):
-                p += weight * phi[i, 0]
-                q += weight * phi[i, 1]
-                weight /= j - i + 1
-            phi[j, 0], phi[j, 1] = p * 0.5**j, q * 0.5**j
+        _doubled(phi, product)
 
 
 @jit
-def _swings(k: float, d: float, h: float, phi: np.ndarray, swing: np.ndarray) -> None:
+def _swings(
+    k: float, d: float, branches: np.ndarray, h: float, room: np.ndarray, swing: np.ndarray
+) -> None:
     """What ``_lean_steps`` reads: how a film of stiffness k and drag d goes on over ``h`` s.
 
-    ``swing`` (19,) is filled: the matrices of Cox and Matthews's method for lam'' = -k lam - d lam'
-    + rest, of which only the columns are needed that act on a rate or an acceleration; k, d and h
-    themselves; and what a force does that grows evenly over the first half.
+    ``swing`` (_SWING,) is filled: the matrices of Cox and Matthews's method for z'' = -k z - d z'
+    + w I + rest, I' = z, of which only the columns are needed that act on a rate or an
+    acceleration: z is how far the film has moved, I what of it the branches have seen, by which
+    they give way while it rings. Then what a force does that grows evenly over the first half, k,
+    d, w and h themselves. ``branches`` (2, 3) is ``_speeds``'s, ``room`` (7, 3, 3).
     """
-    _phis(k, d, 0.5 * h, phi)
-    p, q = phi[0]
-    swing[0], swing[1], swing[2], swing[3] = p, q, -k * q, p - d * q
-    p, q = 0.5 * h * phi[1, 0], 0.5 * h * phi[1, 1]
-    swing[4], swing[5] = q, p - d * q
-    p, q = 0.25 * h * h * phi[2, 0], 0.25 * h * h * phi[2, 1]
-    swing[17], swing[18] = q, p - d * q
-    _phis(k, d, h, phi)
-    p, q = phi[0]
-    swing[6], swing[7] = q, p - d * q
-    first, second, third = phi[1], phi[2], phi[3]
-    p, q = first - 3.0 * second + 4.0 * third
-    swing[8], swing[9] = h * q, h * (p - d * q)
-    p, q = 2.0 * second - 4.0 * third
-    swing[10], swing[11] = h * q, h * (p - d * q)
-    p, q = 4.0 * third - second
-    swing[12], swing[13] = h * q, h * (p - d * q)
-    swing[14], swing[15], swing[16] = k, d, h
+    w = 0.0
+    for i in range(branches.shape[1]):
+        w += branches[0, i] * branches[1, i]
+    doublings, part, fastest = 0, 0.5 * h, max(max(math.sqrt(k), d), w ** (1.0 / 3.0))
+    while part * fastest > 0.5:
+        part *= 0.5
+        doublings += 1
+    a, phi = room[0], room[1:5]
+    a[:] = 0.0
+    a[0, 1] = a[2, 0] = part
+    a[1, 0], a[1, 1], a[1, 2] = -part * k, -part * d, part * w
+    _phis(a, doublings, room[5:], phi)
+    for i in range(3):
+        for j in range(3):
+            swing[3 * i + j] = phi[0, i, j]
+        swing[9 + i] = 0.5 * h * phi[1, i, 1]
+        swing[12 + i] = 0.25 * h * h * phi[2, i, 1]
+    _doubled(phi, room[5])
+    for i in range(3):
+        first, second, third = phi[1, i, 1], phi[2, i, 1], phi[3, i, 1]
+        swing[15 + i] = phi[0, i, 1]
+        swing[18 + i] = h * (first - 3.0 * second + 4.0 * third)
+        swing[21 + i] = h * (2.0 * second - 4.0 * third)
+        swing[24 + i] = h * (4.0 * third - second)
+    swing[_K], swing[_D], swing[_W], swing[_H] = k, d, w, h
+
+
+@inlined
+def _kind_of_drag(drag: float) -> int:
+    """One number for drags that may share a closed form; 0 for none."""
+    if drag < _DRAG_MIN:
+        return 0
+    return min(1 + int(math.log(drag / _DRAG_MIN) / math.log(1.0 + _DRAG_NEAR)), _DRAGS - 1)
+
+
+@inlined
+def _fits(swing: np.ndarray, k: float, near: float, kind: int, h: float) -> bool:
+    """True where ``swing`` is of a stiffness so ``near`` to k, of that drag and that step."""
+    return abs(k - swing[_K]) <= near and kind == swing[_KIND] and abs(h - swing[_H]) <= 1e-6 * h
 
 
 @jit
@@ -609,6 +651,7 @@ def _lean_steps(
     acting: int,
     c: np.ndarray,
     table: np.ndarray,
+    branches: np.ndarray,
     swing: np.ndarray,
     y: np.ndarray,
     v0: float,
@@ -623,10 +666,11 @@ def _lean_steps(
     """``steps`` steps of ``h`` s for the thesis's case: width held, springs of Gent's kind, n <= 3.
 
     Exponential Runge-Kutta of order 4 (Cox and Matthews, J. Comput. Phys. 176, 2002): the film's
-    own swinging and a drag are in closed form, what is left of the forces is slow. So neither
-    ringing nor drag ask for short steps. Branches go as in classical Runge-Kutta, which is the same
-    method for what has no linear part. Nothing leaves the registers on the way. ``table`` is
-    ``_lean_table``'s, ``swing`` is ``_swings``'s. Where effects are ``acting`` it does what
+    own swinging, how branches give way meanwhile, and a drag are in closed form; what is left of
+    the forces is slow. So neither ringing nor drag ask for short steps. What is left of the
+    branches' flow goes as in classical Runge-Kutta, which is the same method for what has no linear
+    part. Nothing leaves the registers on the way. ``table`` is ``_lean_table``'s, ``branches`` is
+    ``_speeds``'s, ``swing`` is ``_swings``'s. Where effects are ``acting`` it does what
     ``_effect_steps`` does.
     """
     n = y.shape[0] - 2 - MEMORY
@@ -637,11 +681,15 @@ def _lean_steps(
     m1, g1, r1 = table[5], table[6], table[7]
     m2, g2, r2 = table[8], table[9], table[10]
     m3, g3, r3 = table[11], table[12], table[13]
-    e11, e12, e21, e22 = swing[0], swing[1], swing[2], swing[3]
-    p1, p2, w1, w2 = swing[4], swing[5], swing[6], swing[7]
-    a1, a2, b1, b2, c1, c2 = swing[8], swing[9], swing[10], swing[11], swing[12], swing[13]
-    k1, k2, k3 = table[15], table[16], table[17]
-    k, d, q1, q2 = swing[14], swing[15], swing[17], swing[18]
+    e11, e12, e13 = swing[0], swing[1], swing[2]
+    e21, e22, e23 = swing[3], swing[4], swing[5]
+    e31, e32, e33 = swing[6], swing[7], swing[8]
+    p1, p2, p3, q1, q2, q3 = swing[9], swing[10], swing[11], swing[12], swing[13], swing[14]
+    w1, w2, w3, a1, a2, a3 = swing[15], swing[16], swing[17], swing[18], swing[19], swing[20]
+    b1, b2, b3, c1, c2, c3 = swing[21], swing[22], swing[23], swing[24], swing[25], swing[26]
+    k, d, w = swing[_K], swing[_D], swing[_W]
+    k1, k2, k3 = branches[0, 0], branches[0, 1], branches[0, 2]
+    s1, s2, s3 = branches[1, 0], branches[1, 1], branches[1, 2]
     x1 = y[2] if n > 0 else 1.0
     x2 = y[3] if n > 1 else 1.0
     x3 = y[4] if n > 2 else 1.0
@@ -672,7 +720,7 @@ def _lean_steps(
             bend = max(bend, abs(a - 2.0 * last + last_but_one))
             last_but_one, last = last, a
         push = a + d * speed
-        z, v = e12 * speed + p1 * push, e22 * speed + p2 * push
+        z, v, seen = e12 * speed + p1 * push, e22 * speed + p2 * push, e32 * speed + p3 * push
         if acting:
             fm, fb = _supplied(
                 acting, c, memory, t, half, lam, speed, z, v - speed, now, va, vm, vb
@@ -683,12 +731,14 @@ def _lean_steps(
         yielding = half * (k1 * f1 + k2 * f2 + k3 * f3)
         rise, later = lam * (em - electric_gain * f0) + yielding, lam * (e1 - em) + yielding
         slope = rise / half
-        z, v = z + q1 * slope, v + q2 * slope
+        z, v, seen = z + q1 * slope, v + q2 * slope, seen + q3 * slope
         sum_1, sum_2, sum_3 = f1, f2, f3
-        first, sum_w, sum_v = push, w1 * speed + a1 * push, w2 * speed + a2 * push
-        there_w, there_v = z, v
+        first, sum_z, sum_v = push, w1 * speed + a1 * push, w2 * speed + a2 * push
+        sum_seen = w3 * speed + a3 * push
+        there_z, there_v, there_seen = z, v, seen
 
-        z1, z2, z3 = x1 + half * f1, x2 + half * f2, x3 + half * f3
+        z1, z2 = x1 + half * f1 + s1 * seen, x2 + half * f2 + s2 * seen
+        z3 = x3 + half * f3 + s3 * seen
         now = lam + z
         p = now * now
         t1, t2 = _lean_pull(p, z1 * z1, g1), _lean_pull(p, z2 * z2, g2)
@@ -701,15 +751,17 @@ def _lean_steps(
                 acting, c, memory, now, v, warmth, lam0, half, t, fm, pull, stress, over
             )  # fmt: skip
         a += load
-        push = a + k * z + d * v
+        push = a + k * z + d * v - w * seen
         less = push - rise
+        f1, f2, f3 = r1 * t1 - s1 * z, r2 * t2 - s2 * z, r3 * t3 - s3 * z
         z = e12 * speed + p1 * less + q1 * slope
         v = e22 * speed + p2 * less + q2 * slope
-        f1, f2, f3 = r1 * t1, r2 * t2, r3 * t3
-        sum_w, sum_v = sum_w + b1 * push, sum_v + b2 * push
+        seen = e32 * speed + p3 * less + q3 * slope
+        sum_z, sum_v, sum_seen = sum_z + b1 * push, sum_v + b2 * push, sum_seen + b3 * push
         sum_1, sum_2, sum_3 = sum_1 + 2.0 * f1, sum_2 + 2.0 * f2, sum_3 + 2.0 * f3
 
-        z1, z2, z3 = x1 + half * f1, x2 + half * f2, x3 + half * f3
+        z1, z2 = x1 + half * f1 + s1 * seen, x2 + half * f2 + s2 * seen
+        z3 = x3 + half * f3 + s3 * seen
         now = lam + z
         p = now * now
         t1, t2 = _lean_pull(p, z1 * z1, g1), _lean_pull(p, z2 * z2, g2)
@@ -722,16 +774,18 @@ def _lean_steps(
                 acting, c, memory, now, v, warmth, lam0, half, t, fm, pull, stress, over
             )  # fmt: skip
         a += load
-        push = a + k * z + d * v
-        sum_w, sum_v = sum_w + b1 * push, sum_v + b2 * push
+        push = a + k * z + d * v - w * seen
+        f1, f2, f3 = r1 * t1 - s1 * z, r2 * t2 - s2 * z, r3 * t3 - s3 * z
+        sum_z, sum_v, sum_seen = sum_z + b1 * push, sum_v + b2 * push, sum_seen + b3 * push
         push = 2.0 * push - first - rise
         slope = later / half
-        z = e11 * there_w + e12 * there_v + p1 * push + q1 * slope
-        v = e21 * there_w + e22 * there_v + p2 * push + q2 * slope
-        f1, f2, f3 = r1 * t1, r2 * t2, r3 * t3
+        z = e11 * there_z + e12 * there_v + e13 * there_seen + p1 * push + q1 * slope
+        v = e21 * there_z + e22 * there_v + e23 * there_seen + p2 * push + q2 * slope
+        seen = e31 * there_z + e32 * there_v + e33 * there_seen + p3 * push + q3 * slope
         sum_1, sum_2, sum_3 = sum_1 + 2.0 * f1, sum_2 + 2.0 * f2, sum_3 + 2.0 * f3
 
-        z1, z2, z3 = x1 + h * f1, x2 + h * f2, x3 + h * f3
+        z1, z2 = x1 + h * f1 + s1 * seen, x2 + h * f2 + s2 * seen
+        z3 = x3 + h * f3 + s3 * seen
         now = lam + z
         p = now * now
         t1, t2 = _lean_pull(p, z1 * z1, g1), _lean_pull(p, z2 * z2, g2)
@@ -744,14 +798,15 @@ def _lean_steps(
                 acting, c, memory, now, v, warmth, lam0, h, t, fb, pull, stress, over
             )  # fmt: skip
         a += load
-        push = a + k * z + d * v
-        lam += sum_w + c1 * push
+        push = a + k * z + d * v - w * seen
+        lam += sum_z + c1 * push
         speed = sum_v + c2 * push
+        seen = sum_seen + c3 * push
         if acting & _COMMIT:
             _commit(c, memory, lam, speed, lam0, h, t)
-        x1 += sixth * (sum_1 + r1 * t1)
-        x2 += sixth * (sum_2 + r2 * t2)
-        x3 += sixth * (sum_3 + r3 * t3)
+        x1 += sixth * (sum_1 + r1 * t1 - s1 * z) + s1 * seen
+        x2 += sixth * (sum_2 + r2 * t2 - s2 * z) + s2 * seen
+        x3 += sixth * (sum_3 + r3 * t3 - s3 * z) + s3 * seen
     trace[0], trace[1], trace[2] = last, last_but_one, bend
     y[0], y[1] = lam, speed
     if n > 0:
@@ -926,8 +981,9 @@ def drive_by_voltage(
     ``time`` s and ``voltage`` V are (N,), increasing and not necessarily even. With ``hold`` each
     voltage stands until the next sample (a converter's output), else the voltage is linear between
     samples. ``warmth`` (N,) K is the temperature above that of the start, or (0,) where none was
-    recorded. ``quick`` takes the longest steps that are good to a tenth of a micrometre, for a
-    search that tries thousands of models; else they are good to some hundredths. Element 0 is the
+    recorded. ``quick`` takes the longest steps that are good to a tenth of a micrometre (to some
+    tenths on a step of 8 kV), for a search that tries thousands of models; else they are good to
+    some hundredths. Element 0 is the
     state as given, so a record can be cut and continued. ``c`` must know the stretch at rest
     (``model.actuator.at_rest``).
 
@@ -948,11 +1004,13 @@ def drive_by_voltage(
     if moves:
         most = _EFFECT_SUBSTEPS_MAX
     drags, turns = acting & _STIFFNESS != 0, acting & _TURNS != 0
+    rings = _RINGING_TURNS if turns else _RINGING
     work = np.zeros((15, y.shape[0]))
     before = np.empty(y.shape[0])
     trace = np.zeros(3)
-    branches = table[15:] if lean else np.zeros(springs.shape[1])
-    phi, swings = np.empty((4, 2)), np.zeros(19)
+    branches = np.zeros((2, max(springs.shape[1] - 1, 3)))
+    room, swings = np.empty((7, 3, 3)), np.zeros((_COURSES, _SWING))
+    course, stiffness_step = swings[0], 0.0
     status = OK
     reached = samples
     h = _RODAS_STEP_MAX
@@ -984,6 +1042,8 @@ def drive_by_voltage(
                 swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
                 lean_bound = _lean_bound(springy, more, fastest, quick)
                 lam_seen = y[0]
+                if stiffness_step == 0.0:
+                    stiffness_step = _STIFFNESS_NEAR * max(springy, 1.0)
             step_before = dt
             wanted = dt * (lean_bound if lean and moves else bound) - 1e-6
             # a bound that is not finite is not gentle either, and cannot be counted in steps
@@ -1007,17 +1067,17 @@ def drive_by_voltage(
             theta = warmth[k] if warm else 0.0
         if explicit and lean:
             fine, refine = steps, 1
-            # ringing asks for steps that see it, more so where a path is followed from turn to turn
+            # ringing is in closed form, but its turns are not, where a path is followed
             forced = 0.0
             if not quick:
                 refine, forced = _refined(
                     kick_gain, ring_gain, kick, kick_before, ring, hold and steps > 1, trace
                 )
                 fine = steps * refine
-            elif max(ring * fading, abs(kick)) > _RINGING * springy:
+            elif max(ring * fading, abs(kick)) > rings * springy:
                 finer = swing * dt / _RK4_PHASE_MAX
                 if turns:
-                    finer *= 2.0 if ring < 200.0 * _RINGING * springy else 4.0
+                    finer *= 2.0 if ring < 2.0 * _RINGING * springy else 4.0
                 fine = max(fine, math.ceil(min(finer - 1e-6, _EFFECT_SUBSTEPS_MAX)))
             if drags:
                 # a drag may change with the rate: where it does within the sample, in finer steps
@@ -1028,16 +1088,22 @@ def drive_by_voltage(
                 growth = (most_drag - least_drag) * dt
                 growth /= _GROWN_QUICK if quick else _GROWN
                 fine = max(fine, math.ceil(min(growth, 4 * _EFFECT_SUBSTEPS_MAX)))
-                if abs(drag - swings[15]) < _DRAG_NEAR * drag:
-                    drag = swings[15]
                 rate_before = y[1]
             h_fine = dt / fine
-            off = abs(springy - swings[14]) > 1e-9 * springy or drag != swings[15]
-            if off or abs(h_fine - swings[16]) > 1e-6 * h_fine:
-                _swings(springy, drag, h_fine, phi, swings)
+            # a film that the field pulls on is softer by that
+            field2 = v0 * v0 if hold else 0.5 * (v0 * v0 + v1 * v1)
+            stiff = springy - c[ELECTRIC] * field2 / c[INERTIA]
+            kind = _kind_of_drag(drag) if drags else 0
+            if not _fits(course, stiff, 0.5 * stiffness_step, kind, h_fine):
+                level = max(math.floor(stiff / stiffness_step), 1.0)
+                stiff = (level + 0.5) * stiffness_step
+                course = swings[(int(level) + 37 * fine + 101 * kind) % _COURSES]
+                if not _fits(course, stiff, 0.0, kind, h_fine):
+                    _swings(stiff, drag, branches, h_fine, room, course)
+                    course[_KIND] = kind
             _lean_steps(
-                acting if moves else 0, c, table, swings, y, v0, v1, time[k], theta, h_fine, fine,
-                max(fine // steps, 1), trace,
+                acting if moves else 0, c, table, branches, course, y, v0, v1, time[k], theta,
+                h_fine, fine, max(fine // steps, 1), trace,
             )  # fmt: skip
             ring = max(ring * fading, trace[2] * per_phase2 - forced)
         elif explicit:

@@ -311,8 +311,10 @@ def test_the_exponential_method_is_the_plain_one(effects):
     traces = np.zeros((2, 3))
     work = np.zeros((15, plain.size))
     table = kernel._lean_table(c, springs)
-    phi, swings = np.empty((4, 2)), np.zeros(19)
-    kernel._swings(2e5, 30.0, 1e-4, phi, swings)
+    branches = np.zeros((2, 3))
+    kernel._speeds(c, lean, branches)
+    swings = np.zeros(kernel._SWING)
+    kernel._swings(2e5, 30.0, branches, 1e-4, np.empty((7, 3, 3)), swings)
     for v0, v1, t0 in ((0.0, 8e3, 0.0), (8e3, 6e3, 0.04)):
         if effects:
             kernel._effect_steps(
@@ -321,7 +323,7 @@ def test_the_exponential_method_is_the_plain_one(effects):
         else:
             kernel._rk4_steps(0, 1, c, springs, plain, v0, v1, 1e-4, 400, 40, work, traces[0])
         kernel._lean_steps(
-            acting, c, table, swings, lean, v0, v1, t0, 0.0, 1e-4, 400, 40, traces[1]
+            acting, c, table, branches, swings, lean, v0, v1, t0, 0.0, 1e-4, 400, 40, traces[1]
         )
     # both are of order 4, and differ by what each of them leaves out
     np.testing.assert_allclose(lean, plain, rtol=1e-7, atol=1e-6)
@@ -329,30 +331,57 @@ def test_the_exponential_method_is_the_plain_one(effects):
 
 
 @pytest.mark.parametrize("drag", [0.0, 40.0, 2e4])
-def test_swinging_and_dragging_in_closed_form(drag):
+def test_swinging_dragging_and_giving_way_in_closed_form(drag):
     stiffness, h = 2e5, 5e-3
-    swings = np.zeros(19)
-    kernel._swings(stiffness, drag, h, np.empty((4, 2)), swings)
-    matrix = np.array([[0.0, 1.0], [-stiffness, -drag]])
+    branches = np.array([[3e4, 1e4, 0.0], [10.0, 2.0, 0.0]])
+    swings = np.zeros(kernel._SWING)
+    kernel._swings(stiffness, drag, branches, h, np.empty((7, 3, 3)), swings)
+    matrix = np.array([[0.0, 1.0, 0.0], [-stiffness, -drag, 3.2e5], [1.0, 0.0, 0.0]])
     half = expm(0.5 * h * matrix)
-    np.testing.assert_allclose(swings[:4], half.ravel(), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(swings[:9], half.ravel(), rtol=1e-9, atol=1e-9)
     # a force that stands still, or grows evenly, over half a step: rows of one larger exponential
-    larger = np.zeros((4, 4))
-    larger[:2, :2], larger[1, 2], larger[2, 3] = matrix, 1.0, 1.0
+    larger = np.zeros((5, 5))
+    larger[:3, :3], larger[1, 3], larger[3, 4] = matrix, 1.0, 1.0
     forced = expm(0.5 * h * larger)
-    np.testing.assert_allclose(swings[4:6], forced[:2, 2], rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(swings[17:], forced[:2, 3], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(swings[9:12], forced[:3, 3], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(swings[12:15], forced[:3, 4], rtol=1e-9, atol=1e-12)
     # over a whole step, with a force 1, t and t^2 at its start, middle and end
     whole = expm(h * matrix)
-    np.testing.assert_allclose(swings[6:8], whole[:, 1], rtol=1e-9, atol=1e-9)
-    larger = np.zeros((5, 5))
-    larger[:2, :2], larger[1, 2], larger[2, 3], larger[3, 4] = matrix, 1.0, 1.0, 1.0
+    np.testing.assert_allclose(swings[15:18], whole[:, 1], rtol=1e-9, atol=1e-9)
+    larger = np.zeros((6, 6))
+    larger[:3, :3], larger[1, 3], larger[3, 4], larger[4, 5] = matrix, 1.0, 1.0, 1.0
     forced = expm(h * larger)
-    weights = swings[8:14].reshape(3, 2) * [[1.0], [2.0], [1.0]]
-    for power, column, scale in ((0, 2, 1.0), (1, 3, 1.0), (2, 4, 2.0)):
+    weights = swings[18:27].reshape(3, 3) * [[1.0], [2.0], [1.0]]
+    for power, column, scale in ((0, 3, 1.0), (1, 4, 1.0), (2, 5, 2.0)):
         at_nodes = np.array([0.0**power, (0.5 * h) ** power, h**power])
-        exact = scale * forced[:2, column]
+        exact = scale * forced[:3, column]
         np.testing.assert_allclose(at_nodes @ weights, exact, rtol=1e-8, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        (),
+        (("linear drag", (("drag", 30.0),)),),
+        (("Mullins softening", (("softening", 0.01), ("width", 0.5))),),
+        (("distributed hysteresis", (("stiffness", 1e4), ("reach", 0.02))),),
+        (("electrode resistance", (("resistance", 2e7),)),),
+    ],
+    ids=lambda e: e[0][0] if e else "plain",
+)
+def test_a_quick_step_may_be_longer_than_the_ringing(effects):
+    # 70 Hz after each step of the voltage, and 5 ms from sample to sample
+    time = ticks(6.0, 5e-3)
+    voltage = np.interp(time, [1.0, 1.02, 3.0, 3.02, 4.0, 4.02], [0.0, 8e3, 8e3, 3e3, 3e3, 5e3])
+    actuator = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, effects)
+    c = actuator.coefficients()[None]
+    drive = Drive(time, voltage, hold=True)
+    quick, status = displacements(c, LENGTH, drive, quick=True)
+    fine, _ = displacements(c, LENGTH, Drive(time, voltage, hold=True))
+    assert status[0] == kernel.OK
+    rang = np.diff(fine[0], 2)[(time[2:] > 1.02) & (time[2:] < 1.3)]
+    assert np.abs(rang).max() > 5e-6
+    assert np.sqrt(np.mean((quick - fine) ** 2)) < 1e-3 * np.std(fine)
 
 
 def test_rest_states_of_the_thesis():

@@ -75,9 +75,10 @@ class Effect:
     The sizes come first among ``parameters``: while all of them are neutral, the effect is skipped.
     ``memory`` is how many numbers of the kernel's state are its own; they are 0 at rest. ``drives``
     says for which measurements it makes sense: under ``voltage``, under an imposed ``stretch``.
-    ``turns`` is True where what it does depends on the turning points of the motion, so that they
-    must not be missed. ``recurs`` is False for what happens in one recording and is no property of
-    the rig: nothing says that another recording has it too, or when.
+    ``turns`` is True where what it does follows the path from turning point to turning point, so
+    that not even those of a film that rings by a tenth of a micrometre must be missed. ``recurs``
+    is False for what happens in one recording and is no property of the rig: nothing says that
+    another recording has it too, or when.
     ``words`` is one sentence for a person: what the effect is and what betrays it.
     """
 

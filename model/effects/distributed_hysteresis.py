@@ -31,7 +31,6 @@ EFFECT = Effect(
         ),
     ),
     memory=8,
-    turns=True,
     drives=("voltage", "stretch"),
 )
 
