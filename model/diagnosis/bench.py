@@ -47,6 +47,7 @@ _ENDING = 25  # iterations of a fit that others build on
 _NEARLY = 1.02  # of the cost: a descent from elsewhere that comes so near is followed on
 _RESTARTS = 3  # from a new global search, beside what was found
 _RESTART = 10  # iterations of each
+_LEADERS = 2  # of several starts that are followed on: the best at first does not always get down
 _ALIKE = 0.5  # of the logarithm of relaxation times: a factor of 1.6
 _AT_END = 0.05  # of the logarithm of a relaxation time: so near the bound it wants to go further
 _BESIDE = (0.6, 1.6)  # of the relaxation time of the branch that it helps
@@ -149,8 +150,7 @@ class Bench:
             for n, start in enumerate(voltage_starts(problem, progress, _STARTS)):
                 fits.append(descend_by_secants(problem, start, fixed, iterations=8, sure=False))
                 progress("descents", 0.5 * (n + 1) / _STARTS)
-            # two, because the one that leads after a few steps is not always the one that gets down
-            leaders = sorted(fits, key=lambda f: f.cost)[:2]
+            leaders = sorted(fits, key=lambda f: f.cost)[:_LEADERS]
             fits = [descend(problem, f.x, fixed, iterations=_BASELINE) for f in leaders]
             fit = min(fits, key=lambda f: f.cost)
         progress("descents", 1.0)
@@ -204,9 +204,11 @@ class Bench:
     def _down(self, trial: Trial, iterations: int, gain: float) -> Trial:
         # a part of what is left, whatever is left: more would only polish a misfit
         gain = max(0.5, gain * trial.problem.samples)
-        fit = descend(
-            trial.problem, trial.x, trial.fixed, iterations, gain, damping=1e-3, quick=True
+        # by secants as far as they lead: valleys that curve ask for more
+        near = descend_by_secants(
+            trial.problem, trial.x, trial.fixed, iterations=iterations, gain=gain
         )
+        fit = descend(trial.problem, near.x, trial.fixed, iterations, gain, 1e-3, quick=True)
         return _trial(trial.problem, fit, trial.fixed)
 
     def ended(self, trial: Trial) -> Trial:
@@ -220,9 +222,14 @@ class Bench:
         starts = _reseeded(layout, best.x)
         if not starts:
             return best
-        fits = [
-            descend_by_secants(best.problem, x, best.fixed, iterations=12, sure=False)
+        scouts = [
+            descend_by_secants(best.problem, x, best.fixed, iterations=_SCOUTING, sure=False)
             for x in starts
+        ]
+        leaders = sorted(scouts, key=lambda f: f.cost)[:_LEADERS]
+        fits = [
+            descend_by_secants(best.problem, f.x, best.fixed, f.jacobian, _RESTART, sure=False)
+            for f in leaders
         ]
         other = min(fits, key=lambda f: f.cost)
         # a few steps do not reach the bottom: nearly as good is promising
