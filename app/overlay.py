@@ -11,7 +11,7 @@ from drivers.channels import Channel
 from drivers.rig import Block
 from model import kernel
 from model.actuator import STATUS_WORDS, Actuator, at_rest, initial_state
-from model.effects import MEMORY
+from model.effects import SENSOR_MEMORY
 from model.errors import ModelError
 from model.sensor import at_sensor
 
@@ -56,7 +56,7 @@ class Overlay:
         if status != kernel.OK:
             raise ModelError(STATUS_WORDS[status])
         self._state = initial_state(self._coefficients, self._rest)
-        self._memory = np.zeros(MEMORY)
+        self._memory = np.zeros(SENSOR_MEMORY)
         self._next = 0
         self._voltage = 0.0
         # what a late sensor still has to show: time, displacement, velocity

@@ -11,7 +11,7 @@ import numpy as np
 
 from model import coefficients as at
 from model import kernel
-from model.effects import EFFECTS, MEMORY, NEUTRAL, PLACES, SLOTS, EffectValues
+from model.effects import EFFECTS, MEMORY, NEUTRAL, PLACES, SENSOR_MEMORY, SLOTS, EffectValues
 from model.errors import ModelError
 from model.kinematics import thinning
 from model.material import VACUUM_PERMITTIVITY, Film, Load, Network
@@ -164,7 +164,7 @@ class Actuator:
             )
         displacement, velocity = np.empty_like(stretch), rate * self.film.length
         at_sensor(drive.time, (stretch - rest) * self.film.length, velocity, lag, displacement)
-        kernel.read_sensor(c, drive.time, displacement, velocity, np.zeros(MEMORY))
+        kernel.read_sensor(c, drive.time, displacement, velocity, np.zeros(SENSOR_MEMORY))
         return Response(
             time=drive.time,
             stretch=stretch,
@@ -265,7 +265,7 @@ def displacements(
                 x *= length
                 u *= length
                 at_sensor(drive.time, x, u, lag, readings[p])
-                kernel.read_sensor(c, drive.time, readings[p], u, np.zeros(MEMORY))
+                kernel.read_sensor(c, drive.time, readings[p], u, np.zeros(SENSOR_MEMORY))
 
     if workers <= 1 or population == 1:
         run(range(population))

@@ -6,7 +6,7 @@ import math
 
 from model.jit import jit
 
-__all__ = ["averaged", "lagged", "low_pass", "slewed", "slid", "switched", "swung"]
+__all__ = ["along_cubic", "lagged", "low_pass", "slewed", "slid", "switched", "swung"]
 
 _SMALL = 0.1
 _SWITCHING = 0.02  # s: long enough for a fit to find the moment
@@ -47,32 +47,13 @@ def low_pass(
 
 
 @jit
-def averaged(
-    before: float,
-    rate: float,
-    x0: float,
-    u0: float,
-    x1: float,
-    u1: float,
-    h: float,
-    window: float,
+def along_cubic(
+    x0: float, u0: float, x1: float, u1: float, h: float, at: float
 ) -> tuple[float, float]:
-    """Output and its rate after ``h`` s of r + w/2 r' + w^2/12 r'' = x for the cubic as above."""
-    w = window
+    """Integral from the start until ``at`` s of the cubic as above, and its value there."""
     a, b = _cubic(x0, u0, x1, u1, h)
-    # the particular solution: the series of 1/(1 + s w/2 + s^2 w^2/12), which a cubic ends
-    p1, p2, p3 = -w / 2.0, w * w / 6.0, -w * w * w / 24.0
-    start = x0 + p1 * u0 + p2 * a + p3 * b
-    start_rate = u0 + p1 * a + p2 * b
-    end = x1 + p1 * u1 + p2 * (a + b * h) + p3 * b
-    end_rate = u1 + p1 * (a + b * h) + p2 * b
-    alpha, beta = 3.0 / w, math.sqrt(3.0) / w
-    z, v = before - start, rate - start_rate
-    left, c, s = math.exp(-alpha * h), math.cos(beta * h), math.sin(beta * h)
-    q = (v + alpha * z) / beta
-    z1 = left * (z * c + q * s)
-    v1 = left * (beta * (q * c - z * s)) - alpha * z1
-    return end + z1, end_rate + v1
+    integral = at * (x0 + at * (u0 / 2.0 + at * (a / 6.0 + at * b / 24.0)))
+    return integral, x0 + at * (u0 + at * (a / 2.0 + at * b / 6.0))
 
 
 @jit

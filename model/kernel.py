@@ -1159,8 +1159,8 @@ def read_sensor(
 ) -> None:
     """What the sensor makes of ``displacement`` (N,) m, in place, by the effects that act on it.
 
-    ``velocity`` (N,) m/s is the film's; ``memory`` (MEMORY,) is carried along. Element 0 is the
-    last reading of the call before, or the first of the record.
+    ``velocity`` (N,) m/s is the film's; ``memory`` (SENSOR_MEMORY,) is carried along. Element
+    0 is the last reading of the call before, or the first of the record.
     """
     for k in range(time.shape[0]):
         dt = time[k] - time[k - 1] if k else 0.0

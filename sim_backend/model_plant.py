@@ -8,7 +8,7 @@ import numpy as np
 
 from model import kernel
 from model.actuator import STATUS_WORDS, Actuator, at_rest, initial_state
-from model.effects import MEMORY
+from model.effects import SENSOR_MEMORY
 from sim_backend.plant import Motion
 
 __all__ = ["ModelPlant"]
@@ -32,7 +32,7 @@ class ModelPlant:
         coefficients = actuator.coefficients()
         _, rest = at_rest(coefficients)
         return cls(
-            actuator, coefficients, rest, initial_state(coefficients, rest), np.zeros(MEMORY)
+            actuator, coefficients, rest, initial_state(coefficients, rest), np.zeros(SENSOR_MEMORY)
         )
 
     @property

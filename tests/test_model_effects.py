@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from app.sequencefile import load_sequence
 from model import kernel
 from model.actuator import Actuator, Drive, at_rest, initial_state
-from model.effects import EFFECTS, MEMORY, NEUTRAL, PLACES, SLOTS, assembly
+from model.effects import EFFECTS, MEMORY, NEUTRAL, PLACES, SENSOR_MEMORY, SLOTS, assembly
 from model.effects.description import ACTS_ON, FAMILIES
 from model.errors import ModelError
 from model.excitation import Sequence
@@ -161,8 +161,17 @@ def test_places_do_not_overlap():
     columns = [PLACES[n].column(e, p.name) for n, e in EFFECTS.items() for p in e.parameters]
     assert columns == list(range(columns[0], columns[0] + SLOTS))
     assert NEUTRAL.shape == (SLOTS,)
-    slots = [PLACES[n].memory + i for n, e in EFFECTS.items() for i in range(e.memory)]
-    assert slots == list(range(MEMORY))
+    for of_sensor, size in ((False, MEMORY), (True, SENSOR_MEMORY)):
+        places = [(PLACES[n], e) for n, e in EFFECTS.items()]
+        there = [(p, e) for p, e in places if hasattr(p.module, "sense") == of_sensor]
+        assert [p.memory + i for p, e in there for i in range(e.memory)] == list(range(size))
+
+
+def test_who_makes_the_reading_wrong_leaves_the_motion_alone():
+    # the two remember apart
+    for place in PLACES.values():
+        others = set(assembly.HOOKS) - {"sense"}
+        assert not (hasattr(place.module, "sense") and others & set(place.module.__all__))
 
 
 def test_values_that_no_effect_has():
@@ -262,19 +271,18 @@ def read(name, values, time):
     c = with_effect(THESIS, name, values).coefficients()
     shown, rate = moved(time)
     shown = shown.copy()
-    kernel.read_sensor(c, time, shown, rate, np.zeros(MEMORY))
+    kernel.read_sensor(c, time, shown, rate, np.zeros(SENSOR_MEMORY))
     return shown
 
 
 def shown_by_averaging(p, time):
-    w = p["window"]
+    w = 2.0 * math.pi * 3.0
 
-    def flow(t, y):
-        return [y[1], 12.0 / w**2 * (moved(t)[0] - y[0]) - 6.0 / w * y[1]]
+    def integral(t):
+        t = np.maximum(t, 0.0)  # it was at rest before
+        return 6e-4 * (t - np.sin(w * t) / w) + 0.5e-4 * t**2
 
-    return solve_ivp(
-        flow, (0.0, time[-1]), [0.0, 0.0], t_eval=time, method="DOP853", rtol=1e-10, atol=1e-14
-    ).y[0]
+    return (integral(time) - integral(time - p["window"])) / p["window"]
 
 
 def shown_by_lag(p, time):
@@ -456,7 +464,7 @@ def test_a_run_in_two_pieces_is_the_run(name):
     c = model.coefficients()
     _, rest = at_rest(c)
     for cut in (333, 757, 1055):
-        y, memory = initial_state(c, rest), np.zeros(MEMORY)
+        y, memory = initial_state(c, rest), np.zeros(SENSOR_MEMORY)
         joined = np.zeros(drive.time.size)
         for part in (slice(0, cut + 1), slice(cut, drive.time.size)):
             time = drive.time[part]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from model.filters import averaged, lagged, low_pass, slewed, slid, switched, swung
+from model.filters import along_cubic, lagged, low_pass, slewed, slid, switched, swung
 
 RATIOS = 10.0 ** np.arange(-6.0, 3.5, 0.5)  # of the step to the filter's own time
 TAU = 0.02
@@ -69,18 +69,14 @@ def test_low_pass(ratio):
         assert found == pytest.approx(expected[0], abs=1e-9)
 
 
-@pytest.mark.parametrize("ratio", RATIOS)
-def test_averaged(ratio):
+@pytest.mark.parametrize("part", [0.0, 0.3, 1.0])
+def test_along_cubic(part):
     rng = np.random.default_rng(3)
-    h, w = ratio * TAU, TAU
-    system = ([[0.0, 1.0], [-12.0 / w**2, -6.0 / w]], [0.0, 12.0 / w**2])
-    for _ in range(5):
-        before, powers = rng.uniform(-1.0, 1.0, 2) / [1.0, TAU], cubic(rng, h, w)
-        expected = driven(system, before, h, powers)
-        x0, u0, x1, u1 = ends(powers, h)
-        found = averaged(*before, x0, u0, x1, u1, h, w)
-        assert found[0] == pytest.approx(expected[0], abs=1e-9)
-        assert found[1] * w == pytest.approx(expected[1] * w, abs=1e-8)
+    for h in (1e-4, 5e-3, 2.0):
+        x = np.polynomial.Polynomial(cubic(rng, h, h))
+        integral, there = along_cubic(x(0.0), x.deriv()(0.0), x(h), x.deriv()(h), h, part * h)
+        assert there == pytest.approx(x(part * h), abs=1e-9)
+        assert integral == pytest.approx(x.integ()(part * h), abs=1e-9 * h)
 
 
 @pytest.mark.parametrize("damping", [1e-3, 0.05, 0.7, 1.0])
@@ -98,21 +94,6 @@ def test_swung(ratio, damping):
         error = 4e-6 if damping == 1.0 else 1e-9
         assert found[0] == pytest.approx(expected[0], abs=error)
         assert found[1] * TAU == pytest.approx(expected[1] * TAU, abs=error)
-
-
-def test_the_average_is_that_over_the_window():
-    # x = sin: its mean over the last w, against the filter with its three right derivatives
-    w, h, om = 0.01, 1e-3, 2.0 * math.pi * 3.0
-    t = np.arange(3000) * h
-    x, u = np.sin(om * t), om * np.cos(om * t)
-    r, rate, shown = 0.0, 0.0, [0.0]
-    for k in range(1, t.size):
-        r, rate = averaged(r, rate, x[k - 1], u[k - 1], x[k], u[k], h, w)
-        shown.append(r)
-    mean = (np.cos(om * (t - w)) - np.cos(om * t)) / (om * w)
-    settled = t > 0.1
-    # (om w)^4/720, the first term in which they differ
-    assert np.abs(np.array(shown) - mean)[settled].max() < 1.2 * (om * w) ** 4 / 720.0
 
 
 @pytest.mark.parametrize("travel", [1e-9, 1e-3, 0.4, 3.0, 500.0])
@@ -176,7 +157,7 @@ def test_outputs_stay_between_what_they_come_from_and_go_to(before, start, end, 
 )  # fmt: skip
 def test_everything_is_finite(before, rate, x0, u0, x1, u1, h, tau, damping):
     assert math.isfinite(low_pass(before, x0, u0, x1, u1, h, tau))
-    assert np.isfinite(averaged(before, rate, x0, u0, x1, u1, h, tau)).all()
+    assert np.isfinite(along_cubic(x0, u0, x1, u1, h, h)).all()
     omega = 2.0 * math.pi * min(max(1.0 / tau, 0.3), 40.0)
     assert np.isfinite(swung(before, rate, x0, x1, h, omega, damping)).all()
     assert abs(slid(x0, x1 - x0, tau)) <= max(abs(x0), tau) * (1.0 + 1e-12)

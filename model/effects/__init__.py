@@ -25,6 +25,7 @@ __all__ = [
     "MEMORY",
     "NEUTRAL",
     "PLACES",
+    "SENSOR_MEMORY",
     "SLOTS",
     "Effect",
     "EffectValues",
@@ -37,7 +38,10 @@ _NOT_EFFECTS = ("assembly", "description")
 
 @dataclass(frozen=True)
 class Place:
-    """Where an effect lives: its ``module``, first coefficient ``at``, first ``memory`` slot."""
+    """Where an effect lives: its ``module``, first coefficient ``at``, first ``memory`` slot.
+
+    The sensor's effects remember apart from those of the motion.
+    """
 
     module: ModuleType
     at: int
@@ -48,10 +52,10 @@ class Place:
         return self.at + [p.name for p in effect.parameters].index(parameter)
 
 
-def _found() -> tuple[dict[str, Effect], dict[str, Place]]:
+def _found() -> tuple[dict[str, Effect], dict[str, Place], int, int]:
     effects: dict[str, Effect] = {}
     places: dict[str, Place] = {}
-    at, memory = EFFECTS_AT, 0
+    at, memory = EFFECTS_AT, {False: 0, True: 0}
     names = sorted(m.name for m in iter_modules(__path__) if m.name not in _NOT_EFFECTS)
     for name in names:
         module = import_module(f"{__name__}.{name}")
@@ -59,21 +63,23 @@ def _found() -> tuple[dict[str, Effect], dict[str, Place]]:
         if effect.name in effects:
             raise ImportError(f"two effects are called {effect.name!r}")
         effects[effect.name] = effect
-        places[effect.name] = Place(module, at, memory)
+        sensed = hasattr(module, "sense")
+        places[effect.name] = Place(module, at, memory[sensed])
         at += len(effect.parameters)
-        memory += effect.memory
-    return effects, places
+        memory[sensed] += effect.memory
+    return effects, places, memory[False], memory[True]
 
 
-_effects, _places = _found()
+_effects, _places, _motion, _sensor = _found()
 
 #: Every effect this version knows, by name.
 EFFECTS: Mapping[str, Effect] = MappingProxyType(_effects)
 #: Where each of them lives.
 PLACES: Mapping[str, Place] = MappingProxyType(_places)
-#: How many coefficients all effects have together, and how many numbers they remember.
+#: How many coefficients all effects have together, and how many numbers those of the motion and
+#: those of the sensor remember.
 SLOTS = sum(len(e.parameters) for e in EFFECTS.values())
-MEMORY = sum(e.memory for e in EFFECTS.values())
+MEMORY, SENSOR_MEMORY = _motion, _sensor
 #: The coefficients (SLOTS,) of a model without effects; shapes are at a typical value.
 NEUTRAL = np.array(
     [
