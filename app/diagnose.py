@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from app.cores import for_simulations
 from app.errors import InputError, Interrupted
 from app.experiment import separating_experiment
 from app.interrupts import Interrupts
@@ -203,7 +204,7 @@ def _search(
 ) -> Diagnosis:
     records = [as_record(r, drive) for r in recordings]
     try:
-        with Interrupts() as interrupts:
+        with Interrupts() as interrupts, for_simulations():
             return diagnose(records, base, progress=progress, stop=interrupts.asked)
     except ModelError as error:
         raise InputError(f"these recordings cannot be diagnosed: {error}") from error

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from app.cores import for_simulations
 from app.errors import InputError
 from app.modelfile import save_model
 from app.outcomes import BranchTrial, Comparison, IdentifyOutcome
@@ -75,10 +76,11 @@ def identify_recordings(
                 progress(f"{counts[done]} branches", (done + fraction) / len(counts))
 
         try:
-            fit = identify(
-                records, base, method, seed, intervals and alone, smaller,
-                progress=report,
-            )  # fmt: skip
+            with for_simulations():
+                fit = identify(
+                    records, base, method, seed, intervals and alone, smaller,
+                    progress=report,
+                )  # fmt: skip
         except ModelError as error:
             raise InputError(f"these recordings cannot be fitted: {error}") from error
         smaller = fit.model.network

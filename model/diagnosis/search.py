@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from model.actuator import Actuator
 from model.diagnosis.bench import Bench, Trial, information
@@ -95,9 +94,7 @@ def diagnose(
     that of the whole work; when ``stop()`` is True, what was found until then is returned. Raises
     ``ModelError`` for records and models that do not fit together.
     """
-    # BLAS's threads wait by spinning, and take the cores from those that simulate
-    with threadpool_limits(limits=1, user_api="blas"):
-        return _Search(records, base, workers, progress, stop).run()
+    return _Search(records, base, workers, progress, stop).run()
 
 
 class _Search:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from model.actuator import Actuator
 from model.errors import ModelError
@@ -93,20 +92,18 @@ def identify(
     """
     if method not in METHODS:
         raise ModelError(f"method {method!r} is not one of {', '.join(METHODS)}")
-    # BLAS's threads wait by spinning, and take the cores from those that simulate
-    with threadpool_limits(limits=1, user_api="blas"):
-        layout = Layout(base)
-        problem = Problem(records, layout, workers)
-        require_free(layout, problem.samples)
-        if method == "de":
-            found = algorithm_1(problem, seed, progress)
-            fit = descend(problem, layout.coordinates(found), iterations=0)
-            return _result(problem, method, fit, found, "Algorithm 1 gives no interval", ())
-        fit, held_limits = fit_globally(problem, nested, progress)
-        limits = tuple(n for n, h in zip(layout.names, held_limits, strict=True) if h)
-        words = "no interval was asked for"
-        result = _result(problem, method, fit, layout.values(fit.x), words, limits)
-        return add_intervals(records, result, workers, progress) if intervals else result
+    layout = Layout(base)
+    problem = Problem(records, layout, workers)
+    require_free(layout, problem.samples)
+    if method == "de":
+        found = algorithm_1(problem, seed, progress)
+        fit = descend(problem, layout.coordinates(found), iterations=0)
+        return _result(problem, method, fit, found, "Algorithm 1 gives no interval", ())
+    fit, held_limits = fit_globally(problem, nested, progress)
+    limits = tuple(n for n, h in zip(layout.names, held_limits, strict=True) if h)
+    words = "no interval was asked for"
+    result = _result(problem, method, fit, layout.values(fit.x), words, limits)
+    return add_intervals(records, result, workers, progress) if intervals else result
 
 
 def add_intervals(
