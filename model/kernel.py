@@ -5,8 +5,8 @@ that its grid and the record's line up exactly; inside one sample interval it ta
 steps as accuracy asks for. Three methods:
 
 * exponential Runge-Kutta of order 4 in the thesis's case (width held, Gent springs, three branches
-  at most): the film's swinging and its drag are in closed form, so that a drag may be as strong as
-  it likes, and only what changes meanwhile asks for short steps;
+  at most): the film's swinging, how branches give way to it, and its drag are in closed form, so
+  that a drag may be as strong as it likes, and only what changes meanwhile asks for short steps;
 * classical Runge-Kutta of order 4 elsewhere, where the film is not stiff for the record's interval;
   either in finer steps while the film rings after an edge of the drive (its bare ringing at 70 Hz
   lasts for tens of cycles, and every step adds to the error of its phase);

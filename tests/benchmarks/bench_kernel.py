@@ -4,7 +4,7 @@ Run as ``python -m tests.benchmarks.bench_kernel``. One thesis record is two per
 (22.8 s) with Table 3's film. The same right-hand side, compiled, goes to every solver; the general
 ones are set as loosely as their error against a 1e-10 reference stays below 0.1 um. SciPy has LSODA
 twice: stepped from Python (solve_ivp) and all in Fortran (odeint). A second table has what effects
-of ``model.effects`` cost. Medians of repeats in one run: compare the ratios, the milliseconds
+of ``model.effects`` cost, a third what the quick steps of a search save. Medians of repeats in one run: compare the ratios, the milliseconds
 belong to this machine and its load.
 """
 
@@ -33,6 +33,7 @@ from model.material import (
     VACUUM_PERMITTIVITY,
 )
 
+STAIRCASE = 200.0  # the same of a record that is diagnosed
 RATE = 400.0  # samples a second: with them the kernel stays below 0.1 um
 ENOUGH = 0.1e-6  # m
 TOLERANCES = tuple(a * 10.0**-b for b in range(4, 10) for a in (5.0, 2.0, 1.0))
@@ -88,12 +89,12 @@ def timed(run: Callable[[], np.ndarray], repeats: int) -> tuple[float, np.ndarra
     return statistics.median(spent), result
 
 
-def followed(c: np.ndarray, drive: Drive) -> np.ndarray:
-    """Stretch (N,) from rest, as a fit would have it."""
+def followed(c: np.ndarray, drive: Drive, quick: bool = False) -> np.ndarray:
+    """Stretch (N,) from rest, as a fit would have it, or ``quick`` as a search would."""
     y = initial_state(c, c[REST])
     stretch, rate = np.empty(drive.time.size), np.empty(drive.time.size)
     kernel.drive_by_voltage(
-        c, drive.time, drive.voltage, drive.hold, drive.temperature, y, stretch, rate
+        c, drive.time, drive.voltage, drive.hold, drive.temperature, y, stretch, rate, quick
     )
     return stretch
 
@@ -135,6 +136,24 @@ def what_effects_cost(actuator: Actuator, drive: Drive) -> None:
     for (label, _), times in zip(cases, spent, strict=True):
         middle = statistics.median(times)
         print(f"{label:<44}{middle * 1e3:>10.3f}{middle / base:>8.2f}x")
+
+
+def what_quick_steps_save(actuator: Actuator, sequence: Sequence) -> None:
+    """Print careful against quick steps on a converter's staircase, under which the film rings."""
+    t = np.arange(math.ceil(sequence.segments[0].duration * STAIRCASE)) / STAIRCASE
+    drive = Drive(t, sequence.segments[0].voltage(t), hold=True)
+    print(f"{'staircase of 200 Hz':<44}{'careful ms':>11}{'quick ms':>10}{'ratio':>8}{'um':>8}")
+    for name in ("", "linear drag", "electrode resistance", "Mullins softening", "dry friction"):
+        effects = at_values(name, "typical") if name else ()
+        c = replace(actuator, effects=effects).coefficients()
+        at_rest(c)
+        careful, expected = timed(partial(followed, c, drive), 21)
+        quick, found = timed(partial(followed, c, drive, True), 21)
+        error = float(np.sqrt(np.mean((found - expected) ** 2))) * THESIS_FILM.length * 1e6
+        print(
+            f"{name or 'no effect':<44}{careful * 1e3:>11.3f}{quick * 1e3:>10.3f}"
+            f"{quick / careful:>7.2f}x{error:>8.3f}"
+        )
 
 
 def main() -> None:
@@ -197,6 +216,8 @@ def main() -> None:
         )
     print()
     what_effects_cost(actuator, drive)
+    print()
+    what_quick_steps_save(actuator, sequence)
 
 
 if __name__ == "__main__":
