@@ -4,8 +4,8 @@ Run as ``python -m tests.benchmarks.bench_kernel``. One thesis record is two per
 (22.8 s) with Table 3's film. The same right-hand side, compiled, goes to every solver; the general
 ones are set as loosely as their error against a 1e-10 reference stays below 0.1 um. SciPy has LSODA
 twice: stepped from Python (solve_ivp) and all in Fortran (odeint). A second table has what effects
-of ``model.effects`` cost, a third what the quick steps of a search save. Medians of repeats in one run: compare the ratios, the milliseconds
-belong to this machine and its load.
+of ``model.effects`` cost, a third what the quick steps of a search save. Medians of repeats in one
+run: compare the ratios, the milliseconds belong to this machine and its load.
 """
 
 import math
