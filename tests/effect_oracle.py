@@ -208,7 +208,11 @@ def extra(name, p, film, drive):
             ),
         ),
         "amplifier saturation": lambda: Extra(
-            voltage=lambda t, lam, u, z, v: math.tanh(v * p["inverse_limit"]) / p["inverse_limit"]
+            voltage=lambda t, lam, u, z, v: (
+                v
+                * (1.0 + p["exponent"] * p["loss"] * (v / 8e3) ** p["exponent"])
+                ** (-1.0 / p["exponent"])
+            )
         ),
         "amplifier slew": amplifier_slew,
         "attached mode": attached,

@@ -43,6 +43,7 @@ _HOPE = 0.95  # of the cost: who explains less than the rest of it is not follow
 _BEAM = 2  # how many explanations are followed on
 _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed on
 _SETTLED = 5  # leading candidates that are fitted to the end of their valleys
+_CLOSE = 1.15  # of the leader's cost: so near, and better than nothing, any other is one too
 _ENDED = 4  # the first of them, where no branch must be left without work
 _NEAR_LEAD = 2.0  # of the leader's cost before that: these are
 _MAY_LEAD = 6.0  # of the leader's cost: what has come so near may lead by its last steps
@@ -363,7 +364,11 @@ class _Search:
         order = sorted(fitted, key=rank)
         lead = first = order[0].trial.cost
         ended = 0 if self._is_noise(best) else _ENDED
-        for place, tried in enumerate(order[:_SETTLED]):
+        mark = self._criterion(best, correlation) - _DECISIVE
+        for place, tried in enumerate(order):
+            near = tried.trial.cost < _CLOSE * lead
+            if place >= _SETTLED and not (near and rank(tried) < mark):
+                continue
             self._check()
             key = frozenset(tried.trial.effects)
             if place < ended and tried.trial.cost < _NEAR_LEAD * first:

@@ -1,8 +1,10 @@
-"""Saturation of the amplifier: the output bends towards a limit, V_s tanh(V/V_s)."""
+"""Saturation of the amplifier: the output bends towards a limit V_s, as sharply as it likes.
+
+V/(1 + (|V|/V_s)^n)^(1/n) (Rapp's model of an amplifier), V_s = 8 kV/(n s)^(1/n): at a small loss s it
+is short of s V (|V|/8 kV)^n, as behind a film that leaks; no record tells the two apart.
+"""
 
 from __future__ import annotations
-
-import math
 
 from model.effects.description import Effect, Parameter
 from model.jit import jit
@@ -15,11 +17,27 @@ EFFECT = Effect(
     acts_on="amplifier",
     words="the film sees less than was asked for, the more the higher the voltage",
     parameters=(
-        Parameter("inverse_limit", "1/V", (0.0, 5e-4), "one over the limit V_s", 3e-5, 0.0),
+        Parameter("loss", "", (0.0, 0.5), "part of the voltage that is lost at 8 kV", 0.02, 0.0),
+        Parameter(
+            "exponent",
+            "",
+            (1.0, 12.0),
+            "by which the lost part grows with the voltage: how sharp the bend is",
+            2.0,
+            starts=(2.0, 5.0),
+        ),
     ),
 )
 
 
+_REFERENCE = 8e3  # V
+
+
+@jit
+def _bent(loss, n, voltage):
+    return voltage / (1.0 + n * loss * (abs(voltage) / _REFERENCE) ** n) ** (1.0 / n)
+
+
 @jit
 def supply(c, k, m, j, t, start, end, h, lam, rate):
-    return math.tanh(c[k] * start) / c[k], math.tanh(c[k] * end) / c[k]
+    return _bent(c[k], c[k + 1], start), _bent(c[k], c[k + 1], end)
