@@ -557,15 +557,19 @@ def _doubled(phi: np.ndarray, room: np.ndarray) -> None:
 
     Hochbruck and Ostermann, Acta Numerica 19, 2010. ``room`` is (3, 3).
     """
+    half = 0.125
     for j in range(3, -1, -1):
         _times(phi[0], phi[j], room)
         weight = 1.0
         for i in range(j, 0, -1):
-            for m in range(9):
-                room[m // 3, m % 3] += weight * phi[i, m // 3, m % 3]
+            for m in range(3):
+                for n in range(3):
+                    room[m, n] += weight * phi[i, m, n]
             weight /= j - i + 1
-        for m in range(9):
-            phi[j, m // 3, m % 3] = room[m // 3, m % 3] * 0.5**j
+        for m in range(3):
+            for n in range(3):
+                phi[j, m, n] = room[m, n] * half
+        half *= 2.0
 
 
 @jit
@@ -583,8 +587,10 @@ def _phis(a: np.ndarray, doublings: int, room: np.ndarray, phi: np.ndarray) -> N
     for n in range(12):
         below = factorial
         for j in range(4):
-            for m in range(9):
-                phi[j, m // 3, m % 3] += power[m // 3, m % 3] / below
+            part = 1.0 / below
+            for m in range(3):
+                for i in range(3):
+                    phi[j, m, i] += power[m, i] * part
             below *= n + j + 1
         _times(power, a, product)
         power[:] = product
