@@ -95,6 +95,8 @@ def separating_experiment(
 ) -> tuple[SeparatingExperiment | None, str]:
     """The sequence under which the least separated two of ``rivals`` lie farthest apart.
 
+    Two that no sequence at all would separate do not count: others may be told from both.
+
     ``rivals`` are (label, family, fitted model), the final model among them; ``noise`` is the floor
     of one reading in m. Every sequence has passed the gate of ``rig_file``. Also returned is a
     sentence, which says why where there is no such sequence.
@@ -103,7 +105,7 @@ def separating_experiment(
     families = tuple(dict.fromkeys(family for _, family, _ in rivals))
     # as much as the rig may give, and no more than the thesis's experiments
     top = math.floor(min(rig_file.gate_limits().voltage_max / 1e3, 8.0) * 1e3) / 1e3
-    tried: list[tuple[str, float, float, tuple[str, str], str]] = []
+    made: list[tuple[str, dict[tuple[str, str], float], float, str]] = []
     for name, text in candidates(top).items():
         admitted = _admitted(text, name, rig_file)
         if admitted is None:
@@ -116,10 +118,15 @@ def separating_experiment(
             (labels[i], labels[j]): _rms(predictions[i] - predictions[j]) / noise
             for i, j in combinations(range(len(rivals)), 2)
         }
-        closest = min(apart, key=lambda pair: apart[pair])
-        tried.append((name, apart[closest], waveform.duration, closest, loaded.toml))
-    if not tried:
+        made.append((name, apart, waveform.duration, loaded.toml))
+    if not made:
         return None, "The limits of the rig file admit none of the excitations that were considered"
+    pairs = list(made[0][1])
+    separable = [p for p in pairs if max(apart[p] for _, apart, _, _ in made) >= SEPARATES]
+    tried: list[tuple[str, float, float, tuple[str, str], str]] = []
+    for name, apart, seconds, toml in made:
+        closest = min(separable or pairs, key=lambda pair: apart[pair])
+        tried.append((name, apart[closest], seconds, closest, toml))
     tried.sort(key=lambda t: -t[1])
     best = tried[0][1]
     if best < SEPARATES:
@@ -129,6 +136,8 @@ def separating_experiment(
         )
     good = [t for t in tried if t[1] >= _NEARLY * best]
     name, separation, seconds, closest, toml = max(good, key=lambda t: t[1] / t[2])
+    alike = [_and(p) for p in pairs if p not in separable]
+    but = f", but for {'; '.join(alike)}, which none would separate" if alike else ""
     found = SeparatingExperiment(
         name=name,
         sequence=toml,
@@ -142,7 +151,7 @@ def separating_experiment(
     return found, (
         f"Of {len(tried)} excitations within the rig's limits, {name!r} ({seconds:.0f} s) "
         f"separates {_and(labels)} best: the predictions of any two differ by at least "
-        f"{separation:.2g} times the noise"
+        f"{separation:.2g} times the noise{but}"
     )
 
 
