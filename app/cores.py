@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from threadpoolctl import threadpool_limits
 
 __all__ = ["for_simulations"]
 
 
-def for_simulations() -> threadpool_limits:
-    """A context in which linear algebra keeps to one thread, and the cores go to simulations.
+@contextmanager
+def for_simulations() -> Iterator[None]:
+    """A context or a decorator: linear algebra keeps to one thread, the cores go to simulations.
 
     BLAS's threads wait by spinning, which takes a core from those that simulate.
     """
-    return threadpool_limits(limits=1, user_api="blas")
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield

@@ -199,12 +199,13 @@ def _prepared(
 # ---------------------------------------------------------------- the search, and after
 
 
+@for_simulations()
 def _search(
     recordings: Sequence[Recording], base: Any, drive: str, progress: Progress
 ) -> Diagnosis:
     records = [as_record(r, drive) for r in recordings]
     try:
-        with Interrupts() as interrupts, for_simulations():
+        with Interrupts() as interrupts:
             return diagnose(records, base, progress=progress, stop=interrupts.asked)
     except ModelError as error:
         raise InputError(f"these recordings cannot be diagnosed: {error}") from error

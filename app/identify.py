@@ -27,6 +27,7 @@ from model.records import Record
 __all__ = ["identify_recordings"]
 
 
+@for_simulations()
 def identify_recordings(
     train: Sequence[str | Path],
     out: str | Path,
@@ -76,11 +77,10 @@ def identify_recordings(
                 progress(f"{counts[done]} branches", (done + fraction) / len(counts))
 
         try:
-            with for_simulations():
-                fit = identify(
-                    records, base, method, seed, intervals and alone, smaller,
-                    progress=report,
-                )  # fmt: skip
+            fit = identify(
+                records, base, method, seed, intervals and alone, smaller,
+                progress=report,
+            )  # fmt: skip
         except ModelError as error:
             raise InputError(f"these recordings cannot be fitted: {error}") from error
         smaller = fit.model.network

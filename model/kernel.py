@@ -89,7 +89,7 @@ _RINGING, _RINGING_TURNS = 1e-4, 1e-6
 # numbers in closed form need not be quite the film's own: what they lack is integrated
 _STIFFNESS_NEAR = 0.005
 _DRAG_NEAR = 0.2
-_DRAG_MIN, _DRAGS = 1e-2, 128  # 1/s; kinds of drag, each so much stronger than the one before
+_DRAG_MIN = 1e-2  # 1/s; less is none
 _COURSES = 256  # of these forms that are kept
 _SWING = 32  # numbers that say how the film goes on
 _K, _D, _W, _H, _KIND = 27, 28, 29, 30, 31  # where those that it follows from stand
@@ -599,6 +599,14 @@ def _phis(a: np.ndarray, doublings: int, room: np.ndarray, phi: np.ndarray) -> N
         _doubled(phi, product)
 
 
+@inlined
+def _kind_of_drag(drag: float) -> int:
+    """One number for drags that may share a closed form; 0 for none."""
+    if drag < _DRAG_MIN:
+        return 0
+    return 1 + int(math.log(drag / _DRAG_MIN) / math.log(1.0 + _DRAG_NEAR))
+
+
 @jit
 def _swings(
     k: float, d: float, branches: np.ndarray, h: float, room: np.ndarray, swing: np.ndarray
@@ -609,7 +617,8 @@ def _swings(
     + w I + rest, I' = z, of which only the columns are needed that act on a rate or an
     acceleration: z is how far the film has moved, I what of it the branches have seen, by which
     they give way while it rings. Then what a force does that grows evenly over the first half, k,
-    d, w and h themselves. ``branches`` (2, 3) is ``_speeds``'s, ``room`` (7, 3, 3).
+    d, w and h themselves, and the kind of drag. ``branches`` (2, 3) is ``_speeds``'s, ``room``
+    (7, 3, 3).
     """
     w = 0.0
     for i in range(branches.shape[1]):
@@ -635,15 +644,7 @@ def _swings(
         swing[18 + i] = h * (first - 3.0 * second + 4.0 * third)
         swing[21 + i] = h * (2.0 * second - 4.0 * third)
         swing[24 + i] = h * (4.0 * third - second)
-    swing[_K], swing[_D], swing[_W], swing[_H] = k, d, w, h
-
-
-@inlined
-def _kind_of_drag(drag: float) -> int:
-    """One number for drags that may share a closed form; 0 for none."""
-    if drag < _DRAG_MIN:
-        return 0
-    return min(1 + int(math.log(drag / _DRAG_MIN) / math.log(1.0 + _DRAG_NEAR)), _DRAGS - 1)
+    swing[_K], swing[_D], swing[_W], swing[_H], swing[_KIND] = k, d, w, h, _kind_of_drag(d)
 
 
 @inlined
@@ -1097,16 +1098,15 @@ def drive_by_voltage(
                 rate_before = y[1]
             h_fine = dt / fine
             # a film that the field pulls on is softer by that
-            field2 = v0 * v0 if hold else 0.5 * (v0 * v0 + v1 * v1)
-            stiff = springy - c[ELECTRIC] * field2 / c[INERTIA]
-            kind = _kind_of_drag(drag) if drags else 0
+            pulling2 = v0 * v0 if hold else 0.5 * (v0 * v0 + v1 * v1)
+            stiff = springy - c[ELECTRIC] * pulling2 / c[INERTIA]
+            kind = _kind_of_drag(drag)
             if not _fits(course, stiff, 0.5 * stiffness_step, kind, h_fine):
                 level = max(math.floor(stiff / stiffness_step), 1.0)
                 stiff = (level + 0.5) * stiffness_step
                 course = swings[(int(level) + 37 * fine + 101 * kind) % _COURSES]
                 if not _fits(course, stiff, 0.0, kind, h_fine):
                     _swings(stiff, drag, branches, h_fine, room, course)
-                    course[_KIND] = kind
             _lean_steps(
                 acting if moves else 0, c, table, branches, course, y, v0, v1, time[k], theta,
                 h_fine, fine, max(fine // steps, 1), trace,

@@ -77,6 +77,14 @@ def test_where_nothing_separates_it_says_so():
     assert "0 times the noise" in words
 
 
+def test_twins_do_not_stand_in_the_way_of_a_third():
+    twin = ("twin", "amplifier", LAG)
+    found, words = separating_experiment([*RIVALS, twin], SLOW, NOISE)
+    alone, _ = separating_experiment(RIVALS, SLOW, NOISE)
+    assert (found.name, found.separation) == (alone.name, alone.separation)
+    assert "but for sensor lag and twin, which none would separate" in words
+
+
 def test_limits_lower_every_candidate():
     low = SLOW.model_copy(update={"limits": SLOW.limits.model_copy(update={"voltage_max_kV": 3.0})})
     found, _ = separating_experiment(RIVALS, low, 1e-9)

@@ -39,7 +39,7 @@ __all__ = [
 
 #: Hooks: what an effect's function of that name takes besides ``(c, k, m, j)``, and what becomes
 #: of the answers. ``c`` are the coefficients and ``k`` where the effect's own begin; ``m`` is the
-#: memory of all effects and ``j`` where its own begins.
+#: memory of all effects of the motion, or of all of the sensor, and ``j`` where its own begins.
 #:
 #: * ``inertia`` kg/m, added to the coefficient of lam'';
 #: * ``supply`` carries the voltage from ``start`` to ``end`` V over ``h`` s to the film, one effect

@@ -51,10 +51,9 @@ def sense(c, k, m, j, t, dt, x, u):
             back = (time + dt - window) / part
             n = math.floor(back)
             a, b = j + 5 + n % _KEPT, j + 5 + (n + 1) % _KEPT
-            s = back - n
-            r = 1.0 - s
-            before = m[a] * (1.0 + 2.0 * s) * r * r + m[b] * (3.0 - 2.0 * s) * s * s
-            before += part * (m[a + _KEPT] * s * r * r - m[b + _KEPT] * s * s * r) - sum0
+            # the integral's own slope is the position
+            _, before = along_cubic(m[a], m[a + _KEPT], m[b], m[b + _KEPT], part, (back - n) * part)
+            before -= sum0
         m[j + 2], m[j + 3], m[j + 4] = sum0 + total, time + dt, (total - before) / window
     m[j], m[j + 1] = x, u
     return m[j + 4]
