@@ -258,6 +258,14 @@ def extra(name, p, film, drive):
         "strain-dependent permittivity": lambda: Extra(
             electric=lambda t, lam, u, z, v: 1.0 + p["strain_coefficient"] * (lam - rest)
         ),
+        "saturating permittivity": lambda: Extra(
+            electric=lambda t, lam, u, z, v: (
+                1.0
+                + p["strain_coefficient"]
+                * (lam - rest)
+                * (1.0 + abs((lam - rest) / p["reach"]) ** p["sharpness"]) ** (-1.0 / p["sharpness"])
+            )
+        ),
         "temperature": lambda: Extra(
             soften=lambda t, lam, u, z, v: 1.0 + p["stiffening"] * drive.warmth(t)
         ),
