@@ -228,7 +228,9 @@ def extra(name, p, film, drive):
         "strained electrode": lambda: charging(p["gauge"]),
         "stress beyond a displacement": lambda: Extra(
             stress=lambda t, lam, u, z, v: (
-                p["stiffness"] * max(lam - rest - p["onset"] / film.length, 0.0)
+                p["stiffness"]
+                * (0.5e-3 / film.length)
+                * (max((lam - rest) * film.length - p["onset"], 0.0) / 0.5e-3) ** p["exponent"]
             )
         ),
         "field-dependent permittivity": lambda: Extra(

@@ -513,6 +513,7 @@ LARGER = {
     "slow branch": 3.0,
     "power-law creep": 3.0,
     "Mullins softening": 3.0,
+    "saturating permittivity": 5.0,
     "dielectric relaxation": 3.0,
 }
 # a film's load cell is worse than a laser: what is typical of an actuator does not show there

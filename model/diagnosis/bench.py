@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from model.actuator import Actuator
+from model.coefficients import REST
 from model.diagnosis.findings import Stage
 from model.film import Strip
 from model.fitting.identify import fit_globally, is_determined
@@ -22,7 +23,7 @@ from model.fitting.intervals import correlation_time, covariance
 from model.fitting.levenberg import LocalFit, descend
 from model.fitting.parameters import Estimate, Layout
 from model.fitting.problem import Problem
-from model.fitting.search import voltage_starts
+from model.fitting.search import voltage_misfit, voltage_starts
 from model.fitting.secant import descend_by_secants
 from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
@@ -54,6 +55,7 @@ _BESIDE = (0.6, 1.6)  # of the relaxation time of the branch that it helps
 _ELSEWHERE = (1.0, 4.0, 16.0)  # s, where a branch that is spare may be of use
 _WORTH = 1e-4  # of chi-square: a descent that promises less has ended
 _RIDGE = 1e-3  # of a number's own curvature, so that no segment alone sets it free
+_SLOW_RATE = 50.0  # Hz: enough to see which branches there may be
 _SEGMENTS = 10  # of time, each predicted by a fit to the others
 
 
@@ -245,15 +247,56 @@ class Bench:
         The baseline's search took what its effects do for work of the branches. Their part, as
         the trial has it, is taken off the measurement, and the branches are sought anew.
         """
-        model = trial.model
-        if isinstance(model, Strip) or not model.effects:
+        return self.sought(trial, trial.x)
+
+    def unaccounted(self, problem: Problem, x: np.ndarray) -> float:
+        """Part of the Maxwell stress that no branches account for, beside the effects at ``x``.
+
+        By the measured stretch, without what the effects do to it; inf where that is not known.
+        Slow samples are enough, and quick.
+        """
+        searched = self._without_effects(problem, x)
+        if searched is None:
+            return math.inf
+        slow = [r.coarse(_SLOW_RATE) for r in searched.records]
+        c = problem.layout.coefficients(problem.layout.values(x)[None])[0]
+        return voltage_misfit(Problem(slow, searched.layout), float(c[REST]))
+
+    def sought(self, trial: Trial, start: np.ndarray) -> Trial:
+        """``trial``, or a better fit from ``start`` (d,) with the branches sought anew for it."""
+        searched = self._without_effects(trial.problem, start)
+        if searched is None:
             return trial
+        fits = [
+            descend_by_secants(
+                trial.problem,
+                np.concatenate([springs, start[springs.size :]]),
+                trial.fixed,
+                iterations=_RESTART,
+                sure=False,
+            )
+            for springs in voltage_starts(searched, lambda *_: None, _RESTARTS)
+        ]
+        other = _trial(trial.problem, min(fits, key=lambda f: f.cost), trial.fixed)
+        if other.cost > _NEARLY * trial.cost:
+            return trial
+        return min(trial, self._down(other, _ENDING, _WORTH * other.cost), key=lambda t: t.cost)
+
+    def _without_effects(self, problem: Problem, x: np.ndarray) -> Problem | None:
+        """The records without the part that the effects have at ``x`` (d,): for the springs alone.
+
+        None of films, and of a model that cannot follow the records.
+        """
+        model = problem.layout.base
+        if isinstance(model, Strip):
+            return None
+        if not model.effects:
+            return problem
         plain = self.problem(replace(model, effects=()))
-        with_them, status = trial.problem.predict(trial.problem.layout.values(trial.x)[None])
-        values = plain.layout.values(trial.x[: plain.layout.size])
-        without, status_too = plain.predict(values[None])
+        with_them, status = problem.predict(problem.layout.values(x)[None])
+        without, status_too = plain.predict(plain.layout.values(x[: plain.layout.size])[None])
         if status.any() or status_too.any():
-            return trial
+            return None
         parts = np.split(
             with_them[0] - without[0], np.cumsum([r.measured.size for r in self.records])
         )
@@ -262,21 +305,7 @@ class Bench:
             for r, part in zip(self.records, parts, strict=False)
             if isinstance(r, ActuatorRecord)
         ]
-        searched = Problem(corrected, plain.layout, self.workers, True, self._count)
-        fits = [
-            descend_by_secants(
-                trial.problem,
-                np.concatenate([start, trial.x[start.size :]]),
-                trial.fixed,
-                iterations=_RESTART,
-                sure=False,
-            )
-            for start in voltage_starts(searched, lambda *_: None, _RESTARTS)
-        ]
-        other = _trial(trial.problem, min(fits, key=lambda f: f.cost), trial.fixed)
-        if other.cost > _NEARLY * trial.cost:
-            return trial
-        return min(trial, self._down(other, _ENDING, _WORTH * other.cost), key=lambda t: t.cost)
+        return Problem(corrected, plain.layout, self.workers, True, self._count)
 
     def polished(self, trial: Trial) -> Trial:
         """``trial`` fitted to every sample, to the end."""

@@ -13,6 +13,7 @@ simulated, and beside them sizes from small to large; what counts is what is the
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -24,7 +25,7 @@ from model.effects import EFFECTS, Effect, EffectValues, Parameter
 from model.film import Strip
 from model.records import ActuatorRecord, FilmRecord
 
-__all__ = ["Promise", "Screen", "with_effect"]
+__all__ = ["Promise", "Screen", "is_of", "sizes_of", "with_effect"]
 
 _MOMENTS = 20  # sought along the longest record
 _CLOSER = ((1.0, 9), (0.3, 9), (0.1, 9))  # parts of their distance, and how many there
@@ -53,6 +54,15 @@ def with_effect(model: Actuator | Strip, name: str, values: tuple[float, ...]) -
     pairs = zip((p.name for p in EFFECTS[name].parameters), values, strict=True)
     effects: EffectValues = (*model.effects, (name, tuple(pairs)))
     return replace(model, effects=effects)
+
+
+def sizes_of(size: Parameter, parts: Sequence[float] = _SIZES) -> list[float]:
+    """Sizes from small to large, ``parts`` of the typical one, of both signs where there are."""
+    low, high = size.bounds
+    neutral = size.neutral or 0.0
+    signs = (1.0, -1.0) if low < neutral else (1.0,)
+    steps = [neutral + sign * part * size.typical for sign in signs for part in parts]
+    return [s for s in steps if low <= s <= high]
 
 
 class Screen:
@@ -102,7 +112,7 @@ class Screen:
         for place, promise in enumerate(found[:_SIMULATED]):
             values = layout.values(promise.start)
             rows.append((place, values))
-            for size in self._sizes(effect.sizes[0]) if several else ():
+            for size in sizes_of(effect.sizes[0]) if several else ():
                 other = values.copy()
                 other[first] = size
                 rows.append((place, other))
@@ -131,15 +141,6 @@ class Screen:
                 columns = ((residual - self.trial.residuals) / moved)[:, None]
             kept[place] = replace(found[place], start=start, columns=columns, share=share)
         return kept
-
-    @staticmethod
-    def _sizes(size: Parameter) -> list[float]:
-        """Sizes from small to large, of both signs where the effect has them."""
-        low, high = size.bounds
-        neutral = size.neutral or 0.0
-        signs = (1.0, -1.0) if low < neutral else (1.0,)
-        steps = [neutral + sign * part * size.typical for sign in signs for part in _SIZES]
-        return [s for s in steps if low <= s <= high]
 
     def _duration(self) -> float:
         return max(float(r.time[-1]) for r in self.bench.records)

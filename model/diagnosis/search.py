@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -21,7 +22,7 @@ from model.diagnosis.findings import (
     Step,
 )
 from model.diagnosis.residual import signatures
-from model.diagnosis.screening import Promise, Screen, is_of
+from model.diagnosis.screening import Promise, Screen, is_of, sizes_of
 from model.diagnosis.stress import missing_stress
 from model.diagnosis.unnamed import describe_unnamed
 from model.effects import EFFECTS, Effect
@@ -52,6 +53,10 @@ _UNNAMED_MARGIN = (
 )
 _PROMISES = 2  # of one effect, in different shapes, from which a fit sets out
 _NEARLY = 0.8  # of the best promise of an effect: another shape that is worth a start
+_IN_THE_WAY = 0.8  # of what no branches account for: with an effect that leaves less, they hid it
+_CLEARLY = 2.0  # of the least that is left: more, and it is not the one that they hid
+_ANEW = 6  # of such effects that are fitted anew
+_ANEW_SIZES = (0.3, 1.0, 3.0, 10.0, 30.0)  # times the typical one, tried for that
 _FOLLOWED = 12  # candidates refitted in later rounds, the most promising ones
 _EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
@@ -247,6 +252,8 @@ class _Search:
             if not tried:
                 break
             fitted, correlation = self._settled(best, tried)
+            if fitted[0].trial.cost > _EXPLAINED_RMS**2:
+                fitted, correlation = self._settled(best, self._anew(fitted))
             leader = fitted[0].trial
             gain = self._criterion(best, correlation) - self._criterion(leader, correlation)
             matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
@@ -380,6 +387,62 @@ class _Search:
         order = [replace(t, trial=self.found[frozenset(t.trial.effects)]) for t in order]
         correlation = self._correlation([best, *(t.trial for t in order)])
         return sorted(order, key=rank), correlation
+
+    def _anew(self, tried: list[_Tried]) -> list[_Tried]:
+        """The candidates, those fitted anew in whose way the branches stand.
+
+        While an effect was missing, the branches imitated it, and a descent from there may not find
+        out. The measured stretch tells without one: with the effect's part taken off it, do
+        branches account for more of the Maxwell stress than before?
+        """
+        before: dict[frozenset[str], float] = {}
+        looks: list[tuple[float, int, np.ndarray]] = []
+        for place, one in enumerate(tried):
+            self._check()
+            parent = one.parent
+            key = frozenset(parent.effects)
+            if key not in before:
+                before[key] = self.bench.unaccounted(parent.problem, parent.x)
+            left, start = self._unaccounted(one)
+            if left < _IN_THE_WAY * before[key]:
+                looks.append((left, place, start))
+        looks.sort(key=lambda look: look[0])
+        again = list(tried)
+        for left, place, start in looks[:_ANEW]:
+            if left > _CLEARLY * looks[0][0]:
+                break
+            self._check()
+            one = tried[place]
+            trial = self.bench.sought(one.trial, start)
+            if trial is not one.trial:
+                key = frozenset(trial.effects)
+                self.found[key] = trial
+                self.settled.discard(key)
+                self.ended.discard(key)
+                again[place] = replace(one, trial=trial)
+        return again
+
+    def _unaccounted(self, tried: _Tried) -> tuple[float, np.ndarray]:
+        """What branches do not account for beside the effect, at the best of sizes; that place."""
+        effect, trial = EFFECTS[tried.name], tried.trial
+        layout = trial.problem.layout
+        first = tried.parent.x.size
+        best, place = math.inf, trial.x
+        if len(effect.sizes) != 1:
+            return best, place
+        values = layout.values(trial.x)
+        values[:first] = tried.parent.problem.layout.values(tried.parent.x)
+
+        def at(size: float) -> np.ndarray:
+            there = values.copy()
+            there[first] = size
+            return np.clip(layout.coordinates(there), layout.lower, layout.upper)
+
+        for size in sizes_of(effect.sizes[0], _ANEW_SIZES):
+            left = self.bench.unaccounted(trial.problem, at(size))
+            if left < best:
+                best, place = left, at(size)
+        return best, place
 
     def _simpler(self, parent: Trial, effect: Effect, start: np.ndarray) -> np.ndarray | None:
         """Coordinates of the best fit of a simpler effect of the family, as a start for this one.

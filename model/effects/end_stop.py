@@ -1,7 +1,8 @@
 """Something that the film meets beyond some travel: an elastic stop, a cable that gets taut.
 
-The stress k (x - x_s) beyond the displacement x_s, over the length L1. No family of its own: it is
-what an unnamed stress that sets in at one displacement looks like.
+The stress k d (d/d_0)^(n - 1), d = (x - x_s)/L1 beyond the displacement x_s and d_0 half a
+millimetre: n = 1 is a spring, 1.5 a ball on a flat (Hertz), more a cushion. No family of its own:
+it is what an unnamed stress that sets in at one displacement looks like.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ EFFECT = Effect(
     acts_on="load",
     words="a stress that sets in at one displacement and grows from there, at any speed",
     parameters=(
-        Parameter("stiffness", "Pa", (-5e6, 5e7), "stress per stretch beyond the onset", 2e4, 0.0),
+        Parameter("stiffness", "Pa", (-5e6, 5e7), "stress per stretch, 0.5 mm beyond", 2e4, 0.0),
         Parameter(
             "onset",
             "m",
@@ -29,15 +30,34 @@ EFFECT = Effect(
             part_of="displacement",
             logarithmic=True,
         ),
+        Parameter(
+            "exponent",
+            "",
+            (1.0, 4.0),
+            "by which it grows with the depth",
+            1.0,
+            starts=(1.0, 1.5),
+        ),
     ),
 )
 
 
+_DEPTH = 0.5e-3  # m, at which the stiffness is what it is called
+
+
 @jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
-    return c[k] * max(lam - c[REST] - c[k + 1] / c[LENGTH], 0.0)
+    depth = lam - c[REST] - c[k + 1] / c[LENGTH]
+    if depth <= 0.0:
+        return 0.0
+    return c[k] * depth * (depth * c[LENGTH] / _DEPTH) ** (c[k + 2] - 1.0)
 
 
 @jit
 def stiffness(c, k, m, j, lam, rate):
-    return (c[k], 0.0) if c[k] > 0.0 and lam - c[REST] > 0.5 * c[k + 1] / c[LENGTH] else (0.0, 0.0)
+    # from half the way on, so that the steps are short enough when it is met
+    depth = lam - c[REST] - 0.5 * c[k + 1] / c[LENGTH]
+    if c[k] <= 0.0 or depth <= 0.0:
+        return 0.0, 0.0
+    n = c[k + 2]
+    return c[k] * n * (depth * c[LENGTH] / _DEPTH) ** (n - 1.0), 0.0

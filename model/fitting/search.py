@@ -22,7 +22,14 @@ from model.material import Branch, Network, Spring
 from model.network import HEAD
 from model.records import ActuatorRecord, FilmRecord
 
-__all__ = ["ALGORITHM_1", "Algorithm1", "algorithm_1", "film_starts", "voltage_starts"]
+__all__ = [
+    "ALGORITHM_1",
+    "Algorithm1",
+    "algorithm_1",
+    "film_starts",
+    "voltage_misfit",
+    "voltage_starts",
+]
 
 Progress = Callable[[str, float], None]
 
@@ -108,20 +115,18 @@ def voltage_starts(problem: Problem, progress: Progress, starts: int = 6) -> np.
     times, with non-negative least squares for the moduli: it needs no luck and no seed.
     """
     layout = problem.layout
-    base = layout.base
-    if not isinstance(base, Actuator):
-        raise ModelError("records driven by voltage need an actuator to fit")
-    values = layout.initial()
-    values[layout.column("J")] = _WIDE_LIMIT
-    c = layout.coefficients(values)[0]
-    candidates = np.array([(t, _WIDE_LIMIT) for t in _time_grid(problem)])
+    base = _actuator(problem)
+    c = layout.coefficients(_start_values(layout))[0]
+    candidates = _candidates(problem)
     measured = base.load.rest_length
     rest = 1.1 if measured is None else measured / base.film.length
     for turn in range(_REST_TURNS):
         parts, target = _balance(problem, base, c, candidates, rest)
-        moduli, _ = nnls(parts.T, target)
         progress("global search", (turn + 1) / (_REST_TURNS + 1))
-        if measured is not None or moduli[0] <= 0.0:
+        if measured is not None:
+            break
+        moduli, _ = nnls(parts.T, target)
+        if moduli[0] <= 0.0:
             break
         c[HEAD + MODULUS] = moduli[0]
         status, solved = kernel.rest_stretch(c, 0.0)
@@ -131,6 +136,39 @@ def voltage_starts(problem: Problem, progress: Progress, starts: int = 6) -> np.
     found = _subsets(layout, _WIDE_LIMIT, candidates, parts, target)
     progress("global search", 1.0)
     return _ranked(layout, found, starts)
+
+
+def voltage_misfit(problem: Problem, rest: float) -> float:
+    """The part of the Maxwell stress that no branches account for, for the measured stretch (RMS).
+
+    As ``voltage_starts`` has it, but for any number of branches and about a ``rest`` stretch that
+    is known well enough: least squares, no simulation.
+    """
+    base = _actuator(problem)
+    c = problem.layout.coefficients(_start_values(problem.layout))[0]
+    parts, target = _balance(problem, base, c, _candidates(problem), rest)
+    triangle = np.asarray(np.linalg.qr(np.vstack([parts, target]).T, mode="r"))
+    _, left = nnls(triangle[:, :-1], triangle[:, -1])
+    return float(left / max(np.linalg.norm(target), 1e-300))
+
+
+def _actuator(problem: Problem) -> Actuator:
+    base = problem.layout.base
+    if not isinstance(base, Actuator):
+        raise ModelError("records driven by voltage need an actuator to fit")
+    return base
+
+
+def _start_values(layout: Layout) -> np.ndarray:
+    """Natural values (d,) to begin with, no spring of which stiffens."""
+    values = layout.initial()
+    values[layout.column("J")] = _WIDE_LIMIT
+    return values
+
+
+def _candidates(problem: Problem) -> np.ndarray:
+    """Relaxation times and limits (G, 2) of the branches that there may be."""
+    return np.array([(t, _WIDE_LIMIT) for t in _time_grid(problem)])
 
 
 def _balance(
@@ -191,10 +229,16 @@ def film_starts(problem: Problem, progress: Progress, starts: int = 8) -> np.nda
 
 
 def _time_grid(problem: Problem, points: int = 16) -> np.ndarray:
-    """Relaxation times that the records can show, from two samples to three durations."""
+    """Relaxation times that records can show, two samples to three durations, if they are free."""
+    layout = problem.layout
     shortest = min(float(np.median(np.diff(r.time))) for r in problem.records)
     longest = max(float(r.time[-1] - r.time[0]) for r in problem.records)
-    return np.geomspace(2.0 * shortest, 3.0 * longest, points)
+    first, last = 2.0 * shortest, 3.0 * longest
+    times = layout.column("T")
+    if times.size:
+        low, high = np.exp(layout.lower[times].min()), np.exp(layout.upper[times].max())
+        first, last = np.clip([first, last], low, high)
+    return np.geomspace(first, last, points)
 
 
 def _unit_stresses(
