@@ -135,6 +135,15 @@ def extra(name, p, film, drive):
             states=1, soften=soften, commit=lambda z, lam0, lam: [max(z[0], film.strain(lam))]
         )
 
+    def first_loading():
+        def soften(t, lam, u, z, v, lam0):
+            most = max(z[0], abs(lam - rest))
+            return 1.0 - p["softening"] * (1.0 - math.exp(-((most / p["reach"]) ** p["exponent"])))
+
+        return Extra(
+            states=1, soften=soften, commit=lambda z, lam0, lam: [max(z[0], abs(lam - rest))]
+        )
+
     def branches(moduli, times):
         return Extra(
             states=len(times),
@@ -161,6 +170,16 @@ def extra(name, p, film, drive):
                 z[1],
                 -2.0 * damping * om * z[1] - om**2 * (z[0] - (lam - rest)),
             ),
+        )
+
+    def broad():
+        at = np.arange(6) - 2.5
+        weights = np.exp(-(at**2) / 2.0) / np.sum(np.exp(-(at**2) / 2.0))
+        times = p["relaxation_time"] * np.exp(p["width"] * at)
+        return Extra(
+            states=6,
+            square=lambda t, lam, u, z, v: v * (v + p["strength"] * float(weights @ np.array(z))),
+            slopes=lambda t, lam, u, z, v: tuple((v - np.array(z)) / times),
         )
 
     def charging(gauge=0.0):
@@ -216,6 +235,7 @@ def extra(name, p, film, drive):
         ),
         "amplifier slew": amplifier_slew,
         "attached mode": attached,
+        "broad dielectric relaxation": broad,
         "dielectric relaxation": lambda: Extra(
             states=1,
             square=lambda t, lam, u, z, v: v * (v + p["strength"] * z[0]),
@@ -255,6 +275,7 @@ def extra(name, p, film, drive):
             stress=lambda t, lam, u, z, v: p["stress"] * ramped(t - p["moment"])
         ),
         "Mullins softening": mullins,
+        "first-loading damage": first_loading,
         "power-law creep": power_law,
         "slow branch": lambda: branches([p["modulus"]], [p["relaxation_time"]]),
         "strain-dependent permittivity": lambda: Extra(
@@ -265,7 +286,8 @@ def extra(name, p, film, drive):
                 1.0
                 + p["strain_coefficient"]
                 * (lam - rest)
-                * (1.0 + abs((lam - rest) / p["reach"]) ** p["sharpness"]) ** (-1.0 / p["sharpness"])
+                * (1.0 + abs((lam - rest) / p["reach"]) ** p["sharpness"])
+                ** (-1.0 / p["sharpness"])
             )
         ),
         "temperature": lambda: Extra(

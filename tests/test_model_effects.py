@@ -319,6 +319,11 @@ SHOWN = {
     ),
     "sensor curvature": lambda p, t: moved(t)[0] * (1.0 + p["quadratic"] * moved(t)[0]),
     "sensor lag": shown_by_lag,
+    "sensor ripple": lambda p, t: (
+        moved(t)[0]
+        + p["sine"] * np.sin(2.0 * np.pi * moved(t)[0] / p["period"])
+        + p["cosine"] * (1.0 - np.cos(2.0 * np.pi * moved(t)[0] / p["period"]))
+    ),
     "settling drift": lambda p, t: (
         moved(t)[0] + p["drift"] * (1.0 - np.exp(-t / p["time_constant"]))
     ),
@@ -513,13 +518,17 @@ LARGER = {
     "slow branch": 3.0,
     "power-law creep": 3.0,
     "Mullins softening": 3.0,
+    "first-loading damage": 5.0,
     "saturating permittivity": 5.0,
     "dielectric relaxation": 3.0,
+    "broad dielectric relaxation": 6.0,
 }
 # a film's load cell is worse than a laser: what is typical of an actuator does not show there
 LARGER_IN_FILMS = 20.0
+# and it is stretched much further
+IN_FILMS = {"first-loading damage": {"reach": 0.3}}
 # a start that is 1.5 times off is in another valley for these, or where nothing is seen of them
-NEARER = {"mains interference": 1.00005, "amplifier limit": 0.8}
+NEARER = {"mains interference": 1.00005, "amplifier limit": 0.8, "sensor ripple": 1.05}
 NEARER |= dict.fromkeys(
     ("sudden change of reading", "sudden change of force", "sudden loss of field"), 1.003
 )
@@ -621,7 +630,7 @@ def truth_of(base, names):
     effects = []
     for name in names:
         size = LARGER_IN_FILMS if isinstance(base, Strip) else LARGER.get(name, 1.0)
-        values = numbers(name, size)
+        values = numbers(name, size, **(IN_FILMS.get(name, {}) if isinstance(base, Strip) else {}))
         if "moment" in values:
             values["moment"] = 4.3  # in the first lobe of the one, in the second of the other
         effects.append((name, tuple(values.items())))

@@ -53,6 +53,7 @@ _UNNAMED_MARGIN = (
 )
 _PROMISES = 2  # of one effect, in different shapes, from which a fit sets out
 _NEARLY = 0.8  # of the best promise of an effect: another shape that is worth a start
+_BETTER = 1e-4  # of the cost: less is the same place
 _IN_THE_WAY = 0.8  # of what no branches account for: with an effect that leaves less, they hid it
 _CLEARLY = 2.0  # of the least that is left: more, and it is not the one that they hid
 _ANEW = 6  # of such effects that are fitted anew
@@ -122,6 +123,7 @@ class _Search:
         self.found: dict[frozenset[str], Trial] = {}
         self.settled: set[frozenset[str]] = set()
         self.ended: set[frozenset[str]] = set()
+        self.bared: set[tuple[str, ...]] = set()
         self.interrupted = False
         self.held = False
 
@@ -415,10 +417,7 @@ class _Search:
             one = tried[place]
             trial = self.bench.sought(one.trial, start)
             if trial is not one.trial:
-                key = frozenset(trial.effects)
-                self.found[key] = trial
-                self.settled.discard(key)
-                self.ended.discard(key)
+                self._keep(trial)
                 again[place] = replace(one, trial=trial)
         return again
 
@@ -487,8 +486,12 @@ class _Search:
         return beam
 
     def _pruned(self, best: Trial) -> Trial:
-        """``best`` without what it does not need."""
-        while len(best.effects) > 1:
+        """``best`` without what it does not need.
+
+        Not even one effect may be needed: what is fitted with it may only have shown the springs
+        a better place.
+        """
+        while best.effects:
             self._check()
             smaller = {name: self._ended(self._without(best, name)) for name in best.effects}
             correlation = self._correlation([best, *smaller.values()])
@@ -505,17 +508,25 @@ class _Search:
 
     def _without(self, trial: Trial, name: str) -> Trial:
         key = frozenset(trial.effects) - {name}
-        if key not in self.ended:
+        # the bare film is fitted again from wherever an effect has led its springs
+        if key not in self.ended or (not key and trial.effects not in self.bared):
+            self.bared.add(trial.effects)
             model = replace(
                 trial.model, effects=tuple(e for e in trial.model.effects if e[0] != name)
             )
             layout = self.bench.problem(model).layout
             fixed = self.found[frozenset()].fixed
             fixed = np.concatenate([fixed, np.zeros(layout.size - fixed.size, dtype=bool)])
-            fresh = self.bench.fit(model, [(layout.coordinates(layout.initial()), None)], fixed)
-            known = self.found.get(key, fresh)
-            self.found[key] = min(known, fresh, key=lambda t: t.cost)
+            self._keep(self.bench.fit(model, [(layout.coordinates(layout.initial()), None)], fixed))
         return self.found[key]
+
+    def _keep(self, trial: Trial) -> None:
+        """``trial``, if it is the best with its effects; it is not at its valley's end then."""
+        key = frozenset(trial.effects)
+        if key not in self.found or trial.cost < (1.0 - _BETTER) * self.found[key].cost:
+            self.found[key] = trial
+            self.settled.discard(key)
+            self.ended.discard(key)
 
     def _for_others(self, trial: Trial) -> Trial:
         """``trial`` as it predicts other recordings: without what may not happen again.

@@ -1,0 +1,41 @@
+"""Sensor nonlinearity that comes again along the travel, as of a grating, fringes or pixels.
+
+The reading is x + a sin(2 pi x/p) + b (1 - cos(2 pi x/p)).
+"""
+
+from __future__ import annotations
+
+import math
+
+from model.effects.description import Effect, Parameter
+from model.jit import jit
+
+__all__ = ["EFFECT", "sense"]
+
+EFFECT = Effect(
+    name="sensor ripple",
+    family="sensor_nonlinearity",
+    acts_on="sensor",
+    words="the reading is off by the same again every so many micrometres of travel",
+    parameters=(
+        Parameter("sine", "m", (-5e-4, 5e-4), "of the error", 5e-6, 0.0),
+        Parameter("cosine", "m", (-5e-4, 5e-4), "of the error", 5e-6, 0.0),
+        Parameter(
+            "period",
+            "m",
+            (2e-5, 1e-2),
+            "of travel",
+            5e-4,
+            # near enough to each other to be told apart over the travel
+            starts=tuple(1.0 / n for n in (1.0, 1.3, 1.7, 2.2, 2.8, 3.4, 4.1, 4.9, 5.8, 6.8)),
+            part_of="displacement",
+            logarithmic=True,
+        ),
+    ),
+)
+
+
+@jit
+def sense(c, k, m, j, t, dt, x, u):
+    angle = 2.0 * math.pi * x / c[k + 2]
+    return x + c[k] * math.sin(angle) + c[k + 1] * (1.0 - math.cos(angle))
