@@ -172,13 +172,16 @@ def extra(name, p, film, drive):
             ),
         )
 
+    def polarised(v, slow):
+        return v * (v + p["strength"] * slow) / (1.0 + p["settled"] * p["strength"])
+
     def broad():
         at = np.arange(6) - 2.5
         weights = np.exp(-(at**2) / 2.0) / np.sum(np.exp(-(at**2) / 2.0))
         times = p["relaxation_time"] * np.exp(p["width"] * at)
         return Extra(
             states=6,
-            square=lambda t, lam, u, z, v: v * (v + p["strength"] * float(weights @ np.array(z))),
+            square=lambda t, lam, u, z, v: polarised(v, float(weights @ np.array(z))),
             slopes=lambda t, lam, u, z, v: tuple((v - np.array(z)) / times),
         )
 
@@ -238,7 +241,7 @@ def extra(name, p, film, drive):
         "broad dielectric relaxation": broad,
         "dielectric relaxation": lambda: Extra(
             states=1,
-            square=lambda t, lam, u, z, v: v * (v + p["strength"] * z[0]),
+            square=lambda t, lam, u, z, v: polarised(v, z[0]),
             slopes=lambda t, lam, u, z, v: ((v - z[0]) / p["relaxation_time"],),
         ),
         "distributed hysteresis": distributed,

@@ -640,7 +640,8 @@ def truth_of(base, names):
 @pytest.mark.parametrize(("name", "driven"), BOTH)
 def test_found_again(name, driven):
     base = STRIP if driven == "stretch" else replace(THESIS, network=ONE)
-    require_found(truth_of(base, [name]))
+    # what the permittivity on a data sheet means shows at large strengths only
+    require_found(truth_of(base, [name]), but=(f"{name}: settled",))
 
 
 @pytest.mark.parametrize(

@@ -293,7 +293,7 @@ def test_order_of_convergence(stiff):
 SOME_EFFECTS = (
     ("linear drag", (("drag", 300.0),)),
     ("electrode resistance", (("resistance", 1e7),)),
-    ("dielectric relaxation", (("strength", 0.05), ("relaxation_time", 0.02))),
+    ("dielectric relaxation", (("strength", 0.05), ("relaxation_time", 0.02), ("settled", 0.0))),
     ("strain-dependent permittivity", (("strain_coefficient", 0.5),)),
     ("ageing", (("softening", 0.02), ("path", 0.01))),
     ("slow branch", (("modulus", 4e3), ("relaxation_time", 3.0))),

@@ -123,7 +123,7 @@ class _Search:
         self.found: dict[frozenset[str], Trial] = {}
         self.settled: set[frozenset[str]] = set()
         self.ended: set[frozenset[str]] = set()
-        self.bared: set[tuple[str, ...]] = set()
+        self.left_out: set[tuple[frozenset[str], str]] = set()
         self.interrupted = False
         self.held = False
 
@@ -486,11 +486,7 @@ class _Search:
         return beam
 
     def _pruned(self, best: Trial) -> Trial:
-        """``best`` without what it does not need.
-
-        Not even one effect may be needed: what is fitted with it may only have shown the springs
-        a better place.
-        """
+        """``best`` without what it does not need, were it its only effect."""
         while best.effects:
             self._check()
             smaller = {name: self._ended(self._without(best, name)) for name in best.effects}
@@ -508,9 +504,9 @@ class _Search:
 
     def _without(self, trial: Trial, name: str) -> Trial:
         key = frozenset(trial.effects) - {name}
-        # the bare film is fitted again from wherever an effect has led its springs
-        if key not in self.ended or (not key and trial.effects not in self.bared):
-            self.bared.add(trial.effects)
+        # however well it is known: what is left out may have shown the others a better place
+        if (frozenset(trial.effects), name) not in self.left_out:
+            self.left_out.add((frozenset(trial.effects), name))
             model = replace(
                 trial.model, effects=tuple(e for e in trial.model.effects if e[0] != name)
             )

@@ -42,6 +42,14 @@ EFFECT = Effect(
             starts=(1.5,),
             logarithmic=True,
         ),
+        Parameter(
+            "settled",
+            "",
+            (0.0, 1.0),
+            "1 where the film's data give the permittivity at rest, 0 where that of fast fields",
+            1.0,
+            starts=(1.0,),
+        ),
     ),
     memory=6,
 )
@@ -62,4 +70,8 @@ def polarise(c, k, m, j, start, end, h):
         before += _WEIGHTS[i] * slow
         m[j + i] = lagged(slow, start, end, h, c[k + 1] * math.exp(c[k + 2] * (_FIRST + i)))
         after += _WEIGHTS[i] * m[j + i]
-    return c[k] * start * before, c[k] * end * after
+    share = c[k] / (1.0 + c[k + 3] * c[k])
+    return (
+        share * start * (before - c[k + 3] * start),
+        share * end * (after - c[k + 3] * end),
+    )

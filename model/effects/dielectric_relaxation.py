@@ -1,7 +1,8 @@
 """Slow polarisation: a part of the permittivity follows the field with a delay (Debye).
 
-With the slow polarisation in proportion to u, u' = (V - u)/tau, the stress D E is eps V (V + d u):
-the film pulls a little harder after the voltage has stood for a while.
+With the slow polarisation in proportion to u, u' = (V - u)/tau, the stress D E is
+eps V (V + d u)/(1 + g d): the film pulls a little harder after the voltage has stood for a while.
+With g = 1 eps is the permittivity at rest, with g = 0 that of fast fields: data sheets differ.
 """
 
 from __future__ import annotations
@@ -30,6 +31,14 @@ EFFECT = Effect(
             starts=(0.1, 0.02, 0.5, 3.0),
             logarithmic=True,
         ),
+        Parameter(
+            "settled",
+            "",
+            (0.0, 1.0),
+            "1 where the film's data give the permittivity at rest, 0 where that of fast fields",
+            1.0,
+            starts=(1.0,),
+        ),
     ),
     memory=1,
 )
@@ -39,4 +48,8 @@ EFFECT = Effect(
 def polarise(c, k, m, j, start, end, h):
     before = m[j]
     m[j] = lagged(before, start, end, h, c[k + 1])
-    return c[k] * start * before, c[k] * end * m[j]
+    share = c[k] / (1.0 + c[k + 2] * c[k])
+    return (
+        share * start * (before - c[k + 2] * start),
+        share * end * (m[j] - c[k + 2] * end),
+    )
