@@ -254,6 +254,7 @@ def extra(name, p, film, drive):
                 p["stiffness"]
                 * (0.5e-3 / film.length)
                 * (max((lam - rest) * film.length - p["onset"], 0.0) / 0.5e-3) ** p["exponent"]
+                * max(1.0 + p["damping"] * film.length * u, 0.0)
             )
         ),
         "field-dependent permittivity": lambda: Extra(
@@ -295,6 +296,18 @@ def extra(name, p, film, drive):
         ),
         "temperature": lambda: Extra(
             soften=lambda t, lam, u, z, v: 1.0 + p["stiffening"] * drive.warmth(t)
+        ),
+        "self-heating": lambda: Extra(
+            states=1,
+            soften=lambda t, lam, u, z, v: 1.0 + p["stiffening"] * z[0],
+            slopes=lambda t, lam, u, z, v: (((v / 5e3) ** 2 - z[0]) / p["time_constant"],),
+        ),
+        "warm-up in stages": lambda: Extra(
+            soften=lambda t, lam, u, z, v: (
+                1.0
+                + p["stiffening"] * (1.0 - math.exp(-t / p["time_constant"]))
+                + p["later"] * (1.0 - math.exp(-t / p["time_constant"] / 10.0))
+            )
         ),
         "warm-up": lambda: Extra(
             soften=lambda t, lam, u, z, v: (

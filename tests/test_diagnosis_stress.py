@@ -45,8 +45,9 @@ def accelerated(drive, answer):
 # (effect, its stress against the motion, Pa at any sample and RMS: as measured, rounded up)
 CASES = {
     "end stop": (
-        effect("stress beyond a displacement", stiffness=STOP, onset=ONSET, exponent=1.0),
-        beyond, 8.0, 0.5,
+        effect(
+            "stress beyond a displacement", stiffness=STOP, onset=ONSET, exponent=1.0, damping=0.0
+        ), beyond, 8.0, 0.5,
     ),
     "drag": (effect("linear drag", drag=DRAG), dragged, 2.5, 0.3),
     "load step": (effect("sudden change of force", stress=STEP, moment=MOMENT), stepped, 3.0, 0.3),

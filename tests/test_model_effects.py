@@ -509,6 +509,8 @@ LARGER = {
     "ageing": 3.0,
     "temperature": 3.0,
     "warm-up": 3.0,
+    "warm-up in stages": 5.0,
+    "self-heating": 3.0,
     "linear drift": 3.0,
     "settling drift": 3.0,
     "wandering drift": 3.0,
@@ -529,6 +531,7 @@ LARGER_IN_FILMS = 20.0
 IN_FILMS = {"first-loading damage": {"reach": 0.3}}
 # a start that is 1.5 times off is in another valley for these, or where nothing is seen of them
 NEARER = {"mains interference": 1.00005, "amplifier limit": 0.8, "sensor ripple": 1.05}
+NEARER |= {"stress beyond a displacement": 1.2, "warm-up in stages": 1.2}
 NEARER |= dict.fromkeys(
     ("sudden change of reading", "sudden change of force", "sudden loss of field"), 1.003
 )

@@ -1,8 +1,9 @@
 """Something that the film meets beyond some travel: an elastic stop, a cable that gets taut.
 
-The stress k d (d/d_0)^(n - 1), d = (x - x_s)/L1 beyond the displacement x_s and d_0 half a
-millimetre: n = 1 is a spring, 1.5 a ball on a flat (Hertz), more a cushion. No family of its own:
-it is what an unnamed stress that sets in at one displacement looks like.
+The stress k d (d/d_0)^(n - 1) (1 + c x'), d = (x - x_s)/L1 beyond the displacement x_s and d_0 half
+a millimetre: n = 1 is a spring, 1.5 a ball on a flat (Hertz), more a cushion; c is what the contact
+loses (Hunt and Crossley, J. Appl. Mech. 42, 440 (1975)). No family of its own: it is what an
+unnamed stress that sets in at one displacement looks like.
 """
 
 from __future__ import annotations
@@ -38,26 +39,35 @@ EFFECT = Effect(
             1.0,
             starts=(1.0, 1.5),
         ),
+        Parameter("damping", "s/m", (0.0, 300.0), "of the contact", 10.0, starts=(5.0,)),
     ),
 )
 
 
 _DEPTH = 0.5e-3  # m, at which the stiffness is what it is called
+_FASTEST = 0.5  # 1/s, of a fast edge
+
+
+@jit
+def _held(c, k, depth):
+    """Stress of a contact at rest, and its slope."""
+    if depth <= 0.0:
+        return 0.0, 0.0
+    slope = c[k] * (depth * c[LENGTH] / _DEPTH) ** (c[k + 2] - 1.0)
+    return slope * depth, c[k + 2] * slope
 
 
 @jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
-    depth = lam - c[REST] - c[k + 1] / c[LENGTH]
-    if depth <= 0.0:
-        return 0.0
-    return c[k] * depth * (depth * c[LENGTH] / _DEPTH) ** (c[k + 2] - 1.0)
+    held, _ = _held(c, k, lam - c[REST] - c[k + 1] / c[LENGTH])
+    return held * max(1.0 + c[k + 3] * rate * c[LENGTH], 0.0)
 
 
 @jit
 def stiffness(c, k, m, j, lam, rate):
     # from half the way on, so that the steps are short enough when it is met
-    depth = lam - c[REST] - 0.5 * c[k + 1] / c[LENGTH]
-    if c[k] <= 0.0 or depth <= 0.0:
+    held, slope = _held(c, k, lam - c[REST] - 0.5 * c[k + 1] / c[LENGTH])
+    if slope <= 0.0:
         return 0.0, 0.0
-    n = c[k + 2]
-    return c[k] * n * (depth * c[LENGTH] / _DEPTH) ** (n - 1.0), 0.0
+    fast = c[k + 3] * c[LENGTH]
+    return slope * (1.0 + fast * min(rate, _FASTEST)), held * fast
