@@ -14,7 +14,7 @@ from app.errors import InputError
 from app.outcomes import Comparison, Published
 from app.presets import PRESETS, VALIDATION_A, VALIDATION_B
 from app.quality import driven_by, inspect
-from app.recording.quiet import noise_floor
+from app.recording.quiet import MIN_QUIET, noise_floor
 from app.recording.reader import open_recording
 from app.recording.recording import Recording
 from app.sequencefile import parse_sequence
@@ -24,7 +24,7 @@ from model.errors import ModelError
 from model.excitation import Lobes
 from model.film import Strip
 from model.measures import errors
-from model.records import ActuatorRecord, FilmRecord, Record, noise_of
+from model.records import ActuatorRecord, FilmRecord, Record, counted, noise_of
 
 __all__ = ["PUBLISHED_FIT", "as_record", "compare", "open_all"]
 
@@ -111,9 +111,15 @@ def as_record(recording: Recording, drive: str = "command") -> Record:
             noise,
             recording.displacement_delay - recording.displacement_skew,
             valid,
+            _lead_in(recording),
         )
     except ModelError as error:
         raise InputError(f"{recording.path}: {error}") from error
+
+
+def _lead_in(recording: Recording) -> int:
+    """Samples from whose mean displacement is counted; 0 where that is within the noise."""
+    return recording.quiet_samples if recording.quiet_samples >= MIN_QUIET else 0
 
 
 def _bridged(time: np.ndarray, values: np.ndarray, valid: np.ndarray | None) -> np.ndarray:
@@ -210,7 +216,7 @@ def compare(
         response = model.simulate(drive_of, lag)
         if not response.ok:
             raise InputError(f"{recording.path}: the model cannot follow it: {response.in_words}")
-        predicted = response.displacement
+        predicted = counted(response.displacement, _lead_in(recording))
         quiet = recording.quiet & usable
         driven, noise = drive_of.voltage, noise_floor(recording.time[quiet], signal[quiet])
         table, row, published = _place(recording)

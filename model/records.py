@@ -12,12 +12,22 @@ from scipy.optimize import minimize_scalar
 from model.actuator import Drive
 from model.errors import ModelError
 
-__all__ = ["ActuatorRecord", "FilmRecord", "Record", "noise_at_rest", "noise_of"]
+__all__ = ["ActuatorRecord", "FilmRecord", "Record", "counted", "noise_at_rest", "noise_of"]
 
 _READINGS_MIN = 4  # to read a noise from
 _READINGS_A_LINE = 4  # a periodic line takes three numbers away, of many more
 _SLOWEST_LINE = 15.0  # Hz; what is slower may be a drift, or noise that a sensor has averaged
 _STANDS_OUT = 30.0  # of the spectrum's median about it: by chance once in a million readings
+
+
+def counted(displacement: np.ndarray, lead_in: int) -> np.ndarray:
+    """``displacement`` (..., N) counted from its mean over the first ``lead_in`` samples, if any.
+
+    As a record's is: what drifts or warms up does so before the film is driven, too.
+    """
+    if lead_in == 0:
+        return displacement
+    return np.asarray(displacement - displacement[..., :lead_in].mean(axis=-1, keepdims=True))
 
 
 @dataclass(frozen=True)
@@ -27,7 +37,8 @@ class ActuatorRecord:
     ``noise`` is the standard deviation of one reading in m. ``lag`` is the known time in s by which
     a reading is older than its time stamp (an averaging sensor), less the converter's skew: the
     model is evaluated at ``time - lag``. ``valid`` (N,) bool is False where a reading must not be
-    used (a dropout, a clipped sensor), None where all are good.
+    used (a dropout, a clipped sensor), None where all are good. Over the first ``lead_in`` samples,
+    at 0 V, the displacement is 0 on average, because it is counted from there.
     """
 
     name: str
@@ -36,6 +47,7 @@ class ActuatorRecord:
     noise: float
     lag: float = 0.0
     valid: np.ndarray | None = None
+    lead_in: int = 0
 
     def __post_init__(self) -> None:
         _check(self.name, self.measured, self.drive.time, self.noise)
@@ -72,7 +84,12 @@ class ActuatorRecord:
             drive = replace(drive, warmth=warmth[rows].mean(axis=1))
         valid = None if self.valid is None else np.all(self.valid[rows], axis=1)
         return replace(
-            self, drive=drive, displacement=x, noise=self.noise / math.sqrt(every), valid=valid
+            self,
+            drive=drive,
+            displacement=x,
+            noise=self.noise / math.sqrt(every),
+            valid=valid,
+            lead_in=self.lead_in // every,
         )
 
 

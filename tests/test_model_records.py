@@ -1,6 +1,7 @@
 """Records as a fit sees them, and the measures of error."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,9 +9,11 @@ import pytest
 from model.actuator import Actuator, Drive
 from model.errors import ModelError
 from model.excitation import Sequence
+from model.fitting.parameters import Layout
+from model.fitting.problem import Problem
 from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from model.measures import errors
-from model.records import ActuatorRecord, FilmRecord, noise_at_rest, noise_of
+from model.records import ActuatorRecord, FilmRecord, counted, noise_at_rest, noise_of
 from model.sensor import at_sensor
 
 THESIS = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
@@ -159,3 +162,18 @@ def test_refusals(time, values, noise, message):
         ActuatorRecord("x", Drive(np.array(time), np.zeros(3)), np.array(values), noise)
     with pytest.raises(ModelError, match=message):
         FilmRecord("x", np.array(time), np.ones(3), np.array(values), noise)
+
+
+def test_what_moves_before_it_is_driven_is_counted_from_there():
+    drive = Drive(*Sequence.thesis(periods=1).sample(100.0))
+    drifting = replace(THESIS, effects=(("linear drift", (("drift", 1e-5),)),))
+    response = drifting.simulate(drive)
+    lead_in = int(np.flatnonzero(drive.voltage)[0])
+    assert lead_in > 50
+    shown = response.displacement - response.displacement[:lead_in].mean()
+    record = ActuatorRecord("drifting", drive, shown, 1e-6, lead_in=lead_in)
+    problem = Problem([record], Layout(drifting))
+    residuals = problem.residuals(problem.layout.coordinates(problem.layout.initial()))
+    np.testing.assert_allclose(residuals, 0.0, atol=1e-6)
+    assert record.coarse(20.0).lead_in == pytest.approx(lead_in / 5, abs=1)
+    assert np.all(counted(shown, 0) == shown)

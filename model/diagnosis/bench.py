@@ -258,7 +258,7 @@ class Bench:
         searched = self._without_effects(problem, x)
         if searched is None:
             return math.inf
-        slow = [r.coarse(_SLOW_RATE) for r in searched.records]
+        slow = [r.coarse(_SLOW_RATE) for r in searched.records if isinstance(r, ActuatorRecord)]
         c = problem.layout.coefficients(problem.layout.values(x)[None])[0]
         return voltage_misfit(Problem(slow, searched.layout), float(c[REST]))
 

@@ -21,7 +21,7 @@ from model.effects import MEMORY, NEUTRAL, SLOTS, assembly
 from model.film import Strip, unit_stresses
 from model.kinematics import thinning
 from model.network import HEAD
-from model.records import ActuatorRecord, FilmRecord, Record
+from model.records import ActuatorRecord, FilmRecord, Record, counted
 
 __all__ = ["missing_stress"]
 
@@ -91,7 +91,9 @@ def _of_actuator(record: ActuatorRecord, model: Actuator) -> MissingStress | Non
         network = c[HEAD + MODULUS :: WIDTH] @ parts
         return network + c[INERTIA] * bend, stretch, rate
 
-    residual = _bridged(record, record.displacement - response.displacement)
+    residual = _bridged(
+        record, record.displacement - counted(response.displacement, record.lead_in)
+    )
     measured, stretch, rate = lacking(response.displacement + residual)
     predicted, there, _ = lacking(response.displacement)
     late = np.interp(time - record.lag, time, record.drive.voltage)

@@ -12,7 +12,7 @@ from model.actuator import Actuator, displacements
 from model.errors import ModelError
 from model.film import stress_of
 from model.fitting.parameters import Layout
-from model.records import ActuatorRecord, FilmRecord, Record
+from model.records import ActuatorRecord, FilmRecord, Record, counted
 
 __all__ = ["Problem"]
 
@@ -75,9 +75,10 @@ class Problem:
             if isinstance(record, ActuatorRecord):
                 base = self.layout.base
                 length = base.film.length if isinstance(base, Actuator) else 1.0
-                part[:], s = displacements(
+                moved, s = displacements(
                     c, length, record.drive, record.lag, self.workers, self.quick
                 )
+                part[:] = counted(moved, record.lead_in)
             else:
                 s = self._stresses(c, record, part)
             status = np.where(status == kernel.OK, s, status)
