@@ -40,6 +40,8 @@ _EXCHANGES = 3  # of one effect for another, when more than one is there
 _DECISIVE = 12.0  # of the information criterion: odds of e^6, over some forty candidates
 _ALIKE = 10.0  # of the same: candidates nearer than that are not told apart
 _MATTERS = 0.01  # of the noise's mean square: less is not worth an effect
+_SECOND_SHARE = 0.25  # of what is left above the noise: less is not worth one more effect
+_BY_FAR = 150.0  # of the criterion: a gain that needs no such share
 _HOPE = 0.95  # of the cost: who explains less than the rest of it is not followed on
 _BEAM = 2  # how many explanations are followed on
 _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed on
@@ -242,7 +244,8 @@ class _Search:
         """The best explanation of up to ``_EFFECTS_MAX`` effects, those of ``start`` among them.
 
         Where none alone explains enough to be believed, the leading ones are followed on once: of
-        two effects each may leave so much of the other that only both are a finding.
+        two effects each may leave so much of the other that only both are a finding. Beside one
+        that is believed, others must be so on their own.
         """
         best, beam = start, [start]
         looking_on = False
@@ -259,6 +262,9 @@ class _Search:
             leader = fitted[0].trial
             gain = self._criterion(best, correlation) - self._criterion(leader, correlation)
             matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
+            if best.effects and gain < _BY_FAR:
+                # beside another, little of what no effect explains may go to any
+                matters &= best.cost - leader.cost > _SECOND_SHARE * (best.cost - 1.0)
             taken = gain > self._asked(fitted[0].name) and matters
             if taken:
                 reason = f"gains {gain:.0f} of the information criterion"
@@ -269,7 +275,9 @@ class _Search:
                     f"no effect explains significantly more (the best gains {gain:.1f} of the "
                     f"information criterion, {self._asked(fitted[0].name):g} are asked for)"
                 )
-            hopeless = self._is_noise(best) or leader.cost > _HOPE * best.cost
+            hopeless = (
+                bool(best.effects) or self._is_noise(best) or leader.cost > _HOPE * best.cost
+            )
             last = depth + 1 == _EFFECTS_MAX
             if not taken and not (looking_on or hopeless or last):
                 reason += "; the leading ones are tried together with others"
