@@ -102,6 +102,52 @@ def test_a_spare_branch_finds_its_work(moduli, times):
     assert (ended.cost - made.cost) * ended.problem.samples < 9.0
 
 
+# --- branches that stand in the way of an effect
+
+
+LIMITS = (1e4,) * 4
+TAU = 0.05
+LATE = replace(
+    PLAIN,
+    network=Network.gent((35e3, 25e3, 12e3, 6e3), LIMITS, (0.25, 1.1, 7.0)),
+    effects=effect("sensor double lag", time_constant=TAU),
+)
+
+
+def test_the_measured_stretch_tells_what_branches_imitate():
+    bench = bench_of(record_of(LATE, thesis_drive(200.0)))
+    bare = bench.baseline(replace(LATE, effects=()), lambda *_: None)
+    # a lag is not seen while branches do its work
+    assert bare.cost > 10.0
+    with_lag = replace(bare.model, effects=effect("sensor double lag", time_constant=0.0))
+    problem = bench.problem(with_lag)
+
+    def at(tau):
+        return np.append(bare.x, tau)
+
+    left = {tau: bench.unaccounted(problem, at(tau)) for tau in (0.0, 0.01, 0.03, TAU, 0.15)}
+    assert left[0.0] == pytest.approx(bench.unaccounted(bare.problem, bare.x))
+    # as the branches have it that are there: near, and that is near enough
+    near = min(left, key=lambda tau: left[tau])
+    assert 0.5 * TAU < near < 2.0 * TAU
+    assert left[near] < 0.5 * left[0.0]
+
+    fixed = np.append(bare.fixed, False)
+    stuck = bench.fit(with_lag, [(at(0.0), None)], fixed)
+    sought = bench.sought(stuck, at(near))
+    # not yet at the noise, but in the valley that leads there
+    assert stuck.cost > 3.0
+    assert sought.cost < 1.2
+    assert sought.x[-1] == pytest.approx(TAU, rel=0.2)
+
+
+def test_films_have_no_voltage_to_account_for():
+    bench = bench_of(film_record_of(STRIP))
+    trial = fitted(bench, STRIP)
+    assert bench.unaccounted(trial.problem, trial.x) == math.inf
+    assert bench.sought(trial, trial.x) is trial
+
+
 # --- time that is left out
 
 

@@ -275,9 +275,7 @@ class _Search:
                     f"no effect explains significantly more (the best gains {gain:.1f} of the "
                     f"information criterion, {self._asked(fitted[0].name):g} are asked for)"
                 )
-            hopeless = (
-                bool(best.effects) or self._is_noise(best) or leader.cost > _HOPE * best.cost
-            )
+            hopeless = bool(best.effects) or self._is_noise(best) or leader.cost > _HOPE * best.cost
             last = depth + 1 == _EFFECTS_MAX
             if not taken and not (looking_on or hopeless or last):
                 reason += "; the leading ones are tried together with others"
