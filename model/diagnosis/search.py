@@ -216,11 +216,11 @@ class _Search:
         held = self._if_held()
         if held is None or not best.effects:
             return best
-        before = (self.bench, self.found, self.settled, self.ended)
+        before = (self.bench, self.found, self.settled, self.ended, self.left_out)
         bench = Bench(held, self.bench.workers)
         bench.simulations = self.bench.simulations
         fits = [bench.fit(t.model, [(t.x, None)], t.fixed) for t in (self.found[frozenset()], best)]
-        self.bench, self.settled, self.ended = bench, set(), set()
+        self.bench, self.settled, self.ended, self.left_out = bench, set(), set(), set()
         self.found = {frozenset(t.effects): t for t in fits}
         try:
             trial = self._pruned(self._ended(fits[1]))
@@ -230,7 +230,7 @@ class _Search:
         finally:
             if not self.held:
                 before[0].simulations = bench.simulations
-                self.bench, self.found, self.settled, self.ended = before
+                self.bench, self.found, self.settled, self.ended, self.left_out = before
         return trial if self.held else best
 
     def _if_held(self) -> list[ActuatorRecord] | None:
