@@ -45,7 +45,10 @@ _MUCH_EXPLAINED = 0.5  # of the cost without it is left: such a fit must be sure
 _SETTLING = 10  # iterations of a fit that may come to lead
 _NOT_NEARER = 0.05  # of what it lies behind: promising less, it will not
 _ENDING = 25  # iterations of a fit that others build on
+_WHITE_COST, _WHITE_CORRELATION = 1.04, 1.3  # a lead-in tells the noise to some 2 %
+_PATIENCE = 3  # iterations down a valley that together must gain something
 _NEARLY = 1.02  # of the cost: a descent from elsewhere that comes so near is followed on
+_FAR_ABOVE = 1.1  # of the cost of a descent from elsewhere: such a valley is left
 _RESTARTS = 3  # from a new global search, beside what was found
 _RESTART = 10  # iterations of each
 _LEADERS = 2  # of several starts that are followed on: the best at first does not always get down
@@ -98,6 +101,11 @@ class Trial:
     def free(self) -> int:
         """How many numbers were fitted."""
         return int(np.count_nonzero(~self.fixed))
+
+    @property
+    def is_white(self) -> bool:
+        """True where only noise is left: no fit of the same model can be much better."""
+        return self.cost < _WHITE_COST and self.correlation < _WHITE_CORRELATION
 
     def jacobian(self, quick: bool = False) -> np.ndarray:
         """d(residuals)/dx (N, f) over the free numbers; ``quick`` by one-sided differences."""
@@ -204,14 +212,24 @@ class Bench:
         return self._down(trial, _SETTLING, max(_WORTH * trial.cost, _NOT_NEARER * behind))
 
     def _down(self, trial: Trial, iterations: int, gain: float) -> Trial:
+        # by secants as far as they lead: valleys that curve ask for more
+        near, fit = self._near(trial, iterations, gain)
+        if fit.converged:
+            return near
+        gain = max(0.5, gain * trial.problem.samples)
+        fit = descend(
+            trial.problem, near.x, trial.fixed, iterations, gain, 1e-3, _PATIENCE, quick=True
+        )
+        return _trial(trial.problem, fit, trial.fixed)
+
+    @staticmethod
+    def _near(trial: Trial, iterations: int, gain: float) -> tuple[Trial, LocalFit]:
         # a part of what is left, whatever is left: more would only polish a misfit
         gain = max(0.5, gain * trial.problem.samples)
-        # by secants as far as they lead: valleys that curve ask for more
-        near = descend_by_secants(
+        fit = descend_by_secants(
             trial.problem, trial.x, trial.fixed, iterations=iterations, gain=gain
         )
-        fit = descend(trial.problem, near.x, trial.fixed, iterations, gain, 1e-3, quick=True)
-        return _trial(trial.problem, fit, trial.fixed)
+        return _trial(trial.problem, fit, trial.fixed), fit
 
     def ended(self, trial: Trial) -> Trial:
         """``trial`` at the bottom of its valley, or of a better one that a spare branch opens.
@@ -219,35 +237,37 @@ class Bench:
         While something was missing, branches gathered where they could imitate it; two that relax
         alike are one, and the other is of use elsewhere. What others build on must not lack it.
         """
-        best = self._down(trial, _ENDING, _WORTH * trial.cost)
-        layout = best.problem.layout
-        starts = _reseeded(layout, best.x)
+        near, _ = self._near(trial, _ENDING, _WORTH * trial.cost)
+        layout = near.problem.layout
+        starts = [] if near.is_white else _reseeded(layout, near.x)
         if not starts:
-            return best
+            return self._down(near, _ENDING, _WORTH * near.cost)
         scouts = [
-            descend_by_secants(best.problem, x, best.fixed, iterations=_SCOUTING, sure=False)
+            descend_by_secants(near.problem, x, near.fixed, iterations=_SCOUTING, sure=False)
             for x in starts
         ]
         leaders = sorted(scouts, key=lambda f: f.cost)[:_LEADERS]
         fits = [
-            descend_by_secants(best.problem, f.x, best.fixed, f.jacobian, _RESTART, sure=False)
+            descend_by_secants(near.problem, f.x, near.fixed, f.jacobian, _RESTART, sure=False)
             for f in leaders
         ]
-        other = min(fits, key=lambda f: f.cost)
+        other = _trial(near.problem, min(fits, key=lambda f: f.cost), near.fixed)
+        # who is far behind the other is not worth the rest of its way
+        if near.cost < _FAR_ABOVE * other.cost:
+            near = self._down(near, _ENDING, _WORTH * near.cost)
         # a few steps do not reach the bottom: nearly as good is promising
-        if other.cost < _NEARLY * best.cost:
-            again = _trial(best.problem, other, best.fixed)
-            again = self._down(again, _ENDING, _WORTH * again.cost)
-            return min(best, again, key=lambda t: t.cost)
-        return best
+        if other.cost < _NEARLY * near.cost:
+            other = self._down(other, _ENDING, _WORTH * other.cost)
+        return min(near, other, key=lambda t: t.cost)
 
     def restarted(self, trial: Trial) -> Trial:
         """``trial``, or a better fit that a new global search leads to; of films ``trial`` itself.
 
-        The baseline's search took what its effects do for work of the branches. Their part, as
-        the trial has it, is taken off the measurement, and the branches are sought anew.
+        So is one that leaves nothing to be found. The baseline's search took what its effects do
+        for work of the branches. Their part, as the trial has it, is taken off the measurement, and
+        the branches are sought anew.
         """
-        return self.sought(trial, trial.x)
+        return trial if trial.is_white else self.sought(trial, trial.x)
 
     def unaccounted(self, problem: Problem, x: np.ndarray) -> float:
         """Part of the Maxwell stress that no branches account for, beside the effects at ``x``.

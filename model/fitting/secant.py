@@ -20,6 +20,7 @@ _DAMPINGS = np.array([3e-3, 1.0])  # tried at once, times the present damping
 _DAMPING_MAX = 1e7
 _FLAT = 1e-9  # of the scaled curvature: flatter directions are not seen by the data
 _CARRIED = 5  # steps by secants, then the Jacobian is computed anew
+_PATIENCE = 3  # Jacobians that together must gain something
 _ASTRAY = 0.25  # of the gain that was promised: less, and the Jacobian is computed anew
 
 
@@ -58,8 +59,9 @@ def descend_by_secants(
     """From ``start`` (d,) down, the numbers ``fixed`` (d,) held, inside the layout's bounds.
 
     ``jacobian`` (N, f) is one known near the start, None to compute it; columns of it that are not
-    finite are computed. Ends where the quadratic model promises less than ``gain`` in chi-square:
-    with ``sure`` only by a Jacobian of that place.
+    finite are computed. Has converged where the quadratic model promises less than ``gain`` in
+    chi-square, with ``sure`` only by a Jacobian of that place; gives up where several Jacobians
+    together have gained no more.
     """
     layout = problem.layout
     free = ~fixed
@@ -74,8 +76,13 @@ def descend_by_secants(
         jac = jac.copy()
         jac[:, unknown] = problem.jacobian(x, which, r)
     damping, done, converged, carried = 1e-2, 0, False, 0
+    marks: list[float] = []
     while done < iterations:
         if jac is None:
+            # what promises and does not keep it is a valley that curves: secants do not follow it
+            marks.append(chi2)
+            if len(marks) > _PATIENCE and marks[-1 - _PATIENCE] - chi2 < gain:
+                break
             jac, fresh, carried = problem.jacobian(x, free, r), True, 0
         done += 1
         scale = np.linalg.norm(jac, axis=0)
