@@ -27,7 +27,7 @@ EFFECT = Effect(
             "of travel",
             5e-4,
             # near enough to each other to be told apart over the travel
-            starts=tuple(1.0 / n for n in (1.0, 1.3, 1.7, 2.2, 2.8, 3.4, 4.1, 4.9, 5.8, 6.8)),
+            starts=tuple(1.0 / (1.0 + 0.4 * n) for n in range(24)),
             part_of="displacement",
             logarithmic=True,
         ),
