@@ -14,8 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from model.actuator import Actuator
-from model.coefficients import REST
+from model.actuator import Actuator, at_rest
 from model.diagnosis.findings import Stage
 from model.film import Strip
 from model.fitting.identify import fit_globally, is_determined
@@ -213,23 +212,19 @@ class Bench:
 
     def _down(self, trial: Trial, iterations: int, gain: float) -> Trial:
         # by secants as far as they lead: valleys that curve ask for more
-        near, fit = self._near(trial, iterations, gain)
-        if fit.converged:
-            return near
-        gain = max(0.5, gain * trial.problem.samples)
-        fit = descend(
-            trial.problem, near.x, trial.fixed, iterations, gain, 1e-3, _PATIENCE, quick=True
-        )
+        fit = self._by_secants(trial, iterations, gain)
+        if not fit.converged:
+            fit = descend(
+                trial.problem, fit.x, trial.fixed, iterations, _chi2(trial, gain), 1e-3, _PATIENCE,
+                quick=True,
+            )  # fmt: skip
         return _trial(trial.problem, fit, trial.fixed)
 
     @staticmethod
-    def _near(trial: Trial, iterations: int, gain: float) -> tuple[Trial, LocalFit]:
-        # a part of what is left, whatever is left: more would only polish a misfit
-        gain = max(0.5, gain * trial.problem.samples)
-        fit = descend_by_secants(
-            trial.problem, trial.x, trial.fixed, iterations=iterations, gain=gain
+    def _by_secants(trial: Trial, iterations: int, gain: float) -> LocalFit:
+        return descend_by_secants(
+            trial.problem, trial.x, trial.fixed, iterations=iterations, gain=_chi2(trial, gain)
         )
-        return _trial(trial.problem, fit, trial.fixed), fit
 
     def ended(self, trial: Trial) -> Trial:
         """``trial`` at the bottom of its valley, or of a better one that a spare branch opens.
@@ -237,7 +232,8 @@ class Bench:
         While something was missing, branches gathered where they could imitate it; two that relax
         alike are one, and the other is of use elsewhere. What others build on must not lack it.
         """
-        near, _ = self._near(trial, _ENDING, _WORTH * trial.cost)
+        fit = self._by_secants(trial, _ENDING, _WORTH * trial.cost)
+        near = _trial(trial.problem, fit, trial.fixed)
         layout = near.problem.layout
         starts = [] if near.is_white else _reseeded(layout, near.x)
         if not starts:
@@ -269,22 +265,24 @@ class Bench:
         """
         return trial if trial.is_white else self.sought(trial, trial.x)
 
-    def unaccounted(self, problem: Problem, x: np.ndarray) -> float:
-        """Part of the Maxwell stress that no branches account for, beside the effects at ``x``.
+    def unaccounted(self, problem: Problem, xs: np.ndarray) -> np.ndarray:
+        """Parts (K,) of the Maxwell stress that no branches account for, beside effects at ``xs``.
 
-        By the measured stretch, without what the effects do to it; inf where that is not known.
-        Slow samples are enough, and quick.
+        By the measured stretch, without what the effects do to it at the coordinates (K, d); inf
+        where that is not known. Slow samples are enough, and quick.
         """
-        searched = self._without_effects(problem, x)
-        if searched is None:
-            return math.inf
-        slow = [r.coarse(_SLOW_RATE) for r in searched.records if isinstance(r, ActuatorRecord)]
-        c = problem.layout.coefficients(problem.layout.values(x)[None])[0]
-        return voltage_misfit(Problem(slow, searched.layout), float(c[REST]))
+        left = np.full(len(xs), math.inf)
+        cs = problem.layout.coefficients(problem.layout.values(xs))
+        for i, searched in enumerate(self._without_effects(problem, xs)):
+            if searched is not None:
+                records = [r for r in searched.records if isinstance(r, ActuatorRecord)]
+                slow = [r.coarse(_SLOW_RATE) for r in records]
+                left[i] = voltage_misfit(Problem(slow, searched.layout), at_rest(cs[i])[1])
+        return left
 
     def sought(self, trial: Trial, start: np.ndarray) -> Trial:
         """``trial``, or a better fit from ``start`` (d,) with the branches sought anew for it."""
-        searched = self._without_effects(trial.problem, start)
+        (searched,) = self._without_effects(trial.problem, start[None])
         if searched is None:
             return trial
         fits = [
@@ -302,30 +300,34 @@ class Bench:
             return trial
         return min(trial, self._down(other, _ENDING, _WORTH * other.cost), key=lambda t: t.cost)
 
-    def _without_effects(self, problem: Problem, x: np.ndarray) -> Problem | None:
-        """The records without the part that the effects have at ``x`` (d,): for the springs alone.
+    def _without_effects(self, problem: Problem, xs: np.ndarray) -> list[Problem | None]:
+        """The records without what the effects do at each of ``xs`` (K, d): for the springs alone.
 
         None of films, and of a model that cannot follow the records.
         """
         model = problem.layout.base
         if isinstance(model, Strip):
-            return None
+            return [None] * len(xs)
         if not model.effects:
-            return problem
+            return [problem] * len(xs)
         plain = self.problem(replace(model, effects=()))
-        with_them, status = problem.predict(problem.layout.values(x)[None])
-        without, status_too = plain.predict(plain.layout.values(x[: plain.layout.size])[None])
-        if status.any() or status_too.any():
-            return None
-        parts = np.split(
-            with_them[0] - without[0], np.cumsum([r.measured.size for r in self.records])
-        )
-        corrected = [
-            replace(r, displacement=r.displacement - part)
-            for r, part in zip(self.records, parts, strict=False)
-            if isinstance(r, ActuatorRecord)
-        ]
-        return Problem(corrected, plain.layout, self.workers, True, self._count)
+        # sizes of one effect are tried with the same springs
+        springs, which = np.unique(xs[:, : plain.layout.size], axis=0, return_inverse=True)
+        without, lost = plain.predict(plain.layout.values(springs))
+        with_them, failed = problem.predict(problem.layout.values(xs))
+        edges = np.cumsum([r.measured.size for r in self.records])[:-1]
+        found: list[Problem | None] = []
+        for there, bad, i in zip(with_them, failed, which.ravel(), strict=True):
+            if bad or lost[i]:
+                found.append(None)
+                continue
+            corrected = [
+                replace(r, displacement=r.displacement - part)
+                for r, part in zip(self.records, np.split(there - without[i], edges), strict=True)
+                if isinstance(r, ActuatorRecord)
+            ]
+            found.append(Problem(corrected, plain.layout, self.workers, True, self._count))
+        return found
 
     def polished(self, trial: Trial) -> Trial:
         """``trial`` fitted to every sample, to the end."""
@@ -443,6 +445,14 @@ def _reseeded(layout: Layout, x: np.ndarray) -> list[np.ndarray]:
     starts = [moved(time, stiffest, 0.0) for time in elsewhere]
     beside = float(values[times[stiffest]])
     return [*starts, *(moved(beside * ratio, stiffest, 0.5) for ratio in _BESIDE)]
+
+
+def _chi2(trial: Trial, gain: float) -> float:
+    """What a descent must promise of chi-square: a part of what is left, whatever is left.
+
+    More would only polish a misfit.
+    """
+    return max(0.5, gain * trial.problem.samples)
 
 
 def _trial(problem: Problem, fit: LocalFit, fixed: np.ndarray) -> Trial:

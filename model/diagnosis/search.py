@@ -410,7 +410,7 @@ class _Search:
             parent = one.parent
             key = frozenset(parent.effects)
             if key not in before:
-                before[key] = self.bench.unaccounted(parent.problem, parent.x)
+                (before[key],) = self.bench.unaccounted(parent.problem, parent.x[None])
             left, start = self._unaccounted(one)
             if left < _IN_THE_WAY * before[key]:
                 looks.append((left, place, start))
@@ -429,25 +429,20 @@ class _Search:
 
     def _unaccounted(self, tried: _Tried) -> tuple[float, np.ndarray]:
         """What branches do not account for beside the effect, at the best of sizes; that place."""
-        effect, trial = EFFECTS[tried.name], tried.trial
+        size, trial = EFFECTS[tried.name].sizes, tried.trial
+        if len(size) != 1:
+            return math.inf, trial.x
         layout = trial.problem.layout
         first = tried.parent.x.size
-        best, place = math.inf, trial.x
-        if len(effect.sizes) != 1:
-            return best, place
-        values = layout.values(trial.x)
-        values[:first] = tried.parent.problem.layout.values(tried.parent.x)
-
-        def at(size: float) -> np.ndarray:
-            there = values.copy()
-            there[first] = size
-            return np.clip(layout.coordinates(there), layout.lower, layout.upper)
-
-        for size in sizes_of(effect.sizes[0], _ANEW_SIZES):
-            left = self.bench.unaccounted(trial.problem, at(size))
-            if left < best:
-                best, place = left, at(size)
-        return best, place
+        sizes = sizes_of(size[0], _ANEW_SIZES)
+        values = np.tile(layout.values(trial.x), (len(sizes), 1))
+        values[:, :first] = tried.parent.problem.layout.values(tried.parent.x)
+        values[:, first] = sizes
+        places = np.array([layout.coordinates(v) for v in values])
+        places = np.clip(places, layout.lower, layout.upper)
+        left = self.bench.unaccounted(trial.problem, places)
+        best = int(np.argmin(left))
+        return float(left[best]), places[best]
 
     def _simpler(self, parent: Trial, effect: Effect, start: np.ndarray) -> np.ndarray | None:
         """Coordinates of the best fit of a simpler effect of the family, as a start for this one.
