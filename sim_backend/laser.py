@@ -121,8 +121,9 @@ def _averages(
 class LaserState:
     """What the average still needs of the past.
 
-    ``position`` and ``velocity`` (K,) are the nodes since ``first_node``, ``draws`` (Q, 2) the
-    noise of the last sample intervals, ``alarm`` whether the film is out of range.
+    ``position`` and ``velocity`` (K,) are the nodes since ``first_node``, none before the first
+    read; ``draws`` (Q, 2) is the noise of the last sample intervals, ``alarm`` whether the film is
+    out of range.
     """
 
     first_node: int
@@ -158,8 +159,8 @@ class Laser:
         self._before = generator.standard_normal((int(self._whole) + 1, 2))
 
     def start(self) -> LaserState:
-        """State with the film at rest."""
-        return LaserState(0, np.zeros(1), np.zeros(1), self._before)
+        """State before the first read."""
+        return LaserState(0, np.zeros(0), np.zeros(0), self._before)
 
     def read(
         self,
@@ -172,11 +173,13 @@ class Laser:
     ) -> tuple[LaserRows, LaserState]:
         """Read at ``times`` (N,) s the film's ``position`` m and ``velocity`` m/s at nodes (K,).
 
-        The first node is the last one of the read before (the state's); times lie within the nodes.
+        The first node is the last one of the read before (the state's), if there was one; times lie
+        within the nodes.
         """
         settings = self._settings
-        position = np.concatenate((state.position, position[1:]))
-        velocity = np.concatenate((state.velocity, velocity[1:]))
+        if state.position.size:
+            position = np.concatenate((state.position, position[1:]))
+            velocity = np.concatenate((state.velocity, velocity[1:]))
         mean = np.empty(times.size)
         _averages(
             position,

@@ -176,6 +176,14 @@ def test_noise_has_the_set_size_and_is_correlated_where_windows_overlap(averagin
     assert np.mean(noise[1:] * noise[:-1]) == pytest.approx(expected, abs=0.04)
 
 
+def test_the_first_reading_is_taken_where_the_film_is():
+    # what hums at the first sample already, as mains do, has not jumped there from rest
+    position = 2.7e-5 * np.cos(2.0 * np.pi * 60.0 * np.arange(201) * 5e-4)
+    instrument = laser(averaging=1, interval=5e-4, clock_error_ppm=0.0)
+    volts, _ = read_all(instrument, position, np.zeros(position.size), interval=5e-4)
+    assert volts[0] * 4e-3 == pytest.approx(2.7e-5, rel=0.02)
+
+
 def test_laser_direction_resolution_range_and_alarm():
     travel = np.linspace(0.0, 0.05, 2001)
     velocity = np.full(travel.size, 0.025)
