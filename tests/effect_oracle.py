@@ -112,7 +112,7 @@ def extra(name, p, film, drive):
 
     def distributed():
         k, reach, count = p["stiffness"], p["reach"], 8
-        ends = [reach * (i + 0.5) / count for i in range(count)]
+        ends = [reach * ((i + 0.5) / count) ** p["spread"] for i in range(count)]
 
         def moved(z, travel):
             return [limited(a + travel, -e, e) for a, e in zip(z, ends, strict=True)]
@@ -177,8 +177,9 @@ def extra(name, p, film, drive):
 
     def broad():
         at = np.arange(6) - 2.5
-        weights = np.exp(-(at**2) / 2.0) / np.sum(np.exp(-(at**2) / 2.0))
-        times = p["relaxation_time"] * np.exp(p["width"] * at)
+        weights = 1.0 / (np.cosh(at) + math.cos(math.pi * (1.0 - p["alpha"])))
+        weights /= weights.sum()
+        times = p["relaxation_time"] * np.exp(at / (1.0 - p["alpha"]))
         return Extra(
             states=6,
             square=lambda t, lam, u, z, v: polarised(v, float(weights @ np.array(z))),

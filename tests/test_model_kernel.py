@@ -364,7 +364,7 @@ def test_swinging_dragging_and_giving_way_in_closed_form(drag):
         (),
         (("linear drag", (("drag", 30.0),)),),
         (("Mullins softening", (("softening", 0.01), ("width", 0.5))),),
-        (("distributed hysteresis", (("stiffness", 1e4), ("reach", 0.02))),),
+        (("distributed hysteresis", (("stiffness", 1e4), ("reach", 0.02), ("spread", 1.0))),),
         (("electrode resistance", (("resistance", 2e7),)),),
     ],
     ids=lambda e: e[0][0] if e else "plain",

@@ -1,8 +1,8 @@
 """Slow polarisation spread over many times, as most polymers have it: a broad Debye spectrum.
 
-Six Debye terms as of ``dielectric_relaxation``, T_i = T exp(w z_i) with the weights of a bell curve
-over ln T of width w (a log-normal spectrum; Cole and Cole's, J. Chem. Phys. 9, 341 (1941), is alike
-but for its tails), at z_i = -2.5, -1.5 ... 2.5.
+Cole and Cole's (J. Chem. Phys. 9, 341 (1941)): the strength is spread over y = ln(T_i/T) as
+1/(cosh((1 - alpha) y) - cos(pi alpha)). Six Debye terms as of ``dielectric_relaxation`` stand for
+it, at (1 - alpha) y = -2.5, -1.5 ... 2.5.
 """
 
 from __future__ import annotations
@@ -34,13 +34,12 @@ EFFECT = Effect(
             logarithmic=True,
         ),
         Parameter(
-            "width",
+            "alpha",
             "",
-            (0.2, 3.0),
-            "of the spectrum, in the logarithm of time",
-            1.5,
-            starts=(1.5,),
-            logarithmic=True,
+            (0.1, 0.8),
+            "of Cole and Cole: the larger, the broader is the spectrum",
+            0.1,
+            starts=(0.4,),
         ),
         Parameter(
             "settled",
@@ -56,22 +55,22 @@ EFFECT = Effect(
 
 _TERMS = 6
 _FIRST = -2.5
-_WEIGHTS = tuple(
-    math.exp(-0.5 * (_FIRST + i) ** 2) / sum(math.exp(-0.5 * (_FIRST + n) ** 2) for n in range(6))
-    for i in range(_TERMS)
-)
+_HEIGHTS = tuple(math.cosh(_FIRST + i) for i in range(_TERMS))
 
 
 @jit
 def polarise(c, k, m, j, start, end, h):
-    before, after = 0.0, 0.0
+    before, after, whole = 0.0, 0.0, 0.0
+    sharp = math.cos(math.pi * c[k + 2])
     for i in range(_TERMS):
-        slow = m[j + i]
-        before += _WEIGHTS[i] * slow
-        m[j + i] = lagged(slow, start, end, h, c[k + 1] * math.exp(c[k + 2] * (_FIRST + i)))
-        after += _WEIGHTS[i] * m[j + i]
+        weight = 1.0 / (_HEIGHTS[i] - sharp)
+        whole += weight
+        before += weight * m[j + i]
+        late = c[k + 1] * math.exp((_FIRST + i) / (1.0 - c[k + 2]))
+        m[j + i] = lagged(m[j + i], start, end, h, late)
+        after += weight * m[j + i]
     share = c[k] / (1.0 + c[k + 3] * c[k])
     return (
-        share * start * (before - c[k + 3] * start),
-        share * end * (after - c[k + 3] * end),
+        share * start * (before / whole - c[k + 3] * start),
+        share * end * (after / whole - c[k + 3] * end),
     )

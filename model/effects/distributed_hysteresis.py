@@ -1,10 +1,15 @@
 """Rate-independent hysteresis as a distribution of yielding elements (Prandtl and Ishlinskii).
 
-Eight elements in parallel, each a spring that slips when it is strained beyond its own threshold;
-thresholds lie evenly up to the reach r. Small loops are parabolic, as Rayleigh found for iron.
+Eight equal elements in parallel, each a spring that slips when it is strained beyond its own
+threshold. The share of them that slips below the threshold s is (s/r)^(1/p) up to the reach r, a
+power law as in Segalman (J. Appl. Mech. 72, 2005). With the spread p = 1 thresholds lie evenly, and
+small loops are parabolic, as Rayleigh found for iron; near 0 all slip at once; a large p rounds the
+loop from its very beginning.
 """
 
 from __future__ import annotations
+
+import math
 
 from model.effects.description import Effect, Parameter
 from model.jit import jit
@@ -29,6 +34,14 @@ EFFECT = Effect(
             starts=(2e-2, 5e-3, 0.5),
             logarithmic=True,
         ),
+        Parameter(
+            "spread",
+            "",
+            (0.05, 4.0),
+            "of the elements: 0 if all slip at the reach, 1 if evenly up to it",
+            0.1,
+            starts=(1.0,),
+        ),
     ),
     memory=8,
     drives=("voltage", "stretch"),
@@ -36,13 +49,14 @@ EFFECT = Effect(
 
 
 _ELEMENTS = 8
+_LOGS = tuple(math.log((i + 0.5) / _ELEMENTS) for i in range(_ELEMENTS))
 
 
 @jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
     total, travel = 0.0, lam - lam0
     for i in range(_ELEMENTS):
-        threshold = c[k + 1] * (i + 0.5) / _ELEMENTS
+        threshold = c[k + 1] * math.exp(c[k + 2] * _LOGS[i])
         total += min(max(m[j + i] + travel, -threshold), threshold)
     return c[k] * total / _ELEMENTS
 
@@ -55,6 +69,6 @@ def stiffness(c, k, m, j, lam, rate):
 @jit
 def commit(c, k, m, j, lam, rate, lam0, h, t):
     for i in range(_ELEMENTS):
-        threshold = c[k + 1] * (i + 0.5) / _ELEMENTS
+        threshold = c[k + 1] * math.exp(c[k + 2] * _LOGS[i])
         m[j + i] = min(max(m[j + i] + lam - lam0, -threshold), threshold)
     return 0

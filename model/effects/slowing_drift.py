@@ -1,0 +1,41 @@
+"""Drift of the sensor's zero that slows down but does not settle: a mount that creeps, heat that
+spreads into it.
+
+The reading is moved by d ((1 + t/T)^n - 1)/((1 + 30 s/T)^n - 1), t since the record began: with
+n = 1 at one rate, with 1/2 as by diffusion, near 0 with the logarithm of time.
+"""
+
+from __future__ import annotations
+
+from model.effects.description import Effect, Parameter
+from model.jit import jit
+
+__all__ = ["EFFECT", "sense"]
+
+EFFECT = Effect(
+    name="slowing drift",
+    family="drift",
+    acts_on="sensor",
+    words="the reading runs away with time, ever slower, whatever the film does",
+    parameters=(
+        Parameter("drift", "m", (-5e-3, 5e-3), "of the zero within 30 s", 3e-6, 0.0),
+        Parameter(
+            "onset",
+            "s",
+            (0.1, 100.0),
+            "time after which it slows down",
+            2.0,
+            starts=(2.0,),
+            logarithmic=True,
+        ),
+        Parameter("exponent", "", (0.02, 1.0), "power of time", 0.1, starts=(0.5,)),
+    ),
+)
+
+_AT = 30.0  # s
+
+
+@jit
+def sense(c, k, m, j, t, dt, x, u):
+    late = (1.0 + t / c[k + 1]) ** c[k + 2] - 1.0
+    return x + c[k] * late / ((1.0 + _AT / c[k + 1]) ** c[k + 2] - 1.0)
