@@ -267,7 +267,9 @@ def extra(name, p, film, drive):
             voltage=lambda t, lam, u, z, v: v * (1.0 - p["loss"] * ramped(t - p["moment"]))
         ),
         "leakage": lambda: Extra(
-            voltage=lambda t, lam, u, z, v: v * (1.0 - p["loss"] * (v / 8e3) ** p["exponent"])
+            voltage=lambda t, lam, u, z, v: (
+                v * (1.0 - p["loss"] * math.exp(p["exponent"] * (math.sqrt(v * lam / 8e3) - 1.0)))
+            )
         ),
         "linear drag": lambda: Extra(stress=lambda t, lam, u, z, v: p["drag"] * u),
         "power-law drag": lambda: Extra(

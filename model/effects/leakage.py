@@ -1,10 +1,13 @@
 """Leakage through the film, whose current drops a part of the voltage in the electrodes.
 
-Conduction that grows faster than the field (Poole-Frenkel, space charge) leaves the film short of
-s V (|V|/8 kV)^n at the voltage V: nothing at small voltages, most at the peak.
+The film conducts better in a strong field, whose traps let their charges go (Poole and Frenkel;
+Phys. Rev. 54, 647 (1938)). The conductivity goes with exp(b sqrt(E)), so that of the voltage V the
+part s exp(b (sqrt(|V| lam/8 kV) - 1)) is lost: nothing at small voltages, most at the peak.
 """
 
 from __future__ import annotations
+
+import math
 
 from model.effects.description import Effect, Parameter
 from model.jit import jit
@@ -17,14 +20,21 @@ EFFECT = Effect(
     acts_on="electrode",
     words="the film sees less than the amplifier gives, the more the higher the voltage",
     parameters=(
-        Parameter("loss", "", (0.0, 0.5), "part of the voltage that is lost at 8 kV", 0.02, 0.0),
+        Parameter(
+            "loss",
+            "",
+            (0.0, 0.5),
+            "part of the voltage that is lost at 8 kV over the unstretched film",
+            0.02,
+            0.0,
+        ),
         Parameter(
             "exponent",
             "",
-            (0.5, 12.0),
-            "by which the lost part grows with the voltage",
+            (0.5, 20.0),
+            "by which the lost part grows with the root of the field",
             2.0,
-            starts=(2.0, 5.0),
+            starts=(4.0, 12.0),
         ),
     ),
 )
@@ -36,6 +46,6 @@ _REFERENCE = 8e3  # V
 @jit
 def supply(c, k, m, j, t, start, end, h, lam, rate):
     # no more can be lost than there is
-    a = start * max(1.0 - c[k] * (abs(start) / _REFERENCE) ** c[k + 1], 0.0)
-    b = end * max(1.0 - c[k] * (abs(end) / _REFERENCE) ** c[k + 1], 0.0)
-    return a, b
+    a = c[k] * math.exp(c[k + 1] * (math.sqrt(abs(start) * lam / _REFERENCE) - 1.0))
+    b = c[k] * math.exp(c[k + 1] * (math.sqrt(abs(end) * lam / _REFERENCE) - 1.0))
+    return start * max(1.0 - a, 0.0), end * max(1.0 - b, 0.0)
