@@ -6,10 +6,12 @@ import math
 
 from model.jit import jit
 
-__all__ = ["along_cubic", "lagged", "low_pass", "slewed", "slid", "switched", "swung"]
+__all__ = ["along_cubic", "lagged", "low_pass", "slewed", "slid", "switched", "swung", "wound"]
 
 _SMALL = 0.1
 _SWITCHING = 0.02  # s: long enough for a fit to find the moment
+_WINDING = 0.25  # reaches over the power, a step: within 3e-5 of the yield stress
+_YIELDED = 1.0 - 1e-6  # of the yield stress: the loop has come to its end
 
 
 @jit
@@ -95,6 +97,43 @@ def slid(z: float, travel: float, reach: float) -> float:
     """Strain of a yielding element after ``travel`` one way: it goes to +-``reach``, from ``z``."""
     end = math.copysign(reach, travel)
     return end + (z - end) * math.exp(-abs(travel) / reach)
+
+
+@jit
+def _winds(b: float, exponent: float, asymmetry: float) -> float:
+    return 1.0 - abs(b) ** exponent * (1.0 - asymmetry + math.copysign(asymmetry, b))
+
+
+@jit
+def wound(b: float, travel: float, exponent: float, asymmetry: float) -> float:
+    """Bouc and Wen's loop, -1 to 1, from ``b`` after ``travel`` one way, in reaches.
+
+    b' = 1 - |b|^n (1 - s + s sign(b)) along the travel, by Runge and Kutta's steps of fourth order
+    on either side of b = 0, where the law has a corner.
+    """
+    way = math.copysign(1.0, travel)
+    b *= way
+    left = abs(travel)
+    longest = _WINDING / max(exponent, 1.0)
+    # who has yielded stays there
+    while left > 0.0 and b < _YIELDED:
+        h = min(left, longest)
+        k1 = _winds(b, exponent, asymmetry)
+        if b < 0.0 <= b + h * k1:
+            # Simpson's rule for the way to 0
+            middle = _winds(0.5 * b, exponent, asymmetry)
+            h = -b / 6.0 * (1.0 / k1 + 4.0 / middle + 1.0)
+            if h <= left:
+                b = 0.0
+                left -= h
+                continue
+            h = left
+        k2 = _winds(b + 0.5 * h * k1, exponent, asymmetry)
+        k3 = _winds(b + 0.5 * h * k2, exponent, asymmetry)
+        k4 = _winds(b + h * k3, exponent, asymmetry)
+        b += h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+        left -= h
+    return way * min(b, 1.0)
 
 
 @jit

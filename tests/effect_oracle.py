@@ -102,12 +102,26 @@ def extra(name, p, film, drive):
 
         return Extra(voltage=voltage)
 
-    def hysteresis(size, reach):
+    def friction():
         # the differential form of Dahl: towards +-reach against every reversal
+        size, reach = p["friction"], p["presliding"]
         return Extra(
             states=1,
             stress=lambda t, lam, u, z, v: size * z[0] / reach,
             slopes=lambda t, lam, u, z, v: (u - abs(u) * z[0] / reach,),
+        )
+
+    def elastoplastic():
+        # as Bouc and Wen have it: A x' - beta |x'| |z|^(n - 1) z - gamma x' |z|^n
+        n, beta = p["exponent"], p["asymmetry"]
+
+        def slope(x, z):
+            return x - beta * abs(x) * abs(z) ** n * (1 - 2 * (z < 0)) - (1 - beta) * x * abs(z) ** n
+
+        return Extra(
+            states=1,
+            stress=lambda t, lam, u, z, v: p["yield_stress"] * z[0],
+            slopes=lambda t, lam, u, z, v: (slope(u / p["reach"], z[0]),),
         )
 
     def distributed():
@@ -246,8 +260,8 @@ def extra(name, p, film, drive):
             slopes=lambda t, lam, u, z, v: ((v - z[0]) / p["relaxation_time"],),
         ),
         "distributed hysteresis": distributed,
-        "dry friction": lambda: hysteresis(p["friction"], p["presliding"]),
-        "elastoplastic hysteresis": lambda: hysteresis(p["yield_stress"], p["reach"]),
+        "dry friction": friction,
+        "elastoplastic hysteresis": elastoplastic,
         "electrode resistance": charging,
         "strained electrode": lambda: charging(p["gauge"]),
         "stress beyond a displacement": lambda: Extra(

@@ -1,16 +1,16 @@
 """Rate-independent hysteresis of the film itself: one yielding element in parallel to its springs.
 
-Bouc and Wen's model with equal constants, which is Dahl's: a stress that approaches Y over the
-stretch r against every reversal. The film's own loops open over a good part of the stroke, where
-those of dry friction open within a few micrometres.
+Bouc and Wen's model (J. Eng. Mech. Div. ASCE 102, 1976): the stress is Y b, and over the stretch r
+db/d(lam/r) = 1 - |b|^n (1 - s + s sign(b lam')). With n = s = 1 it is Dahl's; a large n yields at
+once; with s = 1/2 what is unloaded is as stiff as what is fresh. The film's own loops open over a
+good part of the stroke, where those of dry friction open within a few micrometres.
 """
 
 from __future__ import annotations
 
 from model.effects.description import Effect, Parameter
-
-# one law, on another scale of stretch: the same functions, with numbers of their own
-from model.effects.dry_friction import commit, stiffness, stress
+from model.filters import wound
+from model.jit import jit
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 
@@ -26,14 +26,41 @@ EFFECT = Effect(
         Parameter(
             "reach",
             "",
-            (1e-3, 1.0),
+            (3e-4, 1.0),
             "change of stretch over which the stress builds up",
             5e-3,
             starts=(5e-3, 2e-3, 1.5e-2, 0.2),
             logarithmic=True,
+        ),
+        Parameter(
+            "exponent", "", (0.7, 6.0), "the larger, the sharper it yields", 0.5, starts=(1.5,)
+        ),
+        Parameter(
+            "asymmetry",
+            "",
+            (0.5, 1.0),
+            "1/2 if unloading begins as stiff as what is fresh, 1 if twice as stiff",
+            0.1,
+            starts=(0.8,),
         ),
     ),
     memory=1,
     turns=True,
     drives=("voltage", "stretch"),
 )
+
+
+@jit
+def stress(c, k, m, j, lam, rate, lam0, since, t):
+    return c[k] * wound(m[j], (lam - lam0) / c[k + 1], c[k + 2], c[k + 3])
+
+
+@jit
+def stiffness(c, k, m, j, lam, rate):
+    return 2.0 * c[k + 3] * c[k] / c[k + 1], 0.0
+
+
+@jit
+def commit(c, k, m, j, lam, rate, lam0, h, t):
+    m[j] = wound(m[j], (lam - lam0) / c[k + 1], c[k + 2], c[k + 3])
+    return 0
