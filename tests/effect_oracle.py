@@ -116,7 +116,9 @@ def extra(name, p, film, drive):
         n, beta = p["exponent"], p["asymmetry"]
 
         def slope(x, z):
-            return x - beta * abs(x) * abs(z) ** n * (1 - 2 * (z < 0)) - (1 - beta) * x * abs(z) ** n
+            return (
+                x - beta * abs(x) * abs(z) ** n * (1 - 2 * (z < 0)) - (1 - beta) * x * abs(z) ** n
+            )
 
         return Extra(
             states=1,

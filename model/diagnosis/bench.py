@@ -48,7 +48,8 @@ _WHITE_COST, _WHITE_CORRELATION = 1.04, 1.3  # a lead-in tells the noise to some
 _PATIENCE = 3  # iterations down a valley that together must gain something
 _NEARLY = 1.02  # of the cost: a descent from elsewhere that comes so near is followed on
 _FAR_ABOVE = 1.1  # of the cost of a descent from elsewhere: such a valley is left
-_RESTARTS = 3  # from a new global search, beside what was found
+_RESTARTS = 2  # from a new global search, beside what was found
+_SETTING = 6  # iterations of the branches alone
 _RESTART = 10  # iterations of each
 _LEADERS = 2  # of several starts that are followed on: the best at first does not always get down
 _ALIKE = 0.5  # of the logarithm of relaxation times: a factor of 1.6
@@ -263,7 +264,7 @@ class Bench:
         for work of the branches. Their part, as the trial has it, is taken off the measurement, and
         the branches are sought anew.
         """
-        return trial if trial.is_white else self.sought(trial, trial.x)
+        return trial if trial.is_white else self.sought(trial, trial.x[None])
 
     def unaccounted(self, problem: Problem, xs: np.ndarray) -> np.ndarray:
         """Parts (K,) of the Maxwell stress that no branches account for, beside effects at ``xs``.
@@ -280,21 +281,29 @@ class Bench:
                 left[i] = voltage_misfit(Problem(slow, searched.layout), at_rest(cs[i])[1])
         return left
 
-    def sought(self, trial: Trial, start: np.ndarray) -> Trial:
-        """``trial``, or a better fit from ``start`` (d,) with the branches sought anew for it."""
-        (searched,) = self._without_effects(trial.problem, start[None])
-        if searched is None:
+    def sought(self, trial: Trial, starts: np.ndarray) -> Trial:
+        """``trial``, or a better fit from one of ``starts`` (K, d), with the branches sought anew.
+
+        They settle beside the effects as these are there, before all are fitted.
+        """
+        held = trial.fixed.copy()
+        held[self.problem(replace(trial.model, effects=())).layout.size :] = True
+        fits = []
+        for start, searched in zip(
+            starts, self._without_effects(trial.problem, starts), strict=True
+        ):
+            if searched is None:
+                continue
+            for springs in voltage_starts(searched, lambda *_: None, _RESTARTS):
+                x = np.concatenate([springs, start[springs.size :]])
+                x = descend_by_secants(trial.problem, x, held, iterations=_SETTING, sure=False).x
+                fits.append(
+                    descend_by_secants(
+                        trial.problem, x, trial.fixed, iterations=_RESTART, sure=False
+                    )
+                )
+        if not fits:
             return trial
-        fits = [
-            descend_by_secants(
-                trial.problem,
-                np.concatenate([springs, start[springs.size :]]),
-                trial.fixed,
-                iterations=_RESTART,
-                sure=False,
-            )
-            for springs in voltage_starts(searched, lambda *_: None, _RESTARTS)
-        ]
         other = _trial(trial.problem, min(fits, key=lambda f: f.cost), trial.fixed)
         if other.cost > _NEARLY * trial.cost:
             return trial

@@ -60,6 +60,8 @@ _IN_THE_WAY = 0.8  # of what no branches account for: with an effect that leaves
 _CLEARLY = 2.0  # of the least that is left: more, and it is not the one that they hid
 _ANEW = 6  # of such effects that are fitted anew
 _ANEW_SIZES = (0.3, 1.0, 3.0, 10.0, 30.0)  # times the typical one, tried for that
+_ANEW_CLOSER = (0.56, 0.75, 1.0, 1.33, 1.78)  # times the best of these
+_ANEW_FROM = (1.0, 1.33, 1.78)  # times that: the branches' measure of it is on the small side
 _FOLLOWED = 12  # candidates refitted in later rounds, the most promising ones
 _EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
@@ -404,45 +406,49 @@ class _Search:
         branches account for more of the Maxwell stress than before?
         """
         before: dict[frozenset[str], float] = {}
-        looks: list[tuple[float, int, np.ndarray]] = []
+        looks: list[tuple[float, int, float]] = []
         for place, one in enumerate(tried):
             self._check()
             parent = one.parent
             key = frozenset(parent.effects)
             if key not in before:
                 (before[key],) = self.bench.unaccounted(parent.problem, parent.x[None])
-            left, start = self._unaccounted(one)
+            sizes = EFFECTS[one.name].sizes
+            if len(sizes) != 1:
+                continue
+            left, size = self._unaccounted(one, sizes_of(sizes[0], _ANEW_SIZES))
             if left < _IN_THE_WAY * before[key]:
-                looks.append((left, place, start))
+                left, size = self._unaccounted(one, [f * size for f in _ANEW_CLOSER])
+                looks.append((left, place, size))
         looks.sort(key=lambda look: look[0])
         again = list(tried)
-        for left, place, start in looks[:_ANEW]:
+        for left, place, size in looks[:_ANEW]:
             if left > _CLEARLY * looks[0][0]:
                 break
             self._check()
             one = tried[place]
-            trial = self.bench.sought(one.trial, start)
+            trial = self.bench.sought(one.trial, self._sized(one, [f * size for f in _ANEW_FROM]))
             if trial is not one.trial:
                 self._keep(trial)
                 again[place] = replace(one, trial=trial)
         return again
 
-    def _unaccounted(self, tried: _Tried) -> tuple[float, np.ndarray]:
-        """What branches do not account for beside the effect, at the best of sizes; that place."""
-        size, trial = EFFECTS[tried.name].sizes, tried.trial
-        if len(size) != 1:
-            return math.inf, trial.x
-        layout = trial.problem.layout
+    def _unaccounted(self, tried: _Tried, sizes: Sequence[float]) -> tuple[float, float]:
+        """What branches do not account for beside the effect, at the best of ``sizes``; which."""
+        left = self.bench.unaccounted(tried.trial.problem, self._sized(tried, sizes))
+        best = int(np.argmin(left))
+        return float(left[best]), sizes[best]
+
+    @staticmethod
+    def _sized(tried: _Tried, sizes: Sequence[float]) -> np.ndarray:
+        """Coordinates (K, d): the parent's, and the effect as it was fitted, but of ``sizes``."""
+        layout = tried.trial.problem.layout
         first = tried.parent.x.size
-        sizes = sizes_of(size[0], _ANEW_SIZES)
-        values = np.tile(layout.values(trial.x), (len(sizes), 1))
+        values = np.tile(layout.values(tried.trial.x), (len(sizes), 1))
         values[:, :first] = tried.parent.problem.layout.values(tried.parent.x)
         values[:, first] = sizes
         places = np.array([layout.coordinates(v) for v in values])
-        places = np.clip(places, layout.lower, layout.upper)
-        left = self.bench.unaccounted(trial.problem, places)
-        best = int(np.argmin(left))
-        return float(left[best]), places[best]
+        return np.clip(places, layout.lower, layout.upper)
 
     def _simpler(self, parent: Trial, effect: Effect, start: np.ndarray) -> np.ndarray | None:
         """Coordinates of the best fit of a simpler effect of the family, as a start for this one.
