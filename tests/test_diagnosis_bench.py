@@ -136,7 +136,7 @@ def test_the_measured_stretch_tells_what_branches_imitate():
 
     fixed = np.append(bare.fixed, False)
     stuck = bench.fit(with_lag, [(at(0.0), None)], fixed)
-    sought = bench.sought(stuck, at(near))
+    sought = bench.sought(stuck, np.array([at(near), at(1.5 * near)]))
     # not yet at the noise, but in the valley that leads there
     assert stuck.cost > 3.0
     assert sought.cost < 1.2
@@ -147,7 +147,7 @@ def test_films_have_no_voltage_to_account_for():
     bench = bench_of(film_record_of(STRIP))
     trial = fitted(bench, STRIP)
     assert bench.unaccounted(trial.problem, trial.x[None]) == [math.inf]
-    assert bench.sought(trial, trial.x) is trial
+    assert bench.sought(trial, trial.x[None]) is trial
 
 
 # --- time that is left out
