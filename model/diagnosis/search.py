@@ -55,7 +55,7 @@ _UNNAMED_MARGIN = (
 _PROMISES = 2  # of one effect, in different shapes, from which a fit sets out
 _NEARLY = 0.8  # of the best promise of an effect: another shape that is worth a start
 _BETTER = 1e-4  # of the cost: less is the same place
-_IN_THE_WAY = 0.8  # of what no branches account for: with an effect that leaves less, they hid it
+_IN_THE_WAY = 0.9  # of what no branches account for: with an effect that leaves less, they hid it
 _CLEARLY = 2.0  # of the least that is left: more, and it is not the one that they hid
 _ANEW = 6  # of such effects that are fitted anew
 _ANEW_SIZES = (0.3, 1.0, 3.0, 10.0, 30.0)  # times the typical one, tried for that
@@ -258,7 +258,7 @@ class _Search:
             if not tried:
                 break
             fitted, correlation = self._settled(best, tried)
-            if fitted[0].trial.cost > _EXPLAINED_RMS**2:
+            if not self._is_noise(best):
                 fitted, correlation = self._settled(best, self._anew(fitted))
             leader = fitted[0].trial
             gain = self._criterion(best, correlation) - self._criterion(leader, correlation)
@@ -402,7 +402,8 @@ class _Search:
 
         While an effect was missing, the branches imitated it, and a descent from there may not find
         out. The measured stretch tells without one: with the effect's part taken off it, do
-        branches account for more of the Maxwell stress than before?
+        branches account for more of the Maxwell stress than before? Where the leader explains all,
+        only those are fitted anew beside which they account for more than beside it.
         """
         before: dict[frozenset[str], float] = {}
         looks: list[tuple[float, int, float]] = []
@@ -420,6 +421,9 @@ class _Search:
                 left, size = self._unaccounted(one, [f * size for f in _ANEW_CLOSER])
                 looks.append((left, place, size))
         looks.sort(key=lambda look: look[0])
+        if tried[0].trial.cost < _EXPLAINED_RMS**2:
+            places = [place for _, place, _ in looks]
+            looks = looks[: places.index(0)] if 0 in places else looks
         again = list(tried)
         for left, place, size in looks[:_ANEW]:
             if left > _CLEARLY * looks[0][0]:

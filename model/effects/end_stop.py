@@ -20,7 +20,7 @@ EFFECT = Effect(
     acts_on="load",
     words="a stress that sets in at one displacement and grows from there, at any speed",
     parameters=(
-        Parameter("stiffness", "Pa", (-5e6, 5e7), "stress per stretch, 0.5 mm beyond", 2e4, 0.0),
+        Parameter("stiffness", "Pa", (0.0, 5e7), "stress per stretch, 0.5 mm beyond", 2e4, 0.0),
         Parameter(
             "onset",
             "m",
