@@ -137,6 +137,17 @@ def test_clean_films_lack_nothing():
 # --- one effect is
 
 
+def test_what_the_branches_imitate_is_not_overlooked():
+    # the drag of a resistor's 5 ms is a fast branch's: fitted from there, it ends at 0 ohm
+    thesis = replace(PLAIN, network=TABLE_3)
+    hidden = replace(thesis, effects=effect("electrode resistance", resistance=2e7))
+    found = diagnose([record_of(hidden)], thesis, workers=2)
+    (step,) = found.steps
+    assert "electrode_resistance" in (step.family, *step.indistinguishable_from)
+    assert found.final.cost == pytest.approx(1.0, abs=0.05)
+    require_consistent(found)
+
+
 @pytest.mark.parametrize("name", HIDDEN)
 def test_what_was_hidden_is_found(name):
     found = of_hidden(name)

@@ -57,6 +57,7 @@ _NEARLY = 0.8  # of the best promise of an effect: another shape that is worth a
 _BETTER = 1e-4  # of the cost: less is the same place
 _IN_THE_WAY = 0.9  # of what no branches account for: with an effect that leaves less, they hid it
 _CLEARLY = 2.0  # of the least that is left: more, and it is not the one that they hid
+_AS_WELL = 1.1  # of what is left beside a leader that explains all: these may do so too
 _ANEW = 6  # of such effects that are fitted anew
 _ANEW_SIZES = (0.3, 1.0, 3.0, 10.0, 30.0)  # times the typical one, tried for that
 _ANEW_CLOSER = (0.56, 0.75, 1.0, 1.33, 1.78)  # times the best of these
@@ -258,7 +259,9 @@ class _Search:
             if not tried:
                 break
             fitted, correlation = self._settled(best, tried)
-            if not self._is_noise(best):
+            leader = fitted[0].trial
+            gain = self._criterion(best, correlation) - self._criterion(leader, correlation)
+            if gain > self._asked(fitted[0].name) or not self._is_noise(best):
                 fitted, correlation = self._settled(best, self._anew(fitted))
             leader = fitted[0].trial
             gain = self._criterion(best, correlation) - self._criterion(leader, correlation)
@@ -403,7 +406,7 @@ class _Search:
         While an effect was missing, the branches imitated it, and a descent from there may not find
         out. The measured stretch tells without one: with the effect's part taken off it, do
         branches account for more of the Maxwell stress than before? Where the leader explains all,
-        only those are fitted anew beside which they account for more than beside it.
+        only those are fitted anew beside which they account for as much as beside it.
         """
         before: dict[frozenset[str], float] = {}
         looks: list[tuple[float, int, float]] = []
@@ -421,12 +424,12 @@ class _Search:
                 left, size = self._unaccounted(one, [f * size for f in _ANEW_CLOSER])
                 looks.append((left, place, size))
         looks.sort(key=lambda look: look[0])
+        most = _CLEARLY * looks[0][0] if looks else 0.0
         if tried[0].trial.cost < _EXPLAINED_RMS**2:
-            places = [place for _, place, _ in looks]
-            looks = looks[: places.index(0)] if 0 in places else looks
+            most = min([most, *(_AS_WELL * left for left, place, _ in looks if place == 0)])
         again = list(tried)
         for left, place, size in looks[:_ANEW]:
-            if left > _CLEARLY * looks[0][0]:
+            if left > most:
                 break
             self._check()
             one = tried[place]
