@@ -284,7 +284,7 @@ def extra(name, p, film, drive):
         ),
         "leakage": lambda: Extra(
             voltage=lambda t, lam, u, z, v: (
-                v * (1.0 - p["loss"] * math.exp(p["exponent"] * (math.sqrt(v * lam / 8e3) - 1.0)))
+                v * (1.0 - p["loss"] * math.exp(p["growth"] * (math.sqrt(v * lam / 8e3) - 1.0)))
             )
         ),
         "linear drag": lambda: Extra(stress=lambda t, lam, u, z, v: p["drag"] * u),

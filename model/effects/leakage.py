@@ -29,7 +29,7 @@ EFFECT = Effect(
             0.0,
         ),
         Parameter(
-            "exponent",
+            "growth",
             "",
             (0.5, 20.0),
             "by which the lost part grows with the root of the field",
