@@ -1,4 +1,7 @@
-"""Responses in closed form, exact over a step of any length: no stiffness, no limit to the step."""
+"""Responses over a step of any length: no stiffness, no limit to the step.
+
+All but Bouc and Wen's loop, which has no closed form for any power, are exact.
+"""
 
 from __future__ import annotations
 

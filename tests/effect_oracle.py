@@ -79,6 +79,12 @@ def limited(value, low, high):
     return min(max(value, low), high)
 
 
+def bouc_wen(u, z, power, beta):
+    """z' = u - beta |u| |z|^(power - 1) z - (1 - beta) u |z|^power, as Bouc and Wen have it."""
+    most = min(abs(z), 1.0) ** power  # beyond 1 no loop goes; a trial step may
+    return u - beta * abs(u) * math.copysign(most, z) - (1.0 - beta) * u * most
+
+
 def ramped(since):
     """The 20 ms in which a sudden change comes."""
     return limited(since / 0.02 + 0.5, 0.0, 1.0)
@@ -112,18 +118,12 @@ def extra(name, p, film, drive):
         )
 
     def elastoplastic():
-        # as Bouc and Wen have it: A x' - beta |x'| |z|^(n - 1) z - gamma x' |z|^n
-        n, beta = p["exponent"], p["asymmetry"]
-
-        def slope(x, z):
-            return (
-                x - beta * abs(x) * abs(z) ** n * (1 - 2 * (z < 0)) - (1 - beta) * x * abs(z) ** n
-            )
-
         return Extra(
             states=1,
             stress=lambda t, lam, u, z, v: p["yield_stress"] * z[0],
-            slopes=lambda t, lam, u, z, v: (slope(u / p["reach"], z[0]),),
+            slopes=lambda t, lam, u, z, v: (
+                bouc_wen(u / p["reach"], z[0], p["exponent"], p["asymmetry"]),
+            ),
         )
 
     def distributed():

@@ -28,7 +28,7 @@ from model.fitting.problem import Problem
 from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
 from model.records import ActuatorRecord, FilmRecord
 from sim_backend.model_plant import ModelPlant
-from tests.effect_oracle import Film, extra, follow, limited
+from tests.effect_oracle import Film, bouc_wen, extra, follow, limited
 
 THESIS = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
 LENGTH = THESIS_FILM.length
@@ -375,17 +375,13 @@ def steps_of(name, p, time, stretch):
         return np.array(out)
     if name == "elastoplastic hysteresis":
         # along each straight piece, in the length of the path
-        z, out, n, s = 0.0, [], p["exponent"], p["asymmetry"]
-
-        def slope(_, y, way):
-            # beyond 1 no loop goes; a trial step may
-            most = min(abs(y[0]), 1.0) ** n
-            return [way - way * most * (1.0 - s) - s * most * math.copysign(1.0, y[0])]
-
+        z, out = 0.0, []
         for travel in np.diff(stretch, prepend=rest):
             if travel:
+                way = math.copysign(1.0, travel)
                 z = solve_ivp(
-                    slope, (0.0, abs(travel) / p["reach"]), [z], args=(math.copysign(1.0, travel),),
+                    lambda _, y, way=way: [bouc_wen(way, y[0], p["exponent"], p["asymmetry"])],
+                    (0.0, abs(travel) / p["reach"]), [z],
                     method="DOP853", rtol=1e-10, atol=1e-13,
                 ).y[0, -1]  # fmt: skip
             out.append(p["yield_stress"] * z)

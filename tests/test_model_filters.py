@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from model.filters import along_cubic, lagged, low_pass, slewed, slid, switched, swung, wound
+from tests.effect_oracle import bouc_wen
 
 RATIOS = 10.0 ** np.arange(-6.0, 3.5, 0.5)  # of the step to the filter's own time
 TAU = 0.02
@@ -114,8 +115,7 @@ def test_slid(z, travel):
 @pytest.mark.parametrize("b", [-1.0, -0.3, 0.0, 0.9])
 def test_wound_is_bouc_and_wens_loop(b, exponent, asymmetry):
     def slope(_, y, way):
-        most = min(abs(y[0]), 1.0) ** exponent
-        return [way - way * most * (1.0 - asymmetry) - asymmetry * most * math.copysign(1.0, y[0])]
+        return [bouc_wen(way, y[0], exponent, asymmetry)]
 
     for travel in (1e-6, 0.15, 1.3, 8.0):
         for way in (1.0, -1.0):

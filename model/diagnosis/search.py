@@ -227,7 +227,7 @@ class _Search:
         try:
             trial = self._pruned(self._ended(fits[1]))
             correlation = self._correlation([best, trial])
-            gain = self._criterion(best, correlation) - self._criterion(trial, correlation)
+            gain = self._gain(best, trial, correlation)
             self.held = gain > (0.0 if len(trial.effects) < len(best.effects) else _DECISIVE)
         finally:
             if not self.held:
@@ -260,11 +260,11 @@ class _Search:
                 break
             fitted, correlation = self._settled(best, tried)
             leader = fitted[0].trial
-            gain = self._criterion(best, correlation) - self._criterion(leader, correlation)
+            gain = self._gain(best, leader, correlation)
             if gain > self._asked(fitted[0].name) or not self._is_noise(best):
                 fitted, correlation = self._settled(best, self._anew(fitted))
             leader = fitted[0].trial
-            gain = self._criterion(best, correlation) - self._criterion(leader, correlation)
+            gain = self._gain(best, leader, correlation)
             matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
             if best.effects and gain < _BY_FAR:
                 # beside another, little of what no effect explains may go to any
@@ -569,6 +569,10 @@ class _Search:
     def _criterion(self, trial: Trial, correlation: float) -> float:
         return information(trial.cost, trial.free, self.bench.samples / correlation)
 
+    def _gain(self, over: Trial, trial: Trial, correlation: float) -> float:
+        """What ``trial`` gains of the criterion over another."""
+        return self._criterion(over, correlation) - self._criterion(trial, correlation)
+
     def _demerit(self, trial: Trial, correlation: float) -> float:
         """The criterion, and a margin for each effect that names no cause."""
         unnamed = sum(EFFECTS[name].family == "unknown" for name in trial.effects)
@@ -586,7 +590,7 @@ class _Search:
         correlation = self._correlation(trials)
         best = min(trials, key=lambda t: self._criterion(t, correlation))
         base = self.found[frozenset()]
-        gain = self._criterion(base, correlation) - self._criterion(best, correlation)
+        gain = self._gain(base, best, correlation)
         return best if gain > _DECISIVE else base
 
     def _check(self) -> None:
@@ -742,9 +746,7 @@ class _Search:
                 for e in numbers
                 if e.name.startswith(f"{name}: ")
             )
-            worth = self._criterion(without, correlation_thin) - self._criterion(
-                best, correlation_thin
-            )
+            worth = self._gain(without, best, correlation_thin)
             evidence = [
                 f"without it the residual is {np.sqrt(without.cost):.3g} times the noise, with it "
                 f"{np.sqrt(best.cost):.3g} times",

@@ -53,11 +53,17 @@ _LOGS = tuple(math.log((i + 0.5) / _ELEMENTS) for i in range(_ELEMENTS))
 
 
 @jit
+def _strained(c, k, i, z, travel):
+    """Element ``i`` at ``z`` after ``travel``: no further than where it slips."""
+    threshold = c[k + 1] * math.exp(c[k + 2] * _LOGS[i])
+    return min(max(z + travel, -threshold), threshold)
+
+
+@jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
     total, travel = 0.0, lam - lam0
     for i in range(_ELEMENTS):
-        threshold = c[k + 1] * math.exp(c[k + 2] * _LOGS[i])
-        total += min(max(m[j + i] + travel, -threshold), threshold)
+        total += _strained(c, k, i, m[j + i], travel)
     return c[k] * total / _ELEMENTS
 
 
@@ -69,6 +75,5 @@ def stiffness(c, k, m, j, lam, rate):
 @jit
 def commit(c, k, m, j, lam, rate, lam0, h, t):
     for i in range(_ELEMENTS):
-        threshold = c[k + 1] * math.exp(c[k + 2] * _LOGS[i])
-        m[j + i] = min(max(m[j + i] + lam - lam0, -threshold), threshold)
+        m[j + i] = _strained(c, k, i, m[j + i], lam - lam0)
     return 0

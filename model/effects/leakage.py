@@ -44,8 +44,12 @@ _REFERENCE = 8e3  # V
 
 
 @jit
+def _left(c, k, v, lam):
+    """What is left of ``v`` V; no more can be lost than there is."""
+    lost = c[k] * math.exp(c[k + 1] * (math.sqrt(abs(v) * lam / _REFERENCE) - 1.0))
+    return v * max(1.0 - lost, 0.0)
+
+
+@jit
 def supply(c, k, m, j, t, start, end, h, lam, rate):
-    # no more can be lost than there is
-    a = c[k] * math.exp(c[k + 1] * (math.sqrt(abs(start) * lam / _REFERENCE) - 1.0))
-    b = c[k] * math.exp(c[k + 1] * (math.sqrt(abs(end) * lam / _REFERENCE) - 1.0))
-    return start * max(1.0 - a, 0.0), end * max(1.0 - b, 0.0)
+    return _left(c, k, start, lam), _left(c, k, end, lam)

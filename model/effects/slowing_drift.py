@@ -1,5 +1,4 @@
-"""Drift of the sensor's zero that slows down but does not settle: a mount that creeps, heat that
-spreads into it.
+"""Drift of the sensor's zero that slows down but does not settle: heat that spreads into a mount.
 
 The reading is moved by d ((1 + t/T)^n - 1)/((1 + 30 s/T)^n - 1), t since the record began: with
 n = 1 at one rate, with 1/2 as by diffusion, near 0 with the logarithm of time.
@@ -36,6 +35,10 @@ _AT = 30.0  # s
 
 
 @jit
+def _gone(c, k, t):
+    return (1.0 + t / c[k + 1]) ** c[k + 2] - 1.0
+
+
+@jit
 def sense(c, k, m, j, t, dt, x, u):
-    late = (1.0 + t / c[k + 1]) ** c[k + 2] - 1.0
-    return x + c[k] * late / ((1.0 + _AT / c[k + 1]) ** c[k + 2] - 1.0)
+    return x + c[k] * _gone(c, k, t) / _gone(c, k, _AT)
