@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -24,9 +22,9 @@ __all__ = [
     "Drive",
     "Response",
     "at_rest",
-    "displacements",
     "effect_values",
     "initial_state",
+    "reading_of",
 ]
 
 STATUS_WORDS = MappingProxyType(
@@ -233,44 +231,26 @@ def initial_state(c: np.ndarray, rest: float) -> np.ndarray:
     return y
 
 
-def displacements(
-    coefficients: np.ndarray,
-    length: float,
-    drive: Drive,
-    lag: float = 0.0,
-    workers: int = 2,
-    quick: bool = False,
-) -> tuple[np.ndarray, np.ndarray]:
-    """A population under one drive: ``coefficients`` (P, C) to readings (P, N) in m.
+def reading_of(
+    c: np.ndarray, length: float, drive: Drive, lag: float = 0.0, quick: bool = False
+) -> tuple[np.ndarray, int]:
+    """``(reading, status)`` of coefficient vector ``c`` (see ``model.coefficients``): (N,) m.
 
-    ``lag`` s is the known age of a reading. Also returns the statuses (P,). Members run on
-    ``workers`` threads (the kernels release the interpreter), ``quick`` as the kernel has it.
+    ``lag`` s is the known age of a reading, ``quick`` as the kernel has it. What the model did not
+    reach reads 0.
     """
-    population = coefficients.shape[0]
-    readings = np.zeros((population, drive.time.size))
-    status = np.zeros(population, dtype=np.int64)
-    temperature = drive.temperature
-
-    def run(members: Sequence[int]) -> None:
+    c = c.copy()
+    reading = np.zeros(drive.time.size)
+    status, rest = at_rest(c)
+    if status == kernel.OK:
         x, u = np.zeros(drive.time.size), np.zeros(drive.time.size)
-        for p in members:
-            c = coefficients[p].copy()
-            status[p], rest = at_rest(c)
-            if status[p] == kernel.OK:
-                y = initial_state(c, rest)
-                status[p], _ = kernel.drive_by_voltage(
-                    c, drive.time, drive.voltage, drive.hold, temperature, y, x, u, quick
-                )
-                x -= rest
-                x *= length
-                u *= length
-                at_sensor(drive.time, x, u, lag, readings[p])
-                kernel.read_sensor(c, drive.time, readings[p], u, np.zeros(SENSOR_MEMORY))
-
-    if workers <= 1 or population == 1:
-        run(range(population))
-    else:
-        with ThreadPoolExecutor(workers) as pool:
-            # interleaved, so that stiff members (neighbours in a population) spread over threads
-            list(pool.map(run, [range(w, population, workers) for w in range(workers)]))
-    return readings, status
+        status, _ = kernel.drive_by_voltage(
+            c, drive.time, drive.voltage, drive.hold, drive.temperature,
+            initial_state(c, rest), x, u, quick,
+        )  # fmt: skip
+        x -= rest
+        x *= length
+        u *= length
+        at_sensor(drive.time, x, u, lag, reading)
+        kernel.read_sensor(c, drive.time, reading, u, np.zeros(SENSOR_MEMORY))
+    return reading, status

@@ -14,6 +14,7 @@ __all__ = ["along_cubic", "lagged", "low_pass", "slewed", "slid", "switched", "s
 _SMALL = 0.1
 _SWITCHING = 0.02  # s: long enough for a fit to find the moment
 _WINDING = 0.25  # reaches over the power, a step: within 3e-5 of the yield stress
+_SHORT = 0.05  # of the place, a travel times the power: the series is within 3e-5 of it
 _YIELDED = 1.0 - 1e-6  # of the yield stress: the loop has come to its end
 
 
@@ -137,6 +138,21 @@ def wound(b: float, travel: float, exponent: float, asymmetry: float) -> float:
         b += h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
         left -= h
     return way * min(b, 1.0)
+
+
+@jit
+def wound_on(b: float, power: float, travel: float, exponent: float, asymmetry: float) -> float:
+    """As ``wound``, with ``power`` = |b|^exponent known: by a series where that is enough."""
+    way = math.copysign(1.0, travel)
+    b *= way
+    h = abs(travel)
+    if not max(exponent, 1.0) * h < _SHORT * abs(b):
+        return way * wound(b, h, exponent, asymmetry)
+    straight = 1.0 if b > 0.0 else 1.0 - 2.0 * asymmetry
+    slope = 1.0 - straight * power
+    bend = -straight * exponent * power / b
+    more = bend * bend + slope * bend * (exponent - 1.0) / b
+    return way * min(b + h * slope * (1.0 + h / 2.0 * (bend + h / 3.0 * more)), 1.0)
 
 
 @jit

@@ -83,9 +83,8 @@ _LEAN_SUBSTEPS_MAX = 4  # the same for the quicker form
 # friction that builds up within a nanometre, is given up: no record could tell it apart
 _EFFECT_SUBSTEPS_MAX = 25
 # change of a drag over a step, as a phase: that part is not in closed form
-_GROWN, _GROWN_QUICK = 0.2, 4.0
-# in stretch, from which on steps must see it: 7.5 um on 75 mm; and where a path is followed
-_RINGING, _RINGING_TURNS = 1e-4, 1e-6
+_GROWN, _GROWN_QUICK = 1.0, 25.0
+_RINGING = 1e-4  # in stretch, from which on steps must see it: 7.5 um on 75 mm
 # numbers in closed form need not be quite the film's own: what they lack is integrated
 _STIFFNESS_NEAR = 0.005
 _DRAG_NEAR = 0.2
@@ -989,9 +988,9 @@ def drive_by_voltage(
     voltage stands until the next sample (a converter's output), else the voltage is linear between
     samples. ``warmth`` (N,) K is the temperature above that of the start, or (0,) where none was
     recorded. ``quick`` takes the longest steps that are good to a tenth of a micrometre (to some
-    tenths on a step of 8 kV), for a search that tries thousands of models; else they are good to
-    some hundredths. Element 0 is the
-    state as given, so a record can be cut and continued. ``c`` must know the stretch at rest
+    tenths on a step of 8 kV), for a search that tries thousands of models; else, and where an
+    effect follows the path, they are good to some hundredths. Element 0 is the state as given, so
+    a record can be cut and continued. ``c`` must know the stretch at rest
     (``model.actuator.at_rest``).
 
     Returns ``(status, reached)``: on any status but ``OK`` the samples from ``reached`` on are
@@ -1010,8 +1009,9 @@ def drive_by_voltage(
     most = _LEAN_SUBSTEPS_MAX if lean else _RK4_SUBSTEPS_MAX
     if moves:
         most = _EFFECT_SUBSTEPS_MAX
-    drags, turns = acting & _STIFFNESS != 0, acting & _TURNS != 0
-    rings = _RINGING_TURNS if turns else _RINGING
+    drags = acting & _STIFFNESS != 0
+    # ringing is in closed form, but its turns are not, where a path is followed
+    quick = quick and acting & _TURNS == 0
     work = np.zeros((15, y.shape[0]))
     before = np.empty(y.shape[0])
     trace = np.zeros(3)
@@ -1074,17 +1074,14 @@ def drive_by_voltage(
             theta = warmth[k] if warm else 0.0
         if explicit and lean:
             fine, refine = steps, 1
-            # ringing is in closed form, but its turns are not, where a path is followed
             forced = 0.0
             if not quick:
                 refine, forced = _refined(
                     kick_gain, ring_gain, kick, kick_before, ring, hold and steps > 1, trace
                 )
                 fine = steps * refine
-            elif max(ring * fading, abs(kick)) > rings * springy:
+            elif max(ring * fading, abs(kick)) > _RINGING * springy:
                 finer = swing * dt / _RK4_PHASE_MAX
-                if turns:
-                    finer *= 2.0 if ring < 2.0 * _RINGING * springy else 4.0
                 fine = max(fine, math.ceil(min(finer - 1e-6, _EFFECT_SUBSTEPS_MAX)))
             if drags:
                 # a drag may change with the rate: where it does within the sample, in finer steps

@@ -21,6 +21,7 @@ __all__ = [
     "KINEMATICS",
     "directions",
     "electric",
+    "electric_along",
     "electric_slope",
     "pull_slope",
     "strain_and_pull",
@@ -101,6 +102,15 @@ def electric(held: int, lam: float) -> float:
     if held == 1:
         return 0.5
     return lam * lam * lam
+
+
+@jit
+def electric_along(held: int, stretch: np.ndarray) -> np.ndarray:
+    """``electric`` (N,) at each ``stretch`` (N,)."""
+    out = np.empty(stretch.size)
+    for i in range(stretch.size):
+        out[i] = electric(held, stretch[i])
+    return out
 
 
 @jit

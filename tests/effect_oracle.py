@@ -117,6 +117,13 @@ def extra(name, p, film, drive):
             slopes=lambda t, lam, u, z, v: (u - abs(u) * z[0] / reach,),
         )
 
+    def leakage():
+        def left(t, lam, u, z, v):
+            field = (v * lam / 8e3) ** p["exponent"]
+            return v * (1.0 - p["loss"] * math.exp(p["growth"] * (field - 1.0)))
+
+        return Extra(voltage=left)
+
     def elastoplastic():
         return Extra(
             states=1,
@@ -154,7 +161,9 @@ def extra(name, p, film, drive):
     def first_loading():
         def soften(t, lam, u, z, v, lam0):
             most = max(z[0], abs(lam - rest))
-            return 1.0 - p["softening"] * (1.0 - math.exp(-((most / p["reach"]) ** p["exponent"])))
+            x, b = (most / p["reach"]) ** p["exponent"], p["breadth"]
+            kept = (1.0 + b * x) ** (-1.0 / b) if b else math.exp(-x)
+            return 1.0 - p["softening"] * (1.0 - kept)
 
         return Extra(
             states=1, soften=soften, commit=lambda z, lam0, lam: [max(z[0], abs(lam - rest))]
@@ -282,11 +291,7 @@ def extra(name, p, film, drive):
         "sudden loss of field": lambda: Extra(
             voltage=lambda t, lam, u, z, v: v * (1.0 - p["loss"] * ramped(t - p["moment"]))
         ),
-        "leakage": lambda: Extra(
-            voltage=lambda t, lam, u, z, v: (
-                v * (1.0 - p["loss"] * math.exp(p["growth"] * (math.sqrt(v * lam / 8e3) - 1.0)))
-            )
-        ),
+        "leakage": leakage,
         "linear drag": lambda: Extra(stress=lambda t, lam, u, z, v: p["drag"] * u),
         "power-law drag": lambda: Extra(
             stress=lambda t, lam, u, z, v: (

@@ -19,6 +19,7 @@ from model.diagnosis.findings import (
     PARTLY_EXPLAINED,
     UNEXPLAINED,
 )
+from model.diagnosis.search import _Search
 from model.effects import EFFECTS
 from model.errors import ModelError
 from model.excitation import Sequence
@@ -30,6 +31,7 @@ from tests.engine_tools import (
     STRIP,
     effect,
     film_record_of,
+    made_trial,
     masked,
     record_of,
     thesis_drive,
@@ -242,6 +244,17 @@ def test_effects_that_look_the_same_are_named_as_such():
         left = rival.simulate(record.drive).displacement - record.displacement
         assert np.sqrt(np.mean(left**2)) < 1.1 * NOISE
         assert rival.effects != found.final.model.effects
+
+
+def test_what_a_law_not_quite_the_true_one_leaves_is_no_second_effect():
+    search = _Search([record_of(PLAIN)], PLAIN, 1, lambda *_: None, lambda: False)
+    trial = made_trial([record_of(PLAIN)], PLAIN, np.zeros(1))
+    search.found[frozenset()] = replace(trial, cost=100.0)
+    gain = 1e3  # of the criterion, which is sure that the residual changes
+    assert search._share(replace(trial, cost=50.0), gain) == 0.0
+    assert search._share(replace(trial, cost=50.0), 20.0) > 0.0
+    assert search._share(replace(trial, cost=1.5), gain) > 0.5
+    assert search._share(replace(trial, cost=4.0), gain) == 0.0
 
 
 def test_what_no_family_covers_is_described():

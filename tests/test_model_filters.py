@@ -9,7 +9,17 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from model.filters import along_cubic, lagged, low_pass, slewed, slid, switched, swung, wound
+from model.filters import (
+    along_cubic,
+    lagged,
+    low_pass,
+    slewed,
+    slid,
+    switched,
+    swung,
+    wound,
+    wound_on,
+)
 from tests.effect_oracle import bouc_wen
 
 RATIOS = 10.0 ** np.arange(-6.0, 3.5, 0.5)  # of the step to the filter's own time
@@ -124,6 +134,9 @@ def test_wound_is_bouc_and_wens_loop(b, exponent, asymmetry):
             # a power below 1 has a corner where the stress is 0
             error = 3e-5 if exponent >= 1.0 else 1e-3
             assert found == pytest.approx(done.y[0, -1], abs=error)
+            known = abs(b) ** exponent
+            on = wound_on(b, known, way * travel, exponent, asymmetry)
+            assert on == pytest.approx(done.y[0, -1], abs=error)
             # with 1 and 1 it is Dahl's
             if exponent == asymmetry == 1.0:
                 assert found == pytest.approx(slid(b, way * travel, 1.0), abs=error)
@@ -171,6 +184,20 @@ def test_outputs_stay_between_what_they_come_from_and_go_to(before, start, end, 
         assert low - room <= step(before, start, end, h, tau) <= high + room
 
 
+@pytest.mark.parametrize("exponent", [0.7, 1.0, 2.4, 6.0])
+@pytest.mark.parametrize("b", [-1.0, -0.3, 1e-3, 0.2, 0.9, 1.0])
+def test_short_travels_by_a_series_are_as_good(b, exponent):
+    for part in (0.01, 0.03, 0.049):
+        for way in (1.0, -1.0):
+            travel = way * part * abs(b) / max(exponent, 1.0)
+            done = solve_ivp(
+                lambda _, y, way=way: [bouc_wen(way, y[0], exponent, 0.8)], (0.0, abs(travel)), [b],
+                rtol=1e-12, atol=1e-15,
+            )  # fmt: skip
+            on = wound_on(b, abs(b) ** exponent, travel, exponent, 0.8)
+            assert on == pytest.approx(done.y[0, -1], abs=3e-5 * abs(travel))
+
+
 @given(
     before=VALUE, rate=VALUE, x0=VALUE, u0=VALUE, x1=VALUE, u1=VALUE,
     h=st.floats(1e-9, 1e4), tau=st.floats(1e-12, 2.0), damping=st.floats(1e-3, 1.0),
@@ -182,4 +209,6 @@ def test_everything_is_finite(before, rate, x0, u0, x1, u1, h, tau, damping):
     assert np.isfinite(swung(before, rate, x0, x1, h, omega, damping)).all()
     assert abs(slid(x0, x1 - x0, tau)) <= max(abs(x0), tau) * (1.0 + 1e-12)
     for asymmetry in (0.5, 1.0):
-        assert abs(wound(min(max(x0, -1.0), 1.0), (x1 - x0) / h, 1.0 + damping, asymmetry)) <= 1.0
+        b, n = min(max(x0, -1.0), 1.0), 1.0 + damping
+        assert abs(wound(b, (x1 - x0) / h, n, asymmetry)) <= 1.0
+        assert abs(wound_on(b, abs(b) ** n, (x1 - x0) / h, n, asymmetry)) <= 1.0 + 1e-12

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from model import kernel
 from model.actuator import Actuator, Drive
 from model.errors import ModelError
 from model.excitation import Sequence
@@ -150,6 +151,21 @@ def test_a_film_of_two_branches_is_found_again():
     for a, b in zip(found.springs, network.springs, strict=True):
         assert a.modulus == pytest.approx(b.modulus, rel=0.02)
     assert found.equilibrium.limit == pytest.approx(30.0, rel=0.02)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_population_is_its_members(workers):
+    records = [made(ONE), made(TABLE_3, rate=50.0)]
+    model = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
+    layout = Layout(model)
+    values = np.array([layout.initial() * f for f in (1.0, 0.7, 1.3)])
+    values[1, layout.column("mu")] = 0.0  # cannot carry the load
+    predicted, status = Problem(records, layout, workers).predict(values)
+    assert status.tolist() == [kernel.OK, kernel.NO_REST, kernel.OK]
+    for p in (0, 2):
+        one = layout.model(values[p])
+        alone = [one.simulate(r.drive).displacement for r in records]
+        np.testing.assert_array_equal(predicted[p], np.concatenate(alone))
 
 
 def test_what_does_not_fit_is_said():

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from model import coefficients as at
 from model import kernel
-from model.actuator import Actuator, Drive, at_rest, displacements, initial_state
+from model.actuator import Actuator, Drive, at_rest, initial_state, reading_of
 from model.effects import assembly
 from model.errors import ModelError
 from model.excitation import Sequence
@@ -182,9 +182,9 @@ def test_a_thousand_draws_end_in_a_word(seed):
         for how in ("uniform", "log-uniform", "instant")
         for _ in range(333)
     ]
-    x, status = displacements(np.array(rows), LENGTH, drive)
-    assert np.isfinite(x).all()
-    assert np.mean(status == kernel.OK) > 0.99
+    readings, statuses = zip(*(reading_of(c, LENGTH, drive) for c in rows), strict=True)
+    assert np.isfinite(readings).all()
+    assert np.mean(np.array(statuses) == kernel.OK) > 0.99
 
 
 WILD = st.one_of(
@@ -217,30 +217,16 @@ def test_wild_coefficients_give_finite_numbers(held, kinds, moduli, limits, rate
         c[k + at.RATE] = min(rates[i], 1e9)
     time = np.array([0.0, 0.01, 0.02, 0.05, 0.0501, 0.3])
     voltage = amplitude * np.array([0.0, 0.1, 0.5, 1.0, 0.2, 0.0])
-    x, statuses = displacements(c[None, :], LENGTH, Drive(time, voltage), workers=1)
-    assert np.isfinite(x).all()
-    assert 0 <= statuses[0] <= 5
+    reading, ended = reading_of(c, LENGTH, Drive(time, voltage))
+    assert np.isfinite(reading).all()
+    assert 0 <= ended <= 5
     status, rest = at_rest(c)
     if status == kernel.OK:
         stretch, rate = np.zeros(time.size), np.zeros(time.size)
         y = initial_state(c, rest)
         kernel.drive_by_voltage(c, time, voltage, False, np.zeros(0), y, stretch, rate)
-        np.testing.assert_array_equal((stretch - rest) * LENGTH, x[0])
+        np.testing.assert_array_equal((stretch - rest) * LENGTH, reading)
         assert np.isfinite(rate).all()
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_population_is_its_members(workers):
-    time = ticks(0.5, 5e-3)
-    drive = Drive(time, lobes(time))
-    members = [Network.gent([m] * 4, [1e3] * 4, [0.1, 1.0, 5.0]) for m in (3e4, 5e4, 2e5)]
-    actuators = [Actuator(THESIS_FILM, THESIS_LOAD, m) for m in members]
-    rows = np.array([a.coefficients() for a in actuators])
-    x, status = displacements(rows, LENGTH, drive, workers=workers)
-    assert (status == kernel.OK).all()
-    for p, actuator in enumerate(actuators):
-        response = actuator.simulate(drive)
-        np.testing.assert_array_equal(x[p], response.displacement)
 
 
 @pytest.mark.parametrize("hold", [True, False])
@@ -374,12 +360,12 @@ def test_a_quick_step_may_be_longer_than_the_ringing(effects):
     time = ticks(6.0, 5e-3)
     voltage = np.interp(time, [1.0, 1.02, 3.0, 3.02, 4.0, 4.02], [0.0, 8e3, 8e3, 3e3, 3e3, 5e3])
     actuator = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, effects)
-    c = actuator.coefficients()[None]
+    c = actuator.coefficients()
     drive = Drive(time, voltage, hold=True)
-    quick, status = displacements(c, LENGTH, drive, quick=True)
-    fine, _ = displacements(c, LENGTH, Drive(time, voltage, hold=True))
-    assert status[0] == kernel.OK
-    rang = np.diff(fine[0], 2)[(time[2:] > 1.02) & (time[2:] < 1.3)]
+    quick, status = reading_of(c, LENGTH, drive, quick=True)
+    fine, _ = reading_of(c, LENGTH, drive)
+    assert status == kernel.OK
+    rang = np.diff(fine, 2)[(time[2:] > 1.02) & (time[2:] < 1.3)]
     assert np.abs(rang).max() > 5e-6
     assert np.sqrt(np.mean((quick - fine) ** 2)) < 1e-3 * np.std(fine)
 

@@ -11,6 +11,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from threading import Lock
+from typing import TypeVar
 
 import numpy as np
 
@@ -24,6 +26,7 @@ from model.fitting.parameters import Estimate, Layout
 from model.fitting.problem import Problem
 from model.fitting.search import voltage_misfit, voltage_starts
 from model.fitting.secant import descend_by_secants
+from model.fitting.threads import together
 from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
 __all__ = ["Bench", "Trial", "information"]
@@ -69,6 +72,10 @@ def information(cost: float, free: int, samples: float) -> float:
     an effect explains, so that it also compares models that all leave more than noise.
     """
     return samples * math.log(max(cost, 1e-12)) + free * math.log(max(samples, 2.0))
+
+
+_Job = TypeVar("_Job")
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
@@ -120,6 +127,7 @@ class Bench:
         self.records = tuple(_thinned(r) for r in self.full)
         self.workers = workers
         self.simulations = 0
+        self._counting = Lock()
         longest = max(float(r.time[-1] - r.time[0]) for r in records)
         self.times = (
             (FASTEST_BRANCH, _LONGER_THAN_RECORD * longest)
@@ -142,7 +150,12 @@ class Bench:
         return Problem(records, layout, self.workers, not full, self._count)
 
     def _count(self, simulations: int) -> None:
-        self.simulations += simulations
+        with self._counting:
+            self.simulations += simulations
+
+    def together(self, work: Callable[[_Job], _Result], jobs: Sequence[_Job]) -> list[_Result]:
+        """``work(job)`` of each of ``jobs``, fits that know nothing of each other."""
+        return together(work, jobs, self.workers, "fit")
 
     def baseline(self, base: Actuator | Strip, progress: Callable[[str, float], None]) -> Trial:
         """``base`` fitted from a global search.
@@ -156,12 +169,14 @@ class Bench:
         else:
             fixed = np.zeros(problem.layout.size, dtype=bool)
             fixed[problem.layout.column("J")] = True
-            fits = []
-            for n, start in enumerate(voltage_starts(problem, progress, _STARTS)):
-                fits.append(descend_by_secants(problem, start, fixed, iterations=8, sure=False))
-                progress("descents", 0.5 * (n + 1) / _STARTS)
-            leaders = sorted(fits, key=lambda f: f.cost)[:_LEADERS]
-            fits = [descend(problem, f.x, fixed, iterations=_BASELINE) for f in leaders]
+            fits = self.together(
+                lambda start: descend_by_secants(problem, start, fixed, iterations=8, sure=False),
+                list(voltage_starts(problem, progress, _STARTS)),
+            )
+            progress("descents", 0.5)
+            fits = self.together(
+                lambda f: descend(problem, f.x, fixed, iterations=_BASELINE), _leaders(fits)
+            )
             fit = min(fits, key=lambda f: f.cost)
         progress("descents", 1.0)
         return _trial(problem, fit, fixed)
@@ -239,15 +254,18 @@ class Bench:
         starts = [] if near.is_white else _reseeded(layout, near.x)
         if not starts:
             return self._down(near, _ENDING, _WORTH * near.cost)
-        scouts = [
-            descend_by_secants(near.problem, x, near.fixed, iterations=_SCOUTING, sure=False)
-            for x in starts
-        ]
-        leaders = sorted(scouts, key=lambda f: f.cost)[:_LEADERS]
-        fits = [
-            descend_by_secants(near.problem, f.x, near.fixed, f.jacobian, _RESTART, sure=False)
-            for f in leaders
-        ]
+        scouts = self.together(
+            lambda x: descend_by_secants(
+                near.problem, x, near.fixed, iterations=_SCOUTING, sure=False
+            ),
+            starts,
+        )
+        fits = self.together(
+            lambda f: descend_by_secants(
+                near.problem, f.x, near.fixed, f.jacobian, _RESTART, sure=False
+            ),
+            _leaders(scouts),
+        )
         other = _trial(near.problem, min(fits, key=lambda f: f.cost), near.fixed)
         # who is far behind the other is not worth the rest of its way
         if near.cost < _FAR_ABOVE * other.cost:
@@ -288,22 +306,24 @@ class Bench:
         """
         held = trial.fixed.copy()
         held[self.problem(replace(trial.model, effects=())).layout.size :] = True
-        fits = []
-        for start, searched in zip(
-            starts, self._without_effects(trial.problem, starts), strict=True
-        ):
-            if searched is None:
-                continue
-            for springs in voltage_starts(searched, lambda *_: None, _RESTARTS):
-                x = np.concatenate([springs, start[springs.size :]])
-                x = descend_by_secants(trial.problem, x, held, iterations=_SETTING, sure=False).x
-                fits.append(
-                    descend_by_secants(
-                        trial.problem, x, trial.fixed, iterations=_RESTART, sure=False
-                    )
-                )
-        if not fits:
+        anew = [
+            np.concatenate([springs, start[springs.size :]])
+            for start, searched in zip(
+                starts, self._without_effects(trial.problem, starts), strict=True
+            )
+            if searched is not None
+            for springs in voltage_starts(searched, lambda *_: None, _RESTARTS)
+        ]
+        if not anew:
             return trial
+
+        def down(x: np.ndarray) -> LocalFit:
+            x = descend_by_secants(trial.problem, x, held, iterations=_SETTING, sure=False).x
+            return descend_by_secants(
+                trial.problem, x, trial.fixed, iterations=_RESTART, sure=False
+            )
+
+        fits = self.together(down, anew)
         other = _trial(trial.problem, min(fits, key=lambda f: f.cost), trial.fixed)
         if other.cost > _NEARLY * trial.cost:
             return trial
@@ -409,6 +429,10 @@ class Bench:
             note = "" if sure else "these data hardly determine it"
             found.append(Estimate(q.name, q.unit, float(value), low, high, sure, note))
         return tuple(found)
+
+
+def _leaders(fits: Sequence[LocalFit]) -> list[LocalFit]:
+    return sorted(fits, key=lambda f: f.cost)[:_LEADERS]
 
 
 def _reseeded(layout: Layout, x: np.ndarray) -> list[np.ndarray]:

@@ -40,6 +40,8 @@ _DECISIVE = 12.0  # of the information criterion: odds of e^6, over some forty c
 _ALIKE = 10.0  # of the same: candidates nearer than that are not told apart
 _MATTERS = 0.01  # of the noise's mean square: less is not worth an effect
 _SECOND_SHARE = 0.25  # of what is left above the noise: less is not worth one more effect
+_OF_ITS_FORM = 0.02  # of what is explained: a law not quite the true one leaves so little
+_FORM_SHARE = 0.7  # of that: less is not worth one more effect
 _BY_FAR = 150.0  # of the criterion: a gain that needs no such share
 _HOPE = 0.95  # of the cost: who explains less than the rest of it is not followed on
 _BEAM = 2  # how many explanations are followed on
@@ -266,9 +268,9 @@ class _Search:
             leader = fitted[0].trial
             gain = self._gain(best, leader, correlation)
             matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
-            if best.effects and gain < _BY_FAR:
+            if best.effects:
                 # beside another, little of what no effect explains may go to any
-                matters &= best.cost - leader.cost > _SECOND_SHARE * (best.cost - 1.0)
+                matters &= best.cost - leader.cost > self._share(best, gain) * (best.cost - 1.0)
             taken = gain > self._asked(fitted[0].name) and matters
             if taken:
                 reason = f"gains {gain:.0f} of the information criterion"
@@ -310,6 +312,13 @@ class _Search:
         self.found[key] = self.bench.restarted(trial)
         return self.found[key]
 
+    def _share(self, best: Trial, gain: float) -> float:
+        """The part of what ``best`` leaves above the noise that one more effect must explain."""
+        explained = self.found[frozenset()].cost - best.cost
+        if best.cost - 1.0 < _OF_ITS_FORM * explained:
+            return _FORM_SHARE
+        return _SECOND_SHARE if gain < _BY_FAR else 0.0
+
     @staticmethod
     def _asked(name: str) -> float:
         """Gain of the criterion that is asked for: more of an effect that names no cause."""
@@ -328,20 +337,21 @@ class _Search:
             )
         order = sorted((n for n, p in promises.items() if p), key=lambda n: -promises[n][0].share)
         refitted = order if depth == 0 else order[:_FOLLOWED]
-        # the simpler of a family first: the others start from it too
-        refitted = sorted(refitted, key=lambda n: len(EFFECTS[n].parameters))
         tried = []
-        for n, name in enumerate(refitted):
+        for pair in _abreast(refitted):
             self._check()
-            key = frozenset((*parent.effects, name))
-            trial = self.found.get(key)
-            if trial is None:
-                trial = self._refit(parent, name, promises[name], screen.jacobian)
-                self.found[key] = trial
-            tried.append(_Tried(name, parent, trial, promises[name][0].share))
+            unknown = [n for n in pair if frozenset((*parent.effects, n)) not in self.found]
+            trials = self.bench.together(
+                lambda n: self._refit(parent, n, promises[n], screen.jacobian), unknown
+            )
+            for name, trial in zip(unknown, trials, strict=True):
+                self.found[frozenset((*parent.effects, name))] = trial
+            for name in pair:
+                trial = self.found[frozenset((*parent.effects, name))]
+                tried.append(_Tried(name, parent, trial, promises[name][0].share))
             self.report(
                 _stage(parent, "refitting"),
-                span[0] + span[1] * (0.25 + 0.75 * (n + 1) / len(refitted)),
+                span[0] + span[1] * (0.25 + 0.75 * len(tried) / len(refitted)),
             )
         return tried
 
@@ -408,21 +418,25 @@ class _Search:
         branches account for more of the Maxwell stress than before? Where the leader explains all,
         only those are fitted anew beside which they account for as much as beside it.
         """
-        before: dict[frozenset[str], float] = {}
-        looks: list[tuple[float, int, float]] = []
-        for place, one in enumerate(tried):
-            self._check()
-            parent = one.parent
-            key = frozenset(parent.effects)
-            if key not in before:
-                (before[key],) = self.bench.unaccounted(parent.problem, parent.x[None])
+        self._check()
+        parents = {frozenset(t.parent.effects): t.parent for t in tried}
+        before = {
+            key: float(self.bench.unaccounted(p.problem, p.x[None])[0])
+            for key, p in parents.items()
+        }
+
+        def looked(place: int) -> tuple[float, int, float] | None:
+            one = tried[place]
             sizes = EFFECTS[one.name].sizes
             if len(sizes) != 1:
-                continue
+                return None
             left, size = self._unaccounted(one, sizes_of(sizes[0], _ANEW_SIZES))
-            if left < _IN_THE_WAY * before[key]:
-                left, size = self._unaccounted(one, [f * size for f in _ANEW_CLOSER])
-                looks.append((left, place, size))
+            if not left < _IN_THE_WAY * before[frozenset(one.parent.effects)]:
+                return None
+            left, size = self._unaccounted(one, [f * size for f in _ANEW_CLOSER])
+            return left, place, size
+
+        looks = [k for k in self.bench.together(looked, range(len(tried))) if k is not None]
         looks.sort(key=lambda look: look[0])
         most = _CLEARLY * looks[0][0] if looks else 0.0
         if tried[0].trial.cost < _EXPLAINED_RMS**2:
@@ -465,7 +479,7 @@ class _Search:
         for name in {n for key in self.found for n in key} - set(parent.effects):
             other = EFFECTS[name]
             trial = self.found.get(frozenset((*parent.effects, name)))
-            simpler = len(other.parameters) < len(effect.parameters)
+            simpler = _intricacy(name) < _intricacy(effect.name)
             if other.family != effect.family or not simpler or trial is None:
                 continue
             if trial.effects[:-1] == parent.effects and (best is None or trial.cost < best.cost):
@@ -793,6 +807,25 @@ class _Search:
             if of != family and behind < _ALIKE and behind < found.get(of, (np.inf,))[0]:
                 found[of] = (behind, other, trial)
         return [(n, t) for _, n, t in sorted(found.values(), key=lambda f: f[0])]
+
+
+def _abreast(names: list[str]) -> list[list[str]]:
+    """``names`` of effects in twos that may be fitted at a time, whatever the number of threads.
+
+    The simpler of a family first: the others start from it too.
+    """
+    pairs: list[list[str]] = []
+    for name in sorted(names, key=_intricacy):
+        last = pairs[-1] if pairs else []
+        if len(last) == 1 and _intricacy(last[0]) == _intricacy(name):
+            last.append(name)
+        else:
+            pairs.append([name])
+    return pairs
+
+
+def _intricacy(name: str) -> int:
+    return len(EFFECTS[name].parameters)
 
 
 def _stage(parent: Trial, what: str) -> str:

@@ -9,7 +9,7 @@ good part of the stroke, where those of dry friction open within a few micrometr
 from __future__ import annotations
 
 from model.effects.description import Effect, Parameter
-from model.filters import wound
+from model.filters import wound_on
 from model.jit import jit
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
@@ -44,7 +44,7 @@ EFFECT = Effect(
             starts=(0.8,),
         ),
     ),
-    memory=1,
+    memory=2,
     turns=True,
     drives=("voltage", "stretch"),
 )
@@ -52,7 +52,7 @@ EFFECT = Effect(
 
 @jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
-    return c[k] * wound(m[j], (lam - lam0) / c[k + 1], c[k + 2], c[k + 3])
+    return c[k] * wound_on(m[j], m[j + 1], (lam - lam0) / c[k + 1], c[k + 2], c[k + 3])
 
 
 @jit
@@ -62,5 +62,6 @@ def stiffness(c, k, m, j, lam, rate):
 
 @jit
 def commit(c, k, m, j, lam, rate, lam0, h, t):
-    m[j] = wound(m[j], (lam - lam0) / c[k + 1], c[k + 2], c[k + 3])
+    m[j] = wound_on(m[j], m[j + 1], (lam - lam0) / c[k + 1], c[k + 2], c[k + 3])
+    m[j + 1] = abs(m[j]) ** c[k + 2]
     return 0

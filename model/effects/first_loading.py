@@ -1,7 +1,9 @@
 """Damage by the largest stretch so far, which stays (discontinuous damage, after Miehe 1995).
 
-The network carries 1 - s (1 - exp(-(d/r)^n)) of its stress, d the largest change of stretch since
-rest: once a film has been stretched, it is softer at every stretch, and goes on to be.
+The network carries 1 - s (1 - q) of its stress, q = (1 + b x)^(-1/b) with x = (d/r)^n and d the
+largest change of stretch since rest: once a film has been stretched, it is softer at every stretch,
+and goes on to be. What can still be lost goes with exp(-x) for b = 0 (Miehe), with 1/(1 + x) for
+b = 1: a broader spread of what the parts of the network bear.
 """
 
 from __future__ import annotations
@@ -33,20 +35,43 @@ EFFECT = Effect(
         Parameter(
             "exponent", "", (0.5, 4.0), "of the stretch", 1.5, starts=(1.5,), logarithmic=True
         ),
+        Parameter(
+            "breadth",
+            "",
+            (0.0, 2.0),
+            "0 if it is lost exponentially, 1 algebraically",
+            0.3,
+            starts=(1.0, 0.0),
+        ),
     ),
-    memory=1,
+    memory=2,
     turns=True,
     drives=("voltage", "stretch"),
 )
 
 
+_NONE = 1e-6  # a breadth that is none
+
+
+@jit
+def _lost(c, k, most):
+    """What is lost, of all that can be, after a change of stretch by ``most``: negative."""
+    x = (most / c[k + 1]) ** c[k + 2]
+    if c[k + 3] > _NONE:
+        x = math.log1p(c[k + 3] * x) / c[k + 3]
+    return math.expm1(-x)
+
+
 @jit
 def soften(c, k, m, j, lam, since, t, warmth):
-    most = max(m[j], abs(lam - c[REST]))
-    return 1.0 + c[k] * math.expm1(-((most / c[k + 1]) ** c[k + 2]))
+    # mostly the film has been there before, and what it lost is known
+    most = abs(lam - c[REST])
+    return 1.0 + c[k] * (_lost(c, k, most) if most > m[j] else m[j + 1])
 
 
 @jit
 def commit(c, k, m, j, lam, rate, lam0, h, t):
-    m[j] = max(m[j], abs(lam - c[REST]))
+    most = abs(lam - c[REST])
+    if most > m[j]:
+        m[j], m[j + 1] = most, _lost(c, k, most)
     return 0

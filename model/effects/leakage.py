@@ -1,8 +1,9 @@
 """Leakage through the film, whose current drops a part of the voltage in the electrodes.
 
-The film conducts better in a strong field, whose traps let their charges go (Poole and Frenkel;
-Phys. Rev. 54, 647 (1938)). The conductivity goes with exp(b sqrt(E)), so that of the voltage V the
-part s exp(b (sqrt(|V| lam/8 kV) - 1)) is lost: nothing at small voltages, most at the peak.
+The film conducts better in a strong field, which helps its charges out of their traps (n = 1/2;
+Frenkel, Phys. Rev. 54, 647 (1938)) or from one to the next (n near 1; Mott and Gurney, hopping).
+The conductivity goes with exp(b E^n), so that of the voltage V the part
+s exp(b ((|V| lam/8 kV)^n - 1)) is lost: nothing at small voltages, most at the peak.
 """
 
 from __future__ import annotations
@@ -32,9 +33,17 @@ EFFECT = Effect(
             "growth",
             "",
             (0.5, 20.0),
-            "by which the lost part grows with the root of the field",
+            "by which the lost part grows with the field",
             2.0,
-            starts=(4.0, 12.0),
+            starts=(2.0, 4.0, 12.0),
+        ),
+        Parameter(
+            "exponent",
+            "",
+            (0.5, 1.0),
+            "of the field: 1/2 of traps that it empties, 1 of hops",
+            0.1,
+            starts=(0.5, 1.0),
         ),
     ),
 )
@@ -46,7 +55,7 @@ _REFERENCE = 8e3  # V
 @jit
 def _left(c, k, v, lam):
     """What is left of ``v`` V; no more can be lost than there is."""
-    lost = c[k] * math.exp(c[k + 1] * (math.sqrt(abs(v) * lam / _REFERENCE) - 1.0))
+    lost = c[k] * math.exp(c[k + 1] * ((abs(v) * lam / _REFERENCE) ** c[k + 2] - 1.0))
     return v * max(1.0 - lost, 0.0)
 
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 from model import kernel
-from model.actuator import Actuator, displacements
+from model.actuator import Actuator, reading_of
 from model.errors import ModelError
 from model.film import stress_of
 from model.fitting.parameters import Layout
+from model.fitting.threads import together
 from model.records import ActuatorRecord, FilmRecord, Record, counted
 
 __all__ = ["Problem"]
@@ -69,38 +69,29 @@ class Problem:
         """Model readings (P, N) and statuses (P,) of a population ``values`` (P, d), natural."""
         c = self.layout.coefficients(values)
         out = np.zeros((c.shape[0], self.measured.size))
-        status = np.zeros(c.shape[0], dtype=np.int64)
-        for i, record in enumerate(self.records):
-            part = out[:, self._edges[i] : self._edges[i + 1]]
-            if isinstance(record, ActuatorRecord):
-                base = self.layout.base
-                length = base.film.length if isinstance(base, Actuator) else 1.0
-                moved, s = displacements(
-                    c, length, record.drive, record.lag, self.workers, self.quick
-                )
-                part[:] = counted(moved, record.lead_in)
-            else:
-                s = self._stresses(c, record, part)
-            status = np.where(status == kernel.OK, s, status)
-        simulated = c.shape[0] * len(self.records)
-        self.simulations += simulated
+        status = np.zeros((c.shape[0], len(self.records)), dtype=np.int64)
+
+        def run(job: tuple[int, int]) -> None:
+            member, i = job
+            part = slice(self._edges[i], self._edges[i + 1])
+            out[member, part], status[member, i] = self._reading(c[member], self.records[i])
+
+        together(run, list(np.ndindex(status.shape)), self.workers)
+        self.simulations += status.size
         if self.told is not None:
-            self.told(simulated)
-        return out, status
+            self.told(status.size)
+        # of several records the first that fails speaks
+        failed = np.argmax(status != kernel.OK, axis=1)
+        return out, np.take_along_axis(status, failed[:, None], axis=1)[:, 0]
 
-    def _stresses(self, c: np.ndarray, record: FilmRecord, out: np.ndarray) -> np.ndarray:
-        status = np.zeros(c.shape[0], dtype=np.int64)
-
-        def run(member: int) -> None:
-            out[member], status[member], _ = stress_of(c[member], record.time, record.stretch)
-
-        if self.workers <= 1 or c.shape[0] == 1:
-            for member in range(c.shape[0]):
-                run(member)
-        else:
-            with ThreadPoolExecutor(self.workers) as pool:
-                list(pool.map(run, range(c.shape[0])))
-        return status
+    def _reading(self, c: np.ndarray, record: Record) -> tuple[np.ndarray, int]:
+        if isinstance(record, FilmRecord):
+            stress, status, _ = stress_of(c, record.time, record.stretch)
+            return stress, status
+        base = self.layout.base
+        length = base.film.length if isinstance(base, Actuator) else 1.0
+        moved, status = reading_of(c, length, record.drive, record.lag, self.quick)
+        return counted(moved, record.lead_in), status
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """(model - measured)/noise, (N,), at coordinates ``x`` (d,)."""

@@ -17,7 +17,7 @@ from model.errors import ModelError
 from model.film import unit_stresses
 from model.fitting.parameters import THESIS_RANGES, Layout
 from model.fitting.problem import Problem
-from model.kinematics import electric
+from model.kinematics import electric_along
 from model.material import Branch, Network, Spring
 from model.network import HEAD
 from model.records import ActuatorRecord, FilmRecord
@@ -186,7 +186,7 @@ def _balance(
             )
             part -= part[:, :1]
             parts.append(part)
-            thrust = np.array([electric(base.film.held, lam) for lam in stretch])
+            thrust = electric_along(base.film.held, stretch)
             targets.append(c[ELECTRIC] * record.drive.voltage**2 * thrust)
     return np.concatenate(parts, axis=1), np.concatenate(targets)
 
