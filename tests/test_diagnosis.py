@@ -230,6 +230,21 @@ def test_what_happened_once_predicts_nothing_else():
     assert any("other recordings are predicted without it" in note for note in found.notes)
 
 
+def test_what_happened_in_every_recording_alike_predicts_others():
+    records = [record_of(PLAIN), record_of(PLAIN, seed=1)]
+    size = records[0].measured.size
+    noise = NOISE * np.random.default_rng(3).standard_normal(2 * size)
+    step = np.where(np.arange(size) > size // 2, 5.0 * NOISE, 0.0)
+    search = _Search(records, PLAIN, 1, lambda *_: None, lambda: False)
+    explained = made_trial(records, PLAIN, noise)
+    in_both = made_trial(records, PLAIN, noise + np.concatenate([step, step]))
+    in_one = made_trial(records, PLAIN, noise + np.concatenate([step, 0.0 * step]))
+    assert search._recurred(explained, in_both)
+    assert not search._recurred(explained, in_one)
+    alone = [made_trial(records[:1], PLAIN, r) for r in (noise[:size], noise[:size] + step)]
+    assert not search._recurred(*alone)
+
+
 def test_effects_that_look_the_same_are_named_as_such():
     truth = replace(PLAIN, effects=effect("linear drag", drag=400.0))
     found = diagnose([record_of(truth)], PLAIN, workers=1)

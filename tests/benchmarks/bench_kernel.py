@@ -200,7 +200,7 @@ def main() -> None:
     base, stretch = timed(ours, 51)
     print(f"thesis record, two periods, {duration:.1f} s, {t.size} samples at {RATE:g} Hz")
     print(f"{'solver':<44}{'ms':>10}{'error um':>11}{'ratio':>9}{'target':>9}")
-    name = "this kernel (RK4, fixed steps)"
+    name = "this kernel (exponential Runge-Kutta)"
     print(f"{name:<44}{base * 1e3:>10.3f}{error(stretch) * 1e6:>11.4f}{'1x':>9}")
     for name, run, target in (
         ("SciPy LSODA, solve_ivp", lsoda, "150x"),
