@@ -5,6 +5,7 @@ from __future__ import annotations
 import builtins
 import functools
 import io
+import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -263,13 +264,23 @@ def test_effects_that_look_the_same_are_named_as_such():
 
 def test_what_a_law_not_quite_the_true_one_leaves_is_no_second_effect():
     search = _Search([record_of(PLAIN)], PLAIN, 1, lambda *_: None, lambda: False)
-    trial = made_trial([record_of(PLAIN)], PLAIN, np.zeros(1))
-    search.found[frozenset()] = replace(trial, cost=100.0)
-    gain = 1e3  # of the criterion, which is sure that the residual changes
-    assert search._share(replace(trial, cost=50.0), gain) == 0.0
-    assert search._share(replace(trial, cost=50.0), 20.0) > 0.0
-    assert search._share(replace(trial, cost=1.5), gain) > 0.5
-    assert search._share(replace(trial, cost=4.0), gain) == 0.0
+    search.found[frozenset()] = made_trial([record_of(PLAIN)], PLAIN, np.full(1, 10.0 * NOISE))
+    assert search.found[frozenset()].cost == pytest.approx(100.0)
+
+    def asked(what: str, left: float, name: str, gain: float = 1e3) -> float:
+        values = tuple((p.name, p.typical) for p in EFFECTS[what].parameters)
+        with_it = replace(PLAIN, effects=((what, values),))
+        over = np.full(1, math.sqrt(left) * NOISE)
+        return search._share(made_trial([record_of(PLAIN)], with_it, over), name, gain)
+
+    assert asked("ageing", 50.0, "linear drag") == 0.0
+    assert asked("ageing", 50.0, "linear drag", gain=20.0) == pytest.approx(0.25)
+    # the criterion is sure that the residual changes, but so little is left
+    assert asked("ageing", 1.5, "linear drag") > 0.5
+    assert asked("ageing", 4.0, "linear drag") == 0.0
+    # another law of softening may be the one that is missing, and a walk has none
+    assert asked("ageing", 1.5, "Mullins softening") == 0.0
+    assert asked("wandering drift", 1.5, "linear drag") == 0.0
 
 
 def test_what_no_family_covers_is_described():

@@ -139,8 +139,9 @@ class Candidate:
     ``promised`` is the share of the residual's mean square that its sensitivity promises to
     first order (the score test), ``gained`` the share that the refit took away. ``gain`` is the
     fall of the information criterion against the base, ``behind`` how far it lies behind the best
-    candidate of its round (0 for the best). ``verdict`` is one of chosen, indistinguishable,
-    better (than nothing, but not the best), worthless, failed. ``note`` says why in words.
+    candidate of its round (0 for the best). ``verdict`` is one of chosen, indistinguishable
+    (explains as much as the best, be it with more numbers), better (than nothing, but not the
+    best), worthless, failed. ``note`` says why in words.
     """
 
     effect: str

@@ -37,7 +37,7 @@ _EFFECTS_MAX = 3  # more at once no record of this kind tells apart
 _TURNS = 3  # of searching on and pruning: what is pruned makes room
 _EXCHANGES = 3  # of one effect for another, when more than one is there
 _DECISIVE = 12.0  # of the information criterion: odds of e^6, over some forty candidates
-_ALIKE = 10.0  # of the same: candidates nearer than that are not told apart
+_ALIKE = 10.0  # of the same, for explaining alone: candidates nearer than that are not told apart
 _MATTERS = 0.01  # of the noise's mean square: less is not worth an effect
 _SECOND_SHARE = 0.25  # of what is left above the noise: less is not worth one more effect
 _OF_ITS_FORM = 0.02  # of what is explained: a law not quite the true one leaves so little
@@ -270,7 +270,8 @@ class _Search:
             matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
             if best.effects:
                 # beside another, little of what no effect explains may go to any
-                matters &= best.cost - leader.cost > self._share(best, gain) * (best.cost - 1.0)
+                share = self._share(best, fitted[0].name, gain)
+                matters &= best.cost - leader.cost > share * (best.cost - 1.0)
             taken = gain > self._asked(fitted[0].name) and matters
             if taken:
                 reason = f"gains {gain:.0f} of the information criterion"
@@ -312,10 +313,16 @@ class _Search:
         self.found[key] = self.bench.restarted(trial)
         return self.found[key]
 
-    def _share(self, best: Trial, gain: float) -> float:
-        """The part of what ``best`` leaves above the noise that one more effect must explain."""
+    def _share(self, best: Trial, name: str, gain: float) -> float:
+        """The part of what ``best`` leaves above the noise that effect ``name`` must explain.
+
+        So little may be left as a law in ``best`` is not quite the true one: then another of its
+        family may mend it, but something else must explain most of it. A walk follows no law.
+        """
         explained = self.found[frozenset()].cost - best.cost
-        if best.cost - 1.0 < _OF_ITS_FORM * explained:
+        mended = EFFECTS[name].family in {EFFECTS[n].family for n in best.effects}
+        lawful = all(EFFECTS[n].recurs for n in best.effects)
+        if lawful and not mended and best.cost - 1.0 < _OF_ITS_FORM * explained:
             return _FORM_SHARE
         return _SECOND_SHARE if gain < _BY_FAR else 0.0
 
@@ -587,6 +594,11 @@ class _Search:
         """What ``trial`` gains of the criterion over another."""
         return self._criterion(over, correlation) - self._criterion(trial, correlation)
 
+    def _explains_as_well(self, trial: Trial, best: Trial, correlation: float) -> bool:
+        """Whether the data cannot tell ``trial`` from ``best``, which may be the simpler one."""
+        samples = self.bench.samples / correlation
+        return information(trial.cost, 0, samples) - information(best.cost, 0, samples) < _ALIKE
+
     def _demerit(self, trial: Trial, correlation: float) -> float:
         """The criterion, and a margin for each effect that names no cause."""
         unnamed = sum(EFFECTS[name].family == "unknown" for name in trial.effects)
@@ -619,18 +631,16 @@ class _Search:
         """Keep the round: the candidates on top of the base that the choice was made from."""
         parent = tried[0].parent
         of_parent = [t for t in tried if t.parent is parent]
-        base_criterion = self._criterion(parent, correlation)
-        best = min(self._criterion(t.trial, correlation) for t in of_parent)
+        best = min((t.trial for t in of_parent), key=lambda t: self._criterion(t, correlation))
         candidates = []
         for t in of_parent:
             effect = EFFECTS[t.name]
-            criterion = self._criterion(t.trial, correlation)
-            behind = criterion - best
-            better = base_criterion - criterion
+            behind = self._gain(t.trial, best, correlation)
+            better = self._gain(parent, t.trial, correlation)
             verdict = "worthless"
             if chosen is not None and t is chosen:
                 verdict = "chosen"
-            elif better > _DECISIVE and behind < _ALIKE:
+            elif better > _DECISIVE and self._explains_as_well(t.trial, best, correlation):
                 verdict = "indistinguishable"
             elif better > _DECISIVE:
                 verdict = "better"
@@ -795,7 +805,7 @@ class _Search:
         """Effects of other families that, in place of ``name``, explain the data as well."""
         others = frozenset(best.effects) - {name}
         family = EFFECTS[name].family
-        mark = self._criterion(best, correlation)
+        without = self._without(best, name)
         found: dict[str, tuple[float, str, Trial]] = {}
         for key, trial in self.found.items():
             fresh = key - others
@@ -803,8 +813,12 @@ class _Search:
                 continue
             (other,) = fresh
             of = EFFECTS[other].family
-            behind = self._criterion(trial, correlation) - mark
-            if of != family and behind < _ALIKE and behind < found.get(of, (np.inf,))[0]:
+            as_well = self._explains_as_well(trial, best, correlation)
+            if of == family or not as_well:
+                continue
+            behind = self._gain(trial, best, correlation)
+            better = self._gain(without, trial, correlation)
+            if better > self._asked(other) and behind < found.get(of, (np.inf,))[0]:
                 found[of] = (behind, other, trial)
         return [(n, t) for _, n, t in sorted(found.values(), key=lambda f: f[0])]
 
