@@ -181,8 +181,9 @@ def extra(name, p, film, drive):
         )
 
     def power_law():
-        times = [p["onset"] * 6.0**i for i in range(6)]
-        moduli = [p["modulus"] * (t / p["onset"]) ** -p["exponent"] for t in times]
+        a = p["exponent"]
+        times = [0.03, 0.3, 3.0, 30.0, 300.0, 3000.0]
+        moduli = [p["modulus"] * math.log(10.0) / math.gamma(a) * tau**-a for tau in times]
         return branches(moduli, times)
 
     def attached():

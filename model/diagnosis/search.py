@@ -270,8 +270,7 @@ class _Search:
             matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
             if best.effects:
                 # beside another, little of what no effect explains may go to any
-                share = self._share(best, fitted[0].name, gain)
-                matters &= best.cost - leader.cost > share * (best.cost - 1.0)
+                matters &= best.cost - leader.cost > self._share(best, gain) * (best.cost - 1.0)
             taken = gain > self._asked(fitted[0].name) and matters
             if taken:
                 reason = f"gains {gain:.0f} of the information criterion"
@@ -313,16 +312,14 @@ class _Search:
         self.found[key] = self.bench.restarted(trial)
         return self.found[key]
 
-    def _share(self, best: Trial, name: str, gain: float) -> float:
-        """The part of what ``best`` leaves above the noise that effect ``name`` must explain.
+    def _share(self, best: Trial, gain: float) -> float:
+        """The part of what ``best`` leaves above the noise that one more effect must explain.
 
-        So little may be left as a law in ``best`` is not quite the true one: then another of its
-        family may mend it, but something else must explain most of it. A walk follows no law.
+        So little may be left as a law in ``best`` is not quite the true one; a walk follows none.
         """
         explained = self.found[frozenset()].cost - best.cost
-        mended = EFFECTS[name].family in {EFFECTS[n].family for n in best.effects}
         lawful = all(EFFECTS[n].recurs for n in best.effects)
-        if lawful and not mended and best.cost - 1.0 < _OF_ITS_FORM * explained:
+        if lawful and best.cost - 1.0 < _OF_ITS_FORM * explained:
             return _FORM_SHARE
         return _SECOND_SHARE if gain < _BY_FAR else 0.0
 
