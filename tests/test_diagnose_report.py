@@ -14,6 +14,7 @@ from app.report.diagnosis import (
     HEADLINES,
     before_after,
     dropped,
+    headline,
     pooled,
     ranking,
     summary,
@@ -130,6 +131,15 @@ class TestWords:
     def test_an_interruption_is_told(self):
         words = " ".join(summary(diagnose_outcome(finding=finding(interrupted=True))))
         assert "was interrupted" in words
+
+    def test_a_search_that_ended_within_its_first_round_says_how_far_it_came(self):
+        early = finding(interrupted=True, rounds=())
+        assert early.steps
+        assert "all effects were tried" in headline(early)
+        assert "did best until then" in " ".join(summary(diagnose_outcome(finding=early)))
+        nothing = replace(early, steps=())
+        assert "anything was tried" in headline(nothing)
+        assert "nothing is known yet" in " ".join(summary(diagnose_outcome(finding=nothing)))
 
     def test_quality_and_notes_are_warnings(self):
         said = warnings(diagnose_outcome(finding=finding(notes=("it was odd",))))

@@ -85,7 +85,8 @@ def pooled(comparisons: Sequence[Comparison]) -> Errors | None:
 def headline(finding: Diagnosis) -> str:
     """The verdict as a headline."""
     if finding.interrupted and not finding.rounds:
-        return "Interrupted before anything was tried"
+        tried = "all effects were" if finding.steps else "anything was"
+        return f"Interrupted before {tried} tried"
     return HEADLINES[finding.verdict]
 
 
@@ -137,6 +138,11 @@ def readable(text: str) -> str:
 def _verdict(outcome: DiagnoseOutcome) -> str:
     finding = outcome.finding
     if finding.interrupted and not finding.rounds:
+        if finding.steps:
+            return (
+                "The search was interrupted before all effects were tried: this one did best until "
+                "then, and another may do better."
+            )
         return "The search was interrupted before anything was tried: nothing is known yet."
     if finding.verdict == "nothing_missing":
         return (
