@@ -9,7 +9,17 @@ import math
 
 from model.jit import jit
 
-__all__ = ["along_cubic", "lagged", "low_pass", "slewed", "slid", "switched", "swung", "wound"]
+__all__ = [
+    "along_cubic",
+    "lagged",
+    "low_pass",
+    "slewed",
+    "slid",
+    "switched",
+    "swung",
+    "wound",
+    "wound_on",
+]
 
 _SMALL = 0.1
 _SWITCHING = 0.02  # s: long enough for a fit to find the moment

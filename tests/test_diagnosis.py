@@ -282,6 +282,16 @@ def test_what_a_law_not_quite_the_true_one_leaves_is_no_second_effect():
     assert asked("wandering drift", 1.5) == 0.0
 
 
+def test_a_rival_is_no_worse_for_having_more_numbers():
+    search = _Search([record_of(PLAIN)], PLAIN, 1, lambda *_: None, lambda: False)
+    free = made_trial([record_of(PLAIN)], PLAIN, np.full(1, NOISE))
+    held = replace(free, fixed=~free.fixed)
+    assert search._gain(free, held, 1.0) > 10.0
+    assert search._explains_as_well(free, held, 1.0)
+    worse = made_trial([record_of(PLAIN)], PLAIN, np.full(1, 1.05 * NOISE))
+    assert not search._explains_as_well(worse, held, 1.0)
+
+
 def test_what_no_family_covers_is_described():
     truth = replace(PLAIN, effects=effect("sudden change of force", stress=30.0, moment=6.3))
     found = diagnose([record_of(truth)], PLAIN, workers=1)

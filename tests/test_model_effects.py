@@ -658,8 +658,8 @@ def truth_of(base, names):
 @pytest.mark.parametrize(("name", "driven"), BOTH)
 def test_found_again(name, driven):
     base = STRIP if driven == "stretch" else replace(THESIS, network=ONE)
-    # what the permittivity on a data sheet means shows at large strengths only, how what is lost
-    # of a film ends at its end only
+    # what the permittivity on a data sheet means shows at large strengths only; by what law the
+    # last of a film's stress is lost, only when it is
     hardly = ["settled"] if driven == "voltage" else ["breadth"]
     require_found(truth_of(base, [name]), but=tuple(f"{name}: {number}" for number in hardly))
 

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from threading import Lock
-from typing import TypeVar
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from model.fitting.parameters import Estimate, Layout
 from model.fitting.problem import Problem
 from model.fitting.search import voltage_misfit, voltage_starts
 from model.fitting.secant import descend_by_secants
-from model.fitting.threads import together
+from model.fitting.threads import Job, Result, together
 from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
 __all__ = ["Bench", "Trial", "information"]
@@ -72,10 +71,6 @@ def information(cost: float, free: int, samples: float) -> float:
     an effect explains, so that it also compares models that all leave more than noise.
     """
     return samples * math.log(max(cost, 1e-12)) + free * math.log(max(samples, 2.0))
-
-
-_Job = TypeVar("_Job")
-_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
@@ -153,7 +148,7 @@ class Bench:
         with self._counting:
             self.simulations += simulations
 
-    def together(self, work: Callable[[_Job], _Result], jobs: Sequence[_Job]) -> list[_Result]:
+    def together(self, work: Callable[[Job], Result], jobs: Sequence[Job]) -> list[Result]:
         """``work(job)`` of each of ``jobs``, fits that know nothing of each other."""
         return together(work, jobs, self.workers, "fit")
 

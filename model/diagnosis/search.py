@@ -422,7 +422,6 @@ class _Search:
         branches account for more of the Maxwell stress than before? Where the leader explains all,
         only those are fitted anew beside which they account for as much as beside it.
         """
-        self._check()
         parents = {frozenset(t.parent.effects): t.parent for t in tried}
         before = {
             key: float(self.bench.unaccounted(p.problem, p.x[None])[0])
@@ -430,6 +429,7 @@ class _Search:
         }
 
         def looked(place: int) -> tuple[float, int, float] | None:
+            self._check()
             one = tried[place]
             sizes = EFFECTS[one.name].sizes
             if len(sizes) != 1:

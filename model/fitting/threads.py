@@ -7,10 +7,10 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import TypeVar
 
-__all__ = ["together"]
+__all__ = ["Job", "Result", "together"]
 
-_Job = TypeVar("_Job")
-_Result = TypeVar("_Result")
+Job = TypeVar("Job")
+Result = TypeVar("Result")
 
 
 @cache
@@ -20,11 +20,11 @@ def _pool(workers: int, name: str) -> ThreadPoolExecutor:
 
 
 def together(
-    work: Callable[[_Job], _Result],
-    jobs: Sequence[_Job],
+    work: Callable[[Job], Result],
+    jobs: Sequence[Job],
     workers: int,
     name: str = "simulation",
-) -> list[_Result]:
+) -> list[Result]:
     """``work(job)`` of each of ``jobs``, in their order, done by ``workers`` threads.
 
     Work that itself asks for this needs another ``name``, or all threads would wait for each other.
