@@ -28,7 +28,7 @@ from model.fitting.secant import descend_by_secants
 from model.fitting.threads import Job, Result, together
 from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
-__all__ = ["Bench", "Trial", "information"]
+__all__ = ["Bench", "Trial", "information", "relieved"]
 
 _RATE = 200.0  # Hz, to which records are thinned: mains and a load's ringing still show
 _QUIET_MIN = 100  # samples of a lead-in from which a thinned record's noise is read again
@@ -57,6 +57,7 @@ _LEADERS = 2  # of several starts that are followed on: the best at first does n
 _ALIKE = 0.5  # of the logarithm of relaxation times: a factor of 1.6
 _AT_END = 0.05  # of the logarithm of a relaxation time: so near the bound it wants to go further
 _BESIDE = (0.6, 1.6)  # of the relaxation time of the branch that it helps
+_SLOWER = 3.0  # times the relaxation time of the stiffest branch: such do something else than it
 _ELSEWHERE = (1.0, 4.0, 16.0)  # s, where a branch that is spare may be of use
 _WORTH = 1e-4  # of chi-square: a descent that promises less has ended
 _RIDGE = 1e-3  # of a number's own curvature, so that no segment alone sets it free
@@ -184,8 +185,11 @@ class Bench:
         leader: float = 0.0,
         parent: float = 0.0,
         noise: bool = False,
+        anew: Sequence[np.ndarray] = (),
     ) -> Trial:
         """``model`` fitted from the best of several starts: coordinates and a Jacobian near them.
+
+        ``anew`` are others, with branches in new places: these take longer to show what they lead to.
 
         ``leader`` is the cost to beat, ``parent`` that of the model without what is tried here: a
         fit that lies far behind the one, and not much before the other, is not followed to its end.
@@ -196,6 +200,10 @@ class Bench:
         scouts = [
             descend_by_secants(problem, start, fixed, jacobian, _SCOUTING, sure=False)
             for start, jacobian in starts
+        ]
+        scouts += [
+            descend_by_secants(problem, start, fixed, iterations=_SCOUTING + _RESTART, sure=False)
+            for start in anew
         ]
         best = min(scouts, key=lambda f: f.cost)
         behind = max(best.cost - leader, 0.0) * problem.samples
@@ -473,6 +481,30 @@ def _reseeded(layout: Layout, x: np.ndarray) -> list[np.ndarray]:
     starts = [moved(time, stiffest, 0.0) for time in elsewhere]
     beside = float(values[times[stiffest]])
     return [*starts, *(moved(beside * ratio, stiffest, 0.5) for ratio in _BESIDE)]
+
+
+def relieved(trial: Trial) -> list[tuple[np.ndarray, float, float]]:
+    """Coordinates (d,) with a slow branch's work left to an effect, its modulus in Pa and time in s.
+
+    While the effect was missing, slow branches stood in for it, and what they are there for was left
+    to the stiffest alone. The branch goes back to its side. One for each slow branch.
+    """
+    layout = trial.problem.layout
+    values = layout.values(trial.x)
+    times = layout.column("T")
+    moduli = layout.column("mu")[-times.size :]  # of the branches
+    if not times.size:
+        return []
+    stiffest = int(np.argmax(values[moduli]))
+    beside = values[times[stiffest]]
+    found = []
+    for slow in np.flatnonzero(values[times] > _SLOWER * beside):
+        there = values.copy()
+        there[moduli[[stiffest, slow]]] = 0.5 * values[moduli[stiffest]]
+        there[times[[stiffest, slow]]] = beside * np.array(_BESIDE)
+        x = np.clip(layout.coordinates(there), layout.lower, layout.upper)
+        found.append((x, float(values[moduli[slow]]), float(values[times[slow]])))
+    return found
 
 
 def _chi2(trial: Trial, gain: float) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from model.actuator import Actuator
-from model.diagnosis.bench import Bench, Trial, information
+from model.diagnosis.bench import Bench, Trial, information, relieved
 from model.diagnosis.findings import (
     EXPLAINED,
     NOISE_RMS,
@@ -379,9 +379,24 @@ class _Search:
         simpler = self._simpler(parent, effect, promises[0].start)
         if simpler is not None:
             starts.append((simpler, starts[0][1]))
+        may_relieve = effect.relaxes and isinstance(model, Actuator)
+        anew = self._relieved(parent, promises[0]) if may_relieve else []
         fixed = np.concatenate([parent.fixed, np.zeros(len(effect.parameters), dtype=bool)])
         leader = min(t.cost for t in self.found.values())
-        return self.bench.fit(model, starts, fixed, leader, parent.cost, self._is_noise(parent))
+        noise = self._is_noise(parent)
+        return self.bench.fit(model, starts, fixed, leader, parent.cost, noise, anew)
+
+    def _relieved(self, parent: Trial, promise: Promise) -> list[np.ndarray]:
+        """Coordinates where an effect has taken over from a branch; the rest is as promised."""
+        layout = self.bench.problem(promise.model).layout
+        found = []
+        for springs, modulus, time in relieved(parent):
+            values = layout.values(promise.start)
+            values[springs.size : springs.size + 2] = modulus, time
+            x = np.clip(layout.coordinates(values), layout.lower, layout.upper)
+            x[: springs.size] = springs
+            found.append(x)
+        return found
 
     def _settled(self, best: Trial, fitted: list[_Tried]) -> tuple[list[_Tried], float]:
         """The candidates, best first, the leading ones fitted to the end of their valleys.

@@ -78,7 +78,8 @@ class Effect:
     ``turns`` is True where what it does follows the path from turning point to turning point, so
     that not even those of a film that rings by a tenth of a micrometre must be missed. ``recurs``
     is False for what happens in one recording and is no property of the rig: nothing says that
-    another recording has it too, or when.
+    another recording has it too, or when. ``relaxes`` is True of what relaxes as the network's branches do,
+    its first two numbers being modulus and relaxation time: they stand in for it while it is missing.
     ``words`` is one sentence for a person: what the effect is and what betrays it.
     """
 
@@ -91,6 +92,7 @@ class Effect:
     drives: tuple[str, ...] = field(default=("voltage",))
     turns: bool = False
     recurs: bool = True
+    relaxes: bool = False
 
     @property
     def sizes(self) -> tuple[Parameter, ...]:

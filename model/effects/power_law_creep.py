@@ -51,17 +51,18 @@ def _first_share(k, a):
 @jit
 def _stress(c, k, m, j, lam0, lam, since, commits):
     a = c[k + 1]
-    e0, e = lam0 - c[REST], lam - c[REST]
+    more = lam / c[REST]
+    e0, e = math.log(lam0 / c[REST]), math.log(more)
     total, tau = 0.0, _FIRST
     share, fall = _first_share(c[k], a), math.exp(-a * _DECADE)
     for i in range(_BRANCHES):
-        q = lagged(m[j + i], e0, e, since, tau)
+        q = lagged(m[j + i], e0, e, since, tau * more)
         total += share * (e - q)
         if commits:
             m[j + i] = q
         tau *= 10.0
         share *= fall
-    return total
+    return total / more
 
 
 @jit

@@ -1,9 +1,12 @@
 """Creep by one more slow branch: a spring in series with a dashpot, beside the network.
 
-Stress mu (e - q), q' = (e - q)/T for the strain e = lam - lam_rest.
+As the network's own do at small elastic strains, it answers to the logarithmic strain
+e = ln(lam/lam_rest): stress mu (e - q) lam_rest/lam, q' = (e - q) lam_rest/(lam T).
 """
 
 from __future__ import annotations
+
+import math
 
 from model.coefficients import REST
 from model.effects.description import Effect, Parameter
@@ -31,12 +34,16 @@ EFFECT = Effect(
     ),
     memory=1,
     drives=("voltage", "stretch"),
+    relaxes=True,
 )
 
 
 @jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
-    return c[k] * (lam - c[REST] - lagged(m[j], lam0 - c[REST], lam - c[REST], since, c[k + 1]))
+    more = lam / c[REST]
+    e = math.log(more)
+    late = lagged(m[j], math.log(lam0 / c[REST]), e, since, c[k + 1] * more)
+    return c[k] * (e - late) / more
 
 
 @jit
@@ -46,5 +53,6 @@ def stiffness(c, k, m, j, lam, rate):
 
 @jit
 def commit(c, k, m, j, lam, rate, lam0, h, t):
-    m[j] = lagged(m[j], lam0 - c[REST], lam - c[REST], h, c[k + 1])
+    more = lam / c[REST]
+    m[j] = lagged(m[j], math.log(lam0 / c[REST]), math.log(more), h, c[k + 1] * more)
     return 0

@@ -1,0 +1,60 @@
+"""Slow polarisation in three stages, as mobile side groups, chains and charges give: a Prony series.
+
+Three Debye terms as of ``dielectric_relaxation``, each of its own strength, at T/r, T and r T.
+"""
+
+from __future__ import annotations
+
+from model.effects.description import Effect, Parameter
+from model.filters import lagged
+from model.jit import jit
+
+__all__ = ["EFFECT", "polarise"]
+
+_STRENGTH = (-0.5, 2.0)
+
+EFFECT = Effect(
+    name="dielectric relaxation in stages",
+    family="dielectric_relaxation",
+    acts_on="dielectric",
+    words="parts of the force follow the voltage, one later than the other, whatever the stretch",
+    parameters=(
+        Parameter("strength", "", _STRENGTH, "part at T of the permittivity over the fast", 0.01, 0.0),
+        Parameter("sooner", "", _STRENGTH, "the same at T/r", 0.01, 0.0),
+        Parameter("later", "", _STRENGTH, "the same at r T", 0.01, 0.0),
+        Parameter(
+            "relaxation_time",
+            "s",
+            (2e-3, 60.0),
+            "of the middle stage, T",
+            0.2,
+            starts=(0.2, 0.7),
+            logarithmic=True,
+        ),
+        Parameter(
+            "ratio", "", (2.0, 40.0), "of relaxation times, r", 10.0, starts=(10.0,), logarithmic=True
+        ),
+        Parameter(
+            "settled",
+            "",
+            (0.0, 1.0),
+            "1 where the film's data give the permittivity at rest, 0 where that of fast fields",
+            1.0,
+            starts=(1.0,),
+        ),
+    ),
+    memory=3,
+)
+
+
+@jit
+def polarise(c, k, m, j, start, end, h):
+    before = c[k] * m[j] + c[k + 1] * m[j + 1] + c[k + 2] * m[j + 2]
+    tau, ratio = c[k + 3], c[k + 4]
+    m[j] = lagged(m[j], start, end, h, tau)
+    m[j + 1] = lagged(m[j + 1], start, end, h, tau / ratio)
+    m[j + 2] = lagged(m[j + 2], start, end, h, tau * ratio)
+    after = c[k] * m[j] + c[k + 1] * m[j + 1] + c[k + 2] * m[j + 2]
+    slow = c[k] + c[k + 1] + c[k + 2]
+    rest = c[k + 5] * slow
+    return start * (before - rest * start) / (1.0 + rest), end * (after - rest * end) / (1.0 + rest)
