@@ -90,6 +90,18 @@ def ramped(since):
     return limited(since / 0.02 + 0.5, 0.0, 1.0)
 
 
+def spectrum(name, p):
+    """Moduli in Pa and relaxation times in s of the branches of what creeps."""
+    if name == "slow branch":
+        return np.array([p["modulus"]]), np.array([p["relaxation_time"]])
+    a = p["exponent"]
+    if name == "broad creep":
+        times = p["relaxation_time"] * 10.0 ** (0.5 * np.arange(6))
+        return p["modulus"] * (times / times[0]) ** -a, times
+    times = 0.03 * 10.0 ** np.arange(6)
+    return p["modulus"] * math.log(10.0) / math.gamma(a) * times**-a, times
+
+
 def extra(name, p, film, drive):
     """``Extra`` of the effect ``name`` with the numbers ``p`` on ``film``; ``drive`` is v(t)."""
     rest = film.rest
@@ -172,19 +184,13 @@ def extra(name, p, film, drive):
     def branches(moduli, times):
         return Extra(
             states=len(times),
-            stress=lambda t, lam, u, z, v: sum(
-                m * (lam - rest - q) for m, q in zip(moduli, z, strict=True)
+            stress=lambda t, lam, u, z, v: (
+                rest / lam * sum(m * (math.log(lam / rest) - q) for m, q in zip(moduli, z, strict=True))
             ),
             slopes=lambda t, lam, u, z, v: tuple(
-                (lam - rest - q) / tau for tau, q in zip(times, z, strict=True)
+                rest / lam * (math.log(lam / rest) - q) / tau for tau, q in zip(times, z, strict=True)
             ),
         )
-
-    def power_law():
-        a = p["exponent"]
-        times = [0.03, 0.3, 3.0, 30.0, 300.0, 3000.0]
-        moduli = [p["modulus"] * math.log(10.0) / math.gamma(a) * tau**-a for tau in times]
-        return branches(moduli, times)
 
     def attached():
         om, damping = 2.0 * math.pi * p["frequency"], p["damping"]
@@ -208,6 +214,17 @@ def extra(name, p, film, drive):
         return Extra(
             states=6,
             square=lambda t, lam, u, z, v: polarised(v, float(weights @ np.array(z))),
+            slopes=lambda t, lam, u, z, v: tuple((v - np.array(z)) / times),
+        )
+
+    def in_stages():
+        strengths = np.array([p["strength"], p["sooner"], p["later"]])
+        times = p["relaxation_time"] * np.array([1.0, 1.0 / p["ratio"], p["ratio"]])
+        return Extra(
+            states=3,
+            square=lambda t, lam, u, z, v: (
+                v * (v + strengths @ np.array(z)) / (1.0 + p["settled"] * strengths.sum())
+            ),
             slopes=lambda t, lam, u, z, v: tuple((v - np.array(z)) / times),
         )
 
@@ -270,6 +287,7 @@ def extra(name, p, film, drive):
             square=lambda t, lam, u, z, v: polarised(v, z[0]),
             slopes=lambda t, lam, u, z, v: ((v - z[0]) / p["relaxation_time"],),
         ),
+        "dielectric relaxation in stages": in_stages,
         "distributed hysteresis": distributed,
         "dry friction": friction,
         "elastoplastic hysteresis": elastoplastic,
@@ -304,8 +322,9 @@ def extra(name, p, film, drive):
         ),
         "Mullins softening": mullins,
         "first-loading damage": first_loading,
-        "power-law creep": power_law,
-        "slow branch": lambda: branches([p["modulus"]], [p["relaxation_time"]]),
+        **dict.fromkeys(
+            ("power-law creep", "broad creep", "slow branch"), lambda: branches(*spectrum(name, p))
+        ),
         "strain-dependent permittivity": lambda: Extra(
             electric=lambda t, lam, u, z, v: 1.0 + p["strain_coefficient"] * (lam - rest)
         ),
@@ -325,6 +344,14 @@ def extra(name, p, film, drive):
             states=1,
             soften=lambda t, lam, u, z, v: 1.0 + p["stiffening"] * z[0],
             slopes=lambda t, lam, u, z, v: (((v / 5e3) ** 2 - z[0]) / p["time_constant"],),
+        ),
+        "self-heating in stages": lambda: Extra(
+            states=2,
+            soften=lambda t, lam, u, z, v: 1.0 + p["stiffening"] * z[0] + p["later"] * z[1],
+            slopes=lambda t, lam, u, z, v: (
+                ((v / 5e3) ** 2 - z[0]) / p["time_constant"],
+                ((v / 5e3) ** 2 - z[1]) / p["later_time_constant"],
+            ),
         ),
         "warm-up in stages": lambda: Extra(
             soften=lambda t, lam, u, z, v: (

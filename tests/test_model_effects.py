@@ -28,7 +28,7 @@ from model.fitting.problem import Problem
 from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
 from model.records import ActuatorRecord, FilmRecord
 from sim_backend.model_plant import ModelPlant
-from tests.effect_oracle import Film, bouc_wen, extra, follow, limited
+from tests.effect_oracle import Film, bouc_wen, extra, follow, limited, spectrum
 
 THESIS = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
 LENGTH = THESIS_FILM.length
@@ -386,21 +386,19 @@ def steps_of(name, p, time, stretch):
                 ).y[0, -1]  # fmt: skip
             out.append(p["yield_stress"] * z)
         return np.array(out)
-    if name == "slow branch":
-        times, moduli = [p["relaxation_time"]], [p["modulus"]]
-    else:
-        a = p["exponent"]
-        times = [0.03 * 10.0**i for i in range(6)]
-        moduli = [p["modulus"] * math.log(10.0) / math.gamma(a) * t**-a for t in times]
-    # Boltzmann's superposition: every straight piece relaxes on its own
-    out = np.zeros(time.size)
-    for k in range(1, time.size):
-        before, after = time - time[k - 1], time - time[k]
-        for m, tau in zip(moduli, times, strict=True):
-            since = np.maximum(after, 0.0)
-            left = np.exp(-since / tau) - np.exp(-np.maximum(before, 0.0) / tau)
-            out += np.where(before > 0.0, m * tau * rate[k] * left, 0.0)
-    return out
+    # branches of what creeps, from sample to sample: the strip rests at a stretch of 1
+    moduli, times = spectrum(name, p)
+    q, out = np.zeros(len(times)), [0.0]
+    for t0, t1, lam0, speed in zip(time, time[1:], stretch, rate[1:], strict=False):
+        q = solve_ivp(
+            lambda t, y, t0=t0, lam0=lam0, speed=speed: (
+                (math.log(lam0 + speed * (t - t0)) - y) / times / (lam0 + speed * (t - t0))
+            ),
+            (t0, t1), q, method="Radau", rtol=1e-8, atol=1e-12,
+        ).y[:, -1]  # fmt: skip
+        lam = lam0 + speed * (t1 - t0)
+        out.append(float(np.sum(moduli * (math.log(lam) - q))) / lam)
+    return np.array(out)
 
 
 @pytest.mark.parametrize("size", [1.0, 20.0])
@@ -411,6 +409,7 @@ def steps_of(name, p, time, stretch):
         "distributed hysteresis",
         "elastoplastic hysteresis",
         "slow branch",
+        "broad creep",
         "power-law creep",
     ],
 )
@@ -419,17 +418,20 @@ def test_stresses_in_films_against_direct_evaluation(name, size):
     found = measured(with_effect(STRIP, name, values)) - baseline("stretch")
     expected = steps_of(name, values, *pulled())
     assert np.abs(expected).max() > 10.0
-    # the spring-pot takes its Gamma function to 5e-5, Bouc and Wen's loop its steps to 2e-5
-    error = {"power-law creep": 6e-5, "elastoplastic hysteresis": 2e-5}.get(name, 2e-6)
+    # what creeps takes the logarithm for straight within a sample, and the mean stretch there for
+    # its rate; Bouc and Wen's loop takes its steps to 2e-5
+    error = 1e-4 if EFFECTS[name].family == "creep" else 2e-6
+    error = 2e-5 if name == "elastoplastic hysteresis" else error
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=error * np.abs(expected).max())
 
 
 def test_the_spring_pot_relaxes_by_a_power_of_time():
     values = numbers("power-law creep", exponent=0.2)
     time = np.concatenate([[0.0, 1e-6], np.geomspace(0.1, 100.0, 60)])
-    stretch = np.where(time > 0.0, 1.2, 1.0)
+    stretch = np.where(time > 0.0, 1.02, 1.0)
     found = with_effect(STRIP, "power-law creep", values).simulate(time, stretch).stress
-    found = (found - STRIP.simulate(time, stretch).stress)[2:] / (0.2 * values["modulus"])
+    step = math.log(1.02) / 1.02
+    found = (found - STRIP.simulate(time, stretch).stress)[2:] / (step * values["modulus"])
     # but for what slower branches would carry, which is a constant here
     assert 0.5 < np.ptp(time[2:] ** -0.2) < 1.2
     assert np.ptp(found - time[2:] ** -0.2) < 0.03
@@ -520,6 +522,7 @@ LARGER = {
     "warm-up": 3.0,
     "warm-up in stages": 5.0,
     "self-heating": 3.0,
+    "self-heating in stages": 10.0,
     "linear drift": 3.0,
     "settling drift": 3.0,
     "slowing drift": 30.0,
@@ -528,12 +531,14 @@ LARGER = {
     "sensor curvature": 3.0,
     "sensor bend": 3.0,
     "slow branch": 3.0,
+    "broad creep": 8.0,
     "power-law creep": 3.0,
     "Mullins softening": 3.0,
     "first-loading damage": 5.0,
     "saturating permittivity": 5.0,
     "dielectric relaxation": 3.0,
     "broad dielectric relaxation": 6.0,
+    "dielectric relaxation in stages": 6.0,
 }
 # a film's load cell is worse than a laser: what is typical of an actuator does not show there
 LARGER_IN_FILMS = 20.0
@@ -545,7 +550,13 @@ IN_FILMS = {
 # a start that is 1.5 times off is in another valley for these, or where nothing is seen of them
 NEARER = {"mains interference": 1.00005, "amplifier limit": 0.8, "sensor ripple": 1.05}
 NEARER |= dict.fromkeys(
-    ("stress beyond a displacement", "warm-up in stages", "broad dielectric relaxation"), 1.2
+    (
+        "stress beyond a displacement",
+        "warm-up in stages",
+        "broad dielectric relaxation",
+        "dielectric relaxation in stages",
+    ),
+    1.2,
 )
 NEARER |= dict.fromkeys(
     ("sudden change of reading", "sudden change of force", "sudden loss of field"), 1.003

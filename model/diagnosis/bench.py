@@ -47,6 +47,7 @@ _SETTLING = 10  # iterations of a fit that may come to lead
 _NOT_NEARER = 0.05  # of what it lies behind: promising less, it will not
 _ENDING = 40  # iterations of a fit that others build on
 _WHITE_COST, _WHITE_CORRELATION = 1.04, 1.3  # a lead-in tells the noise to some 2 %
+_POLISHING = 8  # iterations on every sample
 _PATIENCE = 3  # iterations down a valley that together must gain something
 _NEARLY = 1.02  # of the cost: a descent from elsewhere that comes so near is followed on
 _FAR_ABOVE = 1.1  # of the cost of a descent from elsewhere: such a valley is left
@@ -115,10 +116,20 @@ class Trial:
         return self.problem.jacobian(self.x, ~self.fixed, self.residuals if quick else None)
 
 
-class Bench:
-    """Training records of one kind, ``full`` and thinned, and the fits made to them."""
+def _unwatched() -> None:
+    """For fits that nobody ends early."""
 
-    def __init__(self, records: Sequence[Record], workers: int) -> None:
+
+class Bench:
+    """Training records of one kind, ``full`` and thinned, and the fits made to them.
+
+    ``watched`` is called often while they run, from any thread, and may raise to end them.
+    """
+
+    def __init__(
+        self, records: Sequence[Record], workers: int, watched: Callable[[], None] = _unwatched
+    ) -> None:
+        self.watched = watched
         self.full = tuple(_with_model_error(r) for r in records)
         self.records = tuple(_thinned(r) for r in self.full)
         self.workers = workers
@@ -148,6 +159,7 @@ class Bench:
     def _count(self, simulations: int) -> None:
         with self._counting:
             self.simulations += simulations
+        self.watched()
 
     def together(self, work: Callable[[Job], Result], jobs: Sequence[Job]) -> list[Result]:
         """``work(job)`` of each of ``jobs``, fits that know nothing of each other."""
@@ -361,11 +373,12 @@ class Bench:
             found.append(Problem(corrected, plain.layout, self.workers, True, self._count))
         return found
 
-    def polished(self, trial: Trial) -> Trial:
-        """``trial`` fitted to every sample, to the end."""
+    def polished(self, trial: Trial, in_haste: bool = False) -> Trial:
+        """``trial`` fitted to every sample, to the end; ``in_haste`` as it is, on every sample."""
         problem = self.problem(trial.model, full=True)
         gain = max(0.5, _WORTH * trial.cost * problem.samples)
-        fit = descend(problem, trial.x, trial.fixed, iterations=8, gain=gain, damping=1e-4)
+        iterations = 0 if in_haste else _POLISHING
+        fit = descend(problem, trial.x, trial.fixed, iterations, gain, damping=1e-4)
         return _trial(problem, fit, trial.fixed)
 
     def stage(

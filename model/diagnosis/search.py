@@ -119,11 +119,12 @@ class _Search:
         progress: Progress,
         stop: Callable[[], bool],
     ) -> None:
-        self.bench = Bench(records, workers)
+        self.bench = Bench(records, workers, self._watch)
         self.base = base
         self._progress = progress
         self._reached = 0.0
         self.stop = stop
+        self._searching = False
         self.effects = [e for e in EFFECTS.values() if is_of(e, self.bench)]
         self.rounds: list[Round] = []
         self.found: dict[frozenset[str], Trial] = {}
@@ -148,11 +149,14 @@ class _Search:
         )
         baseline = self._timed(baseline)
         self.found[frozenset()] = baseline
+        self._searching = True
         try:
             best = self._retimed(self._explained(self._ended(baseline)))
         except _Interrupted:
             self.interrupted = True
             best = self._leading()
+        finally:
+            self._searching = False
         return self._finding(self.found[frozenset()], best)
 
     def _explained(self, best: Trial) -> Trial:
@@ -203,7 +207,7 @@ class _Search:
         held = self._if_held()
         if self._is_noise(baseline) or held is None:
             return baseline
-        bench = Bench(held, self.bench.workers)
+        bench = Bench(held, self.bench.workers, self._watch)
         trial = bench.baseline(self.base, lambda *_: self.report("baseline", 0.1))
         self.bench.simulations += bench.simulations
         if not self._is_noise(trial) or trial.cost > baseline.cost - _MATTERS:
@@ -221,7 +225,7 @@ class _Search:
         if held is None or not best.effects:
             return best
         before = (self.bench, self.found, self.settled, self.ended, self.left_out)
-        bench = Bench(held, self.bench.workers)
+        bench = Bench(held, self.bench.workers, self._watch)
         bench.simulations = self.bench.simulations
         fits = [bench.fit(t.model, [(t.x, None)], t.fixed) for t in (self.found[frozenset()], best)]
         self.bench, self.settled, self.ended, self.left_out = bench, set(), set(), set()
@@ -334,7 +338,6 @@ class _Search:
         names = [e for e in self.effects if e.name not in parent.effects]
         promises = {}
         for n, effect in enumerate(names):
-            self._check()
             promises[effect.name] = screen.promises(effect)
             self.report(
                 _stage(parent, "screening"), span[0] + span[1] * 0.25 * (n + 1) / len(names)
@@ -343,7 +346,6 @@ class _Search:
         refitted = order if depth == 0 else order[:_FOLLOWED]
         tried = []
         for pair in _abreast(refitted):
-            self._check()
             unknown = [n for n in pair if frozenset((*parent.effects, n)) not in self.found]
             trials = self.bench.together(
                 lambda n: self._refit(parent, n, promises[n], screen.jacobian), unknown
@@ -417,7 +419,6 @@ class _Search:
             near = tried.trial.cost < _CLOSE * lead
             if place >= _SETTLED and not (near and rank(tried) < mark):
                 continue
-            self._check()
             key = frozenset(tried.trial.effects)
             if place < ended and tried.trial.cost < _NEAR_LEAD * first:
                 self._ended(tried.trial)
@@ -444,7 +445,6 @@ class _Search:
         }
 
         def looked(place: int) -> tuple[float, int, float] | None:
-            self._check()
             one = tried[place]
             sizes = EFFECTS[one.name].sizes
             if len(sizes) != 1:
@@ -464,7 +464,6 @@ class _Search:
         for left, place, size in looks[:_ANEW]:
             if left > most:
                 break
-            self._check()
             one = tried[place]
             trial = self.bench.sought(one.trial, self._sized(one, [f * size for f in _ANEW_FROM]))
             if trial is not one.trial:
@@ -534,7 +533,6 @@ class _Search:
     def _pruned(self, best: Trial) -> Trial:
         """``best`` without what it does not need, were it its only effect."""
         while best.effects:
-            self._check()
             smaller = {name: self._ended(self._without(best, name)) for name in best.effects}
             correlation = self._correlation([best, *smaller.values()])
             mark = self._criterion(best, correlation)
@@ -552,7 +550,6 @@ class _Search:
         key = frozenset(trial.effects) - {name}
         # however well it is known: what is left out may have shown the others a better place
         if (frozenset(trial.effects), name) not in self.left_out:
-            self.left_out.add((frozenset(trial.effects), name))
             model = replace(
                 trial.model, effects=tuple(e for e in trial.model.effects if e[0] != name)
             )
@@ -560,6 +557,7 @@ class _Search:
             fixed = self.found[frozenset()].fixed
             fixed = np.concatenate([fixed, np.zeros(layout.size - fixed.size, dtype=bool)])
             self._keep(self.bench.fit(model, [(layout.coordinates(layout.initial()), None)], fixed))
+            self.left_out.add((frozenset(trial.effects), name))
         return self.found[key]
 
     def _keep(self, trial: Trial) -> None:
@@ -631,8 +629,9 @@ class _Search:
         gain = self._gain(base, best, correlation)
         return best if gain > _DECISIVE else base
 
-    def _check(self) -> None:
-        if self.stop():
+    def _watch(self) -> None:
+        """End the search, wherever it is: the fits that run are given up."""
+        if self._searching and self.stop():
             raise _Interrupted
 
     # -- what is handed back
@@ -682,8 +681,8 @@ class _Search:
 
     def _finding(self, baseline: Trial, best: Trial) -> Diagnosis:
         self.report("final fits", 0.94)
-        first = self.bench.polished(baseline)
-        last = self.bench.polished(best) if best.effects else first
+        first = self.bench.polished(baseline, self.interrupted)
+        last = self.bench.polished(best, self.interrupted) if best.effects else first
         correlation = max(1.0, last.correlation)
         stage0 = self.bench.stage(first, correlation, estimates=True)
         excess = max(first.cost - 1.0, 1e-9)
@@ -694,7 +693,7 @@ class _Search:
         if doubtful or not others.effects:
             others = first
         else:
-            others = last if others is best else self.bench.polished(others)
+            others = last if others is best else self.bench.polished(others, self.interrupted)
         final = self.bench.stage(last, correlation, estimates=True, for_others=others)
         steps, rivals = self._steps(best, last, final.estimates, correlation)
         before = signatures(self.bench.full, first)
@@ -709,7 +708,8 @@ class _Search:
         else:
             verdict = PARTLY_EXPLAINED if explained > _UNNAMED_SHARE else UNEXPLAINED
         unnamed = None
-        if verdict in (UNEXPLAINED, PARTLY_EXPLAINED) or any(s.family == "unknown" for s in steps):
+        partly = verdict in (UNEXPLAINED, PARTLY_EXPLAINED) and not self.interrupted
+        if partly or any(s.family == "unknown" for s in steps):
             unnamed = describe_unnamed(missing_after, after, steps)
         notes = []
         if self.interrupted and not self.rounds:

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import math
 
-from model.coefficients import REST
 from model.effects.description import Effect, Parameter
-from model.filters import lagged
 from model.jit import jit
+from model.spectrum import relaxed
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 
@@ -44,36 +43,26 @@ _LOG_RATIO = math.log(_RATIO)
 
 
 @jit
-def _stress(c, k, m, j, lam0, lam, since, commits):
-    more = lam / c[REST]
-    e0, e = math.log(lam0 / c[REST]), math.log(more)
-    total, share, tau = 0.0, c[k], c[k + 1]
-    fall = math.exp(-c[k + 2] * _LOG_RATIO)
-    for i in range(_BRANCHES):
-        q = lagged(m[j + i], e0, e, since, tau * more)
-        total += share * (e - q)
-        if commits:
-            m[j + i] = q
-        tau *= _RATIO
-        share *= fall
-    return total / more
+def _fall(c, k):
+    return math.exp(-c[k + 2] * _LOG_RATIO)
 
 
 @jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
-    return _stress(c, k, m, j, lam0, lam, since, False)
+    fall = _fall(c, k)
+    return relaxed(c, m, j, lam0, lam, since, False, _BRANCHES, c[k], fall, c[k + 1], _RATIO)
 
 
 @jit
 def stiffness(c, k, m, j, lam, rate):
-    total, share = 0.0, c[k]
+    total, share, fall = 0.0, c[k], _fall(c, k)
     for _ in range(_BRANCHES):
         total += share
-        share *= math.exp(-c[k + 2] * _LOG_RATIO)
+        share *= fall
     return total, 0.0
 
 
 @jit
 def commit(c, k, m, j, lam, rate, lam0, h, t):
-    _stress(c, k, m, j, lam0, lam, h, True)
+    relaxed(c, m, j, lam0, lam, h, True, _BRANCHES, c[k], _fall(c, k), c[k + 1], _RATIO)
     return 0

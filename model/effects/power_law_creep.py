@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import math
 
-from model.coefficients import REST
 from model.effects.description import Effect, Parameter
-from model.filters import lagged
 from model.jit import jit
+from model.spectrum import relaxed
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 
@@ -49,25 +48,10 @@ def _first_share(k, a):
 
 
 @jit
-def _stress(c, k, m, j, lam0, lam, since, commits):
-    a = c[k + 1]
-    more = lam / c[REST]
-    e0, e = math.log(lam0 / c[REST]), math.log(more)
-    total, tau = 0.0, _FIRST
-    share, fall = _first_share(c[k], a), math.exp(-a * _DECADE)
-    for i in range(_BRANCHES):
-        q = lagged(m[j + i], e0, e, since, tau * more)
-        total += share * (e - q)
-        if commits:
-            m[j + i] = q
-        tau *= 10.0
-        share *= fall
-    return total / more
-
-
-@jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
-    return _stress(c, k, m, j, lam0, lam, since, False)
+    a = c[k + 1]
+    share, fall = _first_share(c[k], a), math.exp(-a * _DECADE)
+    return relaxed(c, m, j, lam0, lam, since, False, _BRANCHES, share, fall, _FIRST, 10.0)
 
 
 @jit
@@ -78,5 +62,5 @@ def stiffness(c, k, m, j, lam, rate):
 
 @jit
 def commit(c, k, m, j, lam, rate, lam0, h, t):
-    _stress(c, k, m, j, lam0, lam, h, True)
+    relaxed(c, m, j, lam0, lam, h, True, _BRANCHES, 0.0, 1.0, _FIRST, 10.0)
     return 0

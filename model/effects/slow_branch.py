@@ -1,17 +1,10 @@
-"""Creep by one more slow branch: a spring in series with a dashpot, beside the network.
-
-As the network's own do at small elastic strains, it answers to the logarithmic strain
-e = ln(lam/lam_rest): stress mu (e - q) lam_rest/lam, q' = (e - q) lam_rest/(lam T).
-"""
+"""Creep by one more slow branch: a spring in series with a dashpot, beside the network."""
 
 from __future__ import annotations
 
-import math
-
-from model.coefficients import REST
 from model.effects.description import Effect, Parameter
-from model.filters import lagged
 from model.jit import jit
+from model.spectrum import relaxed
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 
@@ -40,10 +33,7 @@ EFFECT = Effect(
 
 @jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
-    more = lam / c[REST]
-    e = math.log(more)
-    late = lagged(m[j], math.log(lam0 / c[REST]), e, since, c[k + 1] * more)
-    return c[k] * (e - late) / more
+    return relaxed(c, m, j, lam0, lam, since, False, 1, c[k], 1.0, c[k + 1], 1.0)
 
 
 @jit
@@ -53,6 +43,5 @@ def stiffness(c, k, m, j, lam, rate):
 
 @jit
 def commit(c, k, m, j, lam, rate, lam0, h, t):
-    more = lam / c[REST]
-    m[j] = lagged(m[j], math.log(lam0 / c[REST]), math.log(more), h, c[k + 1] * more)
+    relaxed(c, m, j, lam0, lam, h, True, 1, c[k], 1.0, c[k + 1], 1.0)
     return 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from functools import cache
 from typing import TypeVar
 
@@ -27,8 +27,13 @@ def together(
 ) -> list[Result]:
     """``work(job)`` of each of ``jobs``, in their order, done by ``workers`` threads.
 
-    Work that itself asks for this needs another ``name``, or all threads would wait for each other.
+    When one raises, no other is left running when that is raised here. Work that itself asks for this needs another ``name``, or all threads would wait for each other.
     """
     if workers <= 1 or len(jobs) <= 1:
         return [work(job) for job in jobs]
-    return list(_pool(workers, name).map(work, jobs))
+    pool = _pool(workers, name)
+    futures = [pool.submit(work, job) for job in jobs]
+    wait(futures, return_when=FIRST_EXCEPTION)
+    wait([f for f in futures if not f.cancel()])
+    # those before the one that raised were begun before it: no result is asked of what was not
+    return [f.result() for f in futures]

@@ -1,0 +1,52 @@
+"""Maxwell branches beside the network's own: what creeps.
+
+As the network's do at small elastic strains (to second order, held at the sides as the film is),
+each answers to the logarithmic strain e = ln(lam/lam_rest), with the stress mu (e - q) lam_rest/lam
+and q' = (e - q) lam_rest/(lam T).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from model.coefficients import REST
+from model.filters import lagged
+from model.jit import jit
+
+__all__ = ["relaxed"]
+
+
+@jit
+def relaxed(
+    c: np.ndarray,
+    m: np.ndarray,
+    j: int,
+    lam0: float,
+    lam: float,
+    since: float,
+    commits: bool,
+    count: int,
+    modulus: float,
+    fall: float,
+    time: float,
+    ratio: float,
+) -> float:
+    """Stress in Pa of ``count`` branches, ``since`` s after the step began at ``lam0``.
+
+    The first is of ``modulus`` Pa and relaxes in ``time`` s; from one to the next these go by the
+    factors ``fall`` and ``ratio``. Their q stand in the memory ``m`` from ``j`` on, and are carried
+    there with ``commits``.
+    """
+    e0, e = math.log(lam0 / c[REST]), math.log(lam / c[REST])
+    time *= 0.5 * (lam0 + lam) / c[REST]
+    total = 0.0
+    for i in range(count):
+        q = lagged(m[j + i], e0, e, since, time)
+        total += modulus * (e - q)
+        if commits:
+            m[j + i] = q
+        modulus *= fall
+        time *= ratio
+    return total * c[REST] / lam
