@@ -141,14 +141,14 @@ def test_the_description_can_be_relied_on(name):
         assert -math.inf < low < high < math.inf
         assert p.meaning
         assert 0.0 < p.typical <= high - low
-        assert p.part_of in ("", "voltage", "displacement", "duration", "spectrum")
+        assert p.part_of in ("", "voltage", "displacement", "duration", "spectrum", "slope")
         if p.neutral is None:
             assert p.starts
             span = p.bounds if p.part_of in ("", "spectrum") else (0.0, 1.0)
             assert all(span[0] <= s <= span[1] for s in p.starts)
         else:
             assert low <= p.neutral <= high
-            assert not p.starts
+            assert not p.starts or p.part_of == "slope"
             assert low <= p.neutral + p.typical <= high
         if p.logarithmic:
             assert low > 0.0

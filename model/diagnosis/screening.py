@@ -112,7 +112,7 @@ class Screen:
         for place, promise in enumerate(found[:_SIMULATED]):
             values = layout.values(promise.start)
             rows.append((place, values))
-            for size in sizes_of(effect.sizes[0]) if several else ():
+            for size in self._sizes(effect.sizes[0]) if several else ():
                 other = values.copy()
                 other[first] = size
                 rows.append((place, other))
@@ -144,6 +144,24 @@ class Screen:
 
     def _duration(self) -> float:
         return max(float(r.time[-1]) for r in self.bench.records)
+
+    def _sizes(self, size: Parameter) -> list[float]:
+        """Sizes to try, for these records."""
+        if size.part_of != "slope":
+            return sizes_of(size)
+        slopes = np.concatenate(
+            [
+                np.abs(np.diff(r.drive.voltage)) / np.diff(r.drive.time)
+                for r in self.bench.records
+                if isinstance(r, ActuatorRecord)
+            ]
+        )
+        moving = slopes[slopes > 0.0]
+        if not moving.size:
+            return []
+        low, high = size.bounds
+        steepest = np.quantile(moving, 1.0 - np.array(size.starts))
+        return [float(s) for s in 1.0 / steepest if low <= s <= high]
 
     def _starts(self, parameter: Parameter) -> list[float]:
         """Values of a shape to try, for these records."""

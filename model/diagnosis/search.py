@@ -458,8 +458,11 @@ class _Search:
         looks = [k for k in self.bench.together(looked, range(len(tried))) if k is not None]
         looks.sort(key=lambda look: look[0])
         most = _CLEARLY * looks[0][0] if looks else 0.0
-        if tried[0].trial.cost < _EXPLAINED_RMS**2:
-            most = min([most, *(_AS_WELL * left for left, place, _ in looks if place == 0)])
+        leader = tried[0].trial
+        if leader.cost < _EXPLAINED_RMS**2:
+            there = float(self.bench.unaccounted(leader.problem, leader.x[None])[0])
+            there = min([there, *(left for left, place, _ in looks if place == 0)])
+            most = min(most, _AS_WELL * there)
         again = list(tried)
         for left, place, size in looks[:_ANEW]:
             if left > most:

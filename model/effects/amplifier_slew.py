@@ -14,7 +14,17 @@ EFFECT = Effect(
     acts_on="amplifier",
     words="the film gets edges of the voltage late, and slow changes in time",
     parameters=(
-        Parameter("inverse_slew", "s/V", (0.0, 2e-3), "one over the greatest slope", 5e-5, 0.0),
+        # shown by the steepest edges only: sought where it would touch so much of the time
+        Parameter(
+            "inverse_slew",
+            "s/V",
+            (0.0, 2e-3),
+            "one over the greatest slope",
+            5e-5,
+            0.0,
+            starts=(0.003, 0.01, 0.03, 0.1, 0.25, 0.5),
+            part_of="slope",
+        ),
     ),
     memory=1,
 )

@@ -53,8 +53,9 @@ class Parameter:
     the scale on which a fit steps. ``starts`` are the values from which a fit sets out, of a shape
     (a size starts where the residual says). With ``part_of`` displacement or voltage they are parts
     of the largest one in the records; with duration the start is sought along the records, with
-    spectrum also where the residual's spectrum is highest. ``logarithmic`` numbers are sought by
-    ratios.
+    spectrum also where the residual's spectrum is highest. With slope, of a size that is the inverse
+    of a slope of the voltage, they are the parts of the time in which the voltage is steeper.
+    ``logarithmic`` numbers are sought by ratios.
     """
 
     name: str
