@@ -552,6 +552,7 @@ NEARER = {"mains interference": 1.00005, "amplifier limit": 0.8, "sensor ripple"
 NEARER |= dict.fromkeys(
     (
         "stress beyond a displacement",
+        "self-heating in stages",
         "warm-up in stages",
         "broad dielectric relaxation",
         "dielectric relaxation in stages",

@@ -53,6 +53,7 @@ _NEARLY = 1.02  # of the cost: a descent from elsewhere that comes so near is fo
 _FAR_ABOVE = 1.1  # of the cost of a descent from elsewhere: such a valley is left
 _RESTARTS = 2  # from a new global search, beside what was found
 _SETTING = 6  # iterations of the branches alone
+_PLACED = 3  # of the starts, the branches in their places, that are followed on
 _RESTART = 10  # iterations of each
 _LEADERS = 2  # of several starts that are followed on: the best at first does not always get down
 _ALIKE = 0.5  # of the logarithm of relaxation times: a factor of 1.6
@@ -332,13 +333,18 @@ class Bench:
         if not anew:
             return trial
 
-        def down(x: np.ndarray) -> LocalFit:
-            x = descend_by_secants(trial.problem, x, held, iterations=_SETTING, sure=False).x
-            return descend_by_secants(
-                trial.problem, x, trial.fixed, iterations=_RESTART, sure=False
-            )
-
-        fits = self.together(down, anew)
+        placed = self.together(
+            lambda x: descend_by_secants(
+                trial.problem, x, held, iterations=_SETTING, sure=False
+            ),
+            anew,
+        )
+        fits = self.together(
+            lambda f: descend_by_secants(
+                trial.problem, f.x, trial.fixed, iterations=_RESTART, sure=False
+            ),
+            _leaders(placed, _PLACED),
+        )
         other = _trial(trial.problem, min(fits, key=lambda f: f.cost), trial.fixed)
         if other.cost > _NEARLY * trial.cost:
             return trial
@@ -447,8 +453,8 @@ class Bench:
         return tuple(found)
 
 
-def _leaders(fits: Sequence[LocalFit]) -> list[LocalFit]:
-    return sorted(fits, key=lambda f: f.cost)[:_LEADERS]
+def _leaders(fits: Sequence[LocalFit], many: int = _LEADERS) -> list[LocalFit]:
+    return sorted(fits, key=lambda f: f.cost)[:many]
 
 
 def _reseeded(layout: Layout, x: np.ndarray) -> list[np.ndarray]:

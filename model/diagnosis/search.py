@@ -420,7 +420,10 @@ class _Search:
             if place >= _SETTLED and not (near and rank(tried) < mark):
                 continue
             key = frozenset(tried.trial.effects)
-            if place < ended and tried.trial.cost < _NEAR_LEAD * first:
+            # beside one that leaves but noise, only who is as near as that
+            leads = self.found[frozenset(order[0].trial.effects)]
+            reach = _CLOSE * lead if leads.is_white else _NEAR_LEAD * first
+            if place < ended and tried.trial.cost < reach:
                 self._ended(tried.trial)
             elif key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
                 self.settled.add(key)
