@@ -185,10 +185,13 @@ def extra(name, p, film, drive):
         return Extra(
             states=len(times),
             stress=lambda t, lam, u, z, v: (
-                rest / lam * sum(m * (math.log(lam / rest) - q) for m, q in zip(moduli, z, strict=True))
+                rest
+                / lam
+                * sum(m * (math.log(lam / rest) - q) for m, q in zip(moduli, z, strict=True))
             ),
             slopes=lambda t, lam, u, z, v: tuple(
-                rest / lam * (math.log(lam / rest) - q) / tau for tau, q in zip(times, z, strict=True)
+                rest / lam * (math.log(lam / rest) - q) / tau
+                for tau, q in zip(times, z, strict=True)
             ),
         )
 

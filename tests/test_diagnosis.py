@@ -366,15 +366,20 @@ def test_it_ends_when_it_is_asked_to():
     record = record_of(plant("load inertia"))
     asked = []
 
-    def stop():
-        asked.append(None)
-        return len(asked) > 60
+    for many in (60, 600):
+        asked.clear()
 
-    found = diagnose([record], PLAIN, workers=1, stop=stop)
-    require_consistent(found)
-    assert found.interrupted
-    assert len(asked) == 61
-    assert found.simulations < of_hidden("load inertia").simulations
+        def stop(many=many):
+            asked.append(None)
+            return len(asked) > many
+
+        found = diagnose([record], PLAIN, workers=1, stop=stop)
+        require_consistent(found)
+        assert found.interrupted
+        assert len(asked) == many + 1
+        assert found.simulations < of_hidden("load inertia").simulations
+        # what it had no time to explain is not described
+        assert found.unnamed is None
     # at once: the baseline is there, with all that is told of it
     found = diagnose([record], PLAIN, workers=1, stop=lambda: True)
     require_consistent(found)

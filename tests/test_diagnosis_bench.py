@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from model.diagnosis.bench import Bench, information
+from model.diagnosis.bench import Bench, information, relieved
 from model.fitting import identify
 from model.fitting.parameters import Layout
 from model.material import Network
@@ -100,6 +100,43 @@ def test_a_spare_branch_finds_its_work(moduli, times):
     made = fitted(bench, truth)
     # three standard deviations of one number above the optimum next to the truth, at most
     assert (ended.cost - made.cost) * ended.problem.samples < 9.0
+
+
+# --- branches that stand in for an effect
+
+
+def test_a_branch_that_stands_in_for_creep_is_relieved():
+    truth = replace(
+        PLAIN,
+        network=Network.gent((45e3, 45e3, 45e3), (1e4,) * 3, (0.25, 0.5)),
+        effects=effect("slow branch", modulus=1e4, relaxation_time=9.0),
+    )
+    bench = bench_of(record_of(truth, thesis_drive(200.0, periods=2)))
+    # without the creep one of the two branches plays it, and the other stands for both
+    plain = Network.gent((46e3, 85e3, 7e3), (1e4,) * 3, (0.36, 7.0))
+    base = bench.ended(fitted(bench, replace(PLAIN, network=plain)))
+    assert base.cost > 1.3
+    (start,) = relieved(base)
+    springs, modulus, time = start
+    values = base.problem.layout.values(base.x)
+    there = base.problem.layout.values(springs)
+    mu, tau = base.problem.layout.column("mu"), base.problem.layout.column("T")
+    slow = int(np.argmax(values[tau]))
+    assert (modulus, time) == (values[mu[1:]][slow], values[tau[slow]])
+    assert there[mu].sum() + modulus == pytest.approx(values[mu].sum())
+    assert np.all(there[tau] < 2.0 * values[tau].min())
+    # from there the fit with the creep finds what was made
+    creeping = replace(
+        base.model, effects=effect("slow branch", modulus=modulus, relaxation_time=time)
+    )
+    layout = bench.problem(creeping).layout
+    begin = np.concatenate([springs, layout.coordinates(layout.initial())[springs.size :]])
+    held = np.concatenate([base.fixed, np.zeros(2, dtype=bool)])
+    found = bench.ended(bench.fit(creeping, [], held, anew=[begin]))
+    made = fitted(bench, truth)
+    assert (found.cost - made.cost) * found.problem.samples < 9.0
+    # one branch alone has nothing to be relieved of
+    assert relieved(fitted(bench, PLAIN)) == []
 
 
 # --- branches that stand in the way of an effect

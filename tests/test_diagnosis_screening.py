@@ -134,6 +134,16 @@ def test_moments_are_found(name, numbers):
     assert best.share > 0.95
 
 
+@pytest.mark.parametrize("part", [0.6, 0.9, 0.97])
+def test_a_limit_that_only_the_steepest_edges_meet_is_found(part):
+    drive = thesis_drive(100.0)
+    steepest = np.max(np.abs(np.diff(drive.voltage)) / np.diff(drive.time))
+    limit = 1.0 / (part * steepest)
+    best, found = promised("amplifier slew", inverse_slew=limit)
+    assert found["inverse_slew"] == pytest.approx(limit, rel=0.15)
+    assert best.share > 0.3
+
+
 @pytest.mark.parametrize("frequency", [49.97, 59.94])
 @pytest.mark.parametrize("rate", [200.0, 1000.0])
 def test_the_line_of_the_mains_is_found(frequency, rate):

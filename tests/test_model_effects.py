@@ -47,7 +47,7 @@ def numbers(name, size=1.0, **given):
     values = {}
     for p in EFFECTS[name].parameters:
         value = p.typical if p.neutral is None else p.neutral + size * p.typical
-        if p.starts and p.part_of in ("", "spectrum"):
+        if p.starts and p.neutral is None and p.part_of in ("", "spectrum"):
             value = p.starts[0]
         elif p.name == "moment":
             value = MOMENT
@@ -148,7 +148,7 @@ def test_the_description_can_be_relied_on(name):
             assert all(span[0] <= s <= span[1] for s in p.starts)
         else:
             assert low <= p.neutral <= high
-            assert not p.starts or p.part_of == "slope"
+            assert p.part_of == "slope" or all(low <= s <= high for s in p.starts)
             assert low <= p.neutral + p.typical <= high
         if p.logarithmic:
             assert low > 0.0

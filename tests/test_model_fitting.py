@@ -3,6 +3,7 @@
 import functools
 import importlib
 import math
+import time
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from model.fitting.levenberg import descend
 from model.fitting.parameters import Layout
 from model.fitting.problem import Problem
 from model.fitting.search import Algorithm1, algorithm_1
+from model.fitting.threads import together
 from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Load, Network, Spring
 from model.records import ActuatorRecord, FilmRecord
 
@@ -292,3 +294,24 @@ def test_covariance_is_the_inverse_where_there_is_one():
     unseen = covariance(np.diag([1.0, 0.0]), 1.0)
     assert np.isfinite(unseen).all()
     assert unseen[1, 1] > 1e9
+
+
+# --- several at once
+
+
+def test_nothing_is_left_running_when_one_of_several_raises():
+    done = []
+
+    def work(job):
+        if job == 0:
+            raise ModelError("ended")
+        time.sleep(0.05)
+        done.append(job)
+
+    with pytest.raises(ModelError, match="ended"):
+        together(work, range(20), 2)
+    finished = list(done)
+    time.sleep(0.2)
+    assert done == finished
+    assert len(done) < 19
+    assert together(lambda job: 2 * job, range(5), 2) == [0, 2, 4, 6, 8]

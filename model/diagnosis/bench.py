@@ -202,7 +202,7 @@ class Bench:
     ) -> Trial:
         """``model`` fitted from the best of several starts: coordinates and a Jacobian near them.
 
-        ``anew`` are others, with branches in new places: these take longer to show what they lead to.
+        ``anew`` are others, with branches in new places: these take longer to show where they lead.
 
         ``leader`` is the cost to beat, ``parent`` that of the model without what is tried here: a
         fit that lies far behind the one, and not much before the other, is not followed to its end.
@@ -334,9 +334,7 @@ class Bench:
             return trial
 
         placed = self.together(
-            lambda x: descend_by_secants(
-                trial.problem, x, held, iterations=_SETTING, sure=False
-            ),
+            lambda x: descend_by_secants(trial.problem, x, held, iterations=_SETTING, sure=False),
             anew,
         )
         fits = self.together(
@@ -503,10 +501,10 @@ def _reseeded(layout: Layout, x: np.ndarray) -> list[np.ndarray]:
 
 
 def relieved(trial: Trial) -> list[tuple[np.ndarray, float, float]]:
-    """Coordinates (d,) with a slow branch's work left to an effect, its modulus in Pa and time in s.
+    """Coordinates (d,) with a slow branch's work left to an effect; its modulus Pa and time s.
 
-    While the effect was missing, slow branches stood in for it, and what they are there for was left
-    to the stiffest alone. The branch goes back to its side. One for each slow branch.
+    While the effect was missing, slow branches stood in for it, and what they are there for was
+    left to the stiffest alone. The branch goes back to its side. One for each slow branch.
     """
     layout = trial.problem.layout
     values = layout.values(trial.x)
@@ -518,9 +516,9 @@ def relieved(trial: Trial) -> list[tuple[np.ndarray, float, float]]:
     beside = values[times[stiffest]]
     found = []
     for slow in np.flatnonzero(values[times] > _SLOWER * beside):
-        there = values.copy()
-        there[moduli[[stiffest, slow]]] = 0.5 * values[moduli[stiffest]]
-        there[times[[stiffest, slow]]] = beside * np.array(_BESIDE)
+        there, both = values.copy(), np.array([stiffest, slow])
+        there[moduli[both]] = 0.5 * values[moduli[stiffest]]
+        there[times[both]] = beside * np.array(_BESIDE)
         x = np.clip(layout.coordinates(there), layout.lower, layout.upper)
         found.append((x, float(values[moduli[slow]]), float(values[times[slow]])))
     return found

@@ -148,7 +148,7 @@ class Screen:
     def _sizes(self, size: Parameter) -> list[float]:
         """Sizes to try, for these records."""
         if size.part_of != "slope":
-            return sizes_of(size)
+            return list(size.starts) or sizes_of(size)
         slopes = np.concatenate(
             [
                 np.abs(np.diff(r.drive.voltage)) / np.diff(r.drive.time)

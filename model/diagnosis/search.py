@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -562,7 +563,9 @@ class _Search:
             layout = self.bench.problem(model).layout
             fixed = self.found[frozenset()].fixed
             fixed = np.concatenate([fixed, np.zeros(layout.size - fixed.size, dtype=bool)])
-            self._keep(self.bench.fit(model, [(layout.coordinates(layout.initial()), None)], fixed))
+            start = layout.coordinates(layout.initial())
+            # to its end, however far behind: what is needless shows only there
+            self._keep(self.bench.fit(model, [(start, None)], fixed, leader=math.inf))
             self.left_out.add((frozenset(trial.effects), name))
         return self.found[key]
 

@@ -30,7 +30,9 @@ EFFECT = Effect(
             starts=(3.0,),
             logarithmic=True,
         ),
-        Parameter("exponent", "", (-0.2, 0.9), "of the moduli's fall with time", 0.2, starts=(0.2,)),
+        Parameter(
+            "exponent", "", (-0.2, 0.9), "of the moduli's fall with time", 0.2, starts=(0.2,)
+        ),
     ),
     memory=6,
     drives=("voltage", "stretch"),

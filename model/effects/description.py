@@ -50,11 +50,12 @@ class Parameter:
 
     ``neutral`` is the value at which the effect vanishes, of a size; a shape (a relaxation time, a
     threshold) has no such value and is None there. ``typical`` is a value that would be noticed:
-    the scale on which a fit steps. ``starts`` are the values from which a fit sets out, of a shape
-    (a size starts where the residual says). With ``part_of`` displacement or voltage they are parts
-    of the largest one in the records; with duration the start is sought along the records, with
-    spectrum also where the residual's spectrum is highest. With slope, of a size that is the inverse
-    of a slope of the voltage, they are the parts of the time in which the voltage is steeper.
+    the scale on which a fit steps. ``starts`` are the values from which a fit sets out, of a shape;
+    a size starts where the residual says, or has them where that says little. With ``part_of``
+    displacement or voltage they are parts of the largest one in the records; with duration the
+    start is sought along the records, with spectrum also where the residual's spectrum is highest.
+    With slope they are of a size that is the inverse of a slope of the voltage: parts of the time
+    in which the voltage is steeper.
     ``logarithmic`` numbers are sought by ratios.
     """
 
@@ -79,8 +80,9 @@ class Effect:
     ``turns`` is True where what it does follows the path from turning point to turning point, so
     that not even those of a film that rings by a tenth of a micrometre must be missed. ``recurs``
     is False for what happens in one recording and is no property of the rig: nothing says that
-    another recording has it too, or when. ``relaxes`` is True of what relaxes as the network's branches do,
-    its first two numbers being modulus and relaxation time: they stand in for it while it is missing.
+    another recording has it too, or when. ``relaxes`` is True of what relaxes as the network's
+    branches do, its first two numbers being a modulus and a relaxation time: while it is missing,
+    branches stand in for it.
     ``words`` is one sentence for a person: what the effect is and what betrays it.
     """
 

@@ -20,7 +20,14 @@ EFFECT = Effect(
     words="mass moves with the film's lower edge: ringing after edges, force against acceleration",
     parameters=(
         Parameter(
-            "moving_mass", "kg", (0.0, 2.0), "mass that moves with the film's lower edge", 0.1, 0.0
+            "moving_mass",
+            "kg",
+            (0.0, 2.0),
+            "mass that moves with the film's lower edge",
+            0.1,
+            0.0,
+            # where the excitation sweeps over the ringing, another mass rings at another time
+            starts=tuple(0.005 * 1.4**i for i in range(17)),
         ),
     ),
 )

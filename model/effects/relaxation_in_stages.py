@@ -1,4 +1,4 @@
-"""Slow polarisation in three stages, as mobile side groups, chains and charges give: a Prony series.
+"""Slow polarisation in three stages (side groups, chains, charges): a Prony series.
 
 Three Debye terms as of ``dielectric_relaxation``, each of its own strength, at T/r, T and r T.
 """
@@ -11,7 +11,7 @@ from model.jit import jit
 
 __all__ = ["EFFECT", "polarise"]
 
-_STRENGTH = (-0.5, 2.0)
+_STRENGTH = (-0.3, 2.0)  # of all three no more than all there is
 
 EFFECT = Effect(
     name="dielectric relaxation in stages",
@@ -19,7 +19,9 @@ EFFECT = Effect(
     acts_on="dielectric",
     words="parts of the force follow the voltage, one later than the other, whatever the stretch",
     parameters=(
-        Parameter("strength", "", _STRENGTH, "part at T of the permittivity over the fast", 0.01, 0.0),
+        Parameter(
+            "strength", "", _STRENGTH, "part at T of the permittivity over the fast", 0.01, 0.0
+        ),
         Parameter("sooner", "", _STRENGTH, "the same at T/r", 0.01, 0.0),
         Parameter("later", "", _STRENGTH, "the same at r T", 0.01, 0.0),
         Parameter(
@@ -32,7 +34,13 @@ EFFECT = Effect(
             logarithmic=True,
         ),
         Parameter(
-            "ratio", "", (2.0, 40.0), "of relaxation times, r", 10.0, starts=(10.0,), logarithmic=True
+            "ratio",
+            "",
+            (2.0, 40.0),
+            "of relaxation times, r",
+            10.0,
+            starts=(10.0,),
+            logarithmic=True,
         ),
         Parameter(
             "settled",

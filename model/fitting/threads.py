@@ -27,7 +27,8 @@ def together(
 ) -> list[Result]:
     """``work(job)`` of each of ``jobs``, in their order, done by ``workers`` threads.
 
-    When one raises, no other is left running when that is raised here. Work that itself asks for this needs another ``name``, or all threads would wait for each other.
+    When one raises, no other is left running when that is raised here. Work that itself asks for
+    this needs another ``name``, or all threads would wait for each other.
     """
     if workers <= 1 or len(jobs) <= 1:
         return [work(job) for job in jobs]
