@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 
+from model.creep import relaxed
 from model.effects.description import Effect, Parameter
 from model.jit import jit
-from model.spectrum import relaxed
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 
