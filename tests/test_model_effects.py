@@ -325,6 +325,12 @@ SHOWN = {
         + p["sine"] * np.sin(2.0 * np.pi * moved(t)[0] / p["period"])
         + p["cosine"] * (1.0 - np.cos(2.0 * np.pi * moved(t)[0] / p["period"]))
     ),
+    "sensor saturation": lambda p, t: np.where(
+        moved(t)[0] < p["knee"],
+        moved(t)[0],
+        p["knee"]
+        + (moved(t)[0] - p["knee"]) / (1.0 + p["inverse_range"] * (moved(t)[0] - p["knee"])),
+    ),
     "settling drift": lambda p, t: (
         moved(t)[0] + p["drift"] * (1.0 - np.exp(-t / p["time_constant"]))
     ),
@@ -548,7 +554,8 @@ IN_FILMS = {
     "distributed hysteresis": {"reach": 0.1},
 }
 # a start that is 1.5 times off is in another valley for these, or where nothing is seen of them
-NEARER = {"mains interference": 1.00005, "amplifier limit": 0.8, "sensor ripple": 1.05}
+NEARER = {"mains interference": 1.00005, "sensor ripple": 1.05}
+NEARER |= dict.fromkeys(("amplifier limit", "sensor saturation"), 0.8)
 NEARER |= dict.fromkeys(
     (
         "stress beyond a displacement",

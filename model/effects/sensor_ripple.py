@@ -23,7 +23,8 @@ EFFECT = Effect(
         Parameter(
             "period",
             "m",
-            (2e-5, 1e-2),
+            # what is longer than a stroke is a bend
+            (2e-5, 1.5e-3),
             "of travel",
             5e-4,
             # near enough to each other to be told apart over the travel

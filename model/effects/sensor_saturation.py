@@ -1,0 +1,44 @@
+"""A sensor whose spot leaves the detector bit by bit: what is beyond the knee counts less and less.
+
+A travel y beyond the knee reads y/(1 + y/s); at s the half of it.
+"""
+
+from __future__ import annotations
+
+from model.effects.description import Effect, Parameter
+from model.jit import jit
+
+__all__ = ["EFFECT", "sense"]
+
+EFFECT = Effect(
+    name="sensor saturation",
+    family="sensor_nonlinearity",
+    acts_on="sensor",
+    words="beyond one displacement the reading falls behind, ever more, at any speed",
+    parameters=(
+        Parameter(
+            "inverse_range",
+            "1/m",
+            (0.0, 1e4),
+            "one over the travel beyond the knee that reads half",
+            20.0,
+            0.0,
+        ),
+        Parameter(
+            "knee",
+            "m",
+            (1e-5, 2e-2),
+            "displacement beyond which it falls behind",
+            5e-4,
+            starts=(0.3, 0.05, 0.5, 0.7),
+            part_of="displacement",
+            logarithmic=True,
+        ),
+    ),
+)
+
+
+@jit
+def sense(c, k, m, j, t, dt, x, u):
+    beyond = max(x - c[k + 1], 0.0)
+    return x - beyond * beyond * c[k] / (1.0 + beyond * c[k])
