@@ -17,7 +17,7 @@ def test_every_count_survives_the_way_there_and_back(scaling):
     np.testing.assert_array_equal(scaling.counts(scaling.physical(counts)), counts)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.floats(-5e3, 5e3))
 def test_counts_are_the_nearest(value):
     back = IDEAL.physical(IDEAL.counts(np.array([value])))[0]

@@ -66,7 +66,7 @@ def within(voltage, field_per_volt, limits=LIMITS, rate=RATE):
     return energy <= limits.energy * (1.0 + 1e-12)
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(
     st.lists(st.one_of(any_float, near_limits), max_size=12),
     st.one_of(any_float, st.floats(min_value=500.0, max_value=2000.0)),
@@ -80,7 +80,7 @@ def test_what_passes_is_within_every_limit_and_what_is_refused_is_not(inside, fi
             gate(voltage, field=field)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(arrays(np.float64, st.integers(2, 20), elements=any_float))
 def test_any_numbers_at_all_pass_only_within_the_limits(voltage):
     try:
@@ -140,7 +140,7 @@ def test_films_that_are_none(volume):
         admit(np.zeros(3), RATE, LIMITS, foreseen(3, volume=volume))
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(
     st.lists(st.floats(-1500.0, 9000.0), min_size=1, max_size=40),
     st.integers(1, 5),

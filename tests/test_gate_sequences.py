@@ -80,7 +80,7 @@ def write(parts, folder: Path) -> str:
     return "\n".join(texts)
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(st.lists(segments, min_size=1, max_size=5), st.floats(0.0, 1.0))
 def test_no_sample_of_any_sequence_is_beyond_a_limit(parts, stopped_at):
     with tempfile.TemporaryDirectory() as folder:

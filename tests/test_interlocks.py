@@ -523,7 +523,7 @@ def spoilt(faults, **locks) -> Signals:
     return signals
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     faults=st.lists(SPOILT, max_size=5),
     cuts=st.sets(st.integers(1, 599), max_size=40),
@@ -571,7 +571,7 @@ def slowly(signals: Signals) -> dict[str, int]:
     return found
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(faults=st.lists(SPOILT, min_size=1, max_size=5))
 def test_what_trips_is_what_a_slow_look_finds(faults):
     signals = spoilt(faults)
@@ -580,7 +580,7 @@ def test_what_trips_is_what_a_slow_look_finds(faults):
     assert {name: at for name, at in tripped.items() if name in THRESHOLDS} == found
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     counts=st.lists(
         st.tuples(*(st.sampled_from([-32768, -20000, 0, 1, 300, 20000, 32767]) for _ in range(4))),

@@ -223,7 +223,7 @@ PIECES = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(pieces=st.lists(PIECES, min_size=1, max_size=6), rate=st.floats(200.0, 5000.0))
 def test_what_is_joined_is_continuous_and_unipolar(pieces, rate):
     joined, end = [], 0.0

@@ -193,7 +193,7 @@ WILD = st.one_of(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     held=st.integers(0, 2),
     kinds=st.lists(st.integers(0, 2), min_size=4, max_size=4),

@@ -36,7 +36,7 @@ class TestDecimation:
         fill=st.floats(-1.0, 1.0),
     )
 
-    @settings(max_examples=60, deadline=None)
+    @settings(max_examples=60)
     @given(values, st.integers(1, 200), st.booleans())
     def test_keeps_extremes_ends_and_order(self, y, columns, uneven):
         x = np.arange(float(y.size)) ** (1.7 if uneven else 1.0)
@@ -50,7 +50,7 @@ class TestDecimation:
             assert np.nanmin(kept_y) == np.nanmin(y)
             assert np.nanmax(kept_y) == np.nanmax(y)
 
-    @settings(max_examples=40, deadline=None)
+    @settings(max_examples=40)
     @given(st.integers(100, 5000), st.integers(1, 40), st.integers(0, 10_000))
     def test_keeps_extremes_of_every_column(self, size, columns, seed):
         x = np.sort(np.random.default_rng(seed).uniform(0.0, 1.0, size))
