@@ -443,6 +443,18 @@ def test_the_spring_pot_relaxes_by_a_power_of_time():
     assert np.ptp(found - time[2:] ** -0.2) < 0.03
 
 
+def test_broad_creep_without_a_power_goes_with_the_logarithm_of_time():
+    values = numbers("broad creep", relaxation_time=1.0, exponent=0.0)
+    time = np.concatenate([[0.0, 1e-6], np.geomspace(2.0, 100.0, 60)])
+    stretch = np.where(time > 0.0, 1.02, 1.0)
+    found = with_effect(STRIP, "broad creep", values).simulate(time, stretch).stress
+    step = math.log(1.02) / 1.02
+    found = (found - STRIP.simulate(time, stretch).stress)[2:] / (step * values["modulus"])
+    line = np.polyfit(np.log(time[2:]), found, 1)
+    assert line[0] == pytest.approx(-2.0 / math.log(10.0), rel=0.05)
+    np.testing.assert_allclose(found, np.polyval(line, np.log(time[2:])), atol=0.15)
+
+
 def test_softening_in_films_against_direct_evaluation():
     _, stretch = pulled()
     plain = baseline("stretch")

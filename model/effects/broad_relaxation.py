@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from model.effects.description import Effect, Parameter
+from model.effects.dielectric_relaxation import SETTLED
 from model.filters import lagged
 from model.jit import jit
 
@@ -41,14 +42,7 @@ EFFECT = Effect(
             0.1,
             starts=(0.4,),
         ),
-        Parameter(
-            "settled",
-            "",
-            (0.0, 1.0),
-            "1 where the film's data give the permittivity at rest, 0 where that of fast fields",
-            1.0,
-            starts=(1.0,),
-        ),
+        SETTLED,
     ),
     memory=6,
 )

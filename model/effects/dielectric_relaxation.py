@@ -13,6 +13,16 @@ from model.jit import jit
 
 __all__ = ["EFFECT", "polarise"]
 
+#: What a permittivity means: of every effect of this family.
+SETTLED = Parameter(
+    "settled",
+    "",
+    (0.0, 1.0),
+    "1 where the film's data give the permittivity at rest, 0 where that of fast fields",
+    1.0,
+    starts=(1.0,),
+)
+
 EFFECT = Effect(
     name="dielectric relaxation",
     family="dielectric_relaxation",
@@ -31,14 +41,7 @@ EFFECT = Effect(
             starts=(0.1, 0.02, 0.5, 3.0),
             logarithmic=True,
         ),
-        Parameter(
-            "settled",
-            "",
-            (0.0, 1.0),
-            "1 where the film's data give the permittivity at rest, 0 where that of fast fields",
-            1.0,
-            starts=(1.0,),
-        ),
+        SETTLED,
     ),
     memory=1,
 )

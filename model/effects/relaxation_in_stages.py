@@ -6,6 +6,7 @@ Three Debye terms as of ``dielectric_relaxation``, each of its own strength, at 
 from __future__ import annotations
 
 from model.effects.description import Effect, Parameter
+from model.effects.dielectric_relaxation import SETTLED
 from model.filters import lagged
 from model.jit import jit
 
@@ -42,14 +43,7 @@ EFFECT = Effect(
             starts=(10.0,),
             logarithmic=True,
         ),
-        Parameter(
-            "settled",
-            "",
-            (0.0, 1.0),
-            "1 where the film's data give the permittivity at rest, 0 where that of fast fields",
-            1.0,
-            starts=(1.0,),
-        ),
+        SETTLED,
     ),
     memory=3,
 )
