@@ -78,9 +78,19 @@ class _Branch(_Spring):
     relaxation_time_s: Annotated[float, Field(ge=0.0)]
 
 
+#: Numbers that an effect's law got after the first files, at which it does what it did before.
+_SINCE_THEN = {"dry friction": {"damping": 1e-6}}
+
+
 class _Effect(Table):
     name: str
     values: dict[str, float]
+
+    def build(self) -> tuple[str, tuple[tuple[str, float], ...]]:
+        values = dict(self.values)
+        for name, value in _SINCE_THEN.get(self.name, {}).items():
+            values.setdefault(name, value)
+        return self.name, tuple(values.items())
 
 
 class _File(Table):
@@ -146,7 +156,7 @@ def load_actuator(path: str | Path) -> Actuator:
 def _build(file: _File) -> Actuator | Strip:
     branches = tuple(Branch(b.build(), b.relaxation_time_s) for b in file.branch)
     network = Network(file.equilibrium.build(), branches)
-    effects = tuple((e.name, tuple(e.values.items())) for e in file.effect)
+    effects = tuple(e.build() for e in file.effect)
     if file.film is None and file.load is None:
         return Strip(network, file.kinematics, effects)
     if file.film is None or file.load is None:

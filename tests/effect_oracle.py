@@ -122,11 +122,15 @@ def extra(name, p, film, drive):
 
     def friction():
         # the differential form of Dahl: towards +-reach against every reversal
-        size, reach = p["friction"], p["presliding"]
+        size, reach, ahead = p["friction"], p["presliding"], p["damping"]
+
+        def bending(u, z):
+            return u - abs(u) * z / reach
+
         return Extra(
             states=1,
-            stress=lambda t, lam, u, z, v: size * z[0] / reach,
-            slopes=lambda t, lam, u, z, v: (u - abs(u) * z[0] / reach,),
+            stress=lambda t, lam, u, z, v: size * (z[0] + ahead * bending(u, z[0])) / reach,
+            slopes=lambda t, lam, u, z, v: (bending(u, z[0]),),
         )
 
     def leakage():
