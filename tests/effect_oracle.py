@@ -133,6 +133,18 @@ def extra(name, p, film, drive):
             slopes=lambda t, lam, u, z, v: (bending(u, z[0]),),
         )
 
+    def elastoplastic_friction():
+        size, reach, ahead = p["friction"], p["presliding"], p["damping"]
+
+        def bending(u, z):
+            return bouc_wen(u / reach, z, p["exponent"], 0.5)
+
+        return Extra(
+            states=1,
+            stress=lambda t, lam, u, z, v: size * (z[0] + ahead * bending(u, z[0])),
+            slopes=lambda t, lam, u, z, v: (bending(u, z[0]),),
+        )
+
     def leakage():
         def left(t, lam, u, z, v):
             field = (v * lam / 8e3) ** p["exponent"]
@@ -297,6 +309,7 @@ def extra(name, p, film, drive):
         "dielectric relaxation in stages": in_stages,
         "distributed hysteresis": distributed,
         "dry friction": friction,
+        "elastoplastic friction": elastoplastic_friction,
         "elastoplastic hysteresis": elastoplastic,
         "electrode resistance": charging,
         "strained electrode": lambda: charging(p["gauge"]),
