@@ -133,15 +133,17 @@ def extra(name, p, film, drive):
             slopes=lambda t, lam, u, z, v: (bending(u, z[0]),),
         )
 
-    def elastoplastic_friction():
+    def easing():
         size, reach, ahead = p["friction"], p["presliding"], p["damping"]
 
         def bending(u, z):
-            return bouc_wen(u / reach, z, p["exponent"], 0.5)
+            return u - abs(u) * z / (
+                reach * (1.0 + p["excess"] * math.exp(-((u / p["easing"]) ** 2)))
+            )
 
         return Extra(
             states=1,
-            stress=lambda t, lam, u, z, v: size * (z[0] + ahead * bending(u, z[0])),
+            stress=lambda t, lam, u, z, v: size * (z[0] + ahead * bending(u, z[0])) / reach,
             slopes=lambda t, lam, u, z, v: (bending(u, z[0]),),
         )
 
@@ -309,7 +311,7 @@ def extra(name, p, film, drive):
         "dielectric relaxation in stages": in_stages,
         "distributed hysteresis": distributed,
         "dry friction": friction,
-        "elastoplastic friction": elastoplastic_friction,
+        "easing friction": easing,
         "elastoplastic hysteresis": elastoplastic,
         "electrode resistance": charging,
         "strained electrode": lambda: charging(p["gauge"]),

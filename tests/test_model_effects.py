@@ -231,6 +231,7 @@ def test_the_typical_size_would_be_noticed(name, driven):
 # um that kernel and oracle may differ by, at five times the typical size: as measured, rounded up
 SPLITTING = {
     "dry friction": 0.3,  # a turning point within a step
+    "easing friction": 0.8,  # the same, and it squeals: what a step does grows
     "ageing": 0.15,  # softens by the path at the beginning of the step
     "leakage": 0.15,  # loses by the stretch amid the step
 }
@@ -255,7 +256,9 @@ def test_the_thesis_sampling_is_fine_enough(name):
     # 10 ms, against the same straight pieces of voltage in steps of a quarter of a millisecond
     model = with_effect(THESIS, name, numbers(name, 3.0))
     coarse, fine = (model.simulate(COURSE.drive(100.0, n)).stretch for n in (1, 40))
-    assert np.abs(coarse - fine[::40]).max() * LENGTH < 0.2e-6
+    # a film that squeals multiplies what a step does
+    error = 0.7e-6 if name == "easing friction" else 0.2e-6
+    assert np.abs(coarse - fine[::40]).max() * LENGTH < error
 
 
 # --- what a sensor makes of a motion that is known exactly
@@ -578,6 +581,9 @@ NEARER |= dict.fromkeys(
     ),
     1.2,
 )
+NEARER["easing friction"] = 1.1
+# who squeals in another phase is far off: a search sets out from the same friction without easing
+SIZED = {"easing friction": 0.8}
 NEARER |= dict.fromkeys(
     ("sudden change of reading", "sudden change of force", "sudden loss of field"), 1.003
 )
@@ -640,7 +646,10 @@ def refitted(truth, start):
 
 
 def nearby(truth):
-    """A start: springs 5 % off, sizes at a third, shapes one and a half times what they are."""
+    """A start: springs 5 % off, sizes at a third, shapes one and a half times what they are.
+
+    Nearer where ``NEARER`` and ``SIZED`` say so.
+    """
     network, effects = truth.network, []
     equilibrium = network.equilibrium
     branches = tuple(
@@ -653,7 +662,7 @@ def nearby(truth):
             if p.neutral is None:
                 value = start[p.name] * NEARER.get(name, 1.5)
             else:
-                value = p.neutral + 0.3 * (start[p.name] - p.neutral)
+                value = p.neutral + SIZED.get(name, 0.3) * (start[p.name] - p.neutral)
             start[p.name] = limited(value, *p.bounds)
         effects.append((name, tuple(start.items())))
     springs = Network(replace(equilibrium, modulus=1.05 * equilibrium.modulus), branches)

@@ -7,8 +7,7 @@ The exact solution is used from one turning point to the next, so z is rate-inde
 What bends also resists its bending (Canudas de Wit and others, IEEE Trans. Autom. Control 40, 1995,
 the bristles' own damping): the stress runs ahead of F z/p by the time tau, F/p (z + tau z'). A film
 that sticks would otherwise ring on its guide for long, which none does; one that slides is not
-damped by it. Their easing with speed is left out: where it shows, the film squeals, in a phase that
-no law predicts.
+damped by it.
 """
 
 from __future__ import annotations
