@@ -232,6 +232,24 @@ def test_what_happened_once_predicts_nothing_else():
     assert any("other recordings are predicted without it" in note for note in found.notes)
 
 
+def test_beside_a_walk_no_drift_predicts_others():
+    walk = {"linear": 0.0, "quadratic": 4e-6, "cubic": -4e-6, "quartic": 2e-6, "quintic": -2e-6}
+    walks = effect("wandering drift", **walk)
+    drifts = effect("settling drift", drift=6e-5, time_constant=2.0)
+    record = record_of(replace(PLAIN, effects=walks + drifts))
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    fits = {}
+    for effects in ((), walks + drifts, drifts):
+        problem = search.bench.problem(replace(PLAIN, effects=effects))
+        start = problem.layout.coordinates(problem.layout.initial())
+        fixed = np.zeros(problem.layout.size, dtype=bool)
+        fixed[problem.layout.column("J")] = True
+        fits[effects] = search.bench.fit(problem.layout.base, [(start, None)], fixed)
+        search.found[frozenset(name for name, _ in effects)] = fits[effects]
+    assert search._for_others(fits[walks + drifts]).effects == ()
+    assert search._for_others(fits[drifts]).effects == ("settling drift",)
+
+
 def test_what_happened_in_every_recording_alike_predicts_others():
     records = [record_of(PLAIN), record_of(PLAIN, seed=1)]
     size = records[0].measured.size

@@ -584,12 +584,14 @@ class _Search:
         fitted with one set of numbers, and each must be the better for it. What is left out is
         fitted without: then whoever has found nothing else predicts as before, and no worse. Where
         the others then take over what happened once, they predict nothing, and the baseline does.
+        Nor does another of its family: where a reading walks, what else drifts may be of the walk.
         """
-        once = [
-            n
+        lawless = {
+            EFFECTS[n].family
             for n in trial.effects
             if not EFFECTS[n].recurs and not self._recurred(trial, self._without(trial, n))
-        ]
+        }
+        once = [n for n in trial.effects if EFFECTS[n].family in lawless]
         kept = self._with_only(trial, [n for n in trial.effects if n not in once])
         base = self.found[frozenset()]
         if kept is not trial and base.cost - kept.cost < _TRUSTED * (base.cost - trial.cost):
