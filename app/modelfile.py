@@ -79,7 +79,10 @@ class _Branch(_Spring):
 
 
 #: Numbers that an effect's law got after the first files, at which it does what it did before.
-_SINCE_THEN = {"dry friction": {"damping": 1e-6}}
+_SINCE_THEN = {
+    "dry friction": {"damping": 1e-6},
+    "broad dielectric relaxation": {"half_width": 4.0},
+}
 
 
 class _Effect(Table):

@@ -11,6 +11,8 @@ from model.jit import jit
 
 __all__ = [
     "along_cubic",
+    "bent",
+    "bristles_slip",
     "lagged",
     "low_pass",
     "slewed",
@@ -25,6 +27,9 @@ _SMALL = 0.1
 _SWITCHING = 0.02  # s: long enough for a fit to find the moment
 _WINDING = 0.25  # reaches over the power, a step: within 3e-5 of the yield stress
 _SHORT = 0.05  # of the place, a travel times the power: the series is within 3e-5 of it
+_NEARLY_ALL = 10.0  # cotangent: from there its law is exact enough for any way
+_ALL_SLIP = 1e6  # cotangent: bristles bend no more
+_ENOUGH = 30.0  # reaches, by which it is far beyond that
 _YIELDED = 1.0 - 1e-6  # of the yield stress: the loop has come to its end
 
 
@@ -111,6 +116,60 @@ def slid(z: float, travel: float, reach: float) -> float:
     """Strain of a yielding element after ``travel`` one way: it goes to +-``reach``, from ``z``."""
     end = math.copysign(reach, travel)
     return end + (z - end) * math.exp(-abs(travel) / reach)
+
+
+@jit
+def bristles_slip(z: float, elastic: float) -> float:
+    """Part of the travel by which bristles bent to ``z`` along it slip, after Dupont and others.
+
+    Both ``z`` and the ``elastic`` part, up to which nothing slips, are in parts of where all does.
+    """
+    if z <= elastic:
+        return 0.0
+    if z >= 1.0:
+        return 1.0
+    return 0.5 - 0.5 * math.cos(math.pi * (z - elastic) / (1.0 - elastic))
+
+
+@jit
+def _hastened(w: float, a: float) -> float:
+    return (1.0 + a * math.atan2(1.0, w) * w * w) / (1.0 + a * w)
+
+
+@jit
+def _cotangent(w: float, h: float, a: float) -> float:
+    return w * math.exp(h) + math.expm1(h) / a
+
+
+@jit
+def bent(z: float, travel: float, reach: float, elastic: float) -> float:
+    """Deflection of bristles after ``travel`` one way: z' = 1 - slip z/``reach`` along it.
+
+    Where they begin to slip, z = reach (1 - a x) with cos(x)^2 of slip, and w = cot(x) would obey
+    w' = w + 1/a if x cos(x) were sin(x): it does at a rate that is nearly one, as is used here.
+    """
+    way = math.copysign(1.0, travel)
+    z *= way / reach
+    left = abs(travel) / reach
+    free = elastic - z
+    if free >= left:
+        return way * reach * (z + left)
+    if free > 0.0:
+        z = elastic
+        left -= free
+    if z >= 1.0:
+        return way * reach * (1.0 + (z - 1.0) * math.exp(-left))
+    a = 2.0 / math.pi * (1.0 - elastic)
+    w = 1.0 / math.tan((1.0 - z) / a)
+    while left > 0.0 and w < _ALL_SLIP:
+        h = min(left, _ENOUGH if w > _NEARLY_ALL else a)
+        start = _hastened(w, a)
+        middle = _hastened(_cotangent(w, 0.5 * h * start, a), a)
+        middle = _hastened(_cotangent(w, 0.25 * h * (start + middle), a), a)
+        end = _hastened(_cotangent(w, h * middle, a), a)
+        w = _cotangent(w, h * (start + 4.0 * middle + end) / 6.0, a)
+        left -= h
+    return way * reach * (1.0 - a * math.atan2(1.0, w))
 
 
 @jit

@@ -147,6 +147,23 @@ def extra(name, p, film, drive):
             slopes=lambda t, lam, u, z, v: (bending(u, z[0]),),
         )
 
+    def elastic_first():
+        size, reach, ahead = p["friction"], p["presliding"], p["damping"]
+
+        def bending(u, z):
+            slips = reach * (1.0 + p["excess"] * math.exp(-((u / p["easing"]) ** 2)))
+            part = z / slips if u > 0.0 else -z / slips
+            if part <= p["elastic"]:
+                return u
+            risen = min((part - p["elastic"]) / (1.0 - p["elastic"]), 1.0)
+            return u * (1.0 - math.sin(0.5 * math.pi * risen) ** 2 * part)
+
+        return Extra(
+            states=1,
+            stress=lambda t, lam, u, z, v: size * (z[0] + ahead * bending(u, z[0])) / reach,
+            slopes=lambda t, lam, u, z, v: (bending(u, z[0]),),
+        )
+
     def leakage():
         def left(t, lam, u, z, v):
             field = (v * lam / 8e3) ** p["exponent"]
@@ -228,12 +245,13 @@ def extra(name, p, film, drive):
         return v * (v + p["strength"] * slow) / (1.0 + p["settled"] * p["strength"])
 
     def broad():
-        at = np.arange(6) - 2.5
-        weights = 1.0 / (np.cosh(at) + math.cos(math.pi * (1.0 - p["alpha"])))
+        at = np.linspace(-p["half_width"], p["half_width"], 7)
+        narrowed = (1.0 - p["alpha"]) * at
+        weights = 1.0 / (np.cosh(narrowed) + math.cos(math.pi * (1.0 - p["alpha"])))
         weights /= weights.sum()
-        times = p["relaxation_time"] * np.exp(at / (1.0 - p["alpha"]))
+        times = p["relaxation_time"] * np.exp(at)
         return Extra(
-            states=6,
+            states=7,
             square=lambda t, lam, u, z, v: polarised(v, float(weights @ np.array(z))),
             slopes=lambda t, lam, u, z, v: tuple((v - np.array(z)) / times),
         )
@@ -312,6 +330,7 @@ def extra(name, p, film, drive):
         "distributed hysteresis": distributed,
         "dry friction": friction,
         "easing friction": easing,
+        "elastoplastic friction": elastic_first,
         "elastoplastic hysteresis": elastoplastic,
         "electrode resistance": charging,
         "strained electrode": lambda: charging(p["gauge"]),

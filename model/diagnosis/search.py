@@ -43,6 +43,7 @@ _MATTERS = 0.01  # of the noise's mean square: less is not worth an effect
 _SECOND_SHARE = 0.25  # of what is left above the noise: less is not worth one more effect
 _OF_ITS_FORM = 0.02  # of what is explained: a law not quite the true one leaves so little
 _FORM_SHARE = 0.7  # of that: less is not worth one more effect
+_SOME = 0.3  # of what is asked: who has explained less will not get so far in the end
 _BY_FAR = 150.0  # of the criterion: a gain that needs no such share
 _HOPE = 0.95  # of the cost: who explains less than the rest of it is not followed on
 _BEAM = 2  # how many explanations are followed on
@@ -265,11 +266,14 @@ class _Search:
                 tried += self._round(parent, depth, span)
             if not tried:
                 break
-            fitted, correlation = self._settled(best, tried)
+            # what is asked of any gain, however large
+            least = _SOME * self._share(best, math.inf) * (best.cost - 1.0) if best.effects else 0.0
+            fitted, correlation = self._settled(best, tried, least)
             leader = fitted[0].trial
             gain = self._gain(best, leader, correlation)
-            if gain > self._asked(fitted[0].name) or not self._is_noise(best):
-                fitted, correlation = self._settled(best, self._anew(fitted))
+            promising = gain > self._asked(fitted[0].name) or not self._is_noise(best)
+            if promising and (least == 0.0 or best.cost - leader.cost > least):
+                fitted, correlation = self._settled(best, self._anew(fitted), least)
             leader = fitted[0].trial
             gain = self._gain(best, leader, correlation)
             matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
@@ -401,10 +405,13 @@ class _Search:
             found.append(x)
         return found
 
-    def _settled(self, best: Trial, fitted: list[_Tried]) -> tuple[list[_Tried], float]:
+    def _settled(
+        self, best: Trial, fitted: list[_Tried], least: float = 0.0
+    ) -> tuple[list[_Tried], float]:
         """The candidates, best first, the leading ones fitted to the end of their valleys.
 
-        Named effects go before unnamed ones that do no better than a margin: an attached mode can
+        Where ``least`` of the cost of ``best`` is asked for, only those that explain as much. Named
+        effects go before unnamed ones that do no better than a margin: an attached mode can
         play a moved mass, and a step nearly anything.
         """
 
@@ -419,6 +426,8 @@ class _Search:
         for place, tried in enumerate(order):
             near = tried.trial.cost < _CLOSE * lead
             if place >= _SETTLED and not (near and rank(tried) < mark):
+                continue
+            if least > 0.0 and best.cost - tried.trial.cost < least:
                 continue
             key = frozenset(tried.trial.effects)
             # beside one that leaves but noise, only who is as near as that

@@ -1,8 +1,9 @@
 """Slow polarisation spread over many times, as most polymers have it: a broad Debye spectrum.
 
 Cole and Cole's (J. Chem. Phys. 9, 341 (1941)): the strength is spread over y = ln(T_i/T) as
-1/(cosh((1 - alpha) y) - cos(pi alpha)). Six Debye terms as of ``dielectric_relaxation`` stand for
-it, at (1 - alpha) y = -2.5, -1.5 ... 2.5.
+1/(cosh((1 - alpha) y) - cos(pi alpha)). No spectrum goes on for ever: the decades where it ends
+are most of what differs between a broad one and a narrow one on short ramps. Seven Debye terms as
+of ``dielectric_relaxation`` stand for it, at even steps of y from -w to w.
 """
 
 from __future__ import annotations
@@ -42,29 +43,39 @@ EFFECT = Effect(
             0.1,
             starts=(0.4,),
         ),
+        Parameter(
+            "half_width",
+            "",
+            (1.0, 7.0),
+            "logarithm of the longest time over the relaxation time, where the spectrum ends",
+            1.0,
+            starts=(4.0,),
+        ),
         SETTLED,
     ),
-    memory=6,
+    memory=7,
 )
 
-_TERMS = 6
-_FIRST = -2.5
-_HEIGHTS = tuple(math.cosh(_FIRST + i) for i in range(_TERMS))
+_TERMS = 7
 
 
 @jit
 def polarise(c, k, m, j, start, end, h):
     before, after, whole = 0.0, 0.0, 0.0
     sharp = math.cos(math.pi * c[k + 2])
+    step = 2.0 * c[k + 3] / (_TERMS - 1)
+    late, later = c[k + 1] * math.exp(-c[k + 3]), math.exp(step)
+    side, beside = math.exp((1.0 - c[k + 2]) * c[k + 3]), math.exp((c[k + 2] - 1.0) * step)
     for i in range(_TERMS):
-        weight = 1.0 / (_HEIGHTS[i] - sharp)
+        weight = 1.0 / (0.5 * (side + 1.0 / side) - sharp)
         whole += weight
         before += weight * m[j + i]
-        late = c[k + 1] * math.exp((_FIRST + i) / (1.0 - c[k + 2]))
         m[j + i] = lagged(m[j + i], start, end, h, late)
         after += weight * m[j + i]
-    share = c[k] / (1.0 + c[k + 3] * c[k])
+        late *= later
+        side *= beside
+    share = c[k] / (1.0 + c[k + 4] * c[k])
     return (
-        share * start * (before / whole - c[k + 3] * start),
-        share * end * (after / whole - c[k + 3] * end),
+        share * start * (before / whole - c[k + 4] * start),
+        share * end * (after / whole - c[k + 4] * end),
     )

@@ -64,7 +64,7 @@ FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
         ),
         "load_inertia": (load_inertia.hung,),
         "drag": (drag.mixed, drag.air_film),
-        "friction": (friction.lugre, friction.elasto_plastic),
+        "friction": (friction.lugre, friction.elasto_plastic, friction.tustin),
         "sensor_lag": (sensor_lag.moving_average, sensor_lag.low_pass),
         "sensor_nonlinearity": (
             sensor_nonlinearity.cubic,

@@ -70,11 +70,12 @@ class Hidden(NamedTuple):
     drag: float = 0.0
     drag_quadratic: float = 0.0
     drag_power: float = 0.0
-    # friction of bristles: Coulomb and static stress Pa, Stribeck rate 1/s, the bristles' reach,
-    # their damping Pa s, and the share of the reach within which they do not slip
+    # friction of bristles: Coulomb and static stress Pa, Stribeck rate 1/s and power, the bristles'
+    # reach, their damping Pa s, and the share of the reach within which they do not slip
     friction: float = 0.0
     friction_static: float = 0.0
     friction_stribeck: float = 1.0
+    friction_easing: float = 2.0
     friction_reach: float = 1.0
     friction_damping: float = 0.0
     friction_elastic: float = 0.0
@@ -285,8 +286,9 @@ def _slipped(start: float, reach: float, moved: float) -> float:
 @jit
 def _bristles(h: Hidden, x: float, rate: float) -> tuple[float, float]:
     """Friction stress in Pa and the rate of the bristles' deflection ``x``."""
-    ratio = rate / h.friction_stribeck
-    level = h.friction + (h.friction_static - h.friction) * math.exp(-ratio * ratio)
+    ratio = abs(rate) / h.friction_stribeck
+    eased = math.exp(-(ratio**h.friction_easing))
+    level = h.friction + (h.friction_static - h.friction) * eased
     stiffness = h.friction / h.friction_reach
     steady = level / stiffness
     slip = 1.0

@@ -4,6 +4,8 @@
 x' = v - |v| x / x_s(v), force s0 x + s1 x', with x_s = (Fc + (Fs - Fc) exp(-(v/vs)^2))/s0 after
 Stribeck. ``elasto_plastic``: Dupont, Hayward, Armstrong and Altpeter, same Trans. 47 (2002): up to
 a share of x_s the bristles only bend, so the load does not creep under a swinging force.
+``tustin``: as the first, but easing as exp(-|v|/vs) does (Tustin, J. IEE 94 (1947)), with a corner
+at rest.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from sim_backend.truth.chance import log_uniform
 from sim_backend.truth.effect import TruthEffect
 from sim_backend.truth.film import FilmNumbers
 
-__all__ = ["elasto_plastic", "lugre"]
+__all__ = ["elasto_plastic", "lugre", "tustin"]
 
 _LEAST, _MOST = 0.4e-3, 18e-3  # N
 _REACH = (4e-6, 30e-6)  # m
@@ -26,7 +28,9 @@ _STRIBECK = (0.5e-3, 5e-3)  # m/s
 _DAMPING = 0.3  # of critical, on the film's own mass
 
 
-def _friction(generator: np.random.Generator, elastic: float, words: str) -> TruthEffect:
+def _friction(
+    generator: np.random.Generator, elastic: float, words: str, easing: float = 2.0
+) -> TruthEffect:
     force = log_uniform(generator, _LEAST, _MOST)
     reach = log_uniform(generator, *_REACH)
     ratio = generator.uniform(*_RATIO)
@@ -43,6 +47,7 @@ def _friction(generator: np.random.Generator, elastic: float, words: str) -> Tru
             friction_reach=reach / numbers.length,
             friction_damping=2.0 * _DAMPING * math.sqrt(stiffness * numbers.inertia),
             friction_elastic=elastic,
+            friction_easing=easing,
         )
 
     return TruthEffect(
@@ -65,3 +70,8 @@ def elasto_plastic(generator: np.random.Generator, load: Load) -> TruthEffect:  
     """Bristles that only bend at first."""
     share = generator.uniform(0.4, 0.8)
     return _friction(generator, share, f"friction (elastic up to {share:.2f} of slip)")
+
+
+def tustin(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """Bristles that slip a little at once, and slip easier at any speed."""
+    return _friction(generator, 0.0, "friction (Tustin)", easing=1.0)
