@@ -15,6 +15,7 @@ from app.errors import InputError
 from app.recording.files import check_output, replaced_when_done
 from app.toml_input import Table, allowed, meant, parse_toml, read_text, shown
 from model.actuator import Actuator
+from model.effects import EFFECTS
 from model.errors import ModelError
 from model.film import Strip
 from model.material import Branch, Film, Load, Network, Spring
@@ -90,10 +91,11 @@ class _Effect(Table):
     values: dict[str, float]
 
     def build(self) -> tuple[str, tuple[tuple[str, float], ...]]:
-        values = dict(self.values)
-        for name, value in _SINCE_THEN.get(self.name, {}).items():
-            values.setdefault(name, value)
-        return self.name, tuple(values.items())
+        values = _SINCE_THEN.get(self.name, {}) | self.values
+        # in the order of the law; what it does not have is refused with the model
+        law = EFFECTS[self.name].parameters if self.name in EFFECTS else ()
+        place = {p.name: i for i, p in enumerate(law)}
+        return self.name, tuple(sorted(values.items(), key=lambda v: place.get(v[0], len(place))))
 
 
 class _File(Table):

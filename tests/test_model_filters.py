@@ -11,6 +11,8 @@ from scipy.linalg import expm
 
 from model.filters import (
     along_cubic,
+    bent,
+    bristles_slip,
     lagged,
     low_pass,
     slewed,
@@ -118,6 +120,29 @@ def test_slid(z, travel):
         assert slid(z * 2e-4, way * travel * 2e-4, 2e-4) == pytest.approx(
             done.y[0, -1] * 2e-4, rel=1e-8, abs=1e-15
         )
+
+
+@pytest.mark.parametrize("elastic", [0.0, 0.4, 0.7, 0.9])
+@pytest.mark.parametrize("z", [-1.3, -0.5, 0.0, 0.95, 1.4])
+def test_bent_is_what_bristles_do_that_slip_so(z, elastic):
+    def slope(_, y):
+        return [1.0 - bristles_slip(y[0], elastic) * y[0]]
+
+    for travel in (1e-6, 0.15, 0.8, 2.0, 8.0, 500.0):
+        far = min(travel, 30.0)  # beyond, there is nothing left to integrate
+        done = solve_ivp(slope, (0.0, far), [z], rtol=1e-10, atol=1e-12, max_step=0.1)
+        for way in (1.0, -1.0):
+            found = bent(way * z * 2e-4, way * travel * 2e-4, 2e-4, elastic) / 2e-4
+            # as measured, rounded up: a thousandth where they slip from the first
+            assert found == pytest.approx(way * done.y[0, -1], abs=1e-3 if elastic == 0.0 else 3e-4)
+
+
+def test_bristles_slip_from_nothing_to_all():
+    z = np.linspace(-1.5, 1.5, 61)
+    slip = np.array([bristles_slip(part, 0.5) for part in z])
+    assert np.all(slip[z <= 0.5] == 0.0)
+    assert np.all(slip[z >= 1.0] == 1.0)
+    assert bristles_slip(0.75, 0.5) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("asymmetry", [0.5, 0.8, 1.0])

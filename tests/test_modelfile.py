@@ -63,13 +63,31 @@ def test_a_model_comes_back_to_the_last_bit(tmp_path: Path, name: str) -> None:
     assert loaded.history == {"seconds": 1.5}
 
 
-def test_an_older_file_lacks_numbers_of_newer_laws(tmp_path: Path) -> None:
-    values = (("friction", 50.0), ("presliding", 1e-4), ("damping", 1e-6))
-    model = replace(MODELS["thesis"], effects=(("dry friction", values),))
+@pytest.mark.parametrize(
+    ("name", "values", "new"),
+    [
+        ("dry friction", {"friction": 50.0, "presliding": 1e-4, "damping": 1e-6}, "damping"),
+        (
+            "broad dielectric relaxation",
+            {
+                "strength": 0.1,
+                "relaxation_time": 0.2,
+                "alpha": 0.4,
+                "half_width": 4.0,
+                "settled": 1.0,
+            },
+            "half_width",
+        ),
+    ],
+)
+def test_an_older_file_lacks_numbers_of_newer_laws(
+    tmp_path: Path, name: str, values: dict[str, float], new: str
+) -> None:
+    model = replace(MODELS["thesis"], effects=((name, tuple(values.items())),))
     path = tmp_path / "m.toml"
     save_model(path, "old", model, {})
     now = path.read_text(encoding="utf-8")
-    then = re.sub(r",? *damping = [^,}\n]*", "", now)
+    then = re.sub(rf",? *{new} = [^,}}\n]*", "", now)
     assert then != now
     path.write_text(then, encoding="utf-8")
     assert load_model(path).model == model
