@@ -14,7 +14,7 @@ from model.effects.description import Effect, Parameter
 from model.filters import slid
 from model.jit import jit
 
-__all__ = ["EFFECT", "commit", "stiffness", "stress"]
+__all__ = ["EFFECT", "commit", "reach", "stiffness", "stress"]
 
 EFFECT = Effect(
     name="easing friction",
@@ -60,7 +60,8 @@ EFFECT = Effect(
 
 
 @jit
-def _reach(c, k, rate):
+def reach(c, k, rate):
+    """Deflection, in stretch, at which all bristles slip while the film moves at ``rate``."""
     return c[k + 1] * (1.0 + c[k + 3] * math.exp(-((rate / c[k + 4]) ** 2)))
 
 
@@ -68,8 +69,8 @@ def _reach(c, k, rate):
 def stress(c, k, m, j, lam, rate, lam0, since, t):
     # on the way here the rate was, in the mean, that of the way
     passed = (lam - lam0) / since if since > 0.0 else rate
-    z = slid(m[j], lam - lam0, _reach(c, k, passed))
-    return c[k] * (z + c[k + 2] * (rate - abs(rate) * z / _reach(c, k, rate))) / c[k + 1]
+    z = slid(m[j], lam - lam0, reach(c, k, passed))
+    return c[k] * (z + c[k + 2] * (rate - abs(rate) * z / reach(c, k, rate))) / c[k + 1]
 
 
 @jit
@@ -80,5 +81,5 @@ def stiffness(c, k, m, j, lam, rate):
 
 @jit
 def commit(c, k, m, j, lam, rate, lam0, h, t):
-    m[j] = slid(m[j], lam - lam0, _reach(c, k, (lam - lam0) / h))
+    m[j] = slid(m[j], lam - lam0, reach(c, k, (lam - lam0) / h))
     return 0
