@@ -79,10 +79,12 @@ class _Branch(_Spring):
     relaxation_time_s: Annotated[float, Field(ge=0.0)]
 
 
-#: Numbers that an effect's law got after the first files, at which it does what it did before.
-_SINCE_THEN = {
+#: Numbers that an effect's law got after the first files, at which it does what it did before: a
+#: value, or which of its other numbers.
+_SINCE_THEN: dict[str, dict[str, float | str]] = {
     "dry friction": {"damping": 1e-6},
     "broad dielectric relaxation": {"half_width": 4.0},
+    "dielectric relaxation in stages": {"sooner_ratio": "ratio"},
 }
 
 
@@ -91,7 +93,10 @@ class _Effect(Table):
     values: dict[str, float]
 
     def build(self) -> tuple[str, tuple[tuple[str, float], ...]]:
-        values = _SINCE_THEN.get(self.name, {}) | self.values
+        values = dict(self.values)
+        for new, then in _SINCE_THEN.get(self.name, {}).items():
+            like = values.get(then, math.nan) if isinstance(then, str) else then
+            values.setdefault(new, like)
         # in the order of the law; what it does not have is refused with the model
         law = EFFECTS[self.name].parameters if self.name in EFFECTS else ()
         place = {p.name: i for i, p in enumerate(law)}

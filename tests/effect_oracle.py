@@ -258,7 +258,7 @@ def extra(name, p, film, drive):
 
     def in_stages():
         strengths = np.array([p["strength"], p["sooner"], p["later"]])
-        times = p["relaxation_time"] * np.array([1.0, 1.0 / p["ratio"], p["ratio"]])
+        times = p["relaxation_time"] * np.array([1.0, 1.0 / p["sooner_ratio"], p["ratio"]])
         return Extra(
             states=3,
             square=lambda t, lam, u, z, v: (
@@ -352,6 +352,9 @@ def extra(name, p, film, drive):
         ),
         "leakage": leakage,
         "linear drag": lambda: Extra(stress=lambda t, lam, u, z, v: p["drag"] * u),
+        "mixed drag": lambda: Extra(
+            stress=lambda t, lam, u, z, v: p["drag"] * u + p["quadratic"] * u * abs(u)
+        ),
         "power-law drag": lambda: Extra(
             stress=lambda t, lam, u, z, v: (
                 p["drag"] * math.copysign((abs(u) / 0.1) ** p["exponent"], u)
@@ -399,6 +402,11 @@ def extra(name, p, film, drive):
                 1.0
                 + p["stiffening"] * (1.0 - math.exp(-t / p["time_constant"]))
                 + p["later"] * (1.0 - math.exp(-t / p["time_constant"] / 10.0))
+            )
+        ),
+        "slowing warm-up": lambda: Extra(
+            soften=lambda t, lam, u, z, v: (
+                1.0 + p["stiffening"] * (1.0 - (1.0 + t / p["time_constant"]) ** -p["power"])
             )
         ),
         "warm-up": lambda: Extra(

@@ -78,6 +78,19 @@ def test_a_model_comes_back_to_the_last_bit(tmp_path: Path, name: str) -> None:
             },
             "half_width",
         ),
+        (
+            "dielectric relaxation in stages",
+            {
+                "strength": 0.1,
+                "sooner": 0.1,
+                "later": 0.1,
+                "relaxation_time": 0.2,
+                "ratio": 7.0,
+                "sooner_ratio": 7.0,
+                "settled": 1.0,
+            },
+            "sooner_ratio",
+        ),
     ],
 )
 def test_an_older_file_lacks_numbers_of_newer_laws(

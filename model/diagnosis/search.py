@@ -52,6 +52,7 @@ _SETTLED = 5  # leading candidates that are fitted to the end of their valleys
 _CLOSE = 1.15  # of the leader's cost: so near, and better than nothing, any other is one too
 _ENDED = 4  # the first of them, where no branch must be left without work
 _NEAR_LEAD = 2.0  # of the leader's cost before that: these are
+_HALF = 0.5  # of what was left: who explains so much, and is as close, is one too
 _MAY_LEAD = 6.0  # of the leader's cost: what has come so near may lead by its last steps
 _UNNAMED_MARGIN = (
     20.0  # of the criterion, by which an unnamed effect must be better than named ones
@@ -430,10 +431,11 @@ class _Search:
             if least > 0.0 and best.cost - tried.trial.cost < least:
                 continue
             key = frozenset(tried.trial.effects)
-            # beside one that leaves but noise, only who is as near as that
+            # beside one that leaves but noise, only who was as near before that one had got so far
             leads = self.found[frozenset(order[0].trial.effects)]
-            reach = _CLOSE * lead if leads.is_white else _NEAR_LEAD * first
-            if place < ended and tried.trial.cost < reach:
+            reach = (_CLOSE if leads.is_white else _NEAR_LEAD) * first
+            abreast = tried.trial.cost < min(_CLOSE * first, _HALF * best.cost)
+            if (place < ended or abreast) and tried.trial.cost < reach:
                 self._ended(tried.trial)
             elif key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
                 self.settled.add(key)

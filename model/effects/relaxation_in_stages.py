@@ -1,6 +1,6 @@
 """Slow polarisation in three stages (side groups, chains, charges): a Prony series.
 
-Three Debye terms as of ``dielectric_relaxation``, each of its own strength, at T/r, T and r T.
+Three Debye terms as of ``dielectric_relaxation``, each of its own strength, at T/s, T and r T.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from model.jit import jit
 
 __all__ = ["EFFECT", "polarise"]
 
-_STRENGTH = (-0.3, 2.0)  # of all three no more than all there is
+_STRENGTH = (0.0, 2.0)  # nothing that is polarised late takes from the field
 
 EFFECT = Effect(
     name="dielectric relaxation in stages",
@@ -38,7 +38,16 @@ EFFECT = Effect(
             "ratio",
             "",
             (2.0, 40.0),
-            "of relaxation times, r",
+            "of the relaxation times of the later stage and the middle one, r",
+            10.0,
+            starts=(10.0,),
+            logarithmic=True,
+        ),
+        Parameter(
+            "sooner_ratio",
+            "",
+            (2.0, 40.0),
+            "of the middle one and the sooner, s",
             10.0,
             starts=(10.0,),
             logarithmic=True,
@@ -52,11 +61,11 @@ EFFECT = Effect(
 @jit
 def polarise(c, k, m, j, start, end, h):
     before = c[k] * m[j] + c[k + 1] * m[j + 1] + c[k + 2] * m[j + 2]
-    tau, ratio = c[k + 3], c[k + 4]
+    tau = c[k + 3]
     m[j] = lagged(m[j], start, end, h, tau)
-    m[j + 1] = lagged(m[j + 1], start, end, h, tau / ratio)
-    m[j + 2] = lagged(m[j + 2], start, end, h, tau * ratio)
+    m[j + 1] = lagged(m[j + 1], start, end, h, tau / c[k + 5])
+    m[j + 2] = lagged(m[j + 2], start, end, h, tau * c[k + 4])
     after = c[k] * m[j] + c[k + 1] * m[j + 1] + c[k + 2] * m[j + 2]
     slow = c[k] + c[k + 1] + c[k + 2]
-    rest = c[k + 5] * slow
+    rest = c[k + 6] * slow
     return start * (before - rest * start) / (1.0 + rest), end * (after - rest * end) / (1.0 + rest)

@@ -1,0 +1,41 @@
+"""Drag in proportion to the rate and to its square: a viscous guide, and the wake of what moves.
+
+The nominal stress (d + q |lam'|) lam' acts against the motion. Below the rate d/q the fluid's
+viscosity rules, above it the fluid's inertia (Forchheimer 1901, of flow through a bed): a power of
+the rate may do as well as this in slow lobes, and then not on an edge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from model.effects.description import Parameter
+from model.effects.linear_drag import EFFECT as LINEAR
+from model.jit import jit
+
+__all__ = ["EFFECT", "stiffness", "stress"]
+
+EFFECT = replace(
+    LINEAR,
+    name="mixed drag",
+    words="a force against the motion that grows with its rate, and with the square of that",
+    parameters=(
+        *LINEAR.parameters,
+        Parameter("quadratic", "Pa s^2", (0.0, 1e6), "nominal stress per rate squared", 5e3, 0.0),
+    ),
+    drives=("voltage",),
+)
+
+_DRIVE = 3e3  # Pa: a Maxwell stress of 8 MV/m
+
+
+@jit
+def stress(c, k, m, j, lam, rate, lam0, since, t):
+    return (c[k] + c[k + 1] * abs(rate)) * rate
+
+
+@jit
+def stiffness(c, k, m, j, lam, rate):
+    # no faster than a fast edge, or than the rate at which drag alone holds the drive
+    greatest = min(0.5, (_DRIVE / max(c[k + 1], 1e-3)) ** 0.5)
+    return 0.0, c[k] + 2.0 * c[k + 1] * min(rate, greatest)

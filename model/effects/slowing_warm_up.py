@@ -1,0 +1,48 @@
+"""Warming up ever more slowly, where no thermometer was recorded: through a thick wall, or a room.
+
+The network's stress is multiplied by 1 + a (1 - (1 + t/tau)^-p), t since the record began: bodies
+that warm at rates spread about p/tau (as gamma distributed), of which the slow ones go on for long.
+``warm_up`` is what they come to if all warm alike, with p without end.
+"""
+
+from __future__ import annotations
+
+import math
+
+from model.effects.description import Effect, Parameter
+from model.jit import jit
+
+__all__ = ["EFFECT", "soften"]
+
+EFFECT = Effect(
+    name="slowing warm-up",
+    family="thermal",
+    acts_on="environment",
+    words="the stiffness goes on changing, by a power of time, whatever the film does",
+    parameters=(
+        Parameter("stiffening", "", (-0.5, 0.5), "relative change of stress in the end", 1e-3, 0.0),
+        Parameter(
+            "time_constant",
+            "s",
+            (1.0, 3e3),
+            "from which on it slows down",
+            20.0,
+            starts=(5.0, 20.0),
+            logarithmic=True,
+        ),
+        Parameter(
+            "power",
+            "",
+            (0.1, 5.0),
+            "of what is still to come",
+            0.5,
+            starts=(1.0,),
+            logarithmic=True,
+        ),
+    ),
+)
+
+
+@jit
+def soften(c, k, m, j, lam, since, t, warmth):
+    return 1.0 - c[k] * math.expm1(-c[k + 2] * math.log1p((t + since) / c[k + 1]))
