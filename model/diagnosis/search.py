@@ -50,9 +50,8 @@ _BEAM = 2  # how many explanations are followed on
 _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed on
 _SETTLED = 5  # leading candidates that are fitted to the end of their valleys
 _CLOSE = 1.15  # of the leader's cost: so near, and better than nothing, any other is one too
-_ENDED = 4  # the first of them, where no branch must be left without work
-_NEAR_LEAD = 2.0  # of the leader's cost before that: these are
-_HALF = 0.5  # of what was left: who explains so much, and is as close, is one too
+_NEAR_LEAD = 2.0  # of the leader's cost before that: no branch of these is left without work
+_NEAR_NOISE = 1.5  # of the same, beside a leader that leaves but noise
 _MAY_LEAD = 6.0  # of the leader's cost: what has come so near may lead by its last steps
 _UNNAMED_MARGIN = (
     20.0  # of the criterion, by which an unnamed effect must be better than named ones
@@ -422,7 +421,7 @@ class _Search:
         correlation = self._correlation([best, *(t.trial for t in fitted)])
         order = sorted(fitted, key=rank)
         lead = first = order[0].trial.cost
-        ended = 0 if self._is_noise(best) else _ENDED
+        ended = 0 if self._is_noise(best) else _SETTLED
         mark = self._criterion(best, correlation) - _DECISIVE
         for place, tried in enumerate(order):
             near = tried.trial.cost < _CLOSE * lead
@@ -431,11 +430,9 @@ class _Search:
             if least > 0.0 and best.cost - tried.trial.cost < least:
                 continue
             key = frozenset(tried.trial.effects)
-            # beside one that leaves but noise, only who was as near before that one had got so far
             leads = self.found[frozenset(order[0].trial.effects)]
-            reach = (_CLOSE if leads.is_white else _NEAR_LEAD) * first
-            abreast = tried.trial.cost < min(_CLOSE * first, _HALF * best.cost)
-            if (place < ended or abreast) and tried.trial.cost < reach:
+            reach = (_NEAR_NOISE if leads.is_white else _NEAR_LEAD) * first
+            if place < ended and tried.trial.cost < reach:
                 self._ended(tried.trial)
             elif key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
                 self.settled.add(key)
