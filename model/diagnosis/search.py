@@ -70,6 +70,7 @@ _FOLLOWED = 12  # candidates refitted in later rounds, the most promising ones
 _EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
 _TRUSTED = 0.8  # of the same: what explains less may be a disguise, and predicts nothing else
+_TAKEN_OVER = 2.0  # times what others explain beside a walk: explaining more without, they play it
 
 
 def _quiet(stage: str, fraction: float) -> None:
@@ -591,7 +592,8 @@ class _Search:
         A moment or a walk is of one recording, unless several of these show it alike: all are
         fitted with one set of numbers, and each must be the better for it. What is left out is
         fitted without: then whoever has found nothing else predicts as before, and no worse. Where
-        the others then take over what happened once, they predict nothing, and the baseline does.
+        the others then take over what happened once, they predict nothing, and the baseline does:
+        they explain far less than all did, or far more without it than beside it.
         Nor does another of its family: where a reading walks, what else drifts may be of the walk.
         """
         lawless = {
@@ -602,7 +604,11 @@ class _Search:
         once = [n for n in trial.effects if EFFECTS[n].family in lawless]
         kept = self._with_only(trial, [n for n in trial.effects if n not in once])
         base = self.found[frozenset()]
-        if kept is not trial and base.cost - kept.cost < _TRUSTED * (base.cost - trial.cost):
+        if kept is trial or kept is base:
+            return kept
+        explained = base.cost - kept.cost
+        beside = self._with_only(trial, once).cost - trial.cost
+        if explained < _TRUSTED * (base.cost - trial.cost) or explained > _TAKEN_OVER * beside:
             return base
         return kept
 
