@@ -14,7 +14,7 @@ from model.effects.description import Effect, Parameter
 from model.filters import slid
 from model.jit import jit
 
-__all__ = ["EFFECT", "commit", "reach", "stiffness", "stress"]
+__all__ = ["EFFECT", "commit", "stiffness", "stress"]
 
 EFFECT = Effect(
     name="easing friction",
