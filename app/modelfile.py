@@ -95,8 +95,10 @@ class _Effect(Table):
     def build(self) -> tuple[str, tuple[tuple[str, float], ...]]:
         values = dict(self.values)
         for new, then in _SINCE_THEN.get(self.name, {}).items():
-            like = values.get(then, math.nan) if isinstance(then, str) else then
-            values.setdefault(new, like)
+            if not isinstance(then, str):
+                values.setdefault(new, then)
+            elif then in values:
+                values.setdefault(new, values[then])
         # in the order of the law; what it does not have is refused with the model
         law = EFFECTS[self.name].parameters if self.name in EFFECTS else ()
         place = {p.name: i for i, p in enumerate(law)}

@@ -232,6 +232,11 @@ def test_what_happened_once_predicts_nothing_else():
     assert any("other recordings are predicted without it" in note for note in found.notes)
 
 
+def typical(name: str) -> tuple[str, tuple[tuple[str, float], ...]]:
+    """The effect ``name`` with the typical value of each of its numbers."""
+    return name, tuple((p.name, p.typical) for p in EFFECTS[name].parameters)
+
+
 def test_beside_a_walk_no_drift_predicts_others():
     walk = {"linear": 0.0, "quadratic": 4e-6, "cubic": -4e-6, "quartic": 2e-6, "quintic": -2e-6}
     walks = effect("wandering drift", **walk)
@@ -248,6 +253,27 @@ def test_beside_a_walk_no_drift_predicts_others():
         search.found[frozenset(name for name, _ in effects)] = fits[effects]
     assert search._for_others(fits[walks + drifts]).effects == ()
     assert search._for_others(fits[drifts]).effects == ("settling drift",)
+
+
+def test_who_plays_a_walk_once_it_is_left_out_predicts_nothing():
+    record = record_of(PLAIN)
+
+    def predicting(walk_leaves: float) -> tuple[str, ...]:
+        """Effects for other recordings, where a drag alone explains nine tenths of all."""
+        search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+        both = ("wandering drift", "linear drag")
+        left = {(): 100.0, both[:1]: walk_leaves, both[1:]: 10.0, both: 1.0}
+        for names, cost in left.items():
+            with_them = replace(PLAIN, effects=tuple(typical(name) for name in names))
+            over = np.full(1, math.sqrt(cost) * NOISE)
+            search.found[frozenset(names)] = made_trial([record], with_them, over)
+            search.left_out |= {(frozenset(names), name) for name in names}
+        return search._for_others(search.found[frozenset(both)]).effects
+
+    # beside the walk the drag does what it does without
+    assert predicting(walk_leaves=90.0) == ("linear drag",)
+    # beside it there is nothing left for the drag to do
+    assert predicting(walk_leaves=5.0) == ()
 
 
 def test_what_happened_in_every_recording_alike_predicts_others():
@@ -287,8 +313,7 @@ def test_what_a_law_not_quite_the_true_one_leaves_is_no_second_effect():
     assert search.found[frozenset()].cost == pytest.approx(100.0)
 
     def asked(what: str, left: float, gain: float = 1e3) -> float:
-        values = tuple((p.name, p.typical) for p in EFFECTS[what].parameters)
-        with_it = replace(PLAIN, effects=((what, values),))
+        with_it = replace(PLAIN, effects=(typical(what),))
         over = np.full(1, math.sqrt(left) * NOISE)
         return search._share(made_trial([record_of(PLAIN)], with_it, over), gain)
 

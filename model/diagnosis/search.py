@@ -267,13 +267,12 @@ class _Search:
                 tried += self._round(parent, depth, span)
             if not tried:
                 break
-            # what is asked of any gain, however large
-            least = _SOME * self._share(best, math.inf) * (best.cost - 1.0) if best.effects else 0.0
+            least = self._least(best)
             fitted, correlation = self._settled(best, tried, least)
             leader = fitted[0].trial
             gain = self._gain(best, leader, correlation)
             promising = gain > self._asked(fitted[0].name) or not self._is_noise(best)
-            if promising and (least == 0.0 or best.cost - leader.cost > least):
+            if promising and best.cost - leader.cost > least:
                 fitted, correlation = self._settled(best, self._anew(fitted), least)
             leader = fitted[0].trial
             gain = self._gain(best, leader, correlation)
@@ -332,6 +331,11 @@ class _Search:
         if lawful and best.cost - 1.0 < _OF_ITS_FORM * explained:
             return _FORM_SHARE
         return _SECOND_SHARE if gain < _BY_FAR else 0.0
+
+    def _least(self, best: Trial) -> float:
+        """The cost that one more effect must explain to be followed on; -inf: none is asked for."""
+        asked = self._share(best, math.inf) if best.effects else 0.0  # of any gain, however large
+        return _SOME * asked * (best.cost - 1.0) if asked > 0.0 else -math.inf
 
     @staticmethod
     def _asked(name: str) -> float:
@@ -407,13 +411,13 @@ class _Search:
         return found
 
     def _settled(
-        self, best: Trial, fitted: list[_Tried], least: float = 0.0
+        self, best: Trial, fitted: list[_Tried], least: float = -math.inf
     ) -> tuple[list[_Tried], float]:
         """The candidates, best first, the leading ones fitted to the end of their valleys.
 
-        Where ``least`` of the cost of ``best`` is asked for, only those that explain as much. Named
-        effects go before unnamed ones that do no better than a margin: an attached mode can
-        play a moved mass, and a step nearly anything.
+        Of these only such as explain ``least`` of the cost of ``best``. Named effects go before
+        unnamed ones that do no better than a margin: an attached mode can play a moved mass, and a
+        step nearly anything.
         """
 
         def rank(tried: _Tried) -> float:
@@ -422,18 +426,18 @@ class _Search:
         correlation = self._correlation([best, *(t.trial for t in fitted)])
         order = sorted(fitted, key=rank)
         lead = first = order[0].trial.cost
-        ended = 0 if self._is_noise(best) else _SETTLED
+        to_the_end = not self._is_noise(best)
         mark = self._criterion(best, correlation) - _DECISIVE
         for place, tried in enumerate(order):
             near = tried.trial.cost < _CLOSE * lead
             if place >= _SETTLED and not (near and rank(tried) < mark):
                 continue
-            if least > 0.0 and best.cost - tried.trial.cost < least:
+            if best.cost - tried.trial.cost < least:
                 continue
             key = frozenset(tried.trial.effects)
             leads = self.found[frozenset(order[0].trial.effects)]
             reach = (_NEAR_NOISE if leads.is_white else _NEAR_LEAD) * first
-            if place < ended and tried.trial.cost < reach:
+            if to_the_end and place < _SETTLED and tried.trial.cost < reach:
                 self._ended(tried.trial)
             elif key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
                 self.settled.add(key)
@@ -590,11 +594,11 @@ class _Search:
         """``trial`` as it predicts other recordings: without what may not happen again.
 
         A moment or a walk is of one recording, unless several of these show it alike: all are
-        fitted with one set of numbers, and each must be the better for it. What is left out is
+        fitted with one set of numbers, and each must be the better for it. What else is of its
+        family goes with it: where a reading walks, what else drifts may be of the walk. The rest is
         fitted without: then whoever has found nothing else predicts as before, and no worse. Where
-        the others then take over what happened once, they predict nothing, and the baseline does:
-        they explain far less than all did, or far more without it than beside it.
-        Nor does another of its family: where a reading walks, what else drifts may be of the walk.
+        the rest then plays what happened once, it predicts nothing, and the baseline does: it
+        explains far less than all did, or far more without it than beside it.
         """
         lawless = {
             EFFECTS[n].family

@@ -9,38 +9,26 @@ at its own frequency, and sticks and slips.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
-from model.effects.description import Effect, Parameter
+from model.effects.description import Parameter
+from model.effects.dry_friction import EFFECT as DRY
+from model.effects.dry_friction import stiffness
 from model.filters import slid
 from model.jit import jit
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 
-EFFECT = Effect(
+_FRICTION, _PRESLIDING, _DAMPING = DRY.parameters
+
+EFFECT = replace(
+    DRY,
     name="easing friction",
-    family="friction",
-    acts_on="load",
     words="a force against the motion that is greater when slow: the film sticks, and slips",
     parameters=(
-        Parameter("friction", "Pa", (0.0, 2e4), "nominal stress while sliding fast", 50.0, 0.0),
-        Parameter(
-            "presliding",
-            "",
-            (3e-6, 1e-3),
-            "change of stretch over which it builds up",
-            1e-4,
-            starts=(1e-4, 5e-4),
-            logarithmic=True,
-        ),
-        Parameter(
-            "damping",
-            "s",
-            (1e-6, 3e-3),
-            "time by which its stress runs ahead while it builds up",
-            1e-3,
-            starts=(1e-3,),
-            logarithmic=True,
-        ),
+        replace(_FRICTION, meaning="nominal stress while sliding fast"),
+        replace(_PRESLIDING, starts=(1e-4, 5e-4)),
+        replace(_DAMPING, bounds=(1e-6, 3e-3)),
         Parameter(
             "excess", "", (0.0, 1.0), "part of it that is lost with speed", 0.1, starts=(0.15, 0.4)
         ),
@@ -54,8 +42,6 @@ EFFECT = Effect(
             logarithmic=True,
         ),
     ),
-    memory=1,
-    turns=True,
 )
 
 
@@ -71,12 +57,6 @@ def stress(c, k, m, j, lam, rate, lam0, since, t):
     passed = (lam - lam0) / since if since > 0.0 else rate
     z = slid(m[j], lam - lam0, reach(c, k, passed))
     return c[k] * (z + c[k + 2] * (rate - abs(rate) * z / reach(c, k, rate))) / c[k + 1]
-
-
-@jit
-def stiffness(c, k, m, j, lam, rate):
-    bristles = c[k] / c[k + 1]
-    return bristles, bristles * c[k + 2]
 
 
 @jit

@@ -8,8 +8,9 @@ slip, or back, they follow the film; from there to that deflection they slip the
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
-from model.effects.description import Effect, Parameter
+from model.effects.description import Parameter
 from model.effects.easing_friction import EFFECT as EASING
 from model.effects.easing_friction import reach, stiffness
 from model.filters import bent, bristles_slip
@@ -17,10 +18,9 @@ from model.jit import jit
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 
-EFFECT = Effect(
+EFFECT = replace(
+    EASING,
     name="elastoplastic friction",
-    family="friction",
-    acts_on="load",
     words="a force against the motion, greater when slow, that a small swing does not overcome",
     parameters=(
         *EASING.parameters,
@@ -28,8 +28,6 @@ EFFECT = Effect(
             "elastic", "", (0.0, 0.9), "part of it up to which nothing slips", 0.1, starts=(0.6,)
         ),
     ),
-    memory=1,
-    turns=True,
 )
 
 

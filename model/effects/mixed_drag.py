@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from model.effects.description import Parameter
 from model.effects.linear_drag import EFFECT as LINEAR
+from model.effects.power_drag import greatest_rate
 from model.jit import jit
 
 __all__ = ["EFFECT", "stiffness", "stress"]
@@ -26,8 +27,6 @@ EFFECT = replace(
     drives=("voltage",),
 )
 
-_DRIVE = 3e3  # Pa: a Maxwell stress of 8 MV/m
-
 
 @jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
@@ -36,6 +35,4 @@ def stress(c, k, m, j, lam, rate, lam0, since, t):
 
 @jit
 def stiffness(c, k, m, j, lam, rate):
-    # no faster than a fast edge, or than the rate at which drag alone holds the drive
-    greatest = min(0.5, (_DRIVE / max(c[k + 1], 1e-3)) ** 0.5)
-    return 0.0, c[k] + 2.0 * c[k + 1] * min(rate, greatest)
+    return 0.0, c[k] + 2.0 * c[k + 1] * min(rate, greatest_rate(c[k + 1], 2.0))

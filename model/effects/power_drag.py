@@ -26,6 +26,13 @@ EFFECT = Effect(
 
 _REFERENCE = 0.1  # 1/s
 _DRIVE = 3e3  # Pa: a Maxwell stress of 8 MV/m
+_FASTEST = 0.5  # 1/s: a fast edge
+
+
+@jit
+def greatest_rate(drag, exponent):
+    """Rate in 1/s of a fast edge, or, if less, at which drag * rate**exponent holds the drive."""
+    return min(_FASTEST, (_DRIVE / max(drag, 1e-3)) ** (1.0 / exponent))
 
 
 @jit
@@ -35,7 +42,6 @@ def stress(c, k, m, j, lam, rate, lam0, since, t):
 
 @jit
 def stiffness(c, k, m, j, lam, rate):
-    # no faster than a fast edge, or than the rate at which drag alone holds the drive
-    greatest = min(0.5, _REFERENCE * (_DRIVE / max(c[k], 1e-3)) ** (1.0 / c[k + 1]))
+    greatest = greatest_rate(c[k] / _REFERENCE ** c[k + 1], c[k + 1])
     there = min(rate, greatest) / _REFERENCE
     return 0.0, c[k] * c[k + 1] / _REFERENCE * there ** (c[k + 1] - 1.0)

@@ -8,28 +8,23 @@ that warm at rates spread about p/tau (as gamma distributed), of which the slow 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
-from model.effects.description import Effect, Parameter
+from model.effects.description import Parameter
+from model.effects.warm_up import EFFECT as WARM_UP
 from model.jit import jit
 
 __all__ = ["EFFECT", "soften"]
 
-EFFECT = Effect(
+_STIFFENING, _TIME_CONSTANT = WARM_UP.parameters
+
+EFFECT = replace(
+    WARM_UP,
     name="slowing warm-up",
-    family="thermal",
-    acts_on="environment",
     words="the stiffness goes on changing, by a power of time, whatever the film does",
     parameters=(
-        Parameter("stiffening", "", (-0.5, 0.5), "relative change of stress in the end", 1e-3, 0.0),
-        Parameter(
-            "time_constant",
-            "s",
-            (1.0, 3e3),
-            "from which on it slows down",
-            20.0,
-            starts=(5.0, 20.0),
-            logarithmic=True,
-        ),
+        _STIFFENING,
+        replace(_TIME_CONSTANT, meaning="from which on it slows down", starts=(5.0, 20.0)),
         Parameter(
             "power",
             "",
