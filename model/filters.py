@@ -28,6 +28,8 @@ _SWITCHING = 0.02  # s: long enough for a fit to find the moment
 _WINDING = 0.25  # reaches over the power, a step: within 3e-5 of the yield stress
 _SHORT = 0.05  # of the place, a travel times the power: the series is within 3e-5 of it
 _NEARLY_ALL = 10.0  # cotangent: from there its law is exact enough for any way
+_NEAR_ALL = 0.02  # of the same angle: there all slip but 4e-4
+_LITTLE = 0.1  # of that angle, a travel: the series is within 1e-5 of it
 _ALL_SLIP = 1e6  # cotangent: bristles bend no more
 _ENOUGH = 30.0  # reaches, by which it is far beyond that
 _YIELDED = 1.0 - 1e-6  # of the yield stress: the loop has come to its end
@@ -157,9 +159,17 @@ def bent(z: float, travel: float, reach: float, elastic: float) -> float:
     if free > 0.0:
         z = elastic
         left -= free
-    if z >= 1.0:
-        return way * reach * (1.0 + (z - 1.0) * math.exp(-left))
     a = 2.0 / math.pi * (1.0 - elastic)
+    # who slides is there mostly
+    if z > 1.0 - _NEAR_ALL * a:
+        return way * reach * (1.0 + (z - 1.0) * math.exp(-left))
+    if left < _LITTLE * a:
+        angle = 2.0 * (z - elastic) / a
+        slip = 0.5 - 0.5 * math.cos(angle)
+        more, bend = math.sin(angle) / a, 2.0 * math.cos(angle) / (a * a)
+        rate, slope = 1.0 - slip * z, -slip - more * z
+        second = slope * slope - rate * (2.0 * more + bend * z)
+        return way * reach * (z + left * rate * (1.0 + left / 2.0 * (slope + left / 3.0 * second)))
     w = 1.0 / math.tan((1.0 - z) / a)
     while left > 0.0 and w < _ALL_SLIP:
         h = min(left, _ENOUGH if w > _NEARLY_ALL else a)

@@ -128,7 +128,7 @@ def test_bent_is_what_bristles_do_that_slip_so(z, elastic):
     def slope(_, y):
         return [1.0 - bristles_slip(y[0], elastic) * y[0]]
 
-    for travel in (1e-6, 0.15, 0.8, 2.0, 8.0, 500.0):
+    for travel in (1e-6, 0.01, 0.03, 0.15, 0.8, 2.0, 8.0, 500.0):
         far = min(travel, 30.0)  # beyond, there is nothing left to integrate
         done = solve_ivp(slope, (0.0, far), [z], rtol=1e-10, atol=1e-12, max_step=0.1)
         for way in (1.0, -1.0):
