@@ -232,11 +232,11 @@ def initial_state(c: np.ndarray, rest: float) -> np.ndarray:
 
 
 def reading_of(
-    c: np.ndarray, length: float, drive: Drive, lag: float = 0.0, quick: bool = False
+    c: np.ndarray, length: float, drive: Drive, lag: float = 0.0, haste: int = kernel.CAREFUL
 ) -> tuple[np.ndarray, int]:
     """``(reading, status)`` of coefficient vector ``c`` (see ``model.coefficients``): (N,) m.
 
-    ``lag`` s is the known age of a reading, ``quick`` as the kernel has it. What the model did not
+    ``lag`` s is the known age of a reading, ``haste`` as the kernel has it. What the model did not
     reach reads 0.
     """
     c = c.copy()
@@ -246,7 +246,7 @@ def reading_of(
         x, u = np.zeros(drive.time.size), np.zeros(drive.time.size)
         status, _ = kernel.drive_by_voltage(
             c, drive.time, drive.voltage, drive.hold, drive.temperature,
-            initial_state(c, rest), x, u, quick,
+            initial_state(c, rest), x, u, haste,
         )  # fmt: skip
         x -= rest
         x *= length

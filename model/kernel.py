@@ -51,11 +51,14 @@ from model.springs import SPRINGS, gent, neo_hookean
 
 __all__ = [
     "BAD_INPUT",
+    "CAREFUL",
     "LOCKED",
     "NOT_CONVERGED",
     "NO_REST",
     "OK",
     "PULL_IN",
+    "QUICK",
+    "ROUGH",
     "drive_by_voltage",
     "read_sensor",
     "rest_stretch",
@@ -67,6 +70,10 @@ LOCKED = 2  #: a spring reached its locking stretch
 NOT_CONVERGED = 3  #: the step had to become too small
 NO_REST = 4  #: no rest state under the load
 BAD_INPUT = 5  #: not finite, or time that does not increase
+
+CAREFUL = 0  #: good to some hundredths of a micrometre
+QUICK = 1  #: to a tenth (some tenths on a step of 8 kV); careful where an effect follows the path
+ROUGH = 2  #: nor careful there: to a tenth of what such an effect does
 
 _STRETCH_MAX = 100.0  # beyond any elastomer: a runaway, whatever the springs say
 _RK4_STEP_MAX = 2.5e-3  # s; a thesis record is then good to 0.03 um
@@ -980,17 +987,15 @@ def drive_by_voltage(
     y: np.ndarray,
     stretch: np.ndarray,
     rate: np.ndarray,
-    quick: bool = False,
+    haste: int = CAREFUL,
 ) -> tuple[int, int]:
     """Carry state ``y`` (2 + n + MEMORY,) along a record; fill ``stretch`` and ``rate`` (N,).
 
     ``time`` s and ``voltage`` V are (N,), increasing and not necessarily even. With ``hold`` each
     voltage stands until the next sample (a converter's output), else the voltage is linear between
     samples. ``warmth`` (N,) K is the temperature above that of the start, or (0,) where none was
-    recorded. ``quick`` takes the longest steps that are good to a tenth of a micrometre (to some
-    tenths on a step of 8 kV), for a search that tries thousands of models; else, and where an
-    effect follows the path, they are good to some hundredths. Element 0 is the state as given, so
-    a record can be cut and continued. ``c`` must know the stretch at rest
+    recorded. ``haste`` says how long steps may be: ``CAREFUL``, ``QUICK``, ``ROUGH``. Element 0 is
+    the state as given, so a record can be cut and continued. ``c`` must know the stretch at rest
     (``model.actuator.at_rest``).
 
     Returns ``(status, reached)``: on any status but ``OK`` the samples from ``reached`` on are
@@ -1011,7 +1016,7 @@ def drive_by_voltage(
         most = _EFFECT_SUBSTEPS_MAX
     drags = acting & _STIFFNESS != 0
     # ringing is in closed form, but its turns are not, where a path is followed
-    quick = quick and acting & _TURNS == 0
+    quick = haste == ROUGH or (haste == QUICK and acting & _TURNS == 0)
     work = np.zeros((15, y.shape[0]))
     before = np.empty(y.shape[0])
     trace = np.zeros(3)

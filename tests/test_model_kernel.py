@@ -362,7 +362,7 @@ def test_a_quick_step_may_be_longer_than_the_ringing(effects):
     actuator = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, effects)
     c = actuator.coefficients()
     drive = Drive(time, voltage, hold=True)
-    quick, status = reading_of(c, LENGTH, drive, quick=True)
+    quick, status = reading_of(c, LENGTH, drive, haste=kernel.QUICK)
     fine, _ = reading_of(c, LENGTH, drive)
     assert status == kernel.OK
     rang = np.diff(fine, 2)[(time[2:] > 1.02) & (time[2:] < 1.3)]

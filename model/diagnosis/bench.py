@@ -15,6 +15,7 @@ from threading import Lock
 
 import numpy as np
 
+from model import kernel
 from model.actuator import Actuator, at_rest
 from model.diagnosis.findings import Stage
 from model.film import Strip
@@ -151,11 +152,11 @@ class Bench:
             for r in self.records
         )
 
-    def problem(self, model: Actuator | Strip, full: bool = False) -> Problem:
-        """The records, all samples or thinned, with ``model``'s numbers free."""
+    def problem(self, model: Actuator | Strip, haste: int = kernel.QUICK) -> Problem:
+        """The thinned records, or with ``CAREFUL`` all samples, with ``model``'s numbers free."""
         layout = Layout(model, self.times)
-        records = self.full if full else self.records
-        return Problem(records, layout, self.workers, not full, self._count)
+        records = self.full if haste == kernel.CAREFUL else self.records
+        return Problem(records, layout, self.workers, haste, self._count)
 
     def _count(self, simulations: int) -> None:
         with self._counting:
@@ -209,13 +210,13 @@ class Bench:
         ``noise`` is True where there is but noise to explain: then what a Jacobian from nearby
         promises is believed.
         """
-        problem = self.problem(model)
+        problem, scouted = self.problem(model), self.problem(model, kernel.ROUGH)
         scouts = [
-            descend_by_secants(problem, start, fixed, jacobian, _SCOUTING, sure=False)
+            descend_by_secants(scouted, start, fixed, jacobian, _SCOUTING, sure=False)
             for start, jacobian in starts
         ]
         scouts += [
-            descend_by_secants(problem, start, fixed, iterations=_SCOUTING + _RESTART, sure=False)
+            descend_by_secants(scouted, start, fixed, iterations=_SCOUTING + _RESTART, sure=False)
             for start in anew
         ]
         best = min(scouts, key=lambda f: f.cost)
@@ -374,12 +375,12 @@ class Bench:
                 for r, part in zip(self.records, np.split(there - without[i], edges), strict=True)
                 if isinstance(r, ActuatorRecord)
             ]
-            found.append(Problem(corrected, plain.layout, self.workers, True, self._count))
+            found.append(Problem(corrected, plain.layout, self.workers, kernel.QUICK, self._count))
         return found
 
     def polished(self, trial: Trial, in_haste: bool = False) -> Trial:
         """``trial`` fitted to every sample, to the end; ``in_haste`` as it is, on every sample."""
-        problem = self.problem(trial.model, full=True)
+        problem = self.problem(trial.model, kernel.CAREFUL)
         gain = max(0.5, _WORTH * trial.cost * problem.samples)
         iterations = 0 if in_haste else _POLISHING
         fit = descend(problem, trial.x, trial.fixed, iterations, gain, damping=1e-4)

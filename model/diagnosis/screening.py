@@ -19,6 +19,7 @@ from itertools import product
 
 import numpy as np
 
+from model import kernel
 from model.actuator import Actuator
 from model.diagnosis.bench import Bench, Trial
 from model.effects import EFFECTS, Effect, EffectValues, Parameter
@@ -81,6 +82,9 @@ class Screen:
             np.isfinite(sigma), trial.residuals * np.where(np.isfinite(sigma), sigma, 0.0), 0.0
         )
         self._weight = 1.0 / trial.problem.sigma
+        # what the base model does must be as it was
+        follows = any(EFFECTS[name].turns for name in trial.effects)
+        self._haste = kernel.QUICK if follows else kernel.ROUGH
 
     def promises(self, effect: Effect) -> list[Promise]:
         """Promises of ``effect``, best first: one for each shape on its grid."""
@@ -105,7 +109,7 @@ class Screen:
         """
         if not found:
             return []
-        problem = self.bench.problem(found[0].model)
+        problem = self.bench.problem(found[0].model, self._haste)
         layout = problem.layout
         first = self.trial.x.size
         rows: list[tuple[int, np.ndarray]] = []
@@ -225,7 +229,7 @@ class Screen:
                 rows.append(np.array((*values, *shape)))
         if not models:
             return []
-        problem = self.bench.problem(models[0])
+        problem = self.bench.problem(models[0], self._haste)
         layout = problem.layout
         base_values = self.trial.problem.layout.values(self.trial.x)
         population = np.array([np.concatenate([base_values, row]) for row in rows])

@@ -49,6 +49,8 @@ _HOPE = 0.95  # of the cost: who explains less than the rest of it is not follow
 _BEAM = 2  # how many explanations are followed on
 _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed on
 _SETTLED = 5  # leading candidates that are fitted to the end of their valleys
+_SETTLED_QUICKLY = 12  # that are followed a little, while the leader leaves more than noise
+_MUCH_LEFT = 25.0  # of the noise's mean square: there only one law of a family is followed
 _CLOSE = 1.15  # of the leader's cost: so near, and better than nothing, any other is one too
 _NEAR_LEAD = 2.0  # of the leader's cost before that: no branch of these is left without work
 _NEAR_NOISE = 1.5  # of the same, beside a leader that leaves but noise
@@ -66,6 +68,7 @@ _ANEW = 6  # of such effects that are fitted anew
 _ANEW_SIZES = (0.3, 1.0, 3.0, 10.0, 30.0)  # times the typical one, tried for that
 _ANEW_CLOSER = (0.56, 0.75, 1.0, 1.33, 1.78)  # times the best of these
 _ANEW_FROM = (1.0, 1.33, 1.78)  # times that: the branches' measure of it is on the small side
+_HINT = 0.05  # of the most promising one's: who promises less is not refitted beside it
 _FOLLOWED = 12  # candidates refitted in later rounds, the most promising ones
 _EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
@@ -133,6 +136,7 @@ class _Search:
         self.found: dict[frozenset[str], Trial] = {}
         self.settled: set[frozenset[str]] = set()
         self.ended: set[frozenset[str]] = set()
+        self.screened: dict[frozenset[str], tuple[Trial, dict[str, list[Promise]], np.ndarray]] = {}
         self.left_out: set[tuple[frozenset[str], str]] = set()
         self.interrupted = False
         self.held = False
@@ -227,11 +231,12 @@ class _Search:
         held = self._if_held()
         if held is None or not best.effects:
             return best
-        before = (self.bench, self.found, self.settled, self.ended, self.left_out)
+        before = (self.bench, self.found, self.settled, self.ended, self.left_out, self.screened)
         bench = Bench(held, self.bench.workers, self._watch)
         bench.simulations = self.bench.simulations
         fits = [bench.fit(t.model, [(t.x, None)], t.fixed) for t in (self.found[frozenset()], best)]
         self.bench, self.settled, self.ended, self.left_out = bench, set(), set(), set()
+        self.screened = {}
         self.found = {frozenset(t.effects): t for t in fits}
         try:
             trial = self._pruned(self._ended(fits[1]))
@@ -241,7 +246,8 @@ class _Search:
         finally:
             if not self.held:
                 before[0].simulations = bench.simulations
-                self.bench, self.found, self.settled, self.ended, self.left_out = before
+                self.bench, self.found, self.settled, self.ended, self.left_out = before[:5]
+                self.screened = before[5]
         return trial if self.held else best
 
     def _if_held(self) -> list[ActuatorRecord] | None:
@@ -265,6 +271,8 @@ class _Search:
             for i, parent in enumerate(beam):
                 span = (0.1 + 0.28 * (depth + i / len(beam)), 0.28 / len(beam))
                 tried += self._round(parent, depth, span)
+                if any(self._is_noise(t.trial) for t in tried):
+                    break  # what else may do as well is sought by exchanges
             if not tried:
                 break
             least = self._least(best)
@@ -344,32 +352,61 @@ class _Search:
 
     def _round(self, parent: Trial, depth: int, span: tuple[float, float]) -> list[_Tried]:
         """All effects on top of ``parent``: promises of all, refits of all or the best of them."""
-        screen = Screen(self.bench, parent)
-        names = [e for e in self.effects if e.name not in parent.effects]
-        promises = {}
-        for n, effect in enumerate(names):
-            promises[effect.name] = screen.promises(effect)
-            self.report(
-                _stage(parent, "screening"), span[0] + span[1] * 0.25 * (n + 1) / len(names)
-            )
-        order = sorted((n for n, p in promises.items() if p), key=lambda n: -promises[n][0].share)
-        refitted = order if depth == 0 else order[:_FOLLOWED]
-        tried = []
-        for pair in _abreast(refitted):
-            unknown = [n for n in pair if frozenset((*parent.effects, n)) not in self.found]
-            trials = self.bench.together(
-                lambda n: self._refit(parent, n, promises[n], screen.jacobian), unknown
-            )
-            for name, trial in zip(unknown, trials, strict=True):
-                self.found[frozenset((*parent.effects, name))] = trial
-            for name in pair:
-                trial = self.found[frozenset((*parent.effects, name))]
-                tried.append(_Tried(name, parent, trial, promises[name][0].share))
-            self.report(
-                _stage(parent, "refitting"),
-                span[0] + span[1] * (0.25 + 0.75 * len(tried) / len(refitted)),
-            )
+        promises, jacobian = self._screened(parent, span)
+        order = sorted(promises, key=lambda n: -promises[n][0].share)
+        tried: list[_Tried] = []
+
+        def refit(names: list[str], of: int) -> None:
+            for pair in _abreast(names):
+                unknown = [n for n in pair if frozenset((*parent.effects, n)) not in self.found]
+                trials = self.bench.together(
+                    lambda n: self._refit(parent, n, promises[n], jacobian), unknown
+                )
+                for name, trial in zip(unknown, trials, strict=True):
+                    self.found[frozenset((*parent.effects, name))] = trial
+                for name in pair:
+                    trial = self.found[frozenset((*parent.effects, name))]
+                    tried.append(_Tried(name, parent, trial, promises[name][0].share))
+                done = len(tried) / of
+                self.report(_stage(parent, "refitting"), span[0] + span[1] * (0.25 + 0.75 * done))
+
+        if depth == 0 or not order:
+            refit(order, len(order))
+            return tried
+        order = order[:_FOLLOWED]
+        first = [n for n in order if _leads_to(n, order[0])]
+        refit(first, len(order))
+        if any(self._is_noise(t.trial) for t in tried):
+            # who promises next to nothing beside what explains all is no rival of it
+            least = _HINT * promises[order[0]][0].share
+            order = [n for n in order if promises[n][0].share > least]
+        if parent.cost > _MUCH_LEFT:
+            # so far from the noise it matters which family it is, not yet which law of it
+            heads = [n for n in order if n not in first and _is_first_of_family(n, order)]
+            refit(heads, len(order))
+            near = _NEAR_LEAD * min(t.trial.cost for t in tried)
+            may_lead = {EFFECTS[t.name].family for t in tried if t.trial.cost < near}
+            order = [n for n in order if n in heads or EFFECTS[n].family in may_lead]
+            first += heads
+        refit([n for n in order if n not in first], len(order))
         return tried
+
+    def _screened(
+        self, parent: Trial, span: tuple[float, float]
+    ) -> tuple[dict[str, list[Promise]], np.ndarray]:
+        """What each effect promises on top of ``parent``, where any; the Jacobian of ``parent``."""
+        key = frozenset(parent.effects)
+        if key not in self.screened or self.screened[key][0] is not parent:
+            screen = Screen(self.bench, parent)
+            names = [e for e in self.effects if e.name not in parent.effects]
+            promises = {}
+            for n, effect in enumerate(names):
+                promises[effect.name] = screen.promises(effect)[:_PROMISES]
+                part = 0.25 * (n + 1) / len(names)
+                self.report(_stage(parent, "screening"), span[0] + span[1] * part)
+            promises = {n: p for n, p in promises.items() if p}
+            self.screened[key] = (parent, promises, screen.jacobian)
+        return self.screened[key][1:]
 
     def _refit(
         self, parent: Trial, name: str, promises: list[Promise], jacobian: np.ndarray
@@ -385,7 +422,7 @@ class _Search:
         nothing = promises[0].start.copy()
         nothing[:first] = parent.x
         nothing[first : first + len(effect.sizes)] = [p.neutral for p in effect.sizes]
-        worth = [p for p in promises[:_PROMISES] if p.share > _NEARLY * promises[0].share]
+        worth = [p for p in promises if p.share > _NEARLY * promises[0].share]
         for start, promise in ((nothing, promises[0]), *((p.start, p) for p in worth)):
             starts.append((start, np.column_stack([jacobian, promise.columns, shapes])))
         simpler = self._simpler(parent, effect, promises[0].start)
@@ -425,17 +462,21 @@ class _Search:
 
         correlation = self._correlation([best, *(t.trial for t in fitted)])
         order = sorted(fitted, key=rank)
+        names = [t.name for t in order]
         lead = first = order[0].trial.cost
         to_the_end = not self._is_noise(best)
         mark = self._criterion(best, correlation) - _DECISIVE
         for place, tried in enumerate(order):
             near = tried.trial.cost < _CLOSE * lead
-            if place >= _SETTLED and not (near and rank(tried) < mark):
+            leads = self.found[frozenset(order[0].trial.effects)]
+            follow = _SETTLED if leads.is_white else _SETTLED_QUICKLY
+            if place >= follow and not (near and rank(tried) < mark):
+                continue
+            if lead > _MUCH_LEFT and not _is_first_of_family(tried.name, names):
                 continue
             if best.cost - tried.trial.cost < least:
                 continue
             key = frozenset(tried.trial.effects)
-            leads = self.found[frozenset(order[0].trial.effects)]
             reach = (_NEAR_NOISE if leads.is_white else _NEAR_LEAD) * first
             if to_the_end and place < _SETTLED and tried.trial.cost < reach:
                 self._ended(tried.trial)
@@ -481,6 +522,9 @@ class _Search:
             there = min([there, *(left for left, place, _ in looks if place == 0)])
             most = min(most, _AS_WELL * there)
         again = list(tried)
+        names = [tried[place].name for _, place, _ in looks]
+        if leader.cost > _MUCH_LEFT:
+            looks = [k for k in looks if _is_first_of_family(tried[k[1]].name, names)]
         for left, place, size in looks[:_ANEW]:
             if left > most:
                 break
@@ -877,6 +921,17 @@ def _abreast(names: list[str]) -> list[list[str]]:
         else:
             pairs.append([name])
     return pairs
+
+
+def _is_first_of_family(name: str, order: Sequence[str]) -> bool:
+    """Whether no other law of the family of ``name`` stands before it in ``order``."""
+    return name == next(n for n in order if EFFECTS[n].family == EFFECTS[name].family)
+
+
+def _leads_to(name: str, other: str) -> bool:
+    """Whether ``name`` is ``other``, or a simpler law of its family that it may start from."""
+    same = EFFECTS[name].family == EFFECTS[other].family
+    return name == other or (same and _intricacy(name) < _intricacy(other))
 
 
 def _intricacy(name: str) -> int:

@@ -22,9 +22,8 @@ class Problem:
 
     ``records`` are all of actuators or all of films, and ``layout`` says what is free. Members of a
     population whose simulation ends early keep the last value they reached: a large but finite
-    residual, which a search walks away from. ``quick`` is for searches: readings good to a tenth of
-    a micrometre, in half of the time. ``simulations`` counts records simulated, and ``told`` is
-    called with each such number.
+    residual, which a search walks away from. ``haste`` is as the kernel has it. ``simulations``
+    counts records simulated, and ``told`` is called with each such number.
     """
 
     def __init__(
@@ -32,7 +31,7 @@ class Problem:
         records: Sequence[Record],
         layout: Layout,
         workers: int = 2,
-        quick: bool = False,
+        haste: int = kernel.CAREFUL,
         told: Callable[[int], None] | None = None,
     ) -> None:
         if not records:
@@ -45,7 +44,7 @@ class Problem:
         self.records = tuple(records)
         self.layout = layout
         self.workers = workers
-        self.quick = quick
+        self.haste = haste
         self.told = told
         self.simulations = 0
         self.measured = np.concatenate([r.measured for r in records])
@@ -90,7 +89,7 @@ class Problem:
             return stress, status
         base = self.layout.base
         length = base.film.length if isinstance(base, Actuator) else 1.0
-        moved, status = reading_of(c, length, record.drive, record.lag, self.quick)
+        moved, status = reading_of(c, length, record.drive, record.lag, self.haste)
         return counted(moved, record.lead_in), status
 
     def residuals(self, x: np.ndarray) -> np.ndarray:

@@ -89,12 +89,12 @@ def timed(run: Callable[[], np.ndarray], repeats: int) -> tuple[float, np.ndarra
     return statistics.median(spent), result
 
 
-def followed(c: np.ndarray, drive: Drive, quick: bool = False) -> np.ndarray:
-    """Stretch (N,) from rest, as a fit would have it, or ``quick`` as a search would."""
+def followed(c: np.ndarray, drive: Drive, haste: int = kernel.CAREFUL) -> np.ndarray:
+    """Stretch (N,) from rest, as a fit would have it, or in ``haste`` as a search would."""
     y = initial_state(c, c[REST])
     stretch, rate = np.empty(drive.time.size), np.empty(drive.time.size)
     kernel.drive_by_voltage(
-        c, drive.time, drive.voltage, drive.hold, drive.temperature, y, stretch, rate, quick
+        c, drive.time, drive.voltage, drive.hold, drive.temperature, y, stretch, rate, haste
     )
     return stretch
 
@@ -148,7 +148,7 @@ def what_quick_steps_save(actuator: Actuator, sequence: Sequence) -> None:
         c = replace(actuator, effects=effects).coefficients()
         at_rest(c)
         careful, expected = timed(partial(followed, c, drive), 21)
-        quick, found = timed(partial(followed, c, drive, True), 21)
+        quick, found = timed(partial(followed, c, drive, kernel.QUICK), 21)
         error = float(np.sqrt(np.mean((found - expected) ** 2))) * THESIS_FILM.length * 1e6
         print(
             f"{name or 'no effect':<44}{careful * 1e3:>11.3f}{quick * 1e3:>10.3f}"
