@@ -73,7 +73,7 @@ BAD_INPUT = 5  #: not finite, or time that does not increase
 
 CAREFUL = 0  #: good to some hundredths of a micrometre
 QUICK = 1  #: to a tenth (some tenths on a step of 8 kV); careful where an effect follows the path
-ROUGH = 2  #: nor careful there: to a tenth of what such an effect does
+ROUGH = 2  #: nor careful there: to a tenth of what such an effect does, or some while it rings
 
 _STRETCH_MAX = 100.0  # beyond any elastomer: a runaway, whatever the springs say
 _RK4_STEP_MAX = 2.5e-3  # s; a thesis record is then good to 0.03 um

@@ -14,12 +14,14 @@ import pytest
 
 from model.actuator import Actuator, Drive
 from model.diagnosis import Diagnosis, diagnose
+from model.diagnosis.bench import Trial
 from model.diagnosis.findings import (
     EXPLAINED,
     NOTHING_MISSING,
     PARTLY_EXPLAINED,
     UNEXPLAINED,
 )
+from model.diagnosis.screening import Promise
 from model.diagnosis.search import _Search
 from model.effects import EFFECTS
 from model.errors import ModelError
@@ -233,8 +235,9 @@ def test_what_happened_once_predicts_nothing_else():
 
 
 def typical(name: str) -> tuple[str, tuple[tuple[str, float], ...]]:
-    """The effect ``name`` with the typical value of each of its numbers."""
-    return name, tuple((p.name, p.typical) for p in EFFECTS[name].parameters)
+    """The effect ``name`` with numbers that would be noticed."""
+    numbers = EFFECTS[name].parameters
+    return name, tuple((p.name, min(max(p.typical, p.bounds[0]), p.bounds[1])) for p in numbers)
 
 
 def test_beside_a_walk_no_drift_predicts_others():
@@ -324,6 +327,70 @@ def test_what_a_law_not_quite_the_true_one_leaves_is_no_second_effect():
     assert asked("ageing", 4.0) == 0.0
     # a walk has no law
     assert asked("wandering drift", 1.5) == 0.0
+
+
+def refitted(parent: float, shares: dict[str, float], left: dict[str, float]) -> list[str]:
+    """Which effects of such promised ``shares`` are refitted beside a drag that leaves ``parent``.
+
+    ``left`` is what a refit of each leaves, in the noise's mean square.
+    """
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+
+    def trial(names: tuple[str, ...], cost: float) -> Trial:
+        with_them = replace(PLAIN, effects=tuple(typical(name) for name in names))
+        return made_trial([record], with_them, np.full(1, math.sqrt(cost) * NOISE))
+
+    beside = trial(("linear drag",), parent)
+    promises = {
+        name: [Promise(beside.model, beside.x, np.zeros((1, 1)), share)]
+        for name, share in shares.items()
+    }
+    search.screened[frozenset(beside.effects)] = (beside, promises, np.zeros((1, 1)))
+    done: list[str] = []
+
+    def refit(parent: Trial, name: str, *_: object) -> Trial:
+        done.append(name)
+        return trial((*parent.effects, name), left.get(name, parent.cost))
+
+    search._refit = refit  # type: ignore[method-assign]
+    tried = search._round(beside, 1, (0.0, 1.0))
+    assert [t.name for t in tried] == done
+    return done
+
+
+def test_who_promises_nothing_beside_what_explains_all_is_not_refitted():
+    shares = {"leakage": 0.9, "mains interference": 0.5, "ageing": 0.01, "warm-up": 0.02}
+    assert refitted(20.0, shares, {"leakage": 1.0}) == ["leakage", "mains interference"]
+    # what is left may be of those too, where it does not explain all
+    assert set(refitted(20.0, shares, {"leakage": 3.0})) == set(shares)
+
+
+def test_far_from_the_noise_one_law_of_a_family_is_refitted():
+    shares = {
+        "leakage": 0.9,
+        "ageing": 0.5,
+        "logarithmic ageing": 0.45,
+        "warm-up": 0.4,
+        "slowing warm-up": 0.3,
+    }
+    left = {"leakage": 400.0, "ageing": 900.0, "warm-up": 500.0}
+    # of warm-ups the others may lead too
+    assert set(refitted(1e3, shares, left)) == set(shares) - {"logarithmic ageing"}
+    assert set(refitted(20.0, shares, left)) == set(shares)
+
+
+def test_a_model_is_screened_once():
+    search = _Search([record_of(PLAIN)], PLAIN, 1, lambda *_: None, lambda: False)
+    search.effects = [EFFECTS["linear drag"], EFFECTS["mains interference"]]
+    parent = made_trial([record_of(PLAIN)], PLAIN, NOISE * np.ones(record_of(PLAIN).measured.size))
+    first = search._screened(parent, (0.0, 1.0))
+    before = search.bench.simulations
+    assert before > 0
+    assert search._screened(parent, (0.0, 1.0))[0] is first[0]
+    assert search.bench.simulations == before
+    # another fit of the same model is another matter
+    assert search._screened(replace(parent), (0.0, 1.0))[0] is not first[0]
 
 
 def test_a_rival_is_no_worse_for_having_more_numbers():

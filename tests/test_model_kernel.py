@@ -1,6 +1,7 @@
 """The film under voltage: the compiled kernel against SciPy, and every way in which it can end."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from scipy.linalg import expm
 from model import coefficients as at
 from model import kernel
 from model.actuator import Actuator, Drive, at_rest, initial_state, reading_of
-from model.effects import assembly
+from model.effects import EFFECTS, assembly
 from model.errors import ModelError
 from model.excitation import Sequence
 from model.fitting.parameters import THESIS_RANGES
@@ -368,6 +369,27 @@ def test_a_quick_step_may_be_longer_than_the_ringing(effects):
     rang = np.diff(fine, 2)[(time[2:] > 1.02) & (time[2:] < 1.3)]
     assert np.abs(rang).max() > 5e-6
     assert np.sqrt(np.mean((quick - fine) ** 2)) < 1e-3 * np.std(fine)
+
+
+@pytest.mark.parametrize("name", [e.name for e in EFFECTS.values() if e.turns])
+def test_a_rough_look_at_what_follows_the_path_is_good_to_a_tenth_of_it(name):
+    time = ticks(8.0, 5e-3)
+    voltage = 7e3 * np.sin(np.pi * 0.5 * time) ** 2
+    numbers = EFFECTS[name].parameters
+    typical = tuple((p.name, min(max(p.typical, p.bounds[0]), p.bounds[1])) for p in numbers)
+    drive = Drive(time, voltage, hold=True)
+    plain = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
+    c = replace(plain, effects=((name, typical),)).coefficients()
+    careful, status = reading_of(c, LENGTH, drive)
+    assert status == kernel.OK
+    rough, _ = reading_of(c, LENGTH, drive, haste=kernel.ROUGH)
+    without, _ = reading_of(plain.coefficients(), LENGTH, drive)
+    does = np.sqrt(np.mean((careful - without) ** 2))
+    # as measured, rounded up
+    assert 0.0 < np.sqrt(np.mean((rough - careful) ** 2)) < 0.11 * does
+    # a search that chooses is careful there
+    quick, _ = reading_of(c, LENGTH, drive, haste=kernel.QUICK)
+    np.testing.assert_array_equal(quick, careful)
 
 
 def test_rest_states_of_the_thesis():

@@ -231,12 +231,11 @@ class _Search:
         held = self._if_held()
         if held is None or not best.effects:
             return best
-        before = (self.bench, self.found, self.settled, self.ended, self.left_out, self.screened)
+        before = (self.bench, self.found, self.settled, self.ended, self.left_out)
         bench = Bench(held, self.bench.workers, self._watch)
         bench.simulations = self.bench.simulations
         fits = [bench.fit(t.model, [(t.x, None)], t.fixed) for t in (self.found[frozenset()], best)]
         self.bench, self.settled, self.ended, self.left_out = bench, set(), set(), set()
-        self.screened = {}
         self.found = {frozenset(t.effects): t for t in fits}
         try:
             trial = self._pruned(self._ended(fits[1]))
@@ -246,8 +245,7 @@ class _Search:
         finally:
             if not self.held:
                 before[0].simulations = bench.simulations
-                self.bench, self.found, self.settled, self.ended, self.left_out = before[:5]
-                self.screened = before[5]
+                self.bench, self.found, self.settled, self.ended, self.left_out = before
         return trial if self.held else best
 
     def _if_held(self) -> list[ActuatorRecord] | None:
@@ -354,10 +352,13 @@ class _Search:
         """All effects on top of ``parent``: promises of all, refits of all or the best of them."""
         promises, jacobian = self._screened(parent, span)
         order = sorted(promises, key=lambda n: -promises[n][0].share)
+        if depth > 0:
+            order = order[:_FOLLOWED]
+        many = len(order)
         tried: list[_Tried] = []
 
-        def refit(names: list[str], of: int) -> None:
-            for pair in _abreast(names):
+        def refit(names: list[str]) -> None:
+            for pair in _abreast([n for n in names if n not in {t.name for t in tried}]):
                 unknown = [n for n in pair if frozenset((*parent.effects, n)) not in self.found]
                 trials = self.bench.together(
                     lambda n: self._refit(parent, n, promises[n], jacobian), unknown
@@ -367,34 +368,31 @@ class _Search:
                 for name in pair:
                     trial = self.found[frozenset((*parent.effects, name))]
                     tried.append(_Tried(name, parent, trial, promises[name][0].share))
-                done = len(tried) / of
-                self.report(_stage(parent, "refitting"), span[0] + span[1] * (0.25 + 0.75 * done))
+                part = 0.25 + 0.75 * len(tried) / many
+                self.report(_stage(parent, "refitting"), span[0] + span[1] * part)
 
-        if depth == 0 or not order:
-            refit(order, len(order))
-            return tried
-        order = order[:_FOLLOWED]
-        first = [n for n in order if _leads_to(n, order[0])]
-        refit(first, len(order))
-        if any(self._is_noise(t.trial) for t in tried):
-            # who promises next to nothing beside what explains all is no rival of it
-            least = _HINT * promises[order[0]][0].share
-            order = [n for n in order if promises[n][0].share > least]
-        if parent.cost > _MUCH_LEFT:
-            # so far from the noise it matters which family it is, not yet which law of it
-            heads = [n for n in order if n not in first and _is_first_of_family(n, order)]
-            refit(heads, len(order))
-            near = _NEAR_LEAD * min(t.trial.cost for t in tried)
-            may_lead = {EFFECTS[t.name].family for t in tried if t.trial.cost < near}
-            order = [n for n in order if n in heads or EFFECTS[n].family in may_lead]
-            first += heads
-        refit([n for n in order if n not in first], len(order))
+        if depth > 0:
+            refit([n for n in order if _leads_to(n, order[0])])
+            if any(self._is_noise(t.trial) for t in tried):
+                # who promises next to nothing beside what explains all is no rival of it
+                least = _HINT * promises[order[0]][0].share
+                order = [n for n in order if promises[n][0].share > least]
+            if order and parent.cost > _MUCH_LEFT:
+                # so far from the noise it matters which family it is, not yet which law of it
+                refit([n for n in order if _is_first_of_family(n, order)])
+                near = _NEAR_LEAD * min(t.trial.cost for t in tried)
+                may_lead = {EFFECTS[t.name].family for t in tried if t.trial.cost < near}
+                order = [n for n in order if EFFECTS[n].family in may_lead]
+        refit(order)
         return tried
 
     def _screened(
         self, parent: Trial, span: tuple[float, float]
     ) -> tuple[dict[str, list[Promise]], np.ndarray]:
-        """What each effect promises on top of ``parent``, where any; the Jacobian of ``parent``."""
+        """What each effect promises on top of ``parent``, where any; the Jacobian of ``parent``.
+
+        Exchanges come back to models that were screened before.
+        """
         key = frozenset(parent.effects)
         if key not in self.screened or self.screened[key][0] is not parent:
             screen = Screen(self.bench, parent)

@@ -139,16 +139,19 @@ def what_effects_cost(actuator: Actuator, drive: Drive) -> None:
 
 
 def what_quick_steps_save(actuator: Actuator, sequence: Sequence) -> None:
-    """Print careful against quick steps on a converter's staircase, under which the film rings."""
+    """Print careful against hasty steps on a converter's staircase, under which the film rings.
+
+    Hasty are those of a search, and, of what follows the path, those of its first look.
+    """
     t = np.arange(math.ceil(sequence.segments[0].duration * STAIRCASE)) / STAIRCASE
     drive = Drive(t, sequence.segments[0].voltage(t), hold=True)
-    print(f"{'staircase of 200 Hz':<44}{'careful ms':>11}{'quick ms':>10}{'ratio':>8}{'um':>8}")
+    print(f"{'staircase of 200 Hz':<44}{'careful ms':>11}{'hasty ms':>10}{'ratio':>8}{'um':>8}")
     for name in ("", "linear drag", "electrode resistance", "Mullins softening", "dry friction"):
         effects = at_values(name, "typical") if name else ()
         c = replace(actuator, effects=effects).coefficients()
         at_rest(c)
         careful, expected = timed(partial(followed, c, drive), 21)
-        quick, found = timed(partial(followed, c, drive, kernel.QUICK), 21)
+        quick, found = timed(partial(followed, c, drive, kernel.ROUGH), 21)
         error = float(np.sqrt(np.mean((found - expected) ** 2))) * THESIS_FILM.length * 1e6
         print(
             f"{name or 'no effect':<44}{careful * 1e3:>11.3f}{quick * 1e3:>10.3f}"
