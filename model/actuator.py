@@ -189,15 +189,23 @@ def effect_values(effects: EffectValues, drive: str) -> np.ndarray:
         if drive not in effect.drives:
             raise ModelError(f"effect {name!r} is not one of films driven by {drive}")
         given = dict(values)
-        if given.keys() != {p.name for p in effect.parameters}:
-            wanted = ", ".join(p.name for p in effect.parameters)
-            raise ModelError(f"effect {name!r} takes the parameters {wanted}")
+        wanted = [p.name for p in effect.parameters]
+        for what, differ in (
+            ("lacks", [n for n in wanted if n not in given]),
+            ("does not know", [n for n in given if n not in wanted]),
+        ):
+            if differ:
+                raise ModelError(
+                    f"effect {name!r} {what} {', '.join(differ)}: it takes the parameters "
+                    f"{', '.join(wanted)}"
+                )
         for parameter in effect.parameters:
             value, (low, high) = given[parameter.name], parameter.bounds
             if not low <= value <= high:
+                unit = f" {parameter.unit}" if parameter.unit else ""
                 raise ModelError(
-                    f"effect {name!r}: {parameter.name} = {value!r} {parameter.unit} must lie "
-                    f"between {low:g} and {high:g}"
+                    f"effect {name!r}: {parameter.name} = {value!r}{unit} must lie between {low:g} "
+                    f"and {high:g}"
                 )
             found[PLACES[name].column(effect, parameter.name) - at.EFFECTS_AT] = value
     return found

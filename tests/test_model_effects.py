@@ -177,7 +177,11 @@ def test_who_makes_the_reading_wrong_leaves_the_motion_alone():
 def test_values_that_no_effect_has():
     for effects, message in (
         ((("magic", ()),), "'magic' is not one of"),
-        ((("linear drag", ()),), "takes the parameters drag"),
+        ((("linear drag", ()),), "lacks drag: it takes the parameters drag"),
+        (
+            (("linear drag", (("drag", 1.0), ("drug", 1.0))),),
+            "does not know drug: it takes the parameters drag",
+        ),
         ((("linear drag", (("drag", -1.0),)),), "drag = -1.0 Pa s must lie between 0 and"),
         ((("linear drag", (("drag", math.nan),)),), "drag = nan Pa s must lie between 0 and"),
         ((("slack", (("looseness", 0.5),)),), "not one of films driven by voltage"),

@@ -450,9 +450,9 @@ class _Search:
     ) -> tuple[list[_Tried], float]:
         """The candidates, best first, the leading ones fitted to the end of their valleys.
 
-        Of these only such as explain ``least`` of the cost of ``best``. Named effects go before
-        unnamed ones that do no better than a margin: an attached mode can play a moved mass, and a
-        step nearly anything.
+        Of these only such as explain ``least`` of the cost of ``best``, and far from the noise one
+        of each family. Named effects go before unnamed ones that do no better than a margin: an
+        attached mode can play a moved mass, and a step nearly anything.
         """
 
         def rank(tried: _Tried) -> float:
