@@ -353,6 +353,12 @@ def test_swinging_dragging_and_giving_way_in_closed_form(drag):
         (("Mullins softening", (("softening", 0.01), ("width", 0.5))),),
         (("distributed hysteresis", (("stiffness", 1e4), ("reach", 0.02), ("spread", 1.0))),),
         (("electrode resistance", (("resistance", 2e7),)),),
+        (
+            (
+                "first-loading damage",
+                (("softening", 0.01), ("reach", 0.02), ("exponent", 1.5), ("breadth", 0.3)),
+            ),
+        ),
     ],
     ids=lambda e: e[0][0] if e else "plain",
 )

@@ -45,7 +45,6 @@ EFFECT = Effect(
         ),
     ),
     memory=2,
-    turns=True,
     drives=("voltage", "stretch"),
 )
 
