@@ -1,8 +1,13 @@
 """Settings of every test run."""
 
 import os
+import signal
 
 from hypothesis import settings
+
+# What a shell runs in the background ignores ctrl-C, and hands that down: the tests send it.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # No example is timed: the machine may be busy, or a kernel still to be compiled. The same answer
 # twice, for whoever runs the tests; DEARIG_EXPLORE=1 lets hypothesis look further.

@@ -10,7 +10,7 @@ import numpy as np
 
 from model.actuator import Actuator, Drive
 from model.diagnosis.bench import Bench, Trial
-from model.effects import EffectValues
+from model.effects import EFFECTS, EffectValues
 from model.excitation import Sequence
 from model.film import Strip
 from model.fitting.parameters import Layout
@@ -67,6 +67,12 @@ def fitted(bench: Bench, model: Actuator | Strip) -> Trial:
     held[layout.column("J")] = True
     start = layout.coordinates(layout.initial())
     return bench.settled(bench.fit(model, [(start, None)], held))
+
+
+def typical(name: str) -> tuple[str, tuple[tuple[str, float], ...]]:
+    """The effect ``name`` with numbers that would be noticed."""
+    numbers = EFFECTS[name].parameters
+    return name, tuple((p.name, min(max(p.typical, p.bounds[0]), p.bounds[1])) for p in numbers)
 
 
 def made_trial(records: Several[Record], model: Actuator | Strip, residual: np.ndarray) -> Trial:

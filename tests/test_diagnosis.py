@@ -38,6 +38,7 @@ from tests.engine_tools import (
     masked,
     record_of,
     thesis_drive,
+    typical,
 )
 
 HIDDEN = {
@@ -232,12 +233,6 @@ def test_what_happened_once_predicts_nothing_else():
     assert found.final.predicting.effects == ()
     assert found.final.predicting == found.baseline.model
     assert any("other recordings are predicted without it" in note for note in found.notes)
-
-
-def typical(name: str) -> tuple[str, tuple[tuple[str, float], ...]]:
-    """The effect ``name`` with numbers that would be noticed."""
-    numbers = EFFECTS[name].parameters
-    return name, tuple((p.name, min(max(p.typical, p.bounds[0]), p.bounds[1])) for p in numbers)
 
 
 def test_beside_a_walk_no_drift_predicts_others():

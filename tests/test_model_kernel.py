@@ -27,6 +27,7 @@ from model.material import (
     Spring,
 )
 from model.network import HEAD
+from tests.engine_tools import typical
 from tests.model_oracle import balance, solve
 
 THESIS = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
@@ -381,11 +382,9 @@ def test_a_quick_step_may_be_longer_than_the_ringing(effects):
 def test_a_rough_look_at_what_follows_the_path_is_good_to_a_tenth_of_it(name):
     time = ticks(8.0, 5e-3)
     voltage = 7e3 * np.sin(np.pi * 0.5 * time) ** 2
-    numbers = EFFECTS[name].parameters
-    typical = tuple((p.name, min(max(p.typical, p.bounds[0]), p.bounds[1])) for p in numbers)
     drive = Drive(time, voltage, hold=True)
     plain = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
-    c = replace(plain, effects=((name, typical),)).coefficients()
+    c = replace(plain, effects=(typical(name),)).coefficients()
     careful, status = reading_of(c, LENGTH, drive)
     assert status == kernel.OK
     rough, _ = reading_of(c, LENGTH, drive, haste=kernel.ROUGH)

@@ -23,7 +23,7 @@ from sksundae.cvode import CVODE
 from model import kernel
 from model.actuator import Actuator, Drive, at_rest, initial_state
 from model.coefficients import REST
-from model.effects import EFFECTS, EffectValues, Parameter
+from model.effects import EFFECTS, EffectValues
 from model.excitation import Sequence
 from model.material import (
     STANDARD_GRAVITY,
@@ -32,6 +32,7 @@ from model.material import (
     THESIS_LOAD,
     VACUUM_PERMITTIVITY,
 )
+from tests.engine_tools import typical
 
 STAIRCASE = 200.0  # the same of a record that is diagnosed
 RATE = 400.0  # samples a second: with them the kernel stays below 0.1 um
@@ -99,26 +100,20 @@ def followed(c: np.ndarray, drive: Drive, haste: int = kernel.CAREFUL) -> np.nda
     return stretch
 
 
-def _value(parameter: Parameter, size: str) -> float:
-    if size == "neutral" and parameter.neutral is not None:
-        return parameter.neutral
-    low, high = parameter.bounds
-    return min(max(parameter.typical, low), high)
-
-
-def at_values(name: str, size: str) -> EffectValues:
-    """The effect with its sizes ``neutral`` or ``typical``."""
-    return ((name, tuple((p.name, _value(p, size)) for p in EFFECTS[name].parameters)),)
+def at_neutral(name: str) -> EffectValues:
+    """The effect with its sizes neutral, and its shapes typical."""
+    neutral = {p.name: p.neutral for p in EFFECTS[name].sizes}
+    return ((name, tuple((n, neutral.get(n, value)) for n, value in typical(name)[1])),)
 
 
 def what_effects_cost(actuator: Actuator, drive: Drive) -> None:
     """Print how long the kernel takes with effects, relative to itself without any."""
     cases: list[tuple[str, EffectValues]] = [("no effect", ())]
     voltage_effects = [e.name for e in EFFECTS.values() if "voltage" in e.drives]
-    neutral = tuple(values for n in voltage_effects for values in at_values(n, "neutral"))
+    neutral = tuple(values for n in voltage_effects for values in at_neutral(n))
     cases.append((f"all {len(neutral)} effects, neutral", neutral))
     active = ("linear drag", "electrode resistance", "dry friction", "load inertia")
-    cases += [(name, at_values(name, "typical")) for name in active]
+    cases += [(name, (typical(name),)) for name in active]
     rows = []
     for _, effects in cases:
         c = replace(actuator, effects=effects).coefficients()
@@ -147,7 +142,7 @@ def what_quick_steps_save(actuator: Actuator, sequence: Sequence) -> None:
     drive = Drive(t, sequence.segments[0].voltage(t), hold=True)
     print(f"{'staircase of 200 Hz':<44}{'careful ms':>11}{'hasty ms':>10}{'ratio':>8}{'um':>8}")
     for name in ("", "linear drag", "electrode resistance", "Mullins softening", "dry friction"):
-        effects = at_values(name, "typical") if name else ()
+        effects = (typical(name),) if name else ()
         c = replace(actuator, effects=effects).coefficients()
         at_rest(c)
         careful, expected = timed(partial(followed, c, drive), 21)
