@@ -14,7 +14,7 @@ import numpy as np
 
 from model.coefficients import HELD, KIND, LIMIT, LOCKING, RATE, WIDTH
 from model.effects import assembly
-from model.jit import jit
+from model.jit import allocating, jit
 from model.kernel import BAD_INPUT, LOCKED, NOT_CONVERGED, OK
 from model.kinematics import strain_and_pull
 from model.network import HEAD, branch_count, nominal_pull, nominal_pull_slope, true_pull
@@ -27,7 +27,7 @@ _GENTLE = 0.1  # relaxation within one interval below which the branch is not st
 _SMALLEST_PART = 1e-9  # of a sample interval
 
 _soften, _stress = assembly.soften, assembly.stress
-_commit, _felt = assembly.commit, assembly.felt
+_commit, _felt, _acting = assembly.commit, assembly.felt, assembly.acting
 
 
 @jit
@@ -114,7 +114,7 @@ def _cross(
     return OK, xi, part
 
 
-@jit
+@allocating
 def drive_by_stretch(
     c: np.ndarray, time: np.ndarray, stretch: np.ndarray, xi: np.ndarray, parts: np.ndarray
 ) -> tuple[int, int]:
@@ -172,14 +172,15 @@ def add_effects(
 
     ``memory`` (MEMORY,) is carried along; ``c`` must know the stretch at rest.
     """
+    acting = _acting(c)
     for k in range(time.shape[0]):
         before, dt, rate = stretch[k], 0.0, 0.0
         t = time[k]
         if k:
             before, dt = stretch[k - 1], time[k] - time[k - 1]
             rate, t = (stretch[k] - before) / dt, time[k - 1]
-        total = stress[k] * _soften(c, memory, stretch[k], dt, t, 0.0)
-        total += _stress(c, memory, stretch[k], rate, before, dt, t)
+        total = stress[k] * _soften(acting, c, memory, stretch[k], dt, t, 0.0)
+        total += _stress(acting, c, memory, stretch[k], rate, before, dt, t)
         if k:
-            _commit(c, memory, stretch[k], rate, before, dt, t)
-        stress[k] = _felt(c, memory, total)
+            _commit(acting, c, memory, stretch[k], rate, before, dt, t)
+        stress[k] = _felt(acting, c, memory, total)

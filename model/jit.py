@@ -18,7 +18,7 @@ from typing import Any, TypeVar, cast
 import numba
 import platformdirs
 
-__all__ = ["cache_folder", "inlined", "is_compiled", "jit"]
+__all__ = ["allocating", "cache_folder", "inlined", "is_compiled", "jit"]
 
 _KERNEL_ROOT = Path(__file__).parent
 _WITHOUT_KERNELS = ("diagnosis", "fitting")  # folders that compile nothing
@@ -67,10 +67,19 @@ _Function = TypeVar("_Function", bound=Callable[..., object])
 
 
 def jit(function: _Function) -> _Function:
-    """Compile ``function`` at its first call, and keep the machine code on disk."""
+    """Compile ``function`` at its first call, and keep the machine code on disk.
+
+    It makes no arrays. Then who owns those that it is handed need not be counted, which at each
+    call of an effect would take longer than the effect.
+    """
+    return cast(_Function, _compiled(function, _nrt=False))
+
+
+def allocating(function: _Function) -> _Function:
+    """As ``jit``, of a function that makes arrays."""
     return cast(_Function, _compiled(function))
 
 
 def inlined(function: _Function) -> _Function:
     """As ``jit``, compiled into its caller, so that literal arguments become constants there."""
-    return cast(_Function, _compiled(function, inline="always"))
+    return cast(_Function, _compiled(function, _nrt=False, inline="always"))

@@ -43,7 +43,7 @@ from model.coefficients import (
     WIDTH,
 )
 from model.effects import MEMORY, assembly
-from model.jit import inlined, jit
+from model.jit import allocating, inlined, jit
 from model.kinematics import electric, electric_slope, strain_and_pull
 from model.network import HEAD, branch_count, nominal_pull, nominal_pull_slope, true_pull
 from model.rodas import ALPHA, GAMMA, A, C, D
@@ -106,7 +106,7 @@ _RODAS_HALVINGS = 2.0**-17
 _inertia, _supply, _polarise = assembly.inertia, assembly.supply, assembly.polarise
 _permittivity, _soften, _stress = assembly.permittivity, assembly.soften, assembly.stress
 _stiffness, _commit, _sense = assembly.stiffness, assembly.commit, assembly.sense
-_acting = assembly.acting
+_acting, _sensing = assembly.acting, assembly.sensing
 _SUPPLY, _POLARISE = assembly.BITS["supply"], assembly.BITS["polarise"]
 _PERMITTIVITY, _SOFTEN = assembly.BITS["permittivity"], assembly.BITS["soften"]
 _STRESS, _COMMIT = assembly.BITS["stress"], assembly.BITS["commit"]
@@ -199,7 +199,7 @@ def rest_stretch(c: np.ndarray, field2: float) -> tuple[int, float]:
 
 @jit
 def _speeds(
-    c: np.ndarray, y: np.ndarray, branches: np.ndarray
+    acting: int, c: np.ndarray, y: np.ndarray, branches: np.ndarray
 ) -> tuple[float, float, float, float]:
     """What limits a step at ``y``: (1/s^2, 1/s^2, 1/s, 1/s), all over the inertia.
 
@@ -221,7 +221,7 @@ def _speeds(
         branches[1, i] = c[k + RATE] * bend * e / y[2 + i]
         stiffness += branches[0, i] * c[INERTIA]
         fastest = max(fastest, branches[1, i])
-    more, drag = _stiffness(c, y[2 + branch_count(c) :], lam, math.inf)
+    more, drag = _stiffness(acting, c, y[2 + branch_count(c) :], lam, math.inf)
     inertia = c[INERTIA]
     return max(stiffness, 0.0) / inertia, more / inertia, drag / inertia, fastest
 
@@ -243,9 +243,9 @@ def _lean_bound(springy: float, more: float, fastest: float, quick: bool) -> flo
 
 
 @jit
-def _drag(c: np.ndarray, y: np.ndarray, rate: float) -> float:
+def _drag(acting: int, c: np.ndarray, y: np.ndarray, rate: float) -> float:
     """Drag of the effects over the inertia, 1/s, at a rate of stretch."""
-    _, drag = _stiffness(c, y[2 + branch_count(c) :], y[0], rate)
+    _, drag = _stiffness(acting, c, y[2 + branch_count(c) :], y[0], rate)
     return drag / c[INERTIA]
 
 
@@ -288,7 +288,7 @@ def _locking_stretch(held: int, locking: float, sign: float) -> float:
     return near
 
 
-@jit
+@allocating
 def _spring_table(c: np.ndarray) -> np.ndarray:
     """Springs as (WIDTH + 3, n + 1): one row a property, so that loops over springs read in order.
 
@@ -396,11 +396,11 @@ def _affected(
     ``acting`` says which hooks have anything to do; all stresses are divided by ``over``.
     """
     if acting & _PERMITTIVITY:
-        pull *= _permittivity(c, m, lam, field2)
+        pull *= _permittivity(acting, c, m, lam, field2)
     if acting & _SOFTEN:
-        held_back *= _soften(c, m, lam, since, t, warmth)
+        held_back *= _soften(acting, c, m, lam, since, t, warmth)
     if acting & _STRESS:
-        held_back += _stress(c, m, lam, rate, lam0, since, t) / over
+        held_back += _stress(acting, c, m, lam, rate, lam0, since, t) / over
     return pull - held_back
 
 
@@ -410,10 +410,10 @@ def _supplied_now(
 ) -> tuple[float, float]:
     """Voltage at the film when a step begins, and the voltage squared that pulls on it."""
     if acting & _SUPPLY:
-        va, _ = _supply(c, m, t, va, va, 0.0, lam, speed)
+        va, _ = _supply(acting, c, m, t, va, va, 0.0, lam, speed)
     ea = va * va
     if acting & _POLARISE:
-        pa, _ = _polarise(c, m, va, va, 0.0)
+        pa, _ = _polarise(acting, c, m, va, va, 0.0)
         ea += pa
     return va, ea
 
@@ -442,16 +442,16 @@ def _supplied(
     """
     if acting & _SUPPLY:
         _, middle = _supply(
-            c, m, t, va, vm, half, lam + 0.5 * grown, speed + 0.5 * gained
+            acting, c, m, t, va, vm, half, lam + 0.5 * grown, speed + 0.5 * gained
         )  # fmt: skip
         _, vb = _supply(
-            c, m, t + half, vm, vb, half, lam + 1.5 * grown, speed + 1.5 * gained
+            acting, c, m, t + half, vm, vb, half, lam + 1.5 * grown, speed + 1.5 * gained
         )  # fmt: skip
         vm = middle
     em, eb = vm * vm, vb * vb
     if acting & _POLARISE:
-        _, pm = _polarise(c, m, now, vm, half)
-        _, pb = _polarise(c, m, vm, vb, half)
+        _, pm = _polarise(acting, c, m, now, vm, half)
+        _, pb = _polarise(acting, c, m, vm, vb, half)
         em, eb = em + pm, eb + pb
     return em, eb
 
@@ -529,10 +529,10 @@ def _effect_steps(
         for j in range(n):
             y[j] += h / 6.0 * (k1[j] + 2.0 * (k2[j] + k3[j]) + k4[j])
         if acting & _COMMIT:
-            _commit(c, m, y[0], y[1], lam0, h, t)
+            _commit(acting, c, m, y[0], y[1], lam0, h, t)
 
 
-@jit
+@allocating
 def _lean_table(c: np.ndarray, springs: np.ndarray) -> np.ndarray:
     """What ``_lean_steps`` reads: load and field over the inertia, then three numbers a spring.
 
@@ -599,7 +599,9 @@ def _phis(a: np.ndarray, doublings: int, room: np.ndarray, phi: np.ndarray) -> N
                     phi[j, m, i] += power[m, i] * part
             below *= n + j + 1
         _times(power, a, product)
-        power[:] = product
+        for m in range(3):
+            for i in range(3):
+                power[m, i] = product[m, i]
         factorial *= n + 1
     for _ in range(doublings):
         _doubled(phi, product)
@@ -816,7 +818,7 @@ def _lean_steps(
         speed = sum_v + c2 * push
         seen = sum_seen + c3 * push
         if acting & _COMMIT:
-            _commit(c, memory, lam, speed, lam0, h, t)
+            _commit(acting, c, memory, lam, speed, lam0, h, t)
         x1 += sixth * (sum_1 + r1 * t1 - s1 * z) + s1 * seen
         x2 += sixth * (sum_2 + r2 * t2 - s2 * z) + s2 * seen
         x3 += sixth * (sum_3 + r3 * t3 - s3 * z) + s3 * seen
@@ -977,7 +979,7 @@ def _refined(
     return refine, forced
 
 
-@jit
+@allocating
 def drive_by_voltage(
     c: np.ndarray,
     time: np.ndarray,
@@ -1005,8 +1007,8 @@ def drive_by_voltage(
     held, uniform = int(c[HELD]), int(c[UNIFORM])
     springs = _spring_table(c)
     c = c.copy()
-    c[INERTIA] += _inertia(c, y)
     acting = _acting(c)
+    c[INERTIA] += _inertia(acting, c, y)
     moves = acting & _MOVING != 0
     warm = warmth.shape[0] == samples
     lean = held == 0 and springs.shape[1] <= 4 and np.max(springs[KIND]) <= _GENT
@@ -1050,7 +1052,7 @@ def drive_by_voltage(
         # the film's stiffness follows the stretch slowly, and time is mostly even
         if k % 64 == 0 or abs(dt - step_before) > 1e-6 * dt:
             if k % 64 == 0:
-                springy, more, drag, fastest = _speeds(c, y, branches)
+                springy, more, drag, fastest = _speeds(acting, c, y, branches)
                 swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
                 lean_bound = _lean_bound(springy, more, fastest, quick)
                 lam_seen = y[0]
@@ -1091,8 +1093,8 @@ def drive_by_voltage(
             if drags:
                 # a drag may change with the rate: where it does within the sample, in finer steps
                 change = abs(y[1] - rate_before) + abs(kick) * dt
-                most_drag = _drag(c, y, abs(y[1]) + change)
-                least_drag = _drag(c, y, max(abs(y[1]) - change, 0.0))
+                most_drag = _drag(acting, c, y, abs(y[1]) + change)
+                least_drag = _drag(acting, c, y, max(abs(y[1]) - change, 0.0))
                 drag = 0.5 * (most_drag + least_drag)
                 growth = (most_drag - least_drag) * dt
                 growth /= _GROWN_QUICK if quick else _GROWN
@@ -1132,7 +1134,7 @@ def drive_by_voltage(
             if explicit and abs(y[0] - lam_seen) > _MOVED * lam_seen:
                 # far enough for springs to have stiffened: then this step was too long
                 bound_before = bound
-                springy, more, drag, fastest = _speeds(c, y, branches)
+                springy, more, drag, fastest = _speeds(acting, c, y, branches)
                 swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
                 lean_bound = _lean_bound(springy, more, fastest, quick)
                 lam_seen, step_before = y[0], 0.0
@@ -1170,6 +1172,9 @@ def read_sensor(
     ``velocity`` (N,) m/s is the film's; ``memory`` (SENSOR_MEMORY,) is carried along. Element
     0 is the last reading of the call before, or the first of the record.
     """
+    sensing = _sensing(c)
+    if not sensing:
+        return
     for k in range(time.shape[0]):
         dt = time[k] - time[k - 1] if k else 0.0
-        displacement[k] = _sense(c, memory, time[k], dt, displacement[k], velocity[k])
+        displacement[k] = _sense(sensing, c, memory, time[k], dt, displacement[k], velocity[k])

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from model.jit import jit
+from model.jit import allocating, jit
 
 __all__ = [
     "KINEMATICS",
@@ -104,7 +104,7 @@ def electric(held: int, lam: float) -> float:
     return lam * lam * lam
 
 
-@jit
+@allocating
 def electric_along(held: int, stretch: np.ndarray) -> np.ndarray:
     """``electric`` (N,) at each ``stretch`` (N,)."""
     out = np.empty(stretch.size)

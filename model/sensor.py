@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.jit import jit
+from model.jit import allocating, jit
 
 __all__ = ["at_sensor"]
 
 
-@jit
+@allocating
 def at_sensor(
     time: np.ndarray, value: np.ndarray, rate: np.ndarray, lag: float, out: np.ndarray
 ) -> None:

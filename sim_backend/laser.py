@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivers.settings import LaserSettings
-from model.jit import jit
+from model.jit import allocating, jit
 from sim_backend.streams import Streams
 
 __all__ = ["Laser", "LaserRows", "LaserState"]
@@ -82,7 +82,7 @@ def _sum_up_to(
     return sums[node] + _partial_sum(position, velocity, node, spacing, into, period, count)
 
 
-@jit
+@allocating
 def _averages(
     position: np.ndarray,
     velocity: np.ndarray,

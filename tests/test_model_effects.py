@@ -757,7 +757,7 @@ pulled = Strip(network, effects=(("constant pull", (("pull", 250.0),)),))
 more = pulled.simulate(time, 1.0 + time).stress - Strip(network).simulate(time, 1.0 + time).stress
 print(more.tolist())
 c = pulled.coefficients()
-print(assembly.stress(c, np.zeros(500), 1.1, 0.0, 1.1, 0.0, 0.0))
+print(assembly.stress(assembly.acting(c), c, np.zeros(500), 1.1, 0.0, 1.1, 0.0, 0.0))
 """
 
 

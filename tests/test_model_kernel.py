@@ -300,7 +300,7 @@ def test_the_exponential_method_is_the_plain_one(effects):
     work = np.zeros((15, plain.size))
     table = kernel._lean_table(c, springs)
     branches = np.zeros((2, 3))
-    kernel._speeds(c, lean, branches)
+    kernel._speeds(acting, c, lean, branches)
     swings = np.zeros(kernel._SWING)
     kernel._swings(2e5, 30.0, branches, 1e-4, np.empty((7, 3, 3)), swings)
     for v0, v1, t0 in ((0.0, 8e3, 0.0), (8e3, 6e3, 0.04)):

@@ -76,7 +76,7 @@ def _of_actuator(record: ActuatorRecord, model: Actuator) -> MissingStress | Non
     time = record.time
     step = float(np.median(np.diff(time)))
     c = model.coefficients()
-    c[INERTIA] += assembly.inertia(c, np.zeros(MEMORY))
+    c[INERTIA] += assembly.inertia(assembly.acting(c), c, np.zeros(MEMORY))
     c[EFFECTS_AT : EFFECTS_AT + SLOTS] = NEUTRAL
     _, rest = at_rest(c)
     length = model.film.length

@@ -1,7 +1,8 @@
 """The kernel's hooks, assembled from the functions of all effects and compiled once.
 
 Each hook is one place of the equations where effects take part. An effect at its neutral values is
-skipped, so one compiled kernel serves every combination. Numba needs real functions with literal
+skipped, so one compiled kernel serves every combination; which are not neutral is looked up once a
+simulation, as bits of one number. Numba needs real functions with literal
 offsets, and a file to cache them by, so the text of the hooks is written beside the compiled
 kernels, in the folder that is named after the sources of this package.
 """
@@ -12,7 +13,7 @@ import importlib.util
 import os
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any
@@ -31,6 +32,7 @@ __all__ = [
     "permittivity",
     "polarise",
     "sense",
+    "sensing",
     "soften",
     "stiffness",
     "stress",
@@ -38,7 +40,8 @@ __all__ = [
 ]
 
 #: Hooks: what an effect's function of that name takes besides ``(c, k, m, j)``, and what becomes
-#: of the answers. ``c`` are the coefficients and ``k`` where the effect's own begin; ``m`` is the
+#: of the answers. A hook itself takes ``(on, c, m)`` and that, ``on`` being what ``acting(c)``
+#: says, or ``sensing(c)`` for ``sense``. ``c`` are the coefficients and ``k`` where the effect's own begin; ``m`` is the
 #: memory of all effects of the motion, or of all of the sensor, and ``j`` where its own begins.
 #:
 #: * ``inertia`` kg/m, added to the coefficient of lam'';
@@ -70,11 +73,6 @@ HOOKS = MappingProxyType(
         "sense": ("t, dt, x, u", "x"),
     }
 )
-#: ``acting(c)`` is the sum of these over the hooks of all effects that are not neutral.
-BITS = MappingProxyType({hook: 1 << i for i, hook in enumerate(HOOKS)})
-#: One more: some effect depends on turning points.
-TURNS = 1 << len(HOOKS)
-
 # how the answers of several effects are put together: what to begin with, what to do with each (an
 # answer is {}), what to return; any other word is an argument that goes from one to the next
 _TOGETHER = MappingProxyType(
@@ -87,6 +85,7 @@ _TOGETHER = MappingProxyType(
 )
 # along the signal path, where the order matters: a sensor is slow before it is wrong
 _ORDER = ("amplifier", "electrode", "dielectric", "film stress", "inertia", "load", "environment")
+_EFFECTS_MAX = 62  # bits of a number that is not negative
 _SENSOR_ORDER = ("sensor_lag", "sensor_nonlinearity", "drift", "interference", "unknown")
 
 
@@ -95,6 +94,25 @@ def _rank(name: str) -> tuple[int, int, str]:
     where = _ORDER.index(effect.acts_on) if effect.acts_on in _ORDER else len(_ORDER)
     sensor = _SENSOR_ORDER.index(effect.family) if effect.family in _SENSOR_ORDER else 0
     return where, sensor, name
+
+
+def _bits() -> dict[str, int]:
+    """One bit for each effect; those of the sensor are counted apart from those of the motion."""
+    bits = {}
+    for sensed in (False, True):
+        names = [n for n in sorted(EFFECTS, key=_rank) if _has(n, "sense") == sensed]
+        if len(names) > _EFFECTS_MAX:
+            raise ImportError(f"{len(names)} effects: bits of one number tell {_EFFECTS_MAX} apart")
+        bits.update({name: 1 << i for i, name in enumerate(names)})
+    return bits
+
+
+def _has(name: str, hook: str) -> bool:
+    return hasattr(PLACES[name].module, hook)
+
+
+def _mask(names: Iterable[str]) -> int:
+    return sum(_OF_EFFECT[n] for n in names)
 
 
 def _active(name: str) -> str:
@@ -116,20 +134,22 @@ def _text() -> str:
     for hook, (arguments, how) in HOOKS.items():
         taking = f", {arguments}" if arguments else ""
         first, each, last = _TOGETHER.get(how, ("", f"{how} = {{}}", how))
-        lines += ["", "", "@jit", f"def {hook}(c, m{taking}):", f"    {first}"]
-        for name in names:
-            place = PLACES[name]
-            if hasattr(place.module, hook):
+        lines += ["", "", "@jit", f"def {hook}(on, c, m{taking}):", f"    {first}"]
+        taken = [n for n in names if _has(n, hook)]
+        # by fours: one test spares four where nobody acts
+        for some in (taken[i : i + 4] for i in range(0, len(taken), 4)):
+            lines.append(f"    if on & {_mask(some)}:")
+            for name in some:
+                place = PLACES[name]
                 call = f"_{modules[name]}.{hook}(c, {place.at}, m, {place.memory}{taking})"
-                lines += [f"    if {_active(name)}:", f"        {each.format(call)}"]
+                lines += [f"        if on & {_OF_EFFECT[name]}:", f"            {each.format(call)}"]
         lines.append(f"    return {last}")
-    lines += ["", "", "@jit", "def acting(c):", "    found = 0"]
-    for name in names:
-        bits = sum(BITS[hook] for hook in HOOKS if hasattr(PLACES[name].module, hook))
-        bits += TURNS * EFFECTS[name].turns
-        lines += [f"    if {_active(name)}:", f"        found |= {bits}"]
-    lines += ["    return found", ""]
-    return "\n".join(lines)
+    for function, sensed in (("acting", False), ("sensing", True)):
+        lines += ["", "", "@jit", f"def {function}(c):", "    found = 0"]
+        for name in (n for n in names if _has(n, "sense") == sensed):
+            lines += [f"    if {_active(name)}:", f"        found |= {_OF_EFFECT[name]}"]
+        lines.append("    return found")
+    return "\n".join([*lines, ""])
 
 
 def _load() -> ModuleType:
@@ -152,6 +172,13 @@ def _load() -> ModuleType:
     return module
 
 
+_OF_EFFECT = _bits()
+#: What ``acting(c)`` has in common with these says which hooks have anything to do; for ``sense``,
+#: what ``sensing(c)`` has.
+BITS = MappingProxyType({h: _mask(n for n in EFFECTS if _has(n, h)) for h in HOOKS})
+#: The same of the effects that depend on turning points.
+TURNS = _mask(n for n, effect in EFFECTS.items() if effect.turns)
+
 _hooks: Any = _load()
 _Hook = Callable[..., Any]
 
@@ -166,3 +193,4 @@ commit: _Hook = _hooks.commit
 felt: _Hook = _hooks.felt
 sense: _Hook = _hooks.sense
 acting: _Hook = _hooks.acting
+sensing: _Hook = _hooks.sensing

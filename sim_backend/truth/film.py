@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.jit import jit
+from model.jit import allocating, jit
 from model.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY, Film, Load, Network
 
 __all__ = [
@@ -417,7 +417,7 @@ def _sound(springs: np.ndarray, y: np.ndarray) -> bool:
     return True
 
 
-@jit
+@allocating
 def follow(
     body: _Body,
     h: Hidden,

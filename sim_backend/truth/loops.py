@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from model.jit import jit
+from model.jit import allocating, jit
 
 __all__ = ["lag_voltage", "limit_slew", "low_pass", "moving_average", "polarise", "sway"]
 
@@ -154,7 +154,7 @@ def moving_average(
         out[1, k - first] = (rows[0, k] - oldest) / window
 
 
-@jit
+@allocating
 def sway(
     time: np.ndarray,
     rows: np.ndarray,
