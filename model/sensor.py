@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.jit import allocating, jit
+from model.jit import allocating
 
 __all__ = ["at_sensor"]
 

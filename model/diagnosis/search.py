@@ -472,6 +472,8 @@ class _Search:
                 continue
             if lead > _MUCH_LEFT and not _is_first_of_family(tried.name, names):
                 continue
+            if place and rank(tried) > self._criterion(best, correlation):
+                continue  # who is worse than nothing after a refit will not lead
             if best.cost - tried.trial.cost < least:
                 continue
             key = frozenset(tried.trial.effects)

@@ -40,9 +40,10 @@ __all__ = [
 ]
 
 #: Hooks: what an effect's function of that name takes besides ``(c, k, m, j)``, and what becomes
-#: of the answers. A hook itself takes ``(on, c, m)`` and that, ``on`` being what ``acting(c)``
-#: says, or ``sensing(c)`` for ``sense``. ``c`` are the coefficients and ``k`` where the effect's own begin; ``m`` is the
-#: memory of all effects of the motion, or of all of the sensor, and ``j`` where its own begins.
+#: of the answers. ``c`` are the coefficients and ``k`` where the effect's own begin; ``m`` is the
+#: memory of all effects of the motion, or of all of the sensor, and ``j`` where its own begins. A
+#: hook itself takes ``(on, c, m)`` and that, ``on`` being what ``acting(c)`` says, or, for
+#: ``sense``, ``sensing(c)``.
 #:
 #: * ``inertia`` kg/m, added to the coefficient of lam'';
 #: * ``supply`` carries the voltage from ``start`` to ``end`` V over ``h`` s to the film, one effect
@@ -142,7 +143,10 @@ def _text() -> str:
             for name in some:
                 place = PLACES[name]
                 call = f"_{modules[name]}.{hook}(c, {place.at}, m, {place.memory}{taking})"
-                lines += [f"        if on & {_OF_EFFECT[name]}:", f"            {each.format(call)}"]
+                lines += [
+                    f"        if on & {_OF_EFFECT[name]}:",
+                    f"            {each.format(call)}",
+                ]
         lines.append(f"    return {last}")
     for function, sensed in (("acting", False), ("sensing", True)):
         lines += ["", "", "@jit", f"def {function}(c):", "    found = 0"]
