@@ -18,6 +18,7 @@ import numpy as np
 from model import kernel
 from model.actuator import Actuator, at_rest
 from model.diagnosis.findings import Stage
+from model.effects import EFFECTS
 from model.film import Strip
 from model.fitting.identify import fit_globally, is_determined
 from model.fitting.intervals import correlation_time, covariance
@@ -29,7 +30,7 @@ from model.fitting.secant import descend_by_secants
 from model.fitting.threads import Job, Result, together
 from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
-__all__ = ["Bench", "Trial", "information", "relieved"]
+__all__ = ["Bench", "Trial", "follows_path", "information", "relieved"]
 
 _RATE = 200.0  # Hz, to which records are thinned: mains and a load's ringing still show
 _QUIET_MIN = 100  # samples of a lead-in from which a thinned record's noise is read again
@@ -47,6 +48,7 @@ _MUCH_EXPLAINED = 0.5  # of the cost without it is left: such a fit must be sure
 _SETTLING = 10  # iterations of a fit that may come to lead
 _NOT_NEARER = 0.05  # of what it lies behind: promising less, it will not
 _ENDING = 40  # iterations of a fit that others build on
+_ROUGHLY = 100.0  # of the noise's mean square: what leaves more need not be simulated any better
 _WHITE_COST, _WHITE_CORRELATION = 1.04, 1.3  # a lead-in tells the noise to some 2 %
 _POLISHING = 8  # iterations on every sample
 _PATIENCE = 3  # iterations down a valley that together must gain something
@@ -220,28 +222,50 @@ class Bench:
             for start in anew
         ]
         best = min(scouts, key=lambda f: f.cost)
-        behind = max(best.cost - leader, 0.0) * problem.samples
-        best = descend_by_secants(
-            problem,
-            best.x,
-            fixed,
-            best.jacobian,
-            gain=max(0.5, _NOT_WORTH * behind, _WORTH * best.cost * problem.samples),
-            sure=not noise
-            and (
-                behind < _FAR_BEHIND * problem.samples * best.cost
-                or best.cost < _MUCH_EXPLAINED * parent
-            ),
-        )
-        return _trial(problem, best, fixed)
+        if best.cost > _ROUGHLY and follows_path(model):
+            problem = scouted
+
+        def down(trial: Trial) -> Trial:
+            behind = max(trial.cost - leader, 0.0) * problem.samples
+            fit = descend_by_secants(
+                trial.problem,
+                trial.x,
+                fixed,
+                best.jacobian,
+                gain=max(0.5, _NOT_WORTH * behind, _WORTH * trial.cost * problem.samples),
+                sure=not noise
+                and (
+                    behind < _FAR_BEHIND * problem.samples * trial.cost
+                    or trial.cost < _MUCH_EXPLAINED * parent
+                ),
+            )
+            return _trial(trial.problem, fit, fixed)
+
+        return self._as_near(_trial(problem, best, fixed), down)
 
     def settled(self, trial: Trial, leader: float = 0.0) -> Trial:
         """``trial`` followed towards the end of its valley, on the thinned records.
 
         No further than it takes to see that it does not come near the cost of the ``leader``.
         """
-        behind = max(trial.cost - leader, 0.0) if leader else 0.0
-        return self._down(trial, _SETTLING, max(_WORTH * trial.cost, _NOT_NEARER * behind))
+
+        def down(trial: Trial) -> Trial:
+            behind = max(trial.cost - leader, 0.0) if leader else 0.0
+            return self._down(trial, _SETTLING, max(_WORTH * trial.cost, _NOT_NEARER * behind))
+
+        return self._as_near(trial, down)
+
+    def _as_near(self, trial: Trial, work: Callable[[Trial], Trial]) -> Trial:
+        """What ``work`` makes of ``trial``: once more, carefully, if it comes near noise.
+
+        Far from it a rough simulation is good enough, where an effect follows the path.
+        """
+        done = work(trial)
+        if done.problem.haste != kernel.ROUGH or done.cost > _ROUGHLY:
+            return done
+        problem = self.problem(done.model)
+        here = descend_by_secants(problem, done.x, done.fixed, iterations=0)
+        return work(_trial(problem, here, done.fixed))
 
     def _down(self, trial: Trial, iterations: int, gain: float) -> Trial:
         # by secants as far as they lead: valleys that curve ask for more
@@ -265,6 +289,9 @@ class Bench:
         While something was missing, branches gathered where they could imitate it; two that relax
         alike are one, and the other is of use elsewhere. What others build on must not lack it.
         """
+        return self._as_near(trial, self._to_the_end)
+
+    def _to_the_end(self, trial: Trial) -> Trial:
         fit = self._by_secants(trial, _ENDING, _WORTH * trial.cost)
         near = _trial(trial.problem, fit, trial.fixed)
         layout = near.problem.layout
@@ -321,6 +348,9 @@ class Bench:
 
         They settle beside the effects as these are there, before all are fitted.
         """
+        return self._as_near(trial, lambda t: self._sought(t, starts))
+
+    def _sought(self, trial: Trial, starts: np.ndarray) -> Trial:
         held = trial.fixed.copy()
         held[self.problem(replace(trial.model, effects=())).layout.size :] = True
         anew = [
@@ -450,6 +480,11 @@ class Bench:
             note = "" if sure else "these data hardly determine it"
             found.append(Estimate(q.name, q.unit, float(value), low, high, sure, note))
         return tuple(found)
+
+
+def follows_path(model: Actuator | Strip) -> bool:
+    """Whether an effect in it follows the path from turn to turn: such take small steps."""
+    return any(EFFECTS[name].turns for name, _ in model.effects)
 
 
 def _leaders(fits: Sequence[LocalFit], many: int = _LEADERS) -> list[LocalFit]:

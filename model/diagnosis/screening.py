@@ -21,7 +21,7 @@ import numpy as np
 
 from model import kernel
 from model.actuator import Actuator
-from model.diagnosis.bench import Bench, Trial
+from model.diagnosis.bench import Bench, Trial, follows_path
 from model.effects import EFFECTS, Effect, EffectValues, Parameter
 from model.film import Strip
 from model.records import ActuatorRecord, FilmRecord
@@ -83,8 +83,7 @@ class Screen:
         )
         self._weight = 1.0 / trial.problem.sigma
         # what the base model does must be as it was
-        follows = any(EFFECTS[name].turns for name in trial.effects)
-        self._haste = kernel.QUICK if follows else kernel.ROUGH
+        self._haste = trial.problem.haste if follows_path(trial.model) else kernel.ROUGH
 
     def promises(self, effect: Effect) -> list[Promise]:
         """Promises of ``effect``, best first: one for each shape on its grid."""

@@ -785,7 +785,7 @@ class _Search:
         if partly or any(s.family == "unknown" for s in steps):
             unnamed = describe_unnamed(missing_after, after, steps)
         notes = []
-        if self.interrupted and not self.rounds:
+        if self.interrupted and not (self.rounds or best.effects):
             notes.append("interrupted before any round was over: what is missing was not found out")
         gone = [n for n in best.effects if n not in {name for name, _ in others.model.effects}]
         if gone and doubtful:
