@@ -22,7 +22,7 @@ from model.diagnosis.findings import (
     UNEXPLAINED,
 )
 from model.diagnosis.screening import Promise
-from model.diagnosis.search import _Search
+from model.diagnosis.search import _Search, _Tried
 from model.effects import EFFECTS
 from model.errors import ModelError
 from model.excitation import Sequence
@@ -373,6 +373,31 @@ def test_far_from_the_noise_one_law_of_a_family_is_refitted():
     # of warm-ups the others may lead too
     assert set(refitted(1e3, shares, left)) == set(shares) - {"logarithmic ageing"}
     assert set(refitted(20.0, shares, left)) == set(shares)
+
+
+def test_who_is_worse_than_nothing_after_a_refit_is_not_followed():
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+
+    def tried(name: str, cost: float) -> _Tried:
+        with_it = replace(PLAIN, effects=(typical(name),))
+        return _Tried(
+            name, best, made_trial([record], with_it, math.sqrt(cost) * noise), promised=0.1
+        )
+
+    best = made_trial([record], PLAIN, 2.0 * noise)
+    fitted = [tried("linear drag", 3.9), tried("leakage", 4.0), tried("ageing", 3.95)]
+    followed: list[str] = []
+
+    def followed_on(trial: Trial, *_: object) -> Trial:
+        followed.append(trial.effects[0])
+        return trial
+
+    search._ended = followed_on  # type: ignore[method-assign]
+    search.found = {frozenset(t.trial.effects): t.trial for t in fitted}
+    search._settled(best, fitted)
+    assert followed == ["linear drag", "ageing"]
 
 
 def test_a_model_is_screened_once():

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from model import kernel
 from model.diagnosis.bench import Bench, information, relieved
 from model.fitting import identify
 from model.fitting.parameters import Layout
@@ -32,6 +33,45 @@ SEEDS = 60
 
 def bench_of(*records):
     return Bench(records, workers=1)
+
+
+# --- haste
+
+
+def aged(softening):
+    """A trial of a film that ages, from its own numbers, on a record of one that ages the more."""
+    model = replace(PLAIN, effects=effect("ageing", softening=softening, path=0.01))
+    bench = bench_of(record_of(replace(PLAIN, effects=effect("ageing", softening=0.02, path=0.01))))
+    layout = bench.problem(model).layout
+    start = layout.coordinates(layout.initial())
+    held = np.ones(layout.size, dtype=bool)
+    held[-2] = False  # its size
+    return bench, model, start, held
+
+
+def test_what_is_far_from_the_noise_is_simulated_roughly():
+    bench, model, start, held = aged(0.015)
+    # all held: it stays as far away as it is
+    far = bench.fit(model, [(start, None)], np.ones_like(held))
+    assert far.cost > 100.0
+    assert far.problem.haste == kernel.ROUGH
+    # what comes near it is carefully told from it
+    near = bench.ended(replace(far, fixed=held))
+    assert near.cost < 1.2
+    assert near.problem.haste == kernel.QUICK
+    again = bench.problem(model).residuals(near.x)
+    assert np.array_equal(again, near.residuals)
+    # and what is near from the beginning
+    assert bench.fit(model, [(near.x, None)], held).problem.haste == kernel.QUICK
+
+
+def test_what_follows_no_path_is_simulated_alike_near_and_far():
+    bench = bench_of(record_of(replace(PLAIN, effects=effect("linear drag", drag=4e3))))
+    layout = bench.problem(PLAIN).layout
+    start = layout.coordinates(layout.initial())
+    far = bench.fit(PLAIN, [(start, None)], np.ones(layout.size, dtype=bool))
+    assert far.cost > 100.0
+    assert far.problem.haste == kernel.QUICK
 
 
 # --- thinning

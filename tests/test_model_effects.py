@@ -167,6 +167,26 @@ def test_places_do_not_overlap():
         assert [p.memory + i for p, e in there for i in range(e.memory)] == list(range(size))
 
 
+@pytest.mark.parametrize("name", [n for n, e in EFFECTS.items() if "voltage" in e.drives])
+def test_each_effect_is_one_bit_of_who_acts(name):
+    c = with_effect(THESIS, name, numbers(name)).coefficients()
+    on, of_sensor = assembly.acting(c), assembly.sensing(c)
+    sensed = hasattr(PLACES[name].module, "sense")
+    assert (of_sensor if sensed else on).bit_count() == 1
+    assert (on if sensed else of_sensor) == 0
+    for hook, mask in assembly.BITS.items():
+        assert bool((of_sensor if hook == "sense" else on) & mask) == hasattr(
+            PLACES[name].module, hook
+        )
+    assert bool(on & assembly.TURNS) == EFFECTS[name].turns
+
+
+def test_no_more_effects_than_bits(monkeypatch):
+    monkeypatch.setattr(assembly, "_EFFECTS_MAX", 3)
+    with pytest.raises(ImportError, match="effects: bits of one number tell 3 apart"):
+        assembly._bits()
+
+
 def test_who_makes_the_reading_wrong_leaves_the_motion_alone():
     # the two remember apart
     for place in PLACES.values():
