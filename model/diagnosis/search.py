@@ -186,9 +186,11 @@ class _Search:
         """``best`` with effects exchanged, one by one, for others that explain more in their place.
 
         What was found first was found while the others were missing, and may have stood for them.
+        What all together explain too little to be named is not worth it.
         """
+        base = self.found[frozenset()]
         for _ in range(_EXCHANGES):
-            if len(best.effects) < 2:
+            if len(best.effects) < 2 or _explained(base, best) < _UNNAMED_SHARE:
                 break
             tried: list[_Tried] = []
             for name in best.effects:
@@ -758,8 +760,7 @@ class _Search:
         last = self.bench.polished(best, self.interrupted) if best.effects else first
         correlation = max(1.0, last.correlation)
         stage0 = self.bench.stage(first, correlation, estimates=True)
-        excess = max(first.cost - 1.0, 1e-9)
-        explained = 1.0 - max(last.cost - 1.0, 0.0) / excess
+        explained = _explained(first, last)
         small = last.cost < _EXPLAINED_RMS**2
         others = self._for_others(best)
         doubtful = not small and explained < _TRUSTED
@@ -906,6 +907,11 @@ class _Search:
             if better > self._asked(other) and behind < found.get(of, (np.inf,))[0]:
                 found[of] = (behind, other, trial)
         return [(n, t) for _, n, t in sorted(found.values(), key=lambda f: f[0])]
+
+
+def _explained(base: Trial, trial: Trial) -> float:
+    """The part that ``trial`` explains of what ``base`` leaves above the noise."""
+    return 1.0 - max(trial.cost - 1.0, 0.0) / max(base.cost - 1.0, 1e-9)
 
 
 def _abreast(names: list[str]) -> list[list[str]]:
