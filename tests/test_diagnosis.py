@@ -400,6 +400,26 @@ def test_who_is_worse_than_nothing_after_a_refit_is_not_followed():
     assert followed == ["linear drag", "ageing"]
 
 
+def test_what_explains_too_little_to_be_named_is_not_exchanged():
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    looked: list[str] = []
+
+    def left_out(trial: Trial, name: str) -> Trial:
+        looked.append(name)
+        raise InterruptedError
+
+    search._without = left_out  # type: ignore[method-assign]
+    search.found = {frozenset(): made_trial([record], PLAIN, math.sqrt(21.0) * noise)}
+    two = replace(PLAIN, effects=(typical("leakage"), typical("ageing")))
+    little = made_trial([record], two, math.sqrt(12.0) * noise)
+    assert search._exchanged(little) is little
+    with pytest.raises(InterruptedError):
+        search._exchanged(made_trial([record], two, math.sqrt(10.0) * noise))
+    assert looked == ["leakage"]
+
+
 def test_a_model_is_screened_once():
     search = _Search([record_of(PLAIN)], PLAIN, 1, lambda *_: None, lambda: False)
     search.effects = [EFFECTS["linear drag"], EFFECTS["mains interference"]]
