@@ -26,7 +26,7 @@ from model.diagnosis.search import _Search, _Tried
 from model.effects import EFFECTS
 from model.errors import ModelError
 from model.excitation import Sequence
-from model.material import TABLE_3
+from model.material import TABLE_3, Network
 from model.records import ActuatorRecord
 from tests.engine_tools import (
     NOISE,
@@ -383,7 +383,7 @@ def test_who_is_worse_than_nothing_after_a_refit_is_not_followed():
     def tried(name: str, cost: float) -> _Tried:
         with_it = replace(PLAIN, effects=(typical(name),))
         return _Tried(
-            name, best, made_trial([record], with_it, math.sqrt(cost) * noise), promised=0.1
+            name, best, made_trial([record], with_it, math.sqrt(cost) * noise), promised=0.0
         )
 
     best = made_trial([record], PLAIN, 2.0 * noise)
@@ -398,6 +398,67 @@ def test_who_is_worse_than_nothing_after_a_refit_is_not_followed():
     search.found = {frozenset(t.trial.effects): t.trial for t in fitted}
     search._settled(best, fitted)
     assert followed == ["linear drag", "ageing"]
+
+
+def test_what_is_exchanged_sets_out_beside_the_rest_as_it_was():
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.ones(record.measured.size)
+    harder = replace(PLAIN, network=Network.gent((50e3, 60e3), (1e4, 1e4), (0.3,)))
+    ageing = effect("ageing", softening=0.02, path=0.03)
+    other = made_trial([record], replace(harder, effects=(*ageing, typical("sensor lag"))), noise)
+    leaking = effect("leakage", loss=0.03, growth=5.0, exponent=0.8)
+    alone = made_trial([record], replace(PLAIN, effects=leaking), noise)
+    model = replace(PLAIN, effects=(typical("ageing"), typical("leakage")))
+    start = search._in_place(model, other, alone)
+    layout = search.bench.problem(model).layout
+    set_out = layout.model(layout.values(start))
+    assert set_out.effects == (*ageing, *leaking)
+    assert [s.modulus for s in set_out.network.springs] == pytest.approx([50e3, 60e3])
+    assert set_out.network.times == pytest.approx([0.3])
+
+
+@pytest.mark.parametrize(
+    ("promised", "left", "followed"), [(0.7, 3.9, True), (0.7, 1.8, False), (0.2, 3.9, False)]
+)
+def test_who_has_not_kept_a_promise_is_followed(promised, left, followed):
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+
+    def tried(name: str, cost: float, promise: float) -> _Tried:
+        with_it = replace(PLAIN, effects=(typical(name),))
+        trial = made_trial([record], with_it, math.sqrt(cost) * noise)
+        return _Tried(name, best, trial, promise)
+
+    best = made_trial([record], PLAIN, 2.0 * noise)
+    others = ["leakage", "ageing", "warm-up", "sensor lag", "linear drag"]
+    fitted = [tried(name, 1.0 + 0.1 * i, 0.0) for i, name in enumerate(others)]
+    fitted.append(tried("self-heating", left, promised))
+    seen: list[str] = []
+
+    def settle(trial: Trial, *_: object) -> Trial:
+        seen.append(trial.effects[0])
+        return trial
+
+    search._ended = search.bench.settled = settle  # type: ignore[method-assign]
+    search.found = {frozenset(t.trial.effects): t.trial for t in fitted}
+    search._settled(best, fitted)
+    assert ("self-heating" in seen) == followed
+
+
+def test_a_walk_needs_a_margin_over_what_follows_a_law():
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+
+    def demerit(name: str) -> float:
+        model = replace(PLAIN, effects=(typical(name),))
+        trial = made_trial([record], model, np.full(1, NOISE))
+        return search._demerit(trial, 1.0) - search._criterion(trial, 1.0)
+
+    assert demerit("wandering drift") == pytest.approx(demerit("sudden change of force"))
+    assert demerit("wandering drift") > 10.0
+    assert demerit("linear drift") == demerit("warm-up in stages") == 0.0
 
 
 def test_what_explains_too_little_to_be_named_is_not_exchanged():

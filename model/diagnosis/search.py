@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -65,10 +66,12 @@ _IN_THE_WAY = 0.9  # of what no branches account for: with an effect that leaves
 _CLEARLY = 2.0  # of the least that is left: more, and it is not the one that they hid
 _AS_WELL = 1.1  # of what is left beside a leader that explains all: these may do so too
 _ANEW = 6  # of such effects that are fitted anew
+_CONTENDERS = 4  # of those that promised as much as a leader that explains all
 _ANEW_SIZES = (0.3, 1.0, 3.0, 10.0, 30.0)  # times the typical one, tried for that
 _ANEW_CLOSER = (0.56, 0.75, 1.0, 1.33, 1.78)  # times the best of these
 _ANEW_FROM = (1.0, 1.33, 1.78)  # times that: the branches' measure of it is on the small side
 _HINT = 0.05  # of the most promising one's: who promises less is not refitted beside it
+_KEPT = 0.8  # of a promise, or of what the leader explains
 _FOLLOWED = 12  # candidates refitted in later rounds, the most promising ones
 _EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
@@ -195,7 +198,7 @@ class _Search:
             tried: list[_Tried] = []
             for name in best.effects:
                 parent = self._ended(self._without(best, name))
-                tried += self._round(parent, len(parent.effects), (0.8, 0.1))
+                tried += self._round(parent, len(parent.effects), (0.8, 0.1), best)
             fitted, correlation = self._settled(best, tried)
             leader = fitted[0]
             gain = self._demerit(best, correlation) - self._demerit(leader.trial, correlation)
@@ -350,8 +353,13 @@ class _Search:
         """Gain of the criterion that is asked for: more of an effect that names no cause."""
         return _DECISIVE + (_UNNAMED_MARGIN if EFFECTS[name].family == "unknown" else 0.0)
 
-    def _round(self, parent: Trial, depth: int, span: tuple[float, float]) -> list[_Tried]:
-        """All effects on top of ``parent``: promises of all, refits of all or the best of them."""
+    def _round(
+        self, parent: Trial, depth: int, span: tuple[float, float], other: Trial | None = None
+    ) -> list[_Tried]:
+        """All effects on top of ``parent``: promises of all, refits of all or the best of them.
+
+        ``other`` is ``parent`` with another effect in the place of which they are tried.
+        """
         promises, jacobian = self._screened(parent, span)
         order = sorted(promises, key=lambda n: -promises[n][0].share)
         if depth > 0:
@@ -363,7 +371,7 @@ class _Search:
             for pair in _abreast([n for n in names if n not in {t.name for t in tried}]):
                 unknown = [n for n in pair if frozenset((*parent.effects, n)) not in self.found]
                 trials = self.bench.together(
-                    lambda n: self._refit(parent, n, promises[n], jacobian), unknown
+                    lambda n: self._refit(parent, n, promises[n], jacobian, other), unknown
                 )
                 for name, trial in zip(unknown, trials, strict=True):
                     self.found[frozenset((*parent.effects, name))] = trial
@@ -409,9 +417,17 @@ class _Search:
         return self.screened[key][1:]
 
     def _refit(
-        self, parent: Trial, name: str, promises: list[Promise], jacobian: np.ndarray
+        self,
+        parent: Trial,
+        name: str,
+        promises: list[Promise],
+        jacobian: np.ndarray,
+        other: Trial | None = None,
     ) -> Trial:
-        """The best fit of one effect: from nothing, and from where its promises were simulated."""
+        """The best fit of one effect: from nothing, and from where its promises were simulated.
+
+        Also with the rest as it is beside the effect that ``other`` has in its place.
+        """
         effect = EFFECTS[name]
         model = promises[0].model
         first = parent.x.size
@@ -428,12 +444,27 @@ class _Search:
         simpler = self._simpler(parent, effect, promises[0].start)
         if simpler is not None:
             starts.append((simpler, starts[0][1]))
+        alone = self.found.get(frozenset((name,)))
+        if other is not None and alone is not None:
+            starts.append((self._in_place(model, other, alone), starts[0][1]))
         may_relieve = effect.relaxes and isinstance(model, Actuator)
         anew = self._relieved(parent, promises[0]) if may_relieve else []
         fixed = np.concatenate([parent.fixed, np.zeros(len(effect.parameters), dtype=bool)])
         leader = min(t.cost for t in self.found.values())
         noise = self._is_noise(parent)
         return self.bench.fit(model, starts, fixed, leader, parent.cost, noise, anew)
+
+    def _in_place(self, model: Actuator | Strip, other: Trial, alone: Trial) -> np.ndarray:
+        """Coordinates of ``model`` as ``other`` is, but its new effect as it was ``alone``."""
+        known = {}
+        for trial in (alone, other):
+            layout = trial.problem.layout
+            known.update(
+                {q.name: v for q, v in zip(layout.quantities, layout.values(trial.x), strict=True)}
+            )
+        layout = self.bench.problem(model).layout
+        x = layout.coordinates(np.array([known[q.name] for q in layout.quantities]))
+        return np.clip(x, layout.lower, layout.upper)
 
     def _relieved(self, parent: Trial, promise: Promise) -> list[np.ndarray]:
         """Coordinates where an effect has taken over from a branch; the rest is as promised."""
@@ -453,8 +484,9 @@ class _Search:
         """The candidates, best first, the leading ones fitted to the end of their valleys.
 
         Of these only such as explain ``least`` of the cost of ``best``, and far from the noise one
-        of each family. Named effects go before unnamed ones that do no better than a margin: an
-        attached mode can play a moved mass, and a step nearly anything.
+        of each family. Who has not kept a promise by which it would lead is followed like those.
+        Named effects go before unnamed ones that do no better than a margin: an attached mode can
+        play a moved mass, a step nearly anything, and a walk all that is slow.
         """
 
         def rank(tried: _Tried) -> float:
@@ -466,21 +498,28 @@ class _Search:
         lead = first = order[0].trial.cost
         to_the_end = not self._is_noise(best)
         mark = self._criterion(best, correlation) - _DECISIVE
+        of_parent: Counter[frozenset[str]] = Counter()
         for place, tried in enumerate(order):
             near = tried.trial.cost < _CLOSE * lead
+            kept = tried.parent.cost - tried.trial.cost > _KEPT * tried.promised * tried.parent.cost
+            owing = _promised_as_much(tried, lead) and not kept
             leads = self.found[frozenset(order[0].trial.effects)]
+            reach = (_NEAR_NOISE if leads.is_white else _NEAR_LEAD) * first
+            # an exchange looks for the best beside each of several parents
+            beside = frozenset(tried.parent.effects)
+            may_lead = owing or (tried.trial.cost < reach and of_parent[beside] < _SETTLED)
+            of_parent[beside] += 1
             follow = _SETTLED if leads.is_white else _SETTLED_QUICKLY
-            if place >= follow and not (near and rank(tried) < mark):
+            if place >= follow and not (near and rank(tried) < mark) and not may_lead:
                 continue
             if lead > _MUCH_LEFT and not _is_first_of_family(tried.name, names):
                 continue
-            if place and rank(tried) > self._criterion(best, correlation):
+            if place and not owing and rank(tried) > self._criterion(tried.parent, correlation):
                 continue  # who is worse than nothing after a refit will not lead
             if best.cost - tried.trial.cost < least:
                 continue
             key = frozenset(tried.trial.effects)
-            reach = (_NEAR_NOISE if leads.is_white else _NEAR_LEAD) * first
-            if to_the_end and place < _SETTLED and tried.trial.cost < reach:
+            if may_lead and to_the_end:
                 self._ended(tried.trial)
             elif key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
                 self.settled.add(key)
@@ -496,7 +535,8 @@ class _Search:
         While an effect was missing, the branches imitated it, and a descent from there may not find
         out. The measured stretch tells without one: with the effect's part taken off it, do
         branches account for more of the Maxwell stress than before? Where the leader explains all,
-        only those are fitted anew beside which they account for as much as beside it.
+        only those are fitted anew beside which they account for as much as beside it; and those
+        that have promised about as much as it keeps, from where they are.
         """
         parents = {frozenset(t.parent.effects): t.parent for t in tried}
         before = {
@@ -527,11 +567,19 @@ class _Search:
         names = [tried[place].name for _, place, _ in looks]
         if leader.cost > _MUCH_LEFT:
             looks = [k for k in looks if _is_first_of_family(tried[k[1]].name, names)]
-        for left, place, size in looks[:_ANEW]:
-            if left > most:
-                break
+        starts = {
+            place: self._sized(tried[place], [f * size for f in _ANEW_FROM])
+            for left, place, size in looks[:_ANEW]
+            if left <= most
+        }
+        if leader.cost < _EXPLAINED_RMS**2:
+            owing = [i for i, t in enumerate(tried) if i and _promised_as_much(t, leader.cost)]
+            starts.update(
+                {i: tried[i].trial.x[None] for i in owing[:_CONTENDERS] if i not in starts}
+            )
+        for place, sizes in starts.items():
             one = tried[place]
-            trial = self.bench.sought(one.trial, self._sized(one, [f * size for f in _ANEW_FROM]))
+            trial = self.bench.sought(one.trial, sizes)
             if trial is not one.trial:
                 self._keep(trial)
                 again[place] = replace(one, trial=trial)
@@ -685,8 +733,10 @@ class _Search:
         return information(trial.cost, 0, samples) - information(best.cost, 0, samples) < _ALIKE
 
     def _demerit(self, trial: Trial, correlation: float) -> float:
-        """The criterion, and a margin for each effect that names no cause."""
-        unnamed = sum(EFFECTS[name].family == "unknown" for name in trial.effects)
+        """The criterion, and a margin for each effect that names no cause, or follows no law."""
+        unnamed = sum(
+            EFFECTS[name].family == "unknown" or not EFFECTS[name].recurs for name in trial.effects
+        )
         return self._criterion(trial, correlation) + _UNNAMED_MARGIN * unnamed
 
     def _correlation(self, trials: Sequence[Trial]) -> float:
@@ -912,6 +962,11 @@ class _Search:
 def _explained(base: Trial, trial: Trial) -> float:
     """The part that ``trial`` explains of what ``base`` leaves above the noise."""
     return 1.0 - max(trial.cost - 1.0, 0.0) / max(base.cost - 1.0, 1e-9)
+
+
+def _promised_as_much(tried: _Tried, lead: float) -> bool:
+    """Whether the score test promised about what a leader of cost ``lead`` explains."""
+    return tried.promised * tried.parent.cost > _KEPT * (tried.parent.cost - lead)
 
 
 def _abreast(names: list[str]) -> list[list[str]]:
