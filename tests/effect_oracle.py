@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from numpy.polynomial import Legendre
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -62,6 +63,7 @@ class Extra:
     factors on the Maxwell and the network's stress, ``stress`` Pa against the motion, ``slopes``
     dz/dt. ``commit`` of a film with a kink gives the state after a step, and then short fixed steps
     are taken; there ``stress`` and ``soften`` also get the stretch at the beginning of the step.
+    ``method`` is that of ``solve_ivp``, an implicit one where the effect is stiff.
     """
 
     states: int = 0
@@ -73,6 +75,7 @@ class Extra:
     stress: object = same(0.0)
     slopes: object = same(())
     commit: object = None
+    method: str = "DOP853"
 
 
 def limited(value, low, high):
@@ -279,6 +282,28 @@ def extra(name, p, film, drive):
             ),
         )
 
+    def diffusing(terms=5):
+        """Galerkin's equations for voltage along the sheet, in Legendre's polynomials of 0 to 1."""
+        basis = [Legendre.basis(i, domain=[0.0, 1.0]) for i in range(terms)]
+        steepness = np.array(
+            [[(a.deriv() * b.deriv()).integ(lbnd=0.0)(1.0) for a in basis] for b in basis]
+        )
+        size = 1.0 / (2.0 * np.arange(terms) + 1.0)
+        at_edge = np.array([b(0.0) for b in basis])
+        contact = p["contact"] * p["resistance"]
+        sheet = p["resistance"] - contact
+
+        def slopes(t, lam, u, z, v):
+            inwards = (v - at_edge @ z) / contact * at_edge - steepness @ z / sheet
+            return tuple(inwards / size / (film.capacitance * lam**2) - 2.0 * u / lam * np.array(z))
+
+        return Extra(
+            states=terms,
+            voltage=lambda t, lam, u, z, v: math.sqrt(size @ np.square(z)),
+            slopes=slopes,
+            method="LSODA",
+        )
+
     known = {
         "ageing": lambda: Extra(
             states=1,
@@ -333,6 +358,7 @@ def extra(name, p, film, drive):
         "elastoplastic friction": elastic_first,
         "elastoplastic hysteresis": elastoplastic,
         "electrode resistance": charging,
+        "sheet electrode": diffusing,
         "strained electrode": lambda: charging(p["gauge"]),
         "stress beyond a displacement": lambda: Extra(
             stress=lambda t, lam, u, z, v: (
@@ -452,7 +478,7 @@ def follow(film, drive, time, effect, tolerance=1e-9, step=1e-4):
     for start, end in pairwise(edges):
         inside = (time >= start - 1e-12) & (time <= end + 1e-12)
         done = solve_ivp(
-            lambda t, y: rates(t, y.tolist()), (start, end), y, method="DOP853",
+            lambda t, y: rates(t, y.tolist()), (start, end), y, method=effect.method,
             t_eval=np.clip(time[inside], start, end), rtol=tolerance, atol=1e-12, max_step=2e-3,
         )  # fmt: skip
         out[inside] = done.y[0, : inside.sum()]

@@ -47,6 +47,7 @@ _FAR_BEHIND = 0.1  # of its own misfit: such a fit will not lead, and need not b
 _MUCH_EXPLAINED = 0.5  # of the cost without it is left: such a fit must be sure of its end
 _SETTLING = 10  # iterations of a fit that may come to lead
 _NOT_NEARER = 0.05  # of what it lies behind: promising less, it will not
+_NO_RIVAL = 0.02  # of the same, of a fit that has come near the leader
 _ENDING = 40  # iterations of a fit that others build on
 _ROUGHLY = 100.0  # of the noise's mean square: what leaves more need not be simulated any better
 _WHITE_COST, _WHITE_CORRELATION = 1.04, 1.3  # a lead-in tells the noise to some 2 %
@@ -243,15 +244,15 @@ class Bench:
 
         return self._as_near(_trial(problem, best, fixed), down)
 
-    def settled(self, trial: Trial, leader: float = 0.0) -> Trial:
+    def settled(self, trial: Trial, leader: float = math.inf) -> Trial:
         """``trial`` followed towards the end of its valley, on the thinned records.
 
         No further than it takes to see that it does not come near the cost of the ``leader``.
         """
 
         def down(trial: Trial) -> Trial:
-            behind = max(trial.cost - leader, 0.0) if leader else 0.0
-            return self._down(trial, _SETTLING, max(_WORTH * trial.cost, _NOT_NEARER * behind))
+            gain = _worth_going(trial, leader, _NOT_NEARER)
+            return self._further(self._by_secants(trial, _SETTLING, gain), _SETTLING, gain)
 
         return self._as_near(trial, down)
 
@@ -267,37 +268,47 @@ class Bench:
         here = descend_by_secants(problem, done.x, done.fixed, iterations=0)
         return work(_trial(problem, here, done.fixed))
 
-    def _down(self, trial: Trial, iterations: int, gain: float) -> Trial:
-        # by secants as far as they lead: valleys that curve ask for more
-        fit = self._by_secants(trial, iterations, gain)
-        if not fit.converged:
-            fit = descend(
-                trial.problem, fit.x, trial.fixed, iterations, _chi2(trial, gain), 1e-3, _PATIENCE,
-                quick=True,
-            )  # fmt: skip
-        return _trial(trial.problem, fit, trial.fixed)
-
     @staticmethod
-    def _by_secants(trial: Trial, iterations: int, gain: float) -> LocalFit:
-        return descend_by_secants(
+    def _by_secants(trial: Trial, iterations: int, gain: float) -> tuple[Trial, bool]:
+        """``trial`` as far down as secants lead, and whether that is the bottom."""
+        fit = descend_by_secants(
             trial.problem, trial.x, trial.fixed, iterations=iterations, gain=_chi2(trial, gain)
         )
+        return _trial(trial.problem, fit, trial.fixed), fit.converged
 
-    def ended(self, trial: Trial) -> Trial:
+    @staticmethod
+    def _further(reached: tuple[Trial, bool], iterations: int, gain: float) -> Trial:
+        """What secants have ``reached``, and on from there: valleys that curve ask for more."""
+        trial, converged = reached
+        if converged:
+            return trial
+        fit = descend(
+            trial.problem, trial.x, trial.fixed, iterations, _chi2(trial, gain), 1e-3, _PATIENCE,
+            quick=True,
+        )  # fmt: skip
+        return _trial(trial.problem, fit, trial.fixed)
+
+    def ended(self, trial: Trial, leader: float = math.inf) -> Trial:
         """``trial`` at the bottom of its valley, or of a better one that a spare branch opens.
 
         While something was missing, branches gathered where they could imitate it; two that relax
         alike are one, and the other is of use elsewhere. What others build on must not lack it.
+        Beside a ``leader`` no further than it takes to see that it does not come near its cost.
         """
-        return self._as_near(trial, self._to_the_end)
+        return self._as_near(trial, lambda t: self._to_the_end(t, leader))
 
-    def _to_the_end(self, trial: Trial) -> Trial:
-        fit = self._by_secants(trial, _ENDING, _WORTH * trial.cost)
-        near = _trial(trial.problem, fit, trial.fixed)
+    def _to_the_end(self, trial: Trial, leader: float) -> Trial:
+        def gain(trial: Trial) -> float:
+            return _worth_going(trial, leader, _NO_RIVAL)
+
+        def down(trial: Trial) -> Trial:
+            return self._further(self._by_secants(trial, _ENDING, gain(trial)), _ENDING, gain(trial))
+
+        near, converged = self._by_secants(trial, _ENDING, gain(trial))
         layout = near.problem.layout
         starts = [] if near.is_white else _reseeded(layout, near.x)
         if not starts:
-            return self._down(near, _ENDING, _WORTH * near.cost)
+            return self._further((near, converged), _ENDING, gain(near))
         scouts = self.together(
             lambda x: descend_by_secants(
                 near.problem, x, near.fixed, iterations=_SCOUTING, sure=False
@@ -313,10 +324,10 @@ class Bench:
         other = _trial(near.problem, min(fits, key=lambda f: f.cost), near.fixed)
         # who is far behind the other is not worth the rest of its way
         if near.cost < _FAR_ABOVE * other.cost:
-            near = self._down(near, _ENDING, _WORTH * near.cost)
+            near = self._further((near, converged), _ENDING, gain(near))
         # a few steps do not reach the bottom: nearly as good is promising
         if other.cost < _NEARLY * near.cost:
-            other = self._down(other, _ENDING, _WORTH * other.cost)
+            other = down(other)
         return min(near, other, key=lambda t: t.cost)
 
     def restarted(self, trial: Trial) -> Trial:
@@ -377,7 +388,9 @@ class Bench:
         other = _trial(trial.problem, min(fits, key=lambda f: f.cost), trial.fixed)
         if other.cost > _NEARLY * trial.cost:
             return trial
-        return min(trial, self._down(other, _ENDING, _WORTH * other.cost), key=lambda t: t.cost)
+        gain = _WORTH * other.cost
+        other = self._further(self._by_secants(other, _ENDING, gain), _ENDING, gain)
+        return min(trial, other, key=lambda t: t.cost)
 
     def _without_effects(self, problem: Problem, xs: np.ndarray) -> list[Problem | None]:
         """The records without what the effects do at each of ``xs`` (K, d): for the springs alone.
@@ -558,6 +571,11 @@ def relieved(trial: Trial) -> list[tuple[np.ndarray, float, float]]:
         x = np.clip(layout.coordinates(there), layout.lower, layout.upper)
         found.append((x, float(values[moduli[slow]]), float(values[times[slow]])))
     return found
+
+
+def _worth_going(trial: Trial, leader: float, part: float) -> float:
+    """Of the cost: what a descent must promise, and ``part`` of what it is behind a ``leader``."""
+    return max(_WORTH * trial.cost, part * max(trial.cost - leader, 0.0))
 
 
 def _chi2(trial: Trial, gain: float) -> float:

@@ -138,7 +138,7 @@ class _Search:
         self.rounds: list[Round] = []
         self.found: dict[frozenset[str], Trial] = {}
         self.settled: set[frozenset[str]] = set()
-        self.ended: set[frozenset[str]] = set()
+        self.ended: dict[frozenset[str], float] = {}  # beside a leader of which cost
         self.screened: dict[frozenset[str], tuple[Trial, dict[str, list[Promise]], np.ndarray]] = {}
         self.left_out: set[tuple[frozenset[str], str]] = set()
         self.interrupted = False
@@ -240,7 +240,7 @@ class _Search:
         bench = Bench(held, self.bench.workers, self._watch)
         bench.simulations = self.bench.simulations
         fits = [bench.fit(t.model, [(t.x, None)], t.fixed) for t in (self.found[frozenset()], best)]
-        self.bench, self.settled, self.ended, self.left_out = bench, set(), set(), set()
+        self.bench, self.settled, self.ended, self.left_out = bench, set(), {}, set()
         self.found = {frozenset(t.effects): t for t in fits}
         try:
             trial = self._pruned(self._ended(fits[1]))
@@ -317,13 +317,17 @@ class _Search:
             beam = [self._ended(t) for t in self._beam(fitted)]
         return best
 
-    def _ended(self, trial: Trial) -> Trial:
-        """``trial`` at the bottom of its valley: what is built on it must not make up for it."""
+    def _ended(self, trial: Trial, leader: float = math.inf) -> Trial:
+        """``trial`` at the bottom of its valley: what is built on it must not make up for it.
+
+        Beside a ``leader`` of such a cost, as far as it takes to see that it will not lead.
+        """
         key = frozenset(trial.effects)
-        if key not in self.ended:
-            self.ended.add(key)
+        if self.ended.get(key, 0.0) < leader:
             self.settled.add(key)
-            self.found[key] = self.bench.ended(trial)
+            self.found[key] = self.bench.ended(trial, leader)
+            # who has come down to the leader was held back by none
+            self.ended[key] = leader if self.found[key].cost > leader else math.inf
         return self.found[key]
 
     def _restarted(self, trial: Trial) -> Trial:
@@ -520,7 +524,7 @@ class _Search:
                 continue
             key = frozenset(tried.trial.effects)
             if may_lead and to_the_end:
-                self._ended(tried.trial)
+                self._ended(tried.trial, lead)
             elif key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
                 self.settled.add(key)
                 self.found[key] = self.bench.settled(tried.trial, lead)
@@ -579,6 +583,8 @@ class _Search:
             )
         for place, sizes in starts.items():
             one = tried[place]
+            if one.trial.is_white:
+                continue  # nothing is left to be gained
             trial = self.bench.sought(one.trial, sizes)
             if trial is not one.trial:
                 self._keep(trial)
@@ -682,7 +688,7 @@ class _Search:
         if key not in self.found or trial.cost < (1.0 - _BETTER) * self.found[key].cost:
             self.found[key] = trial
             self.settled.discard(key)
-            self.ended.discard(key)
+            self.ended.pop(key, None)
 
     def _for_others(self, trial: Trial) -> Trial:
         """``trial`` as it predicts other recordings: without what may not happen again.
