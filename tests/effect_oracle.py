@@ -184,7 +184,7 @@ def extra(name, p, film, drive):
         )
 
     def distributed():
-        k, reach, count = p["stiffness"], p["reach"], 8
+        k, reach, count = p["stiffness"], p["reach"], 24
         ends = [reach * ((i + 0.5) / count) ** p["spread"] for i in range(count)]
 
         def moved(z, travel):

@@ -401,8 +401,8 @@ def steps_of(name, p, time, stretch):
     if name == "linear drag":
         return p["drag"] * rate
     if name == "distributed hysteresis":
-        z, out = np.zeros(8), []
-        ends = p["reach"] * ((np.arange(8) + 0.5) / 8.0) ** p["spread"]
+        z, out = np.zeros(24), []
+        ends = p["reach"] * ((np.arange(24) + 0.5) / 24.0) ** p["spread"]
         for travel in np.diff(stretch, prepend=rest):
             z = np.clip(z + travel, -ends, ends)
             out.append(p["stiffness"] * z.mean())
@@ -457,6 +457,22 @@ def test_stresses_in_films_against_direct_evaluation(name, size):
     error = 1e-4 if EFFECTS[name].family == "creep" else 2e-6
     error = 2e-5 if name == "elastoplastic hysteresis" else error
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=error * np.abs(expected).max())
+
+
+def test_elements_that_yield_follow_the_parabola_of_infinitely_many():
+    # Rayleigh's law: thresholds lie evenly up to the reach
+    values = numbers("distributed hysteresis", reach=0.5, spread=1.0)
+    stretch = np.concatenate([np.linspace(1.0, 1.5, 501), np.linspace(1.5, 0.5, 1001)[1:]])
+    time = 0.01 * np.arange(stretch.size)
+    strip = with_effect(STRIP, "distributed hysteresis", values)
+    found = strip.simulate(time, stretch).stress - STRIP.simulate(time, stretch).stress
+    way = stretch[:501] - 1.0
+    up = values["stiffness"] * (way - way**2 / (2.0 * 0.5))
+    # on the way back the same, twice as large in both directions, as Masing has it
+    back = 1.5 - stretch[500:]
+    down = up[-1] - values["stiffness"] * (back - back**2 / (4.0 * 0.5))
+    expected = np.concatenate([up, down[1:]])
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-3 * up[-1])
 
 
 def test_the_spring_pot_relaxes_by_a_power_of_time():

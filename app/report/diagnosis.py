@@ -146,13 +146,15 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
         return "The search was interrupted before anything was tried: nothing is known yet."
     if finding.verdict == "nothing_missing":
         return (
-            "Nothing is missing: the thesis's model explains these recordings down to the noise, "
-            "and no other effect improves on it by more than chance would."
+            f"Nothing is missing: the thesis's model explains these recordings down to the noise"
+            f"{_or_so_little(outcome) or ','} and no other effect improves on it by more than "
+            f"chance would."
         )
     names = [called(s) for s in finding.steps]
     effects = f"the model lacks {listed(names)}"
     if finding.verdict == "explained":
-        return f"{effects[0].upper()}{effects[1:]}; with that, only noise is left."
+        left = f"only noise{_or_so_little(outcome)} is left"
+        return f"{effects[0].upper()}{effects[1:]}; with that, {left}."
     if finding.verdict == "partly_explained":
         return (
             f"{effects[0].upper()}{effects[1:]}; that explains part of the residual, and something "
@@ -160,6 +162,14 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
         )
     tried = f" ({listed(names)} helps, but explains little)" if names else ""
     return f"Something is missing that none of the known effects explains{tried}."
+
+
+def _or_so_little(outcome: DiagnoseOutcome) -> str:
+    """What may be left besides noise where everything is explained."""
+    from model.diagnosis.bench import FILM_MODEL_ERROR
+
+    film = outcome.kind == "film"
+    return f", or {100.0 * FILM_MODEL_ERROR:g} % of the largest stress," if film else ""
 
 
 def _brought(

@@ -18,7 +18,7 @@ import numpy as np
 from model import kernel
 from model.actuator import Actuator, at_rest
 from model.diagnosis.findings import Stage
-from model.effects import EFFECTS
+from model.effects import follows_path
 from model.film import Strip
 from model.fitting.identify import fit_globally, is_determined
 from model.fitting.intervals import correlation_time, covariance
@@ -30,12 +30,13 @@ from model.fitting.secant import descend_by_secants
 from model.fitting.threads import Job, Result, together
 from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
-__all__ = ["Bench", "Trial", "follows_path", "information", "relieved"]
+__all__ = ["FILM_MODEL_ERROR", "Bench", "Trial", "information", "relieved"]
 
 _RATE = 200.0  # Hz, to which records are thinned: mains and a load's ringing still show
 _QUIET_MIN = 100  # samples of a lead-in from which a thinned record's noise is read again
 _FILM_SAMPLES = 1500
-_FILM_MODEL_ERROR = 5e-3  # of the largest stress: no model of a rubber is better than that
+#: of the largest stress: no model of a rubber is better than that, and none is asked to be
+FILM_MODEL_ERROR = 5e-3
 #: s; a branch that relaxes faster than the excitation shows is a drag, and is sought as one
 FASTEST_BRANCH = 0.1
 _LONGER_THAN_RECORD = 3.0  # a branch slower than so many records is another equilibrium spring
@@ -223,7 +224,7 @@ class Bench:
             for start in anew
         ]
         best = min(scouts, key=lambda f: f.cost)
-        if best.cost > _ROUGHLY and follows_path(model):
+        if best.cost > _ROUGHLY and follows_path(model.effects):
             problem = scouted
 
         def down(trial: Trial) -> Trial:
@@ -251,8 +252,7 @@ class Bench:
         """
 
         def down(trial: Trial) -> Trial:
-            gain = _worth_going(trial, leader, _NOT_NEARER)
-            return self._further(self._by_secants(trial, _SETTLING, gain), _SETTLING, gain)
+            return self._down(trial, _SETTLING, _worth_going(trial, leader, _NOT_NEARER))
 
         return self._as_near(trial, down)
 
@@ -267,6 +267,9 @@ class Bench:
         problem = self.problem(done.model)
         here = descend_by_secants(problem, done.x, done.fixed, iterations=0)
         return work(_trial(problem, here, done.fixed))
+
+    def _down(self, trial: Trial, iterations: int, gain: float) -> Trial:
+        return self._further(self._by_secants(trial, iterations, gain), iterations, gain)
 
     @staticmethod
     def _by_secants(trial: Trial, iterations: int, gain: float) -> tuple[Trial, bool]:
@@ -301,9 +304,6 @@ class Bench:
         def gain(trial: Trial) -> float:
             return _worth_going(trial, leader, _NO_RIVAL)
 
-        def down(trial: Trial) -> Trial:
-            return self._further(self._by_secants(trial, _ENDING, gain(trial)), _ENDING, gain(trial))
-
         near, converged = self._by_secants(trial, _ENDING, gain(trial))
         layout = near.problem.layout
         starts = [] if near.is_white else _reseeded(layout, near.x)
@@ -327,7 +327,7 @@ class Bench:
             near = self._further((near, converged), _ENDING, gain(near))
         # a few steps do not reach the bottom: nearly as good is promising
         if other.cost < _NEARLY * near.cost:
-            other = down(other)
+            other = self._down(other, _ENDING, gain(other))
         return min(near, other, key=lambda t: t.cost)
 
     def restarted(self, trial: Trial) -> Trial:
@@ -375,22 +375,22 @@ class Bench:
         if not anew:
             return trial
 
+        scouted = self.problem(trial.model, kernel.ROUGH)
         placed = self.together(
-            lambda x: descend_by_secants(trial.problem, x, held, iterations=_SETTING, sure=False),
-            anew,
+            lambda x: descend_by_secants(scouted, x, held, iterations=_SETTING, sure=False), anew
         )
         fits = self.together(
             lambda f: descend_by_secants(
-                trial.problem, f.x, trial.fixed, iterations=_RESTART, sure=False
+                scouted, f.x, trial.fixed, iterations=_RESTART, sure=False
             ),
             _leaders(placed, _PLACED),
         )
-        other = _trial(trial.problem, min(fits, key=lambda f: f.cost), trial.fixed)
+        best = min(fits, key=lambda f: f.cost)
+        fit = descend_by_secants(trial.problem, best.x, trial.fixed, iterations=0)
+        other = _trial(trial.problem, fit, trial.fixed)
         if other.cost > _NEARLY * trial.cost:
             return trial
-        gain = _WORTH * other.cost
-        other = self._further(self._by_secants(other, _ENDING, gain), _ENDING, gain)
-        return min(trial, other, key=lambda t: t.cost)
+        return min(trial, self._down(other, _ENDING, _WORTH * other.cost), key=lambda t: t.cost)
 
     def _without_effects(self, problem: Problem, xs: np.ndarray) -> list[Problem | None]:
         """The records without what the effects do at each of ``xs`` (K, d): for the springs alone.
@@ -493,11 +493,6 @@ class Bench:
             note = "" if sure else "these data hardly determine it"
             found.append(Estimate(q.name, q.unit, float(value), low, high, sure, note))
         return tuple(found)
-
-
-def follows_path(model: Actuator | Strip) -> bool:
-    """Whether an effect in it follows the path from turn to turn: such take small steps."""
-    return any(EFFECTS[name].turns for name, _ in model.effects)
 
 
 def _leaders(fits: Sequence[LocalFit], many: int = _LEADERS) -> list[LocalFit]:
@@ -626,7 +621,7 @@ def _with_model_error(record: Record) -> Record:
     if isinstance(record, ActuatorRecord):
         return record
     stress = record.stress if record.valid is None else record.stress[record.valid]
-    error = _FILM_MODEL_ERROR * float(np.max(np.abs(stress)))
+    error = FILM_MODEL_ERROR * float(np.max(np.abs(stress)))
     return replace(record, noise=math.hypot(record.noise, error))
 
 

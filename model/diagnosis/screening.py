@@ -21,8 +21,8 @@ import numpy as np
 
 from model import kernel
 from model.actuator import Actuator
-from model.diagnosis.bench import Bench, Trial, follows_path
-from model.effects import EFFECTS, Effect, EffectValues, Parameter
+from model.diagnosis.bench import Bench, Trial
+from model.effects import EFFECTS, Effect, EffectValues, Parameter, follows_path
 from model.film import Strip
 from model.records import ActuatorRecord, FilmRecord
 
@@ -83,7 +83,7 @@ class Screen:
         )
         self._weight = 1.0 / trial.problem.sigma
         # what the base model does must be as it was
-        self._haste = trial.problem.haste if follows_path(trial.model) else kernel.ROUGH
+        self._haste = trial.problem.haste if follows_path(trial.model.effects) else kernel.ROUGH
 
     def promises(self, effect: Effect) -> list[Promise]:
         """Promises of ``effect``, best first: one for each shape on its grid."""

@@ -52,6 +52,7 @@ _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed 
 _SETTLED = 5  # leading candidates that are fitted to the end of their valleys
 _SETTLED_QUICKLY = 12  # that are followed a little, while the leader leaves more than noise
 _MUCH_LEFT = 25.0  # of the noise's mean square: there only one law of a family is followed
+_AS_GOOD = 0.98  # of its cost: who did not come near the one will not come near the other
 _CLOSE = 1.15  # of the leader's cost: so near, and better than nothing, any other is one too
 _NEAR_LEAD = 2.0  # of the leader's cost before that: no branch of these is left without work
 _NEAR_NOISE = 1.5  # of the same, beside a leader that leaves but noise
@@ -323,7 +324,7 @@ class _Search:
         Beside a ``leader`` of such a cost, as far as it takes to see that it will not lead.
         """
         key = frozenset(trial.effects)
-        if self.ended.get(key, 0.0) < leader:
+        if self.ended.get(key, 0.0) < _AS_GOOD * leader:
             self.settled.add(key)
             self.found[key] = self.bench.ended(trial, leader)
             # who has come down to the leader was held back by none

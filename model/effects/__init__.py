@@ -31,6 +31,7 @@ __all__ = [
     "EffectValues",
     "Parameter",
     "Place",
+    "follows_path",
 ]
 
 _NOT_EFFECTS = ("assembly", "description")
@@ -88,3 +89,8 @@ NEUTRAL = np.array(
         for p in e.parameters
     ]
 )
+
+
+def follows_path(effects: EffectValues) -> bool:
+    """Whether one of ``effects`` follows the path from turn to turn: then steps are small."""
+    return any(EFFECTS[name].turns for name, _ in effects)

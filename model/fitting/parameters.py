@@ -9,7 +9,7 @@ import numpy as np
 
 from model.actuator import Actuator
 from model.coefficients import FORCE, HELD, KIND, LIMIT, LOCKING, MODULUS, RATE, WIDTH
-from model.effects import EFFECTS, PLACES, EffectValues, Parameter
+from model.effects import EFFECTS, PLACES, EffectValues, Parameter, follows_path
 from model.errors import ModelError
 from model.film import Strip
 from model.material import Branch, Network, Spring
@@ -170,8 +170,11 @@ class Layout:
 
     def differences(self, x: np.ndarray) -> np.ndarray:
         """Steps (d,) for difference quotients at coordinates ``x``."""
-        # effects have kinks, and a model with one has them everywhere: wide enough to look across
+        # effects have kinks, and a model with one has them everywhere: wide enough to look across;
+        # a film that turns elsewhere, by as little as it may, has rung otherwise since
         springs = 1e-3 if self.base.effects else 1e-4
+        if follows_path(self.base.effects):
+            springs = 3e-3
         moduli = springs * np.maximum(np.abs(x), 1e-3 * self.reach(x))
         # but not past a moment or a line
         placed = [
