@@ -64,6 +64,18 @@ def page(request, tmp_path_factory):
     return outcome, check(path)
 
 
+def test_no_model_of_a_film_is_asked_to_reach_the_noise():
+    outcome = film_diagnosis()
+    for verdict, words in (
+        ("explained", "with that, only noise, or 0.5 % of the largest stress, is left."),
+        ("nothing_missing", "down to the noise, or 0.5 % of the largest stress, and no other"),
+    ):
+        told = summary(replace(outcome, finding=replace(outcome.finding, verdict=verdict)))
+        assert words in told[0]
+    assert summary(diagnose_outcome())[0].endswith("with that, only noise is left.")
+    assert "down to the noise, and no other" in summary(nothing_missing())[0]
+
+
 class TestPage:
     def test_the_verdict_stands_on_top(self, page):
         outcome, read = page

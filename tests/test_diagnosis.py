@@ -400,6 +400,52 @@ def test_who_is_worse_than_nothing_after_a_refit_is_not_followed():
     assert followed == ["linear drag", "ageing"]
 
 
+def test_who_is_seen_not_to_come_near_a_leader_is_not_followed_again():
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    trial = made_trial([record], PLAIN, math.sqrt(2.0) * noise)
+    cost = trial.cost
+    followed: list[float] = []
+
+    def ended(trial: Trial, leader: float) -> Trial:
+        followed.append(leader)
+        return trial
+
+    search.bench.ended = ended  # type: ignore[method-assign]
+    search._ended(trial, 0.5 * cost)
+    # beside the same, or one that is better: nothing new
+    search._ended(trial, 0.5 * cost)
+    search._ended(trial, 0.4 * cost)
+    assert followed == [0.5 * cost]
+    # beside one that it may come near, or where it is to be built on
+    search._ended(trial, 0.9 * cost)
+    search._ended(trial)
+    search._ended(trial)
+    assert followed == [0.5 * cost, 0.9 * cost, math.inf]
+
+
+def test_what_leaves_but_noise_is_not_fitted_anew():
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    best = made_trial([record], PLAIN, 2.0 * noise)
+    fitted = []
+    for name, left in (("sensor lag", noise), ("leakage", noise), ("ageing", 1.9 * noise)):
+        with_it = replace(PLAIN, effects=(typical(name),))
+        fitted.append(_Tried(name, best, made_trial([record], with_it, left), 0.9))
+    anew: list[str] = []
+
+    def sought(trial: Trial, _: np.ndarray) -> Trial:
+        anew.append(trial.effects[0])
+        return trial
+
+    search.bench.sought = sought  # type: ignore[method-assign]
+    search._anew(fitted)
+    assert fitted[1].trial.is_white
+    assert anew == ["ageing"]
+
+
 def test_what_is_exchanged_sets_out_beside_the_rest_as_it_was():
     record = record_of(PLAIN)
     search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)

@@ -74,6 +74,36 @@ def test_what_follows_no_path_is_simulated_alike_near_and_far():
     assert far.problem.haste == kernel.QUICK
 
 
+# --- no further than it takes
+
+
+def test_who_lies_behind_a_leader_is_followed_as_far_as_it_may_come_near():
+    # a lag, and no lag in the model: branches make up for some of it, slowly
+    records = record_of(replace(PLAIN, effects=effect("sensor lag", time_constant=0.02)))
+    bench = bench_of(records)
+    layout = bench.problem(PLAIN).layout
+    start = layout.coordinates(layout.initial())
+    free = np.zeros(layout.size, dtype=bool)
+    trial = bench.fit(PLAIN, [(start, None)], ~free)
+    trial = replace(trial, fixed=free)
+
+    def followed(leader):
+        before = bench.simulations
+        ended = bench.ended(trial, leader)
+        return ended, bench.simulations - before
+
+    to_the_end, work = followed(math.inf)
+    beside, less = followed(1.0)
+    assert to_the_end.cost > 1.5
+    assert to_the_end.cost <= beside.cost < trial.cost
+    assert less < work
+    # what it gave up is no more than a part of what it lies behind
+    assert beside.cost - to_the_end.cost < 0.5 * (to_the_end.cost - 1.0)
+    # the leader itself is held back by none
+    leads, _ = followed(2.0 * trial.cost)
+    assert leads.cost == to_the_end.cost
+
+
 # --- thinning
 
 

@@ -22,6 +22,7 @@ from model.fitting.search import Algorithm1, algorithm_1
 from model.fitting.threads import together
 from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Load, Network, Spring
 from model.records import ActuatorRecord, FilmRecord
+from tests.engine_tools import typical
 
 # the package exports the function of the same name
 identify_module = importlib.import_module("model.fitting.identify")
@@ -249,6 +250,19 @@ def test_layout_names_and_order():
     np.testing.assert_allclose(ordered, [truths(SORTED)[n] for n in layout.names])
     np.testing.assert_array_equal(layout.by_relaxation_time(ordered), ordered)
     assert layout.build(values).times == pytest.approx(TABLE_3.times)
+
+
+def test_differences_look_across_kinks_and_turns():
+    def springs(*effects):
+        base = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, effects)
+        layout = Layout(base)
+        return layout.differences(layout.coordinates(layout.initial()))[:4]
+
+    plain = springs()
+    kinked = springs(typical("sensor clipping"))
+    turning = springs(typical("dry friction"), typical("sensor clipping"))
+    np.testing.assert_allclose(kinked, 10.0 * plain)
+    np.testing.assert_allclose(turning, 3.0 * kinked)
 
 
 @pytest.mark.parametrize("time", [0.0, 0.4])
