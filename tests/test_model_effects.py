@@ -259,6 +259,7 @@ SPLITTING = {
     "elastoplastic friction": 0.8,  # the same
     "ageing": 0.15,  # softens by the path at the beginning of the step
     "leakage": 0.15,  # loses by the stretch amid the step
+    "hopping leakage": 0.15,  # the same
 }
 
 

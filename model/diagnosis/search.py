@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats.qmc import Sobol
 
 from model.actuator import Actuator
 from model.diagnosis.bench import Bench, Trial, information, relieved
@@ -52,6 +53,8 @@ _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed 
 _SETTLED = 5  # leading candidates that are fitted to the end of their valleys
 _SETTLED_QUICKLY = 12  # that are followed a little, while the leader leaves more than noise
 _MUCH_LEFT = 25.0  # of the noise's mean square: there only one law of a family is followed
+_SCATTERED = 128  # places of what a law has more than one that it extends
+_DESCENDED = 3  # of these, that are followed
 _AS_GOOD = 0.98  # of its cost: who did not come near the one will not come near the other
 _CLOSE = 1.15  # of the leader's cost: so near, and better than nothing, any other is one too
 _NEAR_LEAD = 2.0  # of the leader's cost before that: no branch of these is left without work
@@ -73,7 +76,7 @@ _ANEW_CLOSER = (0.56, 0.75, 1.0, 1.33, 1.78)  # times the best of these
 _ANEW_FROM = (1.0, 1.33, 1.78)  # times that: the branches' measure of it is on the small side
 _HINT = 0.05  # of the most promising one's: who promises less is not refitted beside it
 _KEPT = 0.8  # of a promise, or of what the leader explains
-_FOLLOWED = 12  # candidates refitted in later rounds, the most promising ones
+_FOLLOWED = 12  # candidates refitted beside an effect, the most promising ones; half beside two
 _EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
 _TRUSTED = 0.8  # of the same: what explains less may be a disguise, and predicts nothing else
@@ -368,7 +371,7 @@ class _Search:
         promises, jacobian = self._screened(parent, span)
         order = sorted(promises, key=lambda n: -promises[n][0].share)
         if depth > 0:
-            order = order[:_FOLLOWED]
+            order = order[: _FOLLOWED // depth]
         many = len(order)
         tried: list[_Tried] = []
 
@@ -590,7 +593,37 @@ class _Search:
             if trial is not one.trial:
                 self._keep(trial)
                 again[place] = replace(one, trial=trial)
+        for place, one in enumerate(again):
+            near = min(one.trial.cost, _NEAR_LEAD * leader.cost)
+            better = [t.trial for t in again if _extends(one, t) and t.trial.cost < near]
+            if better and not any(t.is_white for t in better):
+                for simpler in better:
+                    self._keep(self._extended(one, simpler))
+                again[place] = replace(one, trial=self.found[frozenset(one.trial.effects)])
         return again
+
+    def _extended(self, tried: _Tried, simpler: Trial) -> Trial:
+        """The law that was ``tried``, fitted from where a ``simpler`` one has ended.
+
+        It extends that one, and can do all that it does: doing worse, it is in a wrong valley. What
+        it has more is scattered over its bounds.
+        """
+        trial, first = tried.trial, tried.parent.x.size
+        layout = trial.problem.layout
+        start = trial.x.copy()
+        start[:first] = simpler.x[:first]
+        more = np.ones(start.size, dtype=bool)
+        more[:first] = False
+        for j, i in _shared(EFFECTS[tried.name], EFFECTS[simpler.effects[-1]]):
+            start[first + j] = simpler.x[first + i]
+            more[first + j] = False
+        xs = np.tile(np.clip(start, layout.lower, layout.upper), (_SCATTERED, 1))
+        where = Sobol(int(more.sum()), scramble=False).random(_SCATTERED)
+        xs[:, more] = layout.lower[more] + where * (layout.upper - layout.lower)[more]
+        best = np.argsort(self.bench.problem(trial.model).costs(xs))[:_DESCENDED]
+        return self.bench.fit(
+            trial.model, [], trial.fixed, simpler.cost, tried.parent.cost, anew=xs[best]
+        )
 
     def _unaccounted(self, tried: _Tried, sizes: Sequence[float]) -> tuple[float, float]:
         """What branches do not account for beside the effect, at the best of ``sizes``; which."""
@@ -626,13 +659,10 @@ class _Search:
         if best is None:
             return None
         first = start.size - len(effect.parameters)
-        known = EFFECTS[best.effects[-1]].parameters
         taken = start.copy()
         taken[:first] = best.x[:first]
-        for j, p in enumerate(effect.parameters, start=first):
-            for i, q in enumerate(known, start=first):
-                if (p.name, p.unit, p.logarithmic) == (q.name, q.unit, q.logarithmic):
-                    taken[j] = best.x[i]
+        for j, i in _shared(effect, EFFECTS[best.effects[-1]]):
+            taken[first + j] = best.x[first + i]
         return taken
 
     def _beam(self, fitted: list[_Tried]) -> list[Trial]:
@@ -964,6 +994,30 @@ class _Search:
             if better > self._asked(other) and behind < found.get(of, (np.inf,))[0]:
                 found[of] = (behind, other, trial)
         return [(n, t) for _, n, t in sorted(found.values(), key=lambda f: f[0])]
+
+
+def _shared(effect: Effect, other: Effect) -> list[tuple[int, int]]:
+    """Places of the numbers that both have, in the one and in the other."""
+    return [
+        (j, i)
+        for j, p in enumerate(effect.parameters)
+        for i, q in enumerate(other.parameters)
+        if (p.name, p.unit, p.logarithmic) == (q.name, q.unit, q.logarithmic)
+    ]
+
+
+def _extends(tried: _Tried, other: _Tried) -> bool:
+    """Whether the law can do all that the other does, by a choice of shapes of its own."""
+    law, simpler = EFFECTS[tried.name], EFFECTS[other.name]
+    shared = [j for j, _ in _shared(law, simpler)]
+    more = [p for j, p in enumerate(law.parameters) if j not in shared]
+    return (
+        tried.parent is other.parent
+        and law.family == simpler.family
+        and len(shared) == len(simpler.parameters)
+        and bool(more)
+        and all(p.neutral is None for p in more)
+    )
 
 
 def _explained(base: Trial, trial: Trial) -> float:

@@ -40,14 +40,14 @@ EFFECT = replace(
 @jit
 def _mode(beta, n):
     """Root mu of mu tan(mu) = ``beta`` in the ``n``-th half period from 0."""
-    low, high = n * math.pi, (n + 0.5) * math.pi
+    low, high = 0.0, 0.5 * math.pi
     for _ in range(_HALVINGS):
-        mu = 0.5 * (low + high)
-        if mu * math.sin(mu) * (1 - 2 * (n % 2)) < beta * math.cos(mu) * (1 - 2 * (n % 2)):
-            low = mu
+        a = 0.5 * (low + high)
+        if (n * math.pi + a) * math.sin(a) < beta * math.cos(a):
+            low = a
         else:
-            high = mu
-    return 0.5 * (low + high)
+            high = a
+    return n * math.pi + 0.5 * (low + high)
 
 
 @jit
@@ -61,7 +61,7 @@ def supply(c, k, m, j, t, start, end, h, lam, rate):
     before, after, left = 0.0, 0.0, 1.0
     for i in range(_MODES):
         if m[j + _MODES + i] == 0.0:
-            m[j + _MODES + i] = _mode(beta, i)  # once: they are the contact's alone
+            m[j + _MODES + i] = _mode(beta, i)  # once: it is the contact's alone
         mu2 = m[j + _MODES + i] ** 2
         share = 2.0 * beta * beta / (mu2 * (mu2 + beta * beta + beta))
         if i == _MODES - 1:

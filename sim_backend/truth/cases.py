@@ -49,7 +49,7 @@ FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
             amplifier.second_order,
         ),
         "electrode_resistance": (electrode_resistance.ladder, electrode_resistance.percolating),
-        "leakage": (leakage.poole_frenkel, leakage.hopping),
+        "leakage": (leakage.poole_frenkel, leakage.hopping, leakage.space_charge),
         "dielectric_relaxation": (
             dielectric_relaxation.three_terms,
             dielectric_relaxation.cole_cole,

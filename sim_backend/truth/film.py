@@ -89,11 +89,12 @@ class Hidden(NamedTuple):
     ladder_2: float = 0.0
     ladder_gauge: float = 0.0
     # leakage behind a series resistance in ohm: conductance S; exponent of Poole and Frenkel
-    # in V^-1/2 or, when above 0, of hopping in 1/V
+    # in V^-1/2 or, when above 0, of hopping in 1/V, or the voltage of space charge
     leak_series: float = 0.0
     leak_conductance: float = 0.0
     leak_frenkel: float = 0.0
     leak_hopping: float = 0.0
+    leak_space: float = 0.0
     # permittivity: share gained at large strain, reach; inverse square of a voltage
     permittivity_strain: float = 0.0
     permittivity_reach: float = 1.0
@@ -250,6 +251,9 @@ def _leak(h: Hidden, v: float, lam: float) -> tuple[float, float]:
     if h.leak_hopping > 0.0:
         k = h.leak_hopping * lam
         return h.leak_conductance / k * math.sinh(k * v), h.leak_conductance * math.cosh(k * v)
+    if h.leak_space > 0.0:
+        slope = h.leak_conductance * lam**4 / h.leak_space
+        return slope * v * v, 2.0 * slope * v
     root = h.leak_frenkel * math.sqrt(v * lam)
     conductance = h.leak_conductance * math.exp(root)
     return conductance * v, conductance * (1.0 + 0.5 * root)

@@ -2,8 +2,10 @@
 
 ``poole_frenkel``: I = G v exp(b sqrt(v lam)), traps emptied by the field (Frenkel, Phys. Rev. 54,
 1938). ``hopping``: I = G/k sinh(k v), hops over equal barriers (Mott and Gurney). The field in the
-stretched film is v lam/Z, hence lam. The film charges through the series resistor in far less than
-a sample: that is left out.
+stretched film is v lam/Z, hence lam. ``space_charge``: I = G v^2 lam^4/V_0, limited by the charge
+that is in the film (Mott and Gurney's law, by the square of the voltage, the inverse cube of the
+thickness and the area). The film charges through the series resistor in far less than a sample:
+that is left out.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from sim_backend.truth.chance import log_uniform
 from sim_backend.truth.effect import TruthEffect
 from sim_backend.truth.film import FilmNumbers
 
-__all__ = ["hopping", "poole_frenkel"]
+__all__ = ["hopping", "poole_frenkel", "space_charge"]
 
 _SERIES = (1e6, 3e6)  # ohm
 _LEAST, _MOST = 25.0, 500.0  # V lost at 8 kV
@@ -67,6 +69,27 @@ def hopping(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa:
         acts_on="electrode",
         description=(
             f"leakage of {current * 1e6:.3g} uA at 8 kV (hopping, exponent {exponent:.2f}) behind "
+            f"{series / 1e6:.3g} Mohm"
+        ),
+        on_film=on_film,
+    )
+
+
+def space_charge(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """Conduction that is limited by the charge on its way."""
+    series = log_uniform(generator, *_SERIES)
+    current = log_uniform(generator, _LEAST, _MOST) / series
+
+    def on_film(numbers: FilmNumbers) -> FilmNumbers:
+        return numbers.hiding(
+            leak_series=series, leak_conductance=current / _AT / _STRETCH**4, leak_space=_AT
+        )
+
+    return TruthEffect(
+        family="leakage",
+        acts_on="electrode",
+        description=(
+            f"leakage of {current * 1e6:.3g} uA at 8 kV (space charge, by the square) behind "
             f"{series / 1e6:.3g} Mohm"
         ),
         on_film=on_film,

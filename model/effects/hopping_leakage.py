@@ -1,0 +1,27 @@
+"""Leakage by charges that hop over equal barriers, with the field and, less often, against it.
+
+The current goes with sinh(b E) (Mott and Gurney 1940; Eyring): at small fields the film is a plain
+resistor, which leakage by traps is not, and at large ones the current grows exponentially.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from model.conduction import HOPS, behind
+from model.effects.leakage import EFFECT as BY_TRAPS
+from model.jit import jit
+
+__all__ = ["EFFECT", "supply"]
+
+EFFECT = replace(
+    BY_TRAPS,
+    name="hopping leakage",
+    words="the film takes a current at any voltage, and exponentially more at a high one",
+    parameters=(BY_TRAPS.parameters[0], replace(BY_TRAPS.parameters[1], starts=(1.0, 4.0))),
+)
+
+
+@jit
+def supply(c, k, m, j, t, start, end, h, lam, rate):
+    return behind(m, j, c[k], c[k + 1], HOPS, start, end, lam)
