@@ -446,6 +446,47 @@ def test_what_leaves_but_noise_is_not_fitted_anew():
     assert anew == ["ageing"]
 
 
+@pytest.mark.parametrize("left", [1.4, 1.0])
+def test_a_law_that_does_worse_than_one_it_extends_sets_out_from_there(left):
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    best = made_trial([record], PLAIN, 3.0 * noise)
+    friction = {"friction": 80.0, "presliding": 2e-4, "damping": 1e-3}
+
+    def tried(effects, rest: float) -> _Tried:
+        trial = made_trial([record], replace(PLAIN, effects=effects), rest * noise)
+        return _Tried(effects[0][0], best, trial, 0.0)
+
+    simpler = tried(effect("dry friction", **friction), left)
+    worse = tried((typical("easing friction"),), 1.6)
+    # of another family, or with another size of its own: these extend nothing
+    others = [tried((typical(n),), 1.7) for n in ("linear drag", "mixed drag", "leakage")]
+    found = tried((typical("easing friction"),), 1.01)
+    begun: list[np.ndarray] = []
+
+    def fit(model: Actuator, starts, fixed, leader: float, parent: float, anew: np.ndarray):
+        assert (model.effects[0][0], starts, leader) == ("easing friction", [], simpler.trial.cost)
+        begun.extend(anew)
+        return found.trial
+
+    search.bench.fit = fit  # type: ignore[method-assign, assignment]
+    search.bench.sought = lambda trial, _: trial  # type: ignore[method-assign]
+    again = search._anew([simpler, worse, *others])
+    if simpler.trial.is_white:
+        assert not begun
+        return
+    assert again[1].trial is found.trial
+    assert [a.trial for a in again[2:]] == [o.trial for o in others]
+    layout = worse.trial.problem.layout
+    places = [dict(zip(layout.names, layout.values(x), strict=True)) for x in begun]
+    for there in places:
+        for name, value in friction.items():
+            assert there[f"easing friction: {name}"] == pytest.approx(value)
+    # in several places of what it has more
+    assert len({there["easing friction: excess"] for there in places}) > 1
+
+
 def test_what_is_exchanged_sets_out_beside_the_rest_as_it_was():
     record = record_of(PLAIN)
     search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
