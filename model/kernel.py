@@ -90,7 +90,7 @@ _LEAN_SUBSTEPS_MAX = 4  # the same for the quicker form
 # friction that builds up within a nanometre, is given up: no record could tell it apart
 _EFFECT_SUBSTEPS_MAX = 25
 # change of a drag over a step, as a phase: that part is not in closed form
-_GROWN, _GROWN_QUICK = 1.0, 25.0
+_GROWN, _GROWN_QUICK = 1.0, 6.0
 _RINGING = 1e-4  # in stretch, from which on steps must see it: 7.5 um on 75 mm
 # numbers in closed form need not be quite the film's own: what they lack is integrated
 _STIFFNESS_NEAR = 0.005

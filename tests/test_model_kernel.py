@@ -378,6 +378,26 @@ def test_a_quick_step_may_be_longer_than_the_ringing(effects):
     assert np.sqrt(np.mean((quick - fine) ** 2)) < 1e-3 * np.std(fine)
 
 
+@pytest.mark.parametrize(
+    "effects",
+    [
+        (("mixed drag", (("drag", 3.1e3), ("quadratic", 2.9e4))),),
+        (("power-law drag", (("drag", 630.0), ("exponent", 1.37))),),
+    ],
+    ids=lambda e: e[0][0],
+)
+def test_a_quick_look_at_a_drag_that_grows_with_the_rate(effects):
+    # lobes that come ever sooner, up to ten a second
+    time = ticks(8.0, 5e-3)
+    drive = Drive(time, 7e3 * np.abs(np.sin(np.pi * (0.5 * time + 0.6 * time**2))), hold=True)
+    c = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, effects).coefficients()
+    careful, status = reading_of(c, LENGTH, drive)
+    assert status == kernel.OK
+    quick, _ = reading_of(c, LENGTH, drive, haste=kernel.QUICK)
+    # what it misses would be told for an effect by which steps are shorter
+    assert np.abs(quick - careful).max() < 0.2e-6
+
+
 @pytest.mark.parametrize("name", [e.name for e in EFFECTS.values() if e.turns])
 def test_a_rough_look_at_what_follows_the_path_is_good_to_a_tenth_of_it(name):
     time = ticks(8.0, 5e-3)
