@@ -622,7 +622,7 @@ class _Search:
         xs[:, more] = layout.lower[more] + where * (layout.upper - layout.lower)[more]
         best = np.argsort(self.bench.problem(trial.model).costs(xs))[:_DESCENDED]
         return self.bench.fit(
-            trial.model, [], trial.fixed, simpler.cost, tried.parent.cost, anew=xs[best]
+            trial.model, [], trial.fixed, simpler.cost, tried.parent.cost, anew=list(xs[best])
         )
 
     def _unaccounted(self, tried: _Tried, sizes: Sequence[float]) -> tuple[float, float]:
