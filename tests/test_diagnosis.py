@@ -446,45 +446,87 @@ def test_what_leaves_but_noise_is_not_fitted_anew():
     assert anew == ["ageing"]
 
 
-@pytest.mark.parametrize("left", [1.4, 1.0])
-def test_a_law_that_does_worse_than_one_it_extends_sets_out_from_there(left):
+@pytest.mark.parametrize(
+    ("before", "simple", "law", "again"),
+    [
+        (9.0, 1.4, 1.6, True),  # does worse than what it extends
+        (9.0, 1.4, 1.405, False),  # by nothing
+        (9.0, 1.5, 1.3, True),  # leads, and leaves more than noise
+        (9.0, 2.5, 1.3, False),  # so does what it extends, and it is far away
+        (2.5, 1.5, 1.3, False),  # with most of the residual still there
+        (9.0, 1.0, 1.6, False),  # nothing is left to be gained
+        (1.2, 1.4, 1.6, False),  # both do worse than what there was before
+    ],
+)
+def test_who_sets_out_from_a_simpler_law(before, simple, law, again):
     record = record_of(PLAIN)
     search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
     noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
-    best = made_trial([record], PLAIN, 3.0 * noise)
-    friction = {"friction": 80.0, "presliding": 2e-4, "damping": 1e-3}
 
-    def tried(effects, rest: float) -> _Tried:
+    def left(effects, rest: float) -> Trial:
         trial = made_trial([record], replace(PLAIN, effects=effects), rest * noise)
-        return _Tried(effects[0][0], best, trial, 0.0)
+        return replace(trial, correlation=1.0 if rest == 1.0 else 5.0)
 
-    simpler = tried(effect("dry friction", **friction), left)
-    worse = tried((typical("easing friction"),), 1.6)
+    best = left((), before)
+
+    def tried(name: str, rest: float) -> _Tried:
+        trial = left((typical(name),), rest)
+        search.found[frozenset({name})] = trial
+        return _Tried(name, best, trial, 0.0)
+
     # of another family, or with another size of its own: these extend nothing
-    others = [tried((typical(n),), 1.7) for n in ("linear drag", "mixed drag", "leakage")]
-    found = tried((typical("easing friction"),), 1.01)
-    begun: list[np.ndarray] = []
+    others = [tried(n, 1.9) for n in ("linear drag", "mixed drag", "leakage")]
+    candidates = [tried("easing friction", law), tried("dry friction", simple), *others]
+    found = left((typical("easing friction"),), 1.01)
+    set_out: list[tuple[str, str]] = []
 
-    def fit(model: Actuator, starts, fixed, leader: float, parent: float, anew: np.ndarray):
-        assert (model.effects[0][0], starts, leader) == ("easing friction", [], simpler.trial.cost)
-        begun.extend(anew)
-        return found.trial
+    def extended(one: _Tried, simpler: _Tried) -> Trial:
+        set_out.append((one.name, simpler.name))
+        return found
 
-    search.bench.fit = fit  # type: ignore[method-assign, assignment]
-    search.bench.sought = lambda trial, _: trial  # type: ignore[method-assign]
-    again = search._anew([simpler, worse, *others])
-    if simpler.trial.is_white:
-        assert not begun
-        return
-    assert again[1].trial is found.trial
-    assert [a.trial for a in again[2:]] == [o.trial for o in others]
-    layout = worse.trial.problem.layout
-    places = [dict(zip(layout.names, layout.values(x), strict=True)) for x in begun]
-    for there in places:
-        for name, value in friction.items():
-            assert there[f"easing friction: {name}"] == pytest.approx(value)
-    # in several places of what it has more
-    assert len({there["easing friction: excess"] for there in places}) > 1
+    search._extended = extended  # type: ignore[method-assign]
+    search._set_out_from_simpler(best, candidates)
+    assert set_out == [("easing friction", "dry friction")] * again
+    assert (search.found[frozenset({"easing friction"})] is found) == again
+    # once is enough
+    search._set_out_from_simpler(best, candidates)
+    assert len(set_out) == again
+
+
+def test_a_law_gets_out_of_a_wrong_valley_from_where_a_simpler_one_has_ended():
+    hidden = {
+        "friction": 60.0,
+        "presliding": 1.5e-4,
+        "damping": 1e-3,
+        "excess": 0.4,
+        "easing": 8e-3,
+    }
+    record = record_of(replace(PLAIN, effects=effect("easing friction", **hidden)))
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    parent = made_trial([record], PLAIN, np.zeros(record.measured.size))
+
+    def ended(name: str, **numbers: float) -> _Tried:
+        # beside an effect that does nothing, which comes before or after it
+        nothing = effect("linear drag", drag=0.0)
+        own = effect(name, damping=1e-3, **numbers)
+        effects = (*own, *nothing) if name == "dry friction" else (*nothing, *own)
+        layout = search.bench.problem(replace(PLAIN, effects=effects)).layout
+        held = np.zeros(layout.size, dtype=bool)
+        held[layout.column("J")] = held[layout.names.index("linear drag: drag")] = True
+        start = layout.coordinates(layout.initial())
+        trial = search.bench.fit(layout.base, [], held, anew=[start])
+        return _Tried(name, parent, search.bench.ended(trial), 0.0)
+
+    wrong = ended("easing friction", friction=30.0, presliding=1e-4, excess=0.9, easing=0.15)
+    simpler = ended("dry friction", friction=55.0, presliding=2e-4)
+    assert min(wrong.trial.cost, simpler.trial.cost) > 4.0
+    found = search._extended(wrong, simpler)
+    assert found.effects == wrong.trial.effects
+    assert found.cost < 1.05
+    layout = found.problem.layout
+    numbers = dict(zip(layout.names, layout.values(found.x), strict=True))
+    for name in ("friction", "presliding", "excess", "easing"):
+        assert numbers[f"easing friction: {name}"] == pytest.approx(hidden[name], rel=0.03)
 
 
 def test_what_is_exchanged_sets_out_beside_the_rest_as_it_was():

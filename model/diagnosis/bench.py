@@ -14,6 +14,7 @@ from itertools import pairwise
 from threading import Lock
 
 import numpy as np
+from scipy.stats.qmc import Sobol
 
 from model import kernel
 from model.actuator import Actuator, at_rest
@@ -60,6 +61,10 @@ _RESTARTS = 2  # from a new global search, beside what was found
 _SETTING = 6  # iterations of the branches alone
 _PLACED = 3  # of the starts, the branches in their places, that are followed on
 _RESTART = 10  # iterations of each
+_SCATTERED = 128  # places of numbers of which nothing is known
+_SCOUTED = 6  # of these, the best ones, that are followed
+_SCATTERINGS = 2  # the second from the best of the first
+_AS_GOOD = 0.98  # of the cost: who has gained less is where it was
 _LEADERS = 2  # of several starts that are followed on: the best at first does not always get down
 _ALIKE = 0.5  # of the logarithm of relaxation times: a factor of 1.6
 _AT_END = 0.05  # of the logarithm of a relaxation time: so near the bound it wants to go further
@@ -338,6 +343,36 @@ class Bench:
         the branches are sought anew.
         """
         return trial if trial.is_white else self.sought(trial, trial.x[None])
+
+    def scattered(self, trial: Trial, start: np.ndarray, more: np.ndarray, leader: float) -> Trial:
+        """The model of ``trial`` fitted from the best of many places, or ``trial``.
+
+        These are ``start`` (d,), but with ``more`` (d,) of its numbers scattered over their bounds;
+        and once more from a better fit, beside which they may belong elsewhere. Beside a ``leader``
+        no further than it takes to see that it does not come near its cost.
+        """
+        problem, layout, fixed = trial.problem, trial.problem.layout, trial.fixed
+        where = Sobol(int(more.sum()), scramble=False).random(_SCATTERED)
+
+        def down(trial: Trial) -> Trial:
+            return self._down(trial, _ENDING, _worth_going(trial, leader, _NO_RIVAL))
+
+        for _ in range(_SCATTERINGS):
+            xs = np.tile(start, (_SCATTERED, 1))
+            xs[:, more] = layout.lower[more] + where * (layout.upper - layout.lower)[more]
+            best = xs[np.argsort(problem.costs(xs))[:_SCOUTED]]
+            scouts = self.together(
+                lambda x: descend_by_secants(problem, x, fixed, iterations=_RESTART, sure=False),
+                list(best),
+            )
+            leaders = [_trial(problem, f, fixed) for f in _leaders(scouts)]
+            found = min(self.together(down, leaders), key=lambda t: t.cost)
+            gained = found.cost < _AS_GOOD * trial.cost
+            trial = min(trial, found, key=lambda t: t.cost)
+            if not gained or trial.is_white:
+                break
+            start = trial.x
+        return self._as_near(trial, down)
 
     def unaccounted(self, problem: Problem, xs: np.ndarray) -> np.ndarray:
         """Parts (K,) of the Maxwell stress that no branches account for, beside effects at ``xs``.

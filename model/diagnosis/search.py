@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats.qmc import Sobol
 
 from model.actuator import Actuator
 from model.diagnosis.bench import Bench, Trial, information, relieved
@@ -53,8 +52,7 @@ _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed 
 _SETTLED = 5  # leading candidates that are fitted to the end of their valleys
 _SETTLED_QUICKLY = 12  # that are followed a little, while the leader leaves more than noise
 _MUCH_LEFT = 25.0  # of the noise's mean square: there only one law of a family is followed
-_SCATTERED = 128  # places of what a law has more than one that it extends
-_DESCENDED = 3  # of these, that are followed
+_NEARLY_ALL = 0.95  # of what was above the noise: who explains it may be in a wrong valley of it
 _AS_GOOD = 0.98  # of its cost: who did not come near the one will not come near the other
 _CLOSE = 1.15  # of the leader's cost: so near, and better than nothing, any other is one too
 _NEAR_LEAD = 2.0  # of the leader's cost before that: no branch of these is left without work
@@ -145,6 +143,7 @@ class _Search:
         self.ended: dict[frozenset[str], float] = {}  # beside a leader of which cost
         self.screened: dict[frozenset[str], tuple[Trial, dict[str, list[Promise]], np.ndarray]] = {}
         self.left_out: set[tuple[frozenset[str], str]] = set()
+        self.extended: set[frozenset[str]] = set()  # from where a simpler law has ended
         self.interrupted = False
         self.held = False
 
@@ -464,14 +463,9 @@ class _Search:
 
     def _in_place(self, model: Actuator | Strip, other: Trial, alone: Trial) -> np.ndarray:
         """Coordinates of ``model`` as ``other`` is, but its new effect as it was ``alone``."""
-        known = {}
-        for trial in (alone, other):
-            layout = trial.problem.layout
-            known.update(
-                {q.name: v for q, v in zip(layout.quantities, layout.values(trial.x), strict=True)}
-            )
+        known = _numbers(alone) | _numbers(other)
         layout = self.bench.problem(model).layout
-        x = layout.coordinates(np.array([known[q.name] for q in layout.quantities]))
+        x = layout.coordinates(np.array([known[n] for n in layout.names]))
         return np.clip(x, layout.lower, layout.upper)
 
     def _relieved(self, parent: Trial, promise: Promise) -> list[np.ndarray]:
@@ -533,9 +527,42 @@ class _Search:
                 self.settled.add(key)
                 self.found[key] = self.bench.settled(tried.trial, lead)
             lead = min(lead, self.found[key].cost)
-        order = [replace(t, trial=self.found[frozenset(t.trial.effects)]) for t in order]
+        order = self._as_found(order)
+        if to_the_end:
+            self._set_out_from_simpler(best, order)
+            order = self._as_found(order)
         correlation = self._correlation([best, *(t.trial for t in order)])
         return sorted(order, key=rank), correlation
+
+    def _as_found(self, tried: list[_Tried]) -> list[_Tried]:
+        """The candidates as the best fits of them are by now."""
+        return [replace(t, trial=self.found[frozenset(t.trial.effects)]) for t in tried]
+
+    def _set_out_from_simpler(self, best: Trial, tried: list[_Tried]) -> None:
+        """Fit laws again from where the best that they extend has ended, each once, until one fits.
+
+        These are laws that do worse than a simpler one, and the leading one, where it leaves more
+        than noise: a valley that it came into while something else was missing may be the wrong
+        one. The simpler one must do as well as ``best``, of what there was before.
+        """
+        lead = min((t.trial for t in tried), key=lambda t: t.cost)
+        for one in tried:
+            names = frozenset(one.trial.effects)
+            simpler = [t for t in tried if _extends(one, t)]
+            if names in self.extended or not simpler:
+                continue
+            if self._is_noise(lead):
+                return
+            leads = one.trial is lead and _explained(one.parent, lead) > _NEARLY_ALL
+            most = min(best.cost, _NEAR_LEAD * lead.cost)
+            if not leads:
+                most = min(most, _AS_GOOD * one.trial.cost)
+            nearest = min(simpler, key=lambda t: t.trial.cost)
+            if nearest.trial.cost <= most:
+                self.extended.add(names)
+                trial = self._extended(one, nearest)
+                self._keep(trial)
+                lead = min(lead, trial, key=lambda t: t.cost)
 
     def _anew(self, tried: list[_Tried]) -> list[_Tried]:
         """The candidates, those fitted anew in whose way the branches stand.
@@ -593,37 +620,24 @@ class _Search:
             if trial is not one.trial:
                 self._keep(trial)
                 again[place] = replace(one, trial=trial)
-        for place, one in enumerate(again):
-            near = min(one.trial.cost, _NEAR_LEAD * leader.cost)
-            better = [t.trial for t in again if _extends(one, t) and t.trial.cost < near]
-            if better and not any(t.is_white for t in better):
-                for simpler in better:
-                    self._keep(self._extended(one, simpler))
-                again[place] = replace(one, trial=self.found[frozenset(one.trial.effects)])
         return again
 
-    def _extended(self, tried: _Tried, simpler: Trial) -> Trial:
-        """The law that was ``tried``, fitted from where a ``simpler`` one has ended.
+    def _extended(self, tried: _Tried, simpler: _Tried) -> Trial:
+        """The law that was ``tried``, fitted from where one that it extends has ended.
 
-        It extends that one, and can do all that it does: doing worse, it is in a wrong valley. What
-        it has more is scattered over its bounds.
+        It can do all that the ``simpler`` one does. What it has more is scattered over its bounds.
         """
-        trial, first = tried.trial, tried.parent.x.size
-        layout = trial.problem.layout
-        start = trial.x.copy()
-        start[:first] = simpler.x[:first]
-        more = np.ones(start.size, dtype=bool)
-        more[:first] = False
-        for j, i in _shared(EFFECTS[tried.name], EFFECTS[simpler.effects[-1]]):
-            start[first + j] = simpler.x[first + i]
-            more[first + j] = False
-        xs = np.tile(np.clip(start, layout.lower, layout.upper), (_SCATTERED, 1))
-        where = Sobol(int(more.sum()), scramble=False).random(_SCATTERED)
-        xs[:, more] = layout.lower[more] + where * (layout.upper - layout.lower)[more]
-        best = np.argsort(self.bench.problem(trial.model).costs(xs))[:_DESCENDED]
-        return self.bench.fit(
-            trial.model, [], trial.fixed, simpler.cost, tried.parent.cost, anew=list(xs[best])
-        )
+        trial, layout = tried.trial, tried.trial.problem.layout
+        law, other = EFFECTS[tried.name], EFFECTS[simpler.name]
+        known = _numbers(simpler.trial)
+        for j, i in _shared(law, other):
+            shared = known[f"{simpler.name}: {other.parameters[i].name}"]
+            known[f"{tried.name}: {law.parameters[j].name}"] = shared
+        more = np.array([n not in known for n in layout.names])
+        start = layout.values(trial.x)
+        start[~more] = [known[n] for n in layout.names if n in known]
+        start = np.clip(layout.coordinates(start), layout.lower, layout.upper)
+        return self.bench.scattered(trial, start, more, min(trial.cost, simpler.trial.cost))
 
     def _unaccounted(self, tried: _Tried, sizes: Sequence[float]) -> tuple[float, float]:
         """What branches do not account for beside the effect, at the best of ``sizes``; which."""
@@ -994,6 +1008,12 @@ class _Search:
             if better > self._asked(other) and behind < found.get(of, (np.inf,))[0]:
                 found[of] = (behind, other, trial)
         return [(n, t) for _, n, t in sorted(found.values(), key=lambda f: f[0])]
+
+
+def _numbers(trial: Trial) -> dict[str, float]:
+    """The numbers of a model as they were fitted, by name."""
+    layout = trial.problem.layout
+    return dict(zip(layout.names, layout.values(trial.x), strict=True))
 
 
 def _shared(effect: Effect, other: Effect) -> list[tuple[int, int]]:
