@@ -54,6 +54,9 @@ HIDDEN = {
 HARDLY_SEEN = {"sine", "third_sine", "damping"}
 
 
+LEAKING = {"loss": 0.03, "growth": 5.0, "exponent": 0.8}
+
+
 def plant(name: str) -> Actuator:
     return replace(PLAIN, effects=effect(name, **HIDDEN[name]))
 
@@ -536,7 +539,7 @@ def test_what_is_exchanged_sets_out_beside_the_rest_as_it_was():
     harder = replace(PLAIN, network=Network.gent((50e3, 60e3), (1e4, 1e4), (0.3,)))
     ageing = effect("ageing", softening=0.02, path=0.03)
     other = made_trial([record], replace(harder, effects=(*ageing, typical("sensor lag"))), noise)
-    leaking = effect("leakage", loss=0.03, growth=5.0, exponent=0.8)
+    leaking = effect("leakage", **LEAKING)
     alone = made_trial([record], replace(PLAIN, effects=leaking), noise)
     model = replace(PLAIN, effects=(typical("ageing"), typical("leakage")))
     start = search._in_place(model, other, alone)
@@ -547,6 +550,64 @@ def test_what_is_exchanged_sets_out_beside_the_rest_as_it_was():
     assert there["leakage"] == pytest.approx(dict(leaking[0][1]))
     assert [s.modulus for s in set_out.network.springs] == pytest.approx([50e3, 60e3])
     assert set_out.network.times == pytest.approx([0.3])
+
+
+def test_what_is_exchanged_promises_what_it_does_beside_the_rest_as_it_was():
+    late, leaking = effect("sensor lag", time_constant=0.1), effect("leakage", **LEAKING)
+    record = record_of(replace(PLAIN, effects=(*leaking, *late)))
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.ones(record.measured.size)
+    # where the leakage is alone, the rest has bent itself to be late
+    bent = replace(PLAIN, network=Network.gent((40e3, 90e3), (1e4, 1e4), (0.9,)), effects=leaking)
+    parent = made_trial([record], bent, 15.0 * noise)
+    other = made_trial([record], replace(PLAIN, effects=(*leaking, typical("load inertia"))), noise)
+    model = replace(bent, effects=(*leaking, typical("sensor lag")))
+    promise = Promise(model, parent.x, np.zeros((1, 1)), 0.1)
+    # as long as it is not known alone
+    assert search._promised(parent, "sensor lag", promise, other) == 0.1
+    search.found[frozenset({"sensor lag"})] = made_trial(
+        [record], replace(PLAIN, effects=late), noise
+    )
+    promised = search._promised(parent, "sensor lag", promise, other)
+    assert promised == pytest.approx(1.0 - 1.0 / parent.cost, rel=0.01)
+    # where nothing is exchanged, the first order is all that there is
+    assert search._promised(parent, "sensor lag", promise, None) == 0.1
+
+
+def test_who_was_found_beside_another_is_refitted_where_more_is_promised():
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+
+    def left(names: tuple[str, ...], cost: float) -> Trial:
+        model = replace(PLAIN, effects=tuple(typical(n) for n in names))
+        return made_trial([record], model, np.full(1, math.sqrt(cost) * NOISE))
+
+    parent = left(("load inertia",), 10.0)
+    shares = {"settling drift": 0.8, "linear drift": 0.8, "warm-up": 0.3}
+    promises = {
+        n: [Promise(parent.model, parent.x, np.zeros((1, 1)), s)] for n, s in shares.items()
+    }
+    search.screened[frozenset(parent.effects)] = (parent, promises, np.zeros((1, 1)))
+    for name, cost in {"settling drift": 6.0, "linear drift": 3.0, "warm-up": 7.0}.items():
+        trial = left((name, "load inertia"), cost)
+        search.found[frozenset(trial.effects)] = trial
+    better = left(("load inertia", "settling drift"), 2.0)
+    done: list[str] = []
+
+    def refit(parent: Trial, name: str, *_: object) -> Trial:
+        done.append(name)
+        return better
+
+    search._refit = refit  # type: ignore[method-assign]
+    tried = search._round(parent, 1, (0.0, 1.0))
+    assert done == ["settling drift"]
+    assert {t.name: t.trial.cost for t in tried} == pytest.approx(
+        {"settling drift": 2.0, "linear drift": 3.0, "warm-up": 7.0}
+    )
+    # once from each place
+    search.found[frozenset(better.effects)] = left(better.effects, 6.0)
+    search._round(parent, 1, (0.0, 1.0))
+    assert done == ["settling drift"]
 
 
 @pytest.mark.parametrize(

@@ -142,6 +142,7 @@ class _Search:
         self.settled: set[frozenset[str]] = set()
         self.ended: dict[frozenset[str], float] = {}  # beside a leader of which cost
         self.screened: dict[frozenset[str], tuple[Trial, dict[str, list[Promise]], np.ndarray]] = {}
+        self.refitted: set[tuple[frozenset[str], str]] = set()  # on top of what, and which
         self.left_out: set[tuple[frozenset[str], str]] = set()
         self.extended: set[frozenset[str]] = set()  # from where a simpler law has ended
         self.interrupted = False
@@ -368,7 +369,8 @@ class _Search:
         ``other`` is ``parent`` with another effect in the place of which they are tried.
         """
         promises, jacobian = self._screened(parent, span)
-        order = sorted(promises, key=lambda n: -promises[n][0].share)
+        shares = {n: self._promised(parent, n, promises[n][0], other) for n in promises}
+        order = sorted(shares, key=lambda n: -shares[n])
         if depth > 0:
             order = order[: _FOLLOWED // depth]
         many = len(order)
@@ -376,15 +378,16 @@ class _Search:
 
         def refit(names: list[str]) -> None:
             for pair in _abreast([n for n in names if n not in {t.name for t in tried}]):
-                unknown = [n for n in pair if frozenset((*parent.effects, n)) not in self.found]
+                unknown = [n for n in pair if self._owes(parent, n, shares[n])]
                 trials = self.bench.together(
                     lambda n: self._refit(parent, n, promises[n], jacobian, other), unknown
                 )
                 for name, trial in zip(unknown, trials, strict=True):
-                    self.found[frozenset((*parent.effects, name))] = trial
+                    self.refitted.add((frozenset(parent.effects), name))
+                    self._keep(trial)
                 for name in pair:
                     trial = self.found[frozenset((*parent.effects, name))]
-                    tried.append(_Tried(name, parent, trial, promises[name][0].share))
+                    tried.append(_Tried(name, parent, trial, shares[name]))
                 part = 0.25 + 0.75 * len(tried) / many
                 self.report(_stage(parent, "refitting"), span[0] + span[1] * part)
 
@@ -392,8 +395,8 @@ class _Search:
             refit([n for n in order if _leads_to(n, order[0])])
             if any(self._is_noise(t.trial) for t in tried):
                 # who promises next to nothing beside what explains all is no rival of it
-                least = _HINT * promises[order[0]][0].share
-                order = [n for n in order if promises[n][0].share > least]
+                least = _HINT * shares[order[0]]
+                order = [n for n in order if shares[n] > least]
             if order and parent.cost > _MUCH_LEFT:
                 # so far from the noise it matters which family it is, not yet which law of it
                 refit([n for n in order if _is_first_of_family(n, order)])
@@ -402,6 +405,30 @@ class _Search:
                 order = [n for n in order if EFFECTS[n].family in may_lead]
         refit(order)
         return tried
+
+    def _promised(self, parent: Trial, name: str, promise: Promise, other: Trial | None) -> float:
+        """The part of what ``parent`` leaves that an effect promises to take off.
+
+        To first order; or as it was alone, where the rest is as beside the effect that ``other``
+        has in its place: what is missing there bends the rest of ``parent``, for which it would
+        have to make up.
+        """
+        alone = self.found.get(frozenset((name,)))
+        if other is None or alone is None:
+            return promise.share
+        there = self._in_place(promise.model, other, alone)
+        left = float(self.bench.problem(promise.model).costs(there[None])[0])
+        return max(promise.share, 1.0 - left / parent.cost)
+
+    def _owes(self, parent: Trial, name: str, promised: float) -> bool:
+        """Whether an effect has yet to be refitted on top of ``parent``.
+
+        What was found with it on top of another, while something else was missing, will do where it
+        is as good as it is ``promised`` to be from here.
+        """
+        found = self.found.get(frozenset((*parent.effects, name)))
+        kept = found is not None and parent.cost - found.cost > _KEPT * promised * parent.cost
+        return not kept and (frozenset(parent.effects), name) not in self.refitted
 
     def _screened(
         self, parent: Trial, span: tuple[float, float]
