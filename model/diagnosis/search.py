@@ -598,7 +598,7 @@ class _Search:
         out. The measured stretch tells without one: with the effect's part taken off it, do
         branches account for more of the Maxwell stress than before? Where the leader explains all,
         only those are fitted anew beside which they account for as much as beside it; and those
-        that have promised about as much as it keeps, from where they are.
+        that have promised about as much as it keeps, or as it did, from where they are.
         """
         parents = {frozenset(t.parent.effects): t.parent for t in tried}
         before = {
@@ -635,13 +635,23 @@ class _Search:
             if left <= most
         }
         if leader.cost < _EXPLAINED_RMS**2:
-            owing = [i for i, t in enumerate(tried) if i and _promised_as_much(t, leader.cost)]
+            mark = _KEPT * tried[0].promised
+            owing = [
+                i
+                for i, t in enumerate(tried)
+                if i
+                and (
+                    _promised_as_much(t, leader.cost)
+                    or (t.parent is tried[0].parent and t.promised > mark)
+                )
+            ]
             starts.update(
                 {i: tried[i].trial.x[None] for i in owing[:_CONTENDERS] if i not in starts}
             )
+        correlation = self._correlation([leader])
         for place, sizes in starts.items():
             one = tried[place]
-            if one.trial.is_white:
+            if one.trial.is_white and self._explains_as_well(one.trial, leader, correlation):
                 continue  # nothing is left to be gained
             trial = self.bench.sought(one.trial, sizes)
             if trial is not one.trial:
