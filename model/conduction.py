@@ -12,10 +12,12 @@ import numpy as np
 
 from model.jit import jit
 
-__all__ = ["HOPS", "behind", "conductivity"]
+__all__ = ["HOPS", "REMEMBERED", "behind", "conductivity"]
 
 #: As the exponent of the field: charges hop.
 HOPS = 0.0
+#: Numbers that ``behind`` remembers.
+REMEMBERED = 4
 
 _REFERENCE = 8e3  # V over the unstretched film
 _TOLERANCE = 1e-4  # of the voltage, the last of Newton's steps: what is left is its square
@@ -40,19 +42,24 @@ def conductivity(growth: float, exponent: float, field: float) -> tuple[float, f
 @jit
 def _reached(
     ratio: float, growth: float, exponent: float, supplied: float, lam: float, guess: float
-) -> float:
-    """Voltage at the film in V by Newton's steps from a ``guess``; the current is convex."""
+) -> tuple[float, float]:
+    """Voltage at the film in V by Newton's steps from a ``guess``; the current is convex.
+
+    And how it follows what is supplied, d(ln v)/d(ln V).
+    """
     if supplied <= 0.0:
-        return 0.0
-    v = guess
+        return 0.0, 1.0
+    v, follows = guess, 1.0
     for _ in range(_ITERATIONS):
         conducts, grows = conductivity(growth, exponent, v * lam / _REFERENCE)
         drop = ratio * conducts
-        change = (v * (1.0 + drop) - supplied) / (1.0 + drop * (1.0 + grows))
+        slope = 1.0 + drop * (1.0 + grows)
+        change = (v * (1.0 + drop) - supplied) / slope
         v = min(max(v - change, 0.0), supplied)
+        follows = (1.0 + drop) / slope
         if abs(change) < _TOLERANCE * supplied:
             break
-    return v
+    return v, follows
 
 
 @jit
@@ -64,20 +71,30 @@ def behind(
     exponent: float,
     start: float,
     end: float,
+    h: float,
     lam: float,
 ) -> tuple[float, float]:
-    """Voltage at the film before and after a step in which it goes from ``start`` to ``end`` V.
+    """Voltage at the film before and after ``h`` s in which it goes from ``start`` to ``end`` V.
 
-    ``loss`` is the part that is lost at 8 kV over the unstretched film. Two numbers are remembered:
-    the ratio r, and the voltage at the film, from where the next one is sought.
+    ``loss`` is the part that is lost at 8 kV over the unstretched film. ``REMEMBERED`` numbers are:
+    the ratio r, and of the step before the voltage that it ended at, that at the film then, and how
+    the one follows the other. A step begins where the one before has ended; from there the next
+    voltage at the film is foreseen so well that one of Newton's steps will do. With ``h`` = 0 none
+    is made.
     """
     if m[j] == 0.0:
         left = 1.0 - loss
         m[j] = loss / (left * conductivity(growth, exponent, left)[0])
     first, last = abs(start), abs(end)
-    guess = m[j + 1] if 0.0 < m[j + 1] <= first else first
-    before = _reached(m[j], growth, exponent, first, lam, guess)
-    guess = min(before * last / first, last) if first > 0.0 else last
-    after = _reached(m[j], growth, exponent, last, lam, guess)
-    m[j + 1] = after
-    return math.copysign(before, start), math.copysign(after, end)
+    if first != m[j + 1]:
+        guess = m[j + 2] if 0.0 < m[j + 2] <= first else first
+        m[j + 2], m[j + 3] = _reached(m[j], growth, exponent, first, lam, guess)
+        m[j + 1] = first
+    before = m[j + 2]
+    if h > 0.0:
+        guess = last
+        if first > 0.0:
+            guess = min(max(before * (1.0 + m[j + 3] * (last / first - 1.0)), 0.0), last)
+        m[j + 2], m[j + 3] = _reached(m[j], growth, exponent, last, lam, guess)
+        m[j + 1] = last
+    return math.copysign(before, start), math.copysign(m[j + 2], end)

@@ -27,6 +27,7 @@ EFFECT = Effect(
             starts=(2.0, 5.0),
         ),
     ),
+    memory=2,
 )
 
 
@@ -40,4 +41,9 @@ def _bent(loss, n, voltage):
 
 @jit
 def supply(c, k, m, j, t, start, end, h, lam, rate):
-    return _bent(c[k], c[k + 1], start), _bent(c[k], c[k + 1], end)
+    # a step begins where the one before has ended: that voltage is known
+    before = m[j + 1] if start == m[j] else _bent(c[k], c[k + 1], start)
+    if h > 0.0:
+        m[j], m[j + 1] = end, _bent(c[k], c[k + 1], end)
+        return before, m[j + 1]
+    return before, before

@@ -7,7 +7,7 @@ conductivity goes with exp(b E^n): nothing is lost at small voltages, most at th
 
 from __future__ import annotations
 
-from model.conduction import behind
+from model.conduction import REMEMBERED, behind
 from model.effects.description import Effect, Parameter
 from model.jit import jit
 
@@ -44,10 +44,10 @@ EFFECT = Effect(
             starts=(0.5, 1.0),
         ),
     ),
-    memory=2,
+    memory=REMEMBERED,
 )
 
 
 @jit
 def supply(c, k, m, j, t, start, end, h, lam, rate):
-    return behind(m, j, c[k], c[k + 1], c[k + 2], start, end, lam)
+    return behind(m, j, c[k], c[k + 1], c[k + 2], start, end, h, lam)

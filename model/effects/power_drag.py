@@ -42,6 +42,10 @@ def stress(c, k, m, j, lam, rate, lam0, since, t):
 
 @jit
 def stiffness(c, k, m, j, lam, rate):
-    greatest = greatest_rate(c[k] / _REFERENCE ** c[k + 1], c[k + 1])
-    there = min(rate, greatest) / _REFERENCE
-    return 0.0, c[k] * c[k + 1] / _REFERENCE * there ** (c[k + 1] - 1.0)
+    slope = c[k] * c[k + 1] / _REFERENCE
+    there = min(rate, _FASTEST) / _REFERENCE
+    part = there ** (c[k + 1] - 1.0)
+    if c[k] * part * there > _DRIVE:
+        there = greatest_rate(c[k] / _REFERENCE ** c[k + 1], c[k + 1]) / _REFERENCE
+        part = there ** (c[k + 1] - 1.0)
+    return 0.0, slope * part
