@@ -344,7 +344,7 @@ def refitted(parent: float, shares: dict[str, float], left: dict[str, float]) ->
         name: [Promise(beside.model, beside.x, np.zeros((1, 1)), share)]
         for name, share in shares.items()
     }
-    search.screened[frozenset(beside.effects)] = (beside, promises, np.zeros((1, 1)))
+    search._screened = lambda *_: (promises, np.zeros((1, 1)))  # type: ignore[method-assign]
     done: list[str] = []
 
     def refit(parent: Trial, name: str, *_: object) -> Trial:
@@ -595,7 +595,7 @@ def test_who_was_found_beside_another_is_refitted_where_more_is_promised():
     promises = {
         n: [Promise(parent.model, parent.x, np.zeros((1, 1)), s)] for n, s in shares.items()
     }
-    search.screened[frozenset(parent.effects)] = (parent, promises, np.zeros((1, 1)))
+    search._screened = lambda *_: (promises, np.zeros((1, 1)))  # type: ignore[method-assign]
     for name, cost in {"settling drift": 6.0, "linear drift": 3.0, "warm-up": 7.0}.items():
         trial = left((name, "load inertia"), cost)
         search.found[frozenset(trial.effects)] = trial
@@ -681,17 +681,23 @@ def test_what_explains_too_little_to_be_named_is_not_exchanged():
     assert looked == ["leakage"]
 
 
-def test_a_model_is_screened_once():
+def test_a_model_is_screened_once_for_each_effect():
     search = _Search([record_of(PLAIN)], PLAIN, 1, lambda *_: None, lambda: False)
     search.effects = [EFFECTS["linear drag"], EFFECTS["mains interference"]]
     parent = made_trial([record_of(PLAIN)], PLAIN, NOISE * np.ones(record_of(PLAIN).measured.size))
-    first = search._screened(parent, (0.0, 1.0))
-    before = search.bench.simulations
-    assert before > 0
-    assert search._screened(parent, (0.0, 1.0))[0] is first[0]
-    assert search.bench.simulations == before
+
+    def simulated(parent: Trial, *family: str) -> int:
+        before = search.bench.simulations
+        promises, _ = search._screened(parent, (0.0, 1.0), *family)
+        assert set(promises) == {"mains interference", *(() if family else ("linear drag",))}
+        return search.bench.simulations - before
+
+    assert simulated(parent, "interference") > 0
+    assert simulated(parent, "interference") == 0
+    assert simulated(parent) > 0
+    assert simulated(parent) == simulated(parent, "interference") == 0
     # another fit of the same model is another matter
-    assert search._screened(replace(parent), (0.0, 1.0))[0] is not first[0]
+    assert simulated(replace(parent)) > 0
 
 
 def test_a_rival_is_no_worse_for_having_more_numbers():

@@ -141,7 +141,7 @@ class _Search:
         self.found: dict[frozenset[str], Trial] = {}
         self.settled: set[frozenset[str]] = set()
         self.ended: dict[frozenset[str], float] = {}  # beside a leader of which cost
-        self.screened: dict[frozenset[str], tuple[Trial, dict[str, list[Promise]], np.ndarray]] = {}
+        self.screened: dict[frozenset[str], tuple[Screen, dict[str, list[Promise]]]] = {}
         self.refitted: set[tuple[frozenset[str], str]] = set()  # on top of what, and which
         self.left_out: set[tuple[frozenset[str], str]] = set()
         self.extended: set[frozenset[str]] = set()  # from where a simpler law has ended
@@ -199,20 +199,47 @@ class _Search:
         for _ in range(_EXCHANGES):
             if len(best.effects) < 2 or _explained(base, best) < _UNNAMED_SHARE:
                 break
-            tried: list[_Tried] = []
-            for name in best.effects:
-                parent = self._ended(self._without(best, name))
-                tried += self._round(parent, len(parent.effects), (0.8, 0.1), best)
-            fitted, correlation = self._settled(best, tried)
-            leader = fitted[0]
-            gain = self._demerit(best, correlation) - self._demerit(leader.trial, correlation)
-            if frozenset(leader.trial.effects) == frozenset(best.effects) or gain <= 0.0:
+            before, best = best, self._replaced(best, (0.8, 0.1))
+            if frozenset(best.effects) == frozenset(before.effects):
                 break
-            self._record(
-                fitted, correlation, leader, "beside the others explains more than what it replaces"
-            )
-            best = self._pruned(self._ended(leader.trial))
+            best = self._pruned(best)
         return best
+
+    def _in_other_laws(self, best: Trial, span: tuple[float, float]) -> Trial:
+        """``best`` with other laws of the families in it, where these explain more.
+
+        Which law it is was asked while the others were missing, or in a wrong valley.
+        """
+        for _ in range(_EXCHANGES):
+            if self._is_noise(best):
+                break
+            before, best = best, self._replaced(best, span, laws=True)
+            if frozenset(best.effects) == frozenset(before.effects):
+                break
+        return best
+
+    def _replaced(self, best: Trial, span: tuple[float, float], laws: bool = False) -> Trial:
+        """``best``, or what does better with any other effect in the place of one.
+
+        Of ``laws``, only with such as are of the family of that one.
+        """
+        tried: list[_Tried] = []
+        for name in best.effects:
+            parent = self._ended(self._without(best, name))
+            family = EFFECTS[name].family if laws else ""
+            tried += self._round(parent, len(parent.effects), span, best, family)
+        if not tried:
+            return best
+        fitted, correlation = self._settled(best, tried, to_other_laws=True)
+        leader = fitted[0]
+        gain = self._demerit(best, correlation) - self._demerit(leader.trial, correlation)
+        same = frozenset(leader.trial.effects) == frozenset(best.effects)
+        if gain <= 0.0 or same:
+            return self._ended(leader.trial if same else best)
+        self._record(
+            fitted, correlation, leader, "beside the others explains more than what it replaces"
+        )
+        return self._ended(leader.trial)
 
     def _timed(self, baseline: Trial) -> Trial:
         """The baseline of a voltage that stands between samples, where that is all that is missing.
@@ -312,13 +339,14 @@ class _Search:
             self._record(fitted, correlation, fitted[0] if taken else None, reason)
             if taken:
                 best, looking_on = self._restarted(self._ended(leader)), False
+                best = self._in_other_laws(best, (0.1 + 0.28 * (depth + 1), 0.0))
                 if self._is_noise(best):
                     break
             elif looking_on or hopeless:
                 break
             else:
                 looking_on = True
-            beam = [self._ended(t) for t in self._beam(fitted)]
+            beam = [self._ended(t) for t in self._beam(best if taken else leader, fitted)]
         return best
 
     def _ended(self, trial: Trial, leader: float = math.inf) -> Trial:
@@ -362,13 +390,19 @@ class _Search:
         return _DECISIVE + (_UNNAMED_MARGIN if EFFECTS[name].family == "unknown" else 0.0)
 
     def _round(
-        self, parent: Trial, depth: int, span: tuple[float, float], other: Trial | None = None
+        self,
+        parent: Trial,
+        depth: int,
+        span: tuple[float, float],
+        other: Trial | None = None,
+        family: str = "",
     ) -> list[_Tried]:
         """All effects on top of ``parent``: promises of all, refits of all or the best of them.
 
-        ``other`` is ``parent`` with another effect in the place of which they are tried.
+        ``other`` is ``parent`` with another effect in the place of which they are tried; with a
+        ``family``, only effects of that one.
         """
-        promises, jacobian = self._screened(parent, span)
+        promises, jacobian = self._screened(parent, span, family)
         shares = {n: self._promised(parent, n, promises[n][0], other) for n in promises}
         order = sorted(shares, key=lambda n: -shares[n])
         if depth > 0:
@@ -431,24 +465,23 @@ class _Search:
         return not kept and (frozenset(parent.effects), name) not in self.refitted
 
     def _screened(
-        self, parent: Trial, span: tuple[float, float]
+        self, parent: Trial, span: tuple[float, float], family: str = ""
     ) -> tuple[dict[str, list[Promise]], np.ndarray]:
-        """What each effect promises on top of ``parent``, where any; the Jacobian of ``parent``.
+        """What each effect (of a ``family``) promises on top of ``parent``; its Jacobian.
 
         Exchanges come back to models that were screened before.
         """
         key = frozenset(parent.effects)
-        if key not in self.screened or self.screened[key][0] is not parent:
-            screen = Screen(self.bench, parent)
-            names = [e for e in self.effects if e.name not in parent.effects]
-            promises = {}
-            for n, effect in enumerate(names):
-                promises[effect.name] = screen.promises(effect)[:_PROMISES]
-                part = 0.25 * (n + 1) / len(names)
-                self.report(_stage(parent, "screening"), span[0] + span[1] * part)
-            promises = {n: p for n, p in promises.items() if p}
-            self.screened[key] = (parent, promises, screen.jacobian)
-        return self.screened[key][1:]
+        if key not in self.screened or self.screened[key][0].trial is not parent:
+            self.screened[key] = (Screen(self.bench, parent), {})
+        screen, known = self.screened[key]
+        wanted = [e for e in self.effects if family in ("", e.family) and e.name not in key]
+        asked = [e for e in wanted if e.name not in known]
+        for n, effect in enumerate(asked):
+            known[effect.name] = screen.promises(effect)[:_PROMISES]
+            part = 0.25 * (n + 1) / len(asked)
+            self.report(_stage(parent, "screening"), span[0] + span[1] * part)
+        return {e.name: known[e.name] for e in wanted if known[e.name]}, screen.jacobian
 
     def _refit(
         self,
@@ -508,14 +541,19 @@ class _Search:
         return found
 
     def _settled(
-        self, best: Trial, fitted: list[_Tried], least: float = -math.inf
+        self,
+        best: Trial,
+        fitted: list[_Tried],
+        least: float = -math.inf,
+        to_other_laws: bool = False,
     ) -> tuple[list[_Tried], float]:
         """The candidates, best first, the leading ones fitted to the end of their valleys.
 
         Of these only such as explain ``least`` of the cost of ``best``, and far from the noise one
         of each family. Who has not kept a promise by which it would lead is followed like those.
         Named effects go before unnamed ones that do no better than a margin: an attached mode can
-        play a moved mass, a step nearly anything, and a walk all that is slow.
+        play a moved mass, a step nearly anything, and a walk all that is slow. ``to_other_laws``
+        also sets out from where simpler ones have ended.
         """
 
         def rank(tried: _Tried) -> float:
@@ -555,7 +593,7 @@ class _Search:
                 self.found[key] = self.bench.settled(tried.trial, lead)
             lead = min(lead, self.found[key].cost)
         order = self._as_found(order)
-        if to_the_end:
+        if to_other_laws and to_the_end:
             self._set_out_from_simpler(best, order)
             order = self._as_found(order)
         correlation = self._correlation([best, *(t.trial for t in order)])
@@ -570,7 +608,8 @@ class _Search:
 
         These are laws that do worse than a simpler one, and the leading one, where it leaves more
         than noise: a valley that it came into while something else was missing may be the wrong
-        one. The simpler one must do as well as ``best``, of what there was before.
+        one. The simpler one must do as well as ``best``, of what there was before, where its law
+        does not lead.
         """
         lead = min((t.trial for t in tried), key=lambda t: t.cost)
         for one in tried:
@@ -581,9 +620,9 @@ class _Search:
             if self._is_noise(lead):
                 return
             leads = one.trial is lead and _explained(one.parent, lead) > _NEARLY_ALL
-            most = min(best.cost, _NEAR_LEAD * lead.cost)
+            most = _NEAR_LEAD * lead.cost
             if not leads:
-                most = min(most, _AS_GOOD * one.trial.cost)
+                most = min(most, best.cost, _AS_GOOD * one.trial.cost)
             nearest = min(simpler, key=lambda t: t.trial.cost)
             if nearest.trial.cost <= most:
                 self.extended.add(names)
@@ -716,13 +755,12 @@ class _Search:
             taken[first + j] = best.x[first + i]
         return taken
 
-    def _beam(self, fitted: list[_Tried]) -> list[Trial]:
-        """The explanations to follow on: the best of different families."""
+    def _beam(self, leader: Trial, fitted: list[_Tried]) -> list[Trial]:
+        """The explanations to follow on: the best of different families, the leader first."""
         beam: list[Trial] = []
         seen: set[frozenset[str]] = set()
-        for tried in fitted:
-            trial = tried.trial
-            if trial.cost > _BEAM_COST * fitted[0].trial.cost:
+        for trial in (leader, *(t.trial for t in fitted)):
+            if trial.cost > _BEAM_COST * leader.cost:
                 continue
             families = frozenset(EFFECTS[n].family for n in trial.effects)
             if families not in seen:
