@@ -14,7 +14,7 @@ from model.errors import ModelError
 from model.excitation import Sequence
 from model.film import Strip
 from model.fitting import identify
-from model.fitting.intervals import correlation_time, covariance
+from model.fitting.intervals import correlation_time, covariance, is_flat
 from model.fitting.levenberg import descend
 from model.fitting.parameters import Layout
 from model.fitting.problem import Problem
@@ -300,6 +300,25 @@ def test_correlation_time():
     # (1 + a)/(1 - a) of an AR(1) process
     assert correlation_time(red) == pytest.approx(9.0, rel=0.25)
     assert correlation_time(np.zeros(100)) == 1.0
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-6])
+def test_what_is_flat_has_as_much_power_at_any_frequency(size):
+    rng = np.random.default_rng(7)
+    noise = size * rng.standard_normal((400, 5000))
+    # one in a hundred by chance
+    assert 388 <= sum(is_flat(n) for n in noise) <= 400
+    t = np.linspace(0.0, 25.0, 5000)
+    for structure in (
+        np.exp(-t / 3.0),
+        np.sin(2.0 * math.pi * 50.0 * t),
+        np.convolve(rng.standard_normal(5000), np.ones(20), "same"),
+    ):
+        part = structure / structure.std() * size
+        assert not any(is_flat(n + math.sqrt(0.1) * part) for n in noise[:50])
+        assert sum(is_flat(n + math.sqrt(0.003) * part) for n in noise[:50]) > 45
+    assert is_flat(np.zeros(100))
+    assert is_flat(np.ones(3))
 
 
 def test_covariance_is_the_inverse_where_there_is_one():

@@ -18,11 +18,11 @@ from scipy.stats.qmc import Sobol
 
 from model import kernel
 from model.actuator import Actuator, at_rest
-from model.diagnosis.findings import Stage
+from model.diagnosis.findings import NOISE_RMS, Stage
 from model.effects import follows_path
 from model.film import Strip
 from model.fitting.identify import fit_globally, is_determined
-from model.fitting.intervals import correlation_time, covariance
+from model.fitting.intervals import correlation_time, covariance, is_flat
 from model.fitting.levenberg import LocalFit, descend
 from model.fitting.parameters import Estimate, Layout
 from model.fitting.problem import Problem
@@ -52,7 +52,7 @@ _NOT_NEARER = 0.05  # of what it lies behind: promising less, it will not
 _NO_RIVAL = 0.02  # of the same, of a fit that has come near the leader
 _ENDING = 40  # iterations of a fit that others build on
 _ROUGHLY = 100.0  # of the noise's mean square: what leaves more need not be simulated any better
-_WHITE_COST, _WHITE_CORRELATION = 1.04, 1.3  # a lead-in tells the noise to some 2 %
+_WHITE_CORRELATION = 1.3
 _POLISHING = 8  # iterations on every sample
 _PATIENCE = 3  # iterations down a valley that together must gain something
 _NEARLY = 1.02  # of the cost: a descent from elsewhere that comes so near is followed on
@@ -119,8 +119,13 @@ class Trial:
 
     @property
     def is_white(self) -> bool:
-        """True where only noise is left: no fit of the same model can be much better."""
-        return self.cost < _WHITE_COST and self.correlation < _WHITE_CORRELATION
+        """True where only noise is left: no fit of the same model can be much better.
+
+        By its spectrum, as a lead-in tells the size of the noise to some 4 % only.
+        """
+        if self.cost > NOISE_RMS**2 or self.correlation > _WHITE_CORRELATION:
+            return False
+        return all(is_flat(part) for part in _by_record(self.problem, self.residuals))
 
     def jacobian(self, quick: bool = False) -> np.ndarray:
         """d(residuals)/dx (N, f) over the free numbers; ``quick`` by one-sided differences."""
@@ -622,13 +627,14 @@ def _trial(problem: Problem, fit: LocalFit, fixed: np.ndarray) -> Trial:
 
 def _correlation(problem: Problem, fit: LocalFit) -> float:
     """Correlation time of the residuals, the mean over records (each by its own)."""
-    times, sizes, start = [], [], 0
-    for record in problem.records:
-        part = fit.residuals[start : start + record.measured.size]
-        times.append(correlation_time(part))
-        sizes.append(part.size)
-        start += part.size
+    parts = _by_record(problem, fit.residuals)
+    times, sizes = [correlation_time(p) for p in parts], [p.size for p in parts]
     return float(np.average(times, weights=sizes))
+
+
+def _by_record(problem: Problem, residuals: np.ndarray) -> list[np.ndarray]:
+    edges = np.cumsum([r.measured.size for r in problem.records])
+    return np.split(residuals, edges[:-1])
 
 
 def _thinned(record: Record) -> Record:

@@ -7,17 +7,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import kolmogorov
 
 from model.fitting.levenberg import descend
 from model.fitting.problem import Problem
 
-__all__ = ["CHI2_95", "correlation_time", "covariance", "profile"]
+__all__ = ["CHI2_95", "correlation_time", "covariance", "is_flat", "profile"]
 
 CHI2_95 = 3.841458820694124  #: 95 % of chi-square with one degree of freedom
 _POINTS_MAX = 8  # on one side of a profile
 _NEAR = 0.06  # of the threshold's root: close enough to call it crossed
 _NEAR_A_LIMIT = 0.3  # the same for a limit that is not determined: it is a bound by decades
 _SHORTER = np.array([1.0, 0.5, 0.25, 0.1, 0.03])  # of a step: tried at once
+_BY_CHANCE = 0.01  # of white noise is not as flat as is asked for
 _GUESS_MAX = 1e4  # thresholds above the optimum from which a refit takes a few iterations
 
 
@@ -37,6 +39,22 @@ def correlation_time(residuals: np.ndarray) -> float:
     lost = np.flatnonzero(correlation < 2.0 / math.sqrt(n))
     end = int(lost[0]) if lost.size else correlation.size
     return float(1.0 + 2.0 * correlation[1:end].sum())
+
+
+def is_flat(residuals: np.ndarray) -> bool:
+    """Whether ``residuals`` (N,) have as much power at any frequency, whatever their size.
+
+    Bartlett's test: the periodogram of white noise, summed up, is a straight line (Durbin,
+    Biometrika 56, 1969). Of 5000 samples it sees a twentieth of the power that is where it should not be.
+    """
+    power = np.abs(np.fft.rfft(residuals))[1:-1] ** 2
+    summed = np.cumsum(power)
+    if summed.size < 2 or summed[-1] <= 0.0:
+        return True
+    m = summed.size - 1
+    line = np.arange(1, m + 1) / (m + 1.0)
+    away = float(np.max(np.abs(summed[:-1] / summed[-1] - line)))
+    return bool(kolmogorov(away * math.sqrt(m)) > _BY_CHANCE)
 
 
 def covariance(normal: np.ndarray, inflation: float) -> np.ndarray:
