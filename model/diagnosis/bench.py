@@ -60,6 +60,7 @@ _FAR_ABOVE = 1.1  # of the cost of a descent from elsewhere: such a valley is le
 _RESTARTS = 2  # from a new global search, beside what was found
 _SETTING = 6  # iterations of the branches alone
 _PLACED = 3  # of the starts, the branches in their places, that are followed on
+_FAR_OFF = 4.0  # times the cost, before other numbers follow: these lead nowhere near
 _RESTART = 10  # iterations of each
 _SCATTERED = 128  # places of numbers of which nothing is known
 _SCOUTED = 6  # of these, the best ones, that are followed
@@ -419,6 +420,8 @@ class Bench:
         placed = self.together(
             lambda x: descend_by_secants(scouted, x, held, iterations=_SETTING, sure=False), anew
         )
+        if min(f.cost for f in placed) > _FAR_OFF * trial.cost:
+            return trial
         fits = self.together(
             lambda f: descend_by_secants(
                 scouted, f.x, trial.fixed, iterations=_RESTART, sure=False
@@ -428,9 +431,10 @@ class Bench:
         best = min(fits, key=lambda f: f.cost)
         fit = descend_by_secants(trial.problem, best.x, trial.fixed, iterations=0)
         other = _trial(trial.problem, fit, trial.fixed)
-        if other.cost > _NEARLY * trial.cost:
-            return trial
-        return min(trial, self._down(other, _ENDING, _WORTH * other.cost), key=lambda t: t.cost)
+        # who comes to where it was finds nothing on from there
+        if other.cost < _AS_GOOD * trial.cost:
+            other = self._down(other, _ENDING, _WORTH * other.cost)
+        return min(trial, other, key=lambda t: t.cost)
 
     def _without_effects(self, problem: Problem, xs: np.ndarray) -> list[Problem | None]:
         """The records without what the effects do at each of ``xs`` (K, d): for the springs alone.

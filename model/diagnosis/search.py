@@ -364,9 +364,8 @@ class _Search:
 
     def _restarted(self, trial: Trial) -> Trial:
         """``trial`` from a new global search, with what its effects do taken off the records."""
-        key = frozenset(trial.effects)
-        self.found[key] = self.bench.restarted(trial)
-        return self.found[key]
+        self._keep(self.bench.restarted(trial))
+        return self._ended(self.found[frozenset(trial.effects)])
 
     def _share(self, best: Trial, gain: float) -> float:
         """The part of what ``best`` leaves above the noise that one more effect must explain.
