@@ -681,6 +681,49 @@ def test_what_explains_too_little_to_be_named_is_not_exchanged():
     assert looked == ["leakage"]
 
 
+def test_another_law_of_a_family_is_asked_for_beside_what_was_found_since():
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    rounds: list[tuple[tuple[str, ...], str]] = []
+
+    def left(names: tuple[str, ...], cost: float) -> Trial:
+        model = replace(PLAIN, effects=tuple(typical(n) for n in names))
+        trial = made_trial([record], model, math.sqrt(cost) * noise)
+        search.found.setdefault(frozenset(names), trial)
+        return search.found[frozenset(names)]
+
+    def a_round(parent: Trial, *given: object) -> list[_Tried]:
+        *_, family = given
+        rounds.append((parent.effects, str(family)))
+        laws = {"softening": ("ageing", "logarithmic ageing"), "leakage": ("leakage",)}
+        tried = []
+        for name in laws[str(family)]:
+            names = (*parent.effects, name)
+            cost = 1.9 if "logarithmic ageing" in names else 4.0
+            tried.append(_Tried(name, parent, left(names, cost), 0.5))
+        return tried
+
+    search._ended = lambda trial, *_: trial  # type: ignore[method-assign]
+    search.bench.settled = lambda trial, *_: trial  # type: ignore[method-assign]
+    search._without = lambda trial, name: left(  # type: ignore[method-assign]
+        tuple(n for n in trial.effects if n != name), 20.0
+    )
+    search._round = a_round  # type: ignore[assignment, method-assign]
+    best = left(("ageing", "leakage"), 4.0)
+    found = search._in_other_laws(best, (0.0, 1.0))
+    assert set(found.effects) == {"leakage", "logarithmic ageing"}
+    beside = [(("leakage",), "softening"), (("ageing",), "leakage")]
+    again = [(("logarithmic ageing",), "leakage"), (("leakage",), "softening")]
+    assert rounds[:2] == beside
+    assert sorted(rounds[2:]) == sorted(again)
+    # nothing is left to be explained by another law
+    rounds.clear()
+    told = replace(found, residuals=noise / NOISE, cost=1.0, correlation=1.0)
+    assert search._in_other_laws(told, (0.0, 1.0)) is told
+    assert rounds == []
+
+
 def test_a_model_is_screened_once_for_each_effect():
     search = _Search([record_of(PLAIN)], PLAIN, 1, lambda *_: None, lambda: False)
     search.effects = [EFFECTS["linear drag"], EFFECTS["mains interference"]]

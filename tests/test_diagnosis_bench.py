@@ -249,6 +249,13 @@ def test_the_measured_stretch_tells_what_branches_imitate():
     assert sought.cost < 1.2
     assert sought.x[-1] == pytest.approx(TAU, rel=0.2)
 
+    # who comes back to where it was is not followed on from there
+    def down(*_):
+        raise AssertionError
+
+    bench._down = down
+    assert bench.sought(sought, sought.x[None]).cost == pytest.approx(sought.cost, rel=0.02)
+
 
 def test_films_have_no_voltage_to_account_for():
     bench = bench_of(film_record_of(STRIP))

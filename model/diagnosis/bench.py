@@ -60,7 +60,6 @@ _FAR_ABOVE = 1.1  # of the cost of a descent from elsewhere: such a valley is le
 _RESTARTS = 2  # from a new global search, beside what was found
 _SETTING = 6  # iterations of the branches alone
 _PLACED = 3  # of the starts, the branches in their places, that are followed on
-_FAR_OFF = 4.0  # times the cost, before other numbers follow: these lead nowhere near
 _RESTART = 10  # iterations of each
 _SCATTERED = 128  # places of numbers of which nothing is known
 _SCOUTED = 6  # of these, the best ones, that are followed
@@ -420,8 +419,6 @@ class Bench:
         placed = self.together(
             lambda x: descend_by_secants(scouted, x, held, iterations=_SETTING, sure=False), anew
         )
-        if min(f.cost for f in placed) > _FAR_OFF * trial.cost:
-            return trial
         fits = self.together(
             lambda f: descend_by_secants(
                 scouted, f.x, trial.fixed, iterations=_RESTART, sure=False

@@ -45,7 +45,7 @@ def is_flat(residuals: np.ndarray) -> bool:
     """Whether ``residuals`` (N,) have as much power at any frequency, whatever their size.
 
     Bartlett's test: the periodogram of white noise, summed up, is a straight line (Durbin,
-    Biometrika 56, 1969). Of 5000 samples it sees a twentieth of the power that is where it should not be.
+    Biometrika 56, 1969). Of 5000 samples it sees a twentieth of the power, where that is elsewhere.
     """
     power = np.abs(np.fft.rfft(residuals))[1:-1] ** 2
     summed = np.cumsum(power)
