@@ -68,6 +68,7 @@ _IN_THE_WAY = 0.9  # of what no branches account for: with an effect that leaves
 _CLEARLY = 2.0  # of the least that is left: more, and it is not the one that they hid
 _AS_WELL = 1.1  # of what is left beside a leader that explains all: these may do so too
 _ANEW = 6  # of such effects that are fitted anew
+_OUT_OF_REACH = 30.0  # times the leader's cost: from there no branches elsewhere lead to it
 _CONTENDERS = 4  # of those that promised as much as a leader that explains all
 _ANEW_SIZES = (0.3, 1.0, 3.0, 10.0, 30.0)  # times the typical one, tried for that
 _ANEW_CLOSER = (0.56, 0.75, 1.0, 1.33, 1.78)  # times the best of these
@@ -585,7 +586,8 @@ class _Search:
             if best.cost - tried.trial.cost < least:
                 continue
             key = frozenset(tried.trial.effects)
-            if may_lead and to_the_end:
+            # beside a leader that leaves but noise, it need only be seen who does as well
+            if may_lead and to_the_end and not leads.is_white:
                 self._ended(tried.trial, lead)
             elif key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
                 self.settled.add(key)
@@ -644,10 +646,12 @@ class _Search:
             for key, p in parents.items()
         }
 
+        leader = tried[0].trial
+
         def looked(place: int) -> tuple[float, int, float] | None:
             one = tried[place]
             sizes = EFFECTS[one.name].sizes
-            if len(sizes) != 1:
+            if len(sizes) != 1 or one.trial.cost > _OUT_OF_REACH * leader.cost:
                 return None
             left, size = self._unaccounted(one, sizes_of(sizes[0], _ANEW_SIZES))
             if not left < _IN_THE_WAY * before[frozenset(one.parent.effects)]:
@@ -658,7 +662,6 @@ class _Search:
         looks = [k for k in self.bench.together(looked, range(len(tried))) if k is not None]
         looks.sort(key=lambda look: look[0])
         most = _CLEARLY * looks[0][0] if looks else 0.0
-        leader = tried[0].trial
         if leader.cost < _EXPLAINED_RMS**2:
             there = float(self.bench.unaccounted(leader.problem, leader.x[None])[0])
             there = min([there, *(left for left, place, _ in looks if place == 0)])
