@@ -24,6 +24,7 @@ from model.actuator import Actuator
 from model.diagnosis.bench import Bench, Trial
 from model.effects import EFFECTS, Effect, EffectValues, Parameter, follows_path
 from model.film import Strip
+from model.fitting.problem import Problem
 from model.records import ActuatorRecord, FilmRecord
 
 __all__ = ["Promise", "Screen", "is_of", "sizes_of", "with_effect"]
@@ -32,6 +33,7 @@ _MOMENTS = 20  # sought along the longest record
 _CLOSER = ((1.0, 9), (0.3, 9), (0.1, 9))  # parts of their distance, and how many there
 _LINES = 400  # frequencies within an effect's bounds
 _SIMULATED = 2  # leading promises that are held against a simulation
+_DONE_WELL = (1e-2, 1e-3)  # of what a model's numbers do best: what is left to them
 _SIZES = (0.3, 1.0, 3.0, 10.0)  # times the typical one, tried of effects with a single size
 
 
@@ -123,6 +125,7 @@ class Screen:
         there = (predicted - problem.measured) * self._weight
         total = float(self._residual @ self._residual)
         kept = [replace(promise, share=0.0) for promise in found]
+        off: dict[int, np.ndarray] = {}  # what the base model's own numbers could take off
         for (place, values), residual, failed in zip(rows, there, status, strict=True):
             if failed:
                 continue
@@ -132,18 +135,34 @@ class Screen:
             if share <= kept[place].share:
                 continue
             start = layout.coordinates(values)
-            # what the base model's own numbers do about the rest of it, no further than sensible
-            step = np.zeros(first)
-            step[~self.trial.fixed] = -np.linalg.lstsq(self._r, own, rcond=1e-6)[0]
-            reach = layout.reach(start)[:first]
-            start[:first] += step / max(1.0, float(np.max(np.abs(step) / reach)))
-            start = np.clip(start, layout.lower, layout.upper)
+            off[place] = own
             columns = found[place].columns
             moved = values[first] - (effect.sizes[0].neutral or 0.0)
             if len(effect.sizes) == 1 and moved != 0.0:
                 columns = ((residual - self.trial.residuals) / moved)[:, None]
             kept[place] = replace(found[place], start=start, columns=columns, share=share)
+        for place, own in off.items():
+            kept[place] = replace(kept[place], start=self._met(problem, kept[place].start, own))
         return kept
+
+    def _met(self, problem: Problem, start: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """``start`` (d,) with the base model's own numbers where they meet the effect best.
+
+        ``own`` (f,) is what they could take off there, to first order. Where branches relax nearly
+        alike that leads far away, along numbers that to first order do nothing: so only what they
+        do well is asked of them, and what it comes to is simulated, as is where nothing moves.
+        """
+        free, layout = ~self.trial.fixed, problem.layout
+        reach = self.trial.problem.layout.reach(self.trial.x)[free]
+        u, much, v = np.linalg.svd(self._r * reach)
+        starts = [start]
+        for least in _DONE_WELL:
+            told = much > least * much[0]
+            step = -v[told].T @ ((u[:, told].T @ own) / much[told])
+            there = start.copy()
+            there[: free.size][free] += reach * step / max(1.0, float(np.max(np.abs(step))))
+            starts.append(np.clip(there, layout.lower, layout.upper))
+        return starts[int(np.argmin(problem.costs(np.array(starts))))]
 
     def _duration(self) -> float:
         return max(float(r.time[-1]) for r in self.bench.records)
