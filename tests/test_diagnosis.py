@@ -461,7 +461,7 @@ def test_what_leaves_but_noise_is_not_fitted_anew():
     ("before", "simple", "law", "again"),
     [
         (9.0, 1.4, 1.6, True),  # does worse than what it extends
-        (9.0, 1.4, 1.405, False),  # by nothing
+        (9.0, 1.4, 1.4, True),  # does no better
         (9.0, 1.5, 1.3, True),  # leads, and leaves more than noise
         (9.0, 2.5, 1.3, False),  # so does what it extends, and it is far away
         (2.5, 1.5, 1.3, False),  # with most of the residual still there

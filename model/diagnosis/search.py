@@ -607,10 +607,10 @@ class _Search:
     def _set_out_from_simpler(self, best: Trial, tried: list[_Tried]) -> None:
         """Fit laws again from where the best that they extend has ended, each once, until one fits.
 
-        These are laws that do worse than a simpler one, and the leading one, where it leaves more
-        than noise: a valley that it came into while something else was missing may be the wrong
-        one. The simpler one must do as well as ``best``, of what there was before, where its law
-        does not lead.
+        These are laws that do no better than a simpler one, and the leading one, where it leaves
+        more than noise: a valley that it came into while something else was missing may be the
+        wrong one. Where its law does not lead, the simpler one must do as well as ``best``, of what
+        there was before.
         """
         lead = min((t.trial for t in tried), key=lambda t: t.cost)
         for one in tried:
@@ -623,7 +623,7 @@ class _Search:
             leads = one.trial is lead and _explained(one.parent, lead) > _NEARLY_ALL
             most = _NEAR_LEAD * lead.cost
             if not leads:
-                most = min(most, best.cost, _AS_GOOD * one.trial.cost)
+                most = min(most, best.cost, one.trial.cost)
             nearest = min(simpler, key=lambda t: t.trial.cost)
             if nearest.trial.cost <= most:
                 self.extended.add(names)
