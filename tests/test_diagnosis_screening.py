@@ -93,6 +93,25 @@ def test_the_sensitivities_are_those_of_the_model():
     assert there < 0.1 * trial.cost
 
 
+def test_branches_that_relax_alike_do_not_lead_a_start_away():
+    # one relaxation, and two branches for it
+    one = Network.gent((45e3, 60e3), (1e4, 1e4), (4.0,))
+    two = Network.gent((45e3, 40e3, 20e3), (1e4,) * 3, (4.0, 4.0001))
+    truth = replace(PLAIN, network=one, effects=effect("amplifier slew", inverse_slew=5e-5))
+    bench, _, _ = screened(truth, base=replace(PLAIN, network=one))
+    layout = bench.problem(replace(PLAIN, network=two)).layout
+    held = np.zeros(layout.size, dtype=bool)
+    held[layout.column("J")] = True
+    alike = held.copy()
+    alike[layout.column("T")] = True
+    start = layout.coordinates(layout.initial())
+    trial = bench.fit(layout.base, [(start, None)], alike)
+    best = Screen(bench, replace(trial, fixed=held)).promises(EFFECTS["amplifier slew"])[0]
+    assert best.share > 0.9
+    there = bench.problem(best.model).costs(best.start[None])[0]
+    assert there < 0.1 * trial.cost
+
+
 def test_of_noise_little_is_promised():
     _, trial, screen = screened(PLAIN, quiet=False)
     readings = trial.residuals.size
