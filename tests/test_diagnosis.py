@@ -560,6 +560,30 @@ def test_what_is_exchanged_sets_out_beside_the_rest_as_it_was():
     assert set_out.network.times == pytest.approx([0.3])
 
 
+@pytest.mark.parametrize(("left", "sets_out"), [(1e4, True), (2.0, False)])
+def test_far_from_the_noise_a_mass_sets_out_where_the_measured_stretch_tells_it(left, sets_out):
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    residual = math.sqrt(left) * NOISE * np.ones(record.measured.size)
+    parent = made_trial([record], PLAIN, residual)
+    search.found[frozenset()] = parent
+    harder = parent.x + 0.1
+    search.bench.moving = lambda _: [(harder, 0.17)]  # type: ignore[method-assign]
+    with_mass = replace(PLAIN, effects=effect("load inertia", moving_mass=0.01))
+    layout = search.bench.problem(with_mass).layout
+    promise = Promise(with_mass, layout.coordinates(layout.initial()), np.zeros((1, 1)), 0.0)
+    given = []
+
+    def fit(*those: object) -> Trial:
+        given.append(those[-1])
+        return parent
+
+    search.bench.fit = fit  # type: ignore[method-assign]
+    search._refit(parent, "load inertia", [promise], np.zeros((1, parent.x.size)))
+    (anew,) = given
+    assert np.allclose(anew, [np.append(harder, 0.17)] if sets_out else [])
+
+
 def test_what_is_exchanged_promises_what_it_does_beside_the_rest_as_it_was():
     late, leaking = effect("sensor lag", time_constant=0.1), effect("leakage", **LEAKING)
     record = record_of(replace(PLAIN, effects=(*leaking, *late)))

@@ -11,7 +11,11 @@ import numpy as np
 import pytest
 
 from model import kernel
+from model.actuator import Drive
 from model.diagnosis.bench import Bench, information, relieved
+from model.diagnosis.screening import Screen
+from model.effects import EFFECTS
+from model.excitation import Chirp, Ramp, Sequence
 from model.fitting import identify
 from model.fitting.parameters import Layout
 from model.material import Network
@@ -255,6 +259,28 @@ def test_the_measured_stretch_tells_what_branches_imitate():
 
     bench._down = down
     assert bench.sought(sought, sought.x[None]).cost == pytest.approx(sought.cost, rel=0.02)
+
+
+def test_the_measured_stretch_tells_a_mass_that_has_bent_everything():
+    mass = 0.2
+    chirp = Chirp(1500.0, 0.2, 12.0, 20.0)
+    swept = Sequence("swept", (Ramp(3500.0, 2.0), chirp, Ramp(0.0, 2.0)))
+    drive = Drive(*swept.sample(200.0))
+    loaded = replace(PLAIN, effects=effect("load inertia", moving_mass=mass))
+    bench = bench_of(record_of(loaded, drive))
+    bare = bench.ended(bench.baseline(PLAIN, lambda *_: None))
+    assert bare.cost > 1000.0
+    promises = Screen(bench, bare).promises(EFFECTS["load inertia"])
+    # what was fitted without it cannot ring as it does, whatever the mass
+    assert all(p.share < 0.5 for p in promises)
+    ((springs, told),) = bench.moving(bare)[:1]
+    assert told == pytest.approx(mass, rel=0.1)
+
+    with_mass = replace(bare.model, effects=effect("load inertia", moving_mass=0.0))
+    fixed = np.append(bare.fixed, False)
+    found = bench.settled(bench.fit(with_mass, [], fixed, anew=[np.append(springs, told)]))
+    assert found.cost < 1.2
+    assert found.x[-1] == pytest.approx(mass, rel=0.01)
 
 
 def test_films_have_no_voltage_to_account_for():

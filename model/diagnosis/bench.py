@@ -26,7 +26,7 @@ from model.fitting.intervals import correlation_time, covariance, is_flat
 from model.fitting.levenberg import LocalFit, descend
 from model.fitting.parameters import Estimate, Layout
 from model.fitting.problem import Problem
-from model.fitting.search import voltage_misfit, voltage_starts
+from model.fitting.search import moving_starts, voltage_misfit, voltage_starts
 from model.fitting.secant import descend_by_secants
 from model.fitting.threads import Job, Result, together
 from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
@@ -432,6 +432,16 @@ class Bench:
         if other.cost < _AS_GOOD * trial.cost:
             other = self._down(other, _ENDING, _WORTH * other.cost)
         return min(trial, other, key=lambda t: t.cost)
+
+    def moving(self, trial: Trial) -> list[tuple[np.ndarray, float]]:
+        """Coordinates (d,) of springs beside a mass that the measured stretch asks for; its kg."""
+        return [
+            (springs, mass)
+            for searched in self._without_effects(trial.problem, trial.x[None])
+            if searched is not None
+            for found, mass in (moving_starts(searched, _RESTARTS),)
+            for springs in found
+        ]
 
     def _without_effects(self, problem: Problem, xs: np.ndarray) -> list[Problem | None]:
         """The records without what the effects do at each of ``xs`` (K, d): for the springs alone.

@@ -514,8 +514,11 @@ class _Search:
         alone = self.found.get(frozenset((name,)))
         if other is not None and alone is not None:
             starts.append((self._in_place(model, other, alone), starts[0][1]))
-        may_relieve = effect.relaxes and isinstance(model, Actuator)
-        anew = self._relieved(parent, promises[0]) if may_relieve else []
+        anew: list[np.ndarray] = []
+        if effect.relaxes and isinstance(model, Actuator):
+            anew = self._relieved(parent, promises[0])
+        elif effect.acts_on == "inertia" and parent.cost > _MUCH_LEFT:
+            anew = self._moving(parent, promises[0])
         fixed = np.concatenate([parent.fixed, np.zeros(len(effect.parameters), dtype=bool)])
         leader = min(t.cost for t in self.found.values())
         noise = self._is_noise(parent)
@@ -535,6 +538,21 @@ class _Search:
         for springs, modulus, time in relieved(parent):
             values = layout.values(promise.start)
             values[springs.size : springs.size + 2] = modulus, time
+            x = np.clip(layout.coordinates(values), layout.lower, layout.upper)
+            x[: springs.size] = springs
+            found.append(x)
+        return found
+
+    def _moving(self, parent: Trial, promise: Promise) -> list[np.ndarray]:
+        """Coordinates with the mass, and the springs beside it, that the measured stretch tells.
+
+        While a mass is missing, so much is bent that no size of it promises anything from there.
+        """
+        layout = self.bench.problem(promise.model).layout
+        found = []
+        for springs, mass in self.bench.moving(parent):
+            values = layout.values(promise.start)
+            values[parent.x.size] = mass
             x = np.clip(layout.coordinates(values), layout.lower, layout.upper)
             x[: springs.size] = springs
             found.append(x)

@@ -19,13 +19,13 @@ from model.coefficients import EFFECTS_AT, ELECTRIC, INERTIA, MODULUS, WIDTH
 from model.diagnosis.findings import MissingStress
 from model.effects import MEMORY, NEUTRAL, SLOTS, assembly
 from model.film import Strip, unit_stresses
+from model.fitting.search import SMOOTHING
 from model.kinematics import thinning
 from model.network import HEAD
 from model.records import ActuatorRecord, FilmRecord, Record, counted
 
 __all__ = ["missing_stress"]
 
-_SMOOTHING = 0.015  # s: standard deviation of the window, so that lam'' is kept to about 10 Hz
 _BAND = 10.0  # Hz
 
 
@@ -80,7 +80,7 @@ def _of_actuator(record: ActuatorRecord, model: Actuator) -> MissingStress | Non
     c[EFFECTS_AT : EFFECTS_AT + SLOTS] = NEUTRAL
     _, rest = at_rest(c)
     length = model.film.length
-    width = _SMOOTHING / step
+    width = SMOOTHING / step
 
     def lacking(displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         stretch = rest + gaussian_filter1d(displacement, width, mode="nearest") / length

@@ -8,11 +8,12 @@ from itertools import combinations
 from math import comb
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import OptimizeResult, differential_evolution, nnls
 
 from model import kernel
 from model.actuator import Actuator
-from model.coefficients import ELECTRIC, MODULUS
+from model.coefficients import ELECTRIC, INERTIA, LENGTH, MODULUS, SECTION
 from model.errors import ModelError
 from model.film import unit_stresses
 from model.fitting.parameters import THESIS_RANGES, Layout
@@ -24,15 +25,19 @@ from model.records import ActuatorRecord, FilmRecord
 
 __all__ = [
     "ALGORITHM_1",
+    "SMOOTHING",
     "Algorithm1",
     "algorithm_1",
     "film_starts",
+    "moving_starts",
     "voltage_misfit",
     "voltage_starts",
 ]
 
 Progress = Callable[[str, float], None]
 
+#: s, standard deviation of the window through which lam'' is read: it is kept to about 10 Hz
+SMOOTHING = 0.015
 _WIDE_LIMIT = 1e4  # of J: a spring that does not stiffen within any stretch of an actuator
 _REST_TURNS = 6
 _SETS_MAX = 6000  # of branches, each tried by least squares: a third of a second
@@ -115,27 +120,25 @@ def voltage_starts(problem: Problem, progress: Progress, starts: int = 6) -> np.
     times, with non-negative least squares for the moduli: it needs no luck and no seed.
     """
     layout = problem.layout
-    base = _actuator(problem)
-    c = layout.coefficients(_start_values(layout))[0]
-    candidates = _candidates(problem)
-    measured = base.load.rest_length
-    rest = 1.1 if measured is None else measured / base.film.length
-    for turn in range(_REST_TURNS):
-        parts, target = _balance(problem, base, c, candidates, rest)
-        progress("global search", (turn + 1) / (_REST_TURNS + 1))
-        if measured is not None:
-            break
-        moduli, _ = nnls(parts.T, target)
-        if moduli[0] <= 0.0:
-            break
-        c[HEAD + MODULUS] = moduli[0]
-        status, solved = kernel.rest_stretch(c, 0.0)
-        if status != kernel.OK or abs(solved - rest) < 1e-6:
-            break
-        rest = solved
+    candidates, parts, target = _at_rest_balance(problem, progress)
     found = _subsets(layout, _WIDE_LIMIT, candidates, parts, target)
     progress("global search", 1.0)
     return _ranked(layout, found, starts)
+
+
+def moving_starts(problem: Problem, starts: int = 6) -> tuple[np.ndarray, float]:
+    """Starts (K, d) as of ``voltage_starts`` beside a mass that moves with the film; its kg.
+
+    The stress that the mass takes is proportional to the measured acceleration: one more column of
+    the least squares. So it is told also where it has bent all that was fitted without it.
+    """
+    layout = problem.layout
+    c = layout.coefficients(_start_values(layout))[0]
+    candidates, parts, target = _at_rest_balance(problem, lambda *_: None, moving=True)
+    weights, _ = nnls(parts.T, target)
+    found = _subsets(layout, _WIDE_LIMIT, candidates, parts[:-1], target - weights[-1] * parts[-1])
+    mass = max(weights[-1] - c[INERTIA], 0.0) * c[SECTION] / c[LENGTH]
+    return _ranked(layout, found, starts), float(mass)
 
 
 def voltage_misfit(problem: Problem, rest: float) -> float:
@@ -171,10 +174,44 @@ def _candidates(problem: Problem) -> np.ndarray:
     return np.array([(t, _WIDE_LIMIT) for t in _time_grid(problem)])
 
 
+def _at_rest_balance(
+    problem: Problem, progress: Progress, moving: bool = False
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Candidates (G, 2) and the balance as in ``_balance``, about the rest that it leads to."""
+    layout = problem.layout
+    base = _actuator(problem)
+    c = layout.coefficients(_start_values(layout))[0]
+    candidates = _candidates(problem)
+    measured = base.load.rest_length
+    rest = 1.1 if measured is None else measured / base.film.length
+    for turn in range(_REST_TURNS):
+        parts, target = _balance(problem, base, c, candidates, rest, moving)
+        progress("global search", (turn + 1) / (_REST_TURNS + 1))
+        if measured is not None:
+            break
+        moduli, _ = nnls(parts.T, target)
+        if moduli[0] <= 0.0:
+            break
+        c[HEAD + MODULUS] = moduli[0]
+        status, solved = kernel.rest_stretch(c, 0.0)
+        if status != kernel.OK or abs(solved - rest) < 1e-6:
+            break
+        rest = solved
+    return candidates, parts, target
+
+
 def _balance(
-    problem: Problem, base: Actuator, c: np.ndarray, candidates: np.ndarray, rest: float
+    problem: Problem,
+    base: Actuator,
+    c: np.ndarray,
+    candidates: np.ndarray,
+    rest: float,
+    moving: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Stress per unit modulus (1 + G, N) less that at rest, and the Maxwell stress (N,)."""
+    """Stress per unit modulus (1 + G, N) less that at rest, and the Maxwell stress (N,).
+
+    If ``moving``, both smoothed alike, and with the acceleration of the stretch as a last row.
+    """
     parts, targets = [], []
     for record in problem.records:
         if isinstance(record, ActuatorRecord):
@@ -185,9 +222,18 @@ def _balance(
                 base.network, base.film.held, _WIDE_LIMIT, candidates, record.time, stretch
             )
             part -= part[:, :1]
-            parts.append(part)
             thrust = electric_along(base.film.held, stretch)
-            targets.append(c[ELECTRIC] * record.drive.voltage**2 * thrust)
+            target = c[ELECTRIC] * record.drive.voltage**2 * thrust
+            if moving:
+                step = float(np.median(np.diff(record.time)))
+                width = SMOOTHING / step
+                part = gaussian_filter1d(part, width, mode="nearest")
+                # from rest: the filter's weights do not quite add up to nothing
+                bend = gaussian_filter1d(stretch - rest, width, order=2, mode="nearest")
+                part = np.vstack([part, bend / step**2])
+                target = gaussian_filter1d(target, width, mode="nearest")
+            parts.append(part)
+            targets.append(target)
     return np.concatenate(parts, axis=1), np.concatenate(targets)
 
 
