@@ -91,16 +91,17 @@ class Screen:
         """Promises of ``effect``, best first: one for each shape on its grid."""
         shapes = list(product(*(self._starts(p) for p in effect.shapes)))
         found = self._scored(effect, shapes)
-        sought = any(p.part_of == "duration" for p in effect.shapes)
-        if found and sought:
+        only = effect.shapes[0] if len(effect.shapes) == 1 else None
+        step = self._step(only) if only else 0.0
+        if found and only and step:
+            low, high = only.bounds
             for part, count in _CLOSER:
                 best = max(found, key=lambda p: p.share)
-                moment = best.model.effects[-1][1][-1][1]
-                step = part * self._duration() / _MOMENTS
-                finer = [(moment + f * step,) for f in np.linspace(-1.0, 1.0, count)]
-                found += self._scored(effect, [s for s in finer if s[0] > 0.0])
+                place = best.model.effects[-1][1][-1][1]
+                finer = [(place + f * part * step,) for f in np.linspace(-1.0, 1.0, count)]
+                found += self._scored(effect, [s for s in finer if low < s[0] < high])
         found.sort(key=lambda p: -p.share)
-        tried = self._simulated(effect, found, several=not sought and len(effect.sizes) == 1)
+        tried = self._simulated(effect, found, several=not step and len(effect.sizes) == 1)
         return sorted(tried, key=lambda p: -p.share)
 
     def _simulated(self, effect: Effect, found: list[Promise], several: bool) -> list[Promise]:
@@ -163,6 +164,12 @@ class Screen:
             there[: free.size][free] += reach * step / max(1.0, float(np.max(np.abs(step))))
             starts.append(np.clip(there, layout.lower, layout.upper))
         return starts[int(np.argmin(problem.costs(np.array(starts))))]
+
+    def _step(self, shape: Parameter) -> float:
+        """How far apart places are between which a descent loses its way; 0 where it does not."""
+        if shape.part_of == "duration":
+            return self._duration() / _MOMENTS
+        return 1.0 / self._duration() if shape.part_of == "spectrum" else 0.0
 
     def _duration(self) -> float:
         return max(float(r.time[-1]) for r in self.bench.records)
