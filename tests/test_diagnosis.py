@@ -34,6 +34,7 @@ from tests.engine_tools import (
     STRIP,
     effect,
     film_record_of,
+    fitted,
     made_trial,
     masked,
     record_of,
@@ -275,6 +276,25 @@ def test_who_plays_a_walk_once_it_is_left_out_predicts_nothing():
     assert predicting(walk_leaves=90.0) == ("linear drag",)
     # beside it there is nothing left for the drag to do
     assert predicting(walk_leaves=5.0) == ()
+
+
+@pytest.mark.parametrize(("explained", "predicting"), [(0.9, ("linear drag",)), (0.7, ())])
+def test_what_does_not_foretell_a_part_of_the_records_predicts_no_others(explained, predicting):
+    # drag, and something else by which the film is off by twice the noise
+    record = record_of(replace(PLAIN, effects=effect("linear drag", drag=6000.0)))
+    off = 2.0 * NOISE * np.sin(2.0 * np.pi * 17.0 * record.time)
+    record = replace(record, displacement=record.displacement + off)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    bare = fitted(search.bench, PLAIN)
+    dragged = replace(PLAIN, effects=effect("linear drag", drag=6000.0))
+    search.found = {frozenset(): bare, frozenset({"linear drag"}): fitted(search.bench, dragged)}
+    best = search.found[frozenset({"linear drag"})]
+    unseen = {id(best): 1.0 + (1.0 - explained) * (bare.cost - 1.0), id(bare): bare.cost}
+    search.bench.foretold = lambda trial: unseen[id(trial)]  # type: ignore[method-assign]
+    found = search._finding(bare, best)
+    assert found.verdict == PARTLY_EXPLAINED
+    assert tuple(name for name, _ in found.final.predicting.effects) == predicting
+    assert any("predicted without it" in note for note in found.notes) == (not predicting)
 
 
 def test_what_happened_in_every_recording_alike_predicts_others():
@@ -746,6 +766,31 @@ def test_another_law_of_a_family_is_asked_for_beside_what_was_found_since():
     told = replace(found, residuals=noise / NOISE, cost=1.0, correlation=1.0)
     assert search._in_other_laws(told, (0.0, 1.0)) is told
     assert rounds == []
+
+
+@pytest.mark.parametrize(("better", "turns"), [(1.0, 1), (0.5, 2)])
+def test_an_effect_that_stays_alone_is_asked_for_its_law_in_the_end(better, turns):
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = 3.0 * NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    aged = replace(PLAIN, effects=(typical("ageing"),))
+    alone, base = (made_trial([record], model, noise) for model in (aged, PLAIN))
+    done: list[str] = []
+
+    def searched(best: Trial) -> Trial:
+        done.append("search")
+        return best if best.effects else alone
+
+    def in_other_laws(best: Trial, _: object) -> Trial:
+        done.append("laws")
+        return replace(best, cost=(better if best is alone else 1.0) * best.cost)
+
+    search._search = searched  # type: ignore[method-assign]
+    search._in_other_laws = in_other_laws  # type: ignore[method-assign]
+    search._pruned = search._exchanged = lambda best: best  # type: ignore[method-assign]
+    search._explained(base)
+    # what has found a better place may leave room for another beside it
+    assert done == ["search", "laws"] * turns
 
 
 def test_a_model_is_screened_once_for_each_effect():

@@ -472,6 +472,33 @@ class Bench:
             found.append(Problem(corrected, plain.layout, self.workers, kernel.QUICK, self._count))
         return found
 
+    def foretold(self, trial: Trial) -> float:
+        """Mean square over noise of each part of the records, as a fit to the others predicts it.
+
+        Parts are records, or the halves of a single one. The fits set out from the trial's, and are
+        simulated: what is far from the noise is not linear over what a part changes.
+        """
+        problem = trial.problem
+        sizes = [r.measured.size for r in problem.records]
+        edges = np.cumsum([0, *sizes]) if len(sizes) > 1 else [0, sizes[0] // 2, sizes[0]]
+
+        def left(part: tuple[int, int]) -> float:
+            kept = np.isfinite(problem.sigma)
+            kept[slice(*part)] = False
+            if not kept.any():
+                return math.inf
+            records = [
+                replace(r, valid=valid)
+                for r, valid in zip(problem.records, _by_record(problem, kept), strict=True)
+            ]
+            others = Problem(records, problem.layout, self.workers, problem.haste, self._count)
+            gain = max(0.5, _WORTH * trial.cost * others.samples)
+            fit = descend_by_secants(others, trial.x, trial.fixed, iterations=_ENDING, gain=gain)
+            _, residuals = problem.evaluate(fit.x[None])
+            return float(np.sum(residuals[0][slice(*part)] ** 2))
+
+        return sum(self.together(left, list(pairwise(edges)))) / problem.samples
+
     def polished(self, trial: Trial, in_haste: bool = False) -> Trial:
         """``trial`` fitted to every sample, to the end; ``in_haste`` as it is, on every sample."""
         problem = self.problem(trial.model, kernel.CAREFUL)

@@ -78,7 +78,8 @@ _KEPT = 0.8  # of a promise, or of what the leader explains
 _FOLLOWED = 12  # candidates refitted beside an effect, the most promising ones; half beside two
 _EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
-_TRUSTED = 0.8  # of the same: what explains less may be a disguise, and predicts nothing else
+_TRUSTED = 0.8  # of the same: what explains less may be a disguise, and predicts nothing else;
+# nor does what explains less of one part of the records, fitted to the others
 _TAKEN_OVER = 2.0  # times what others explain beside a walk: explaining more without, they play it
 
 
@@ -184,8 +185,12 @@ class _Search:
         for _ in range(_TURNS):
             grown = self._search(best)
             best = self._exchanged(self._pruned(grown))
+            if len(best.effects) == 1:
+                # no other was found beside it: then it may be its own law that is not the right one
+                best = self._in_other_laws(best, (0.8, 0.1))
             names = frozenset(best.effects)
-            if names == frozenset(grown.effects) or names in been or self._is_noise(best):
+            same = names == frozenset(grown.effects) and best.cost > _AS_GOOD * grown.cost
+            if same or names in been or self._is_noise(best):
                 break
             been.add(names)
         return best
@@ -340,7 +345,8 @@ class _Search:
             self._record(fitted, correlation, fitted[0] if taken else None, reason)
             if taken:
                 best, looking_on = self._restarted(self._ended(leader)), False
-                best = self._in_other_laws(best, (0.1 + 0.28 * (depth + 1), 0.0))
+                if len(best.effects) > 1:
+                    best = self._in_other_laws(best, (0.1 + 0.28 * (depth + 1), 0.0))
                 if self._is_noise(best):
                     break
             elif looking_on or hopeless:
@@ -856,6 +862,17 @@ class _Search:
             return base
         return kept
 
+    def _foretold(self, trial: Trial, baseline: Trial) -> float:
+        """The part that ``trial`` explains of parts of the records, fitted to the rest of them.
+
+        What leaves more than noise is not the right law: it may be of no use on what it has not
+        seen, however much it explains of what it was fitted to.
+        """
+        if self.interrupted or not trial.effects:
+            return 1.0
+        left, before = (self.bench.foretold(t) for t in (trial, baseline))
+        return 1.0 - max(left - 1.0, 0.0) / max(before - 1.0, 1e-9)
+
     def _recurred(self, trial: Trial, without: Trial) -> bool:
         """Whether each of several recordings is decisively better explained than ``without``."""
         sizes = [r.measured.size for r in trial.problem.records]
@@ -959,7 +976,7 @@ class _Search:
         explained = _explained(first, last)
         small = last.cost < _EXPLAINED_RMS**2
         others = self._for_others(best)
-        doubtful = not small and explained < _TRUSTED
+        doubtful = not small and min(explained, self._foretold(best, baseline)) < _TRUSTED
         if doubtful or not others.effects:
             others = first
         else:
@@ -987,8 +1004,8 @@ class _Search:
         gone = [n for n in best.effects if n not in {name for name, _ in others.model.effects}]
         if gone and doubtful:
             notes.append(
-                "what was found explains too little to be trusted elsewhere: other recordings are "
-                "predicted without it"
+                "what was found explains too little, or a part of these recordings too badly from "
+                "the rest, to be trusted elsewhere: other recordings are predicted without it"
             )
         elif gone:
             notes.append(
