@@ -190,7 +190,7 @@ class _Search:
                 best = self._in_other_laws(best, (0.8, 0.1))
             names = frozenset(best.effects)
             same = names == frozenset(grown.effects) and best.cost > _AS_GOOD * grown.cost
-            if same or names in been or self._is_noise(best):
+            if same or names in been or best.is_white:
                 break
             been.add(names)
         return best
@@ -327,7 +327,8 @@ class _Search:
             matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
             if best.effects:
                 # beside another, little of what no effect explains may go to any
-                matters &= best.cost - leader.cost > self._share(best, gain) * (best.cost - 1.0)
+                share = 0.0 if self._is_all(fitted[0]) else self._share(best, gain)
+                matters &= best.cost - leader.cost > share * (best.cost - 1.0)
             taken = gain > self._asked(fitted[0].name) and matters
             if taken:
                 reason = f"gains {gain:.0f} of the information criterion"
@@ -347,7 +348,7 @@ class _Search:
                 best, looking_on = self._restarted(self._ended(leader)), False
                 if len(best.effects) > 1:
                     best = self._in_other_laws(best, (0.1 + 0.28 * (depth + 1), 0.0))
-                if self._is_noise(best):
+                if best.is_white:
                     break
             elif looking_on or hopeless:
                 break
@@ -384,6 +385,15 @@ class _Search:
         if lawful and best.cost - 1.0 < _OF_ITS_FORM * explained:
             return _FORM_SHARE
         return _SECOND_SHARE if gain < _BY_FAR else 0.0
+
+    @staticmethod
+    def _is_all(tried: _Tried) -> bool:
+        """Whether an effect that follows a law leaves nothing: then it took all that there was.
+
+        However much that is of the cost, in which the noise may be read a little wrong.
+        """
+        effect = EFFECTS[tried.name]
+        return tried.trial.is_white and effect.recurs and effect.family != "unknown"
 
     def _least(self, best: Trial) -> float:
         """The cost that one more effect must explain to be followed on; -inf: none is asked for."""
@@ -588,6 +598,8 @@ class _Search:
         names = [t.name for t in order]
         lead = first = order[0].trial.cost
         to_the_end = not self._is_noise(best)
+        # little is to be explained: who explains it is told by the last steps of each
+        subtle = not (to_the_end or best.is_white)
         mark = self._criterion(best, correlation) - _DECISIVE
         of_parent: Counter[frozenset[str]] = Counter()
         for place, tried in enumerate(order):
@@ -598,20 +610,24 @@ class _Search:
             reach = (_NEAR_NOISE if leads.is_white else _NEAR_LEAD) * first
             # an exchange looks for the best beside each of several parents
             beside = frozenset(tried.parent.effects)
-            may_lead = owing or (tried.trial.cost < reach and of_parent[beside] < _SETTLED)
+            follow = _SETTLED if leads.is_white and not subtle else _SETTLED_QUICKLY
+            most = follow if subtle else _SETTLED
+            may_lead = owing or (tried.trial.cost < reach and of_parent[beside] < most)
             of_parent[beside] += 1
-            follow = _SETTLED if leads.is_white else _SETTLED_QUICKLY
             if place >= follow and not (near and rank(tried) < mark) and not may_lead:
                 continue
             if lead > _MUCH_LEFT and not _is_first_of_family(tried.name, names):
                 continue
-            if place and not owing and rank(tried) > self._criterion(tried.parent, correlation):
+            worse = rank(tried) - self._criterion(tried.parent, correlation)
+            if place and not owing and worse > (_DECISIVE if subtle else 0.0):
                 continue  # who is worse than nothing after a refit will not lead
             if best.cost - tried.trial.cost < least:
                 continue
             key = frozenset(tried.trial.effects)
             # beside a leader that leaves but noise, it need only be seen who does as well
-            if may_lead and to_the_end and not leads.is_white:
+            if may_lead and subtle:
+                self._ended(tried.trial)
+            elif may_lead and to_the_end and not leads.is_white:
                 self._ended(tried.trial, lead)
             elif key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
                 self.settled.add(key)
