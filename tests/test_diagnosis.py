@@ -423,6 +423,59 @@ def test_who_is_worse_than_nothing_after_a_refit_is_not_followed():
     assert followed == ["linear drag", "ageing"]
 
 
+def test_where_little_is_to_be_explained_rivals_are_followed_to_their_last_steps():
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    noise /= np.sqrt(np.mean((noise / NOISE) ** 2))
+    # an effect of a tenth of the noise's mean square
+    slow = 0.45 * NOISE * np.sin(2.0 * np.pi * 0.3 * record.time)
+
+    def left(names: tuple[str, ...], cost: float, of: np.ndarray) -> Trial:
+        model = replace(PLAIN, effects=tuple(typical(name) for name in names))
+        return made_trial([record], model, math.sqrt(cost) * of)
+
+    def followed(best: Trial) -> list[tuple[str, float]]:
+        costs = {"sensor lag": 0.95, "amplifier lag": best.cost, "leakage": 1.2, "ageing": 0.97}
+        fits = [_Tried(n, best, left((n,), cost, noise), 0.0) for n, cost in costs.items()]
+        search.found = {frozenset(t.trial.effects): t.trial for t in fits}
+        search.settled, search.ended = set(), {}
+        seen: list[tuple[str, float]] = []
+
+        def on(trial: Trial, leader: float = math.inf) -> Trial:
+            seen.append((trial.effects[0], leader))
+            return trial
+
+        search.bench.ended = on  # type: ignore[method-assign]
+        search.bench.settled = lambda trial, _: trial  # type: ignore[method-assign]
+        search._settled(best, fits)
+        return seen
+
+    best = left((), 1.0, noise + slow)
+    assert search._is_noise(best)
+    assert not best.is_white
+    # also who does as well as nothing, not who does far worse; and as if none of them led
+    told = ("sensor lag", "ageing", "amplifier lag")
+    assert followed(best) == [(name, math.inf) for name in told]
+    # where there is nothing to be explained at all, none
+    assert followed(left((), 1.0, noise)) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "white", "is_all"),
+    [("sensor lag", True, True), ("sensor lag", False, False), ("wandering drift", True, False),
+     ("attached mode", True, False)],
+)  # fmt: skip
+def test_a_law_that_leaves_nothing_took_all_that_there_was(name, white, is_all):
+    record = record_of(PLAIN)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    slow = 0.45 * NOISE * np.sin(2.0 * np.pi * 0.3 * record.time)
+    with_it = replace(PLAIN, effects=(typical(name),))
+    trial = made_trial([record], with_it, noise if white else noise + slow)
+    assert trial.is_white == white
+    assert _Search._is_all(_Tried(name, trial, trial, 0.0)) == is_all
+
+
 def test_who_is_seen_not_to_come_near_a_leader_is_not_followed_again():
     record = record_of(PLAIN)
     search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
