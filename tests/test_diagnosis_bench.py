@@ -343,6 +343,18 @@ def test_a_single_record_is_foretold_by_halves():
     assert bench.foretold(bare) > 1.3 * bare.cost
 
 
+def test_a_number_at_the_end_of_its_range_is_said_to_be_there():
+    # pushed along instead of held back: no drag does that
+    record = record_of(PLAIN)
+    rate = PLAIN.simulate(record.drive).rate
+    bench = bench_of(replace(record, displacement=record.displacement + 3e-5 * rate))
+    trial = fitted(bench, DRAGGED)
+    notes = {e.name: e.note for e in bench.estimates(trial, trial.jacobian())}
+    assert trial.x[-1] == trial.problem.layout.lower[-1]
+    assert "end of the range" in notes["linear drag: drag"]
+    assert "end of the range" not in notes["mu_0"]
+
+
 @functools.cache
 def many():
     """Estimates of the same truth under other noise."""

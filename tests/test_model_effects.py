@@ -823,3 +823,11 @@ def test_an_effect_is_one_file(compiled, tmp_path):
     assert float(hook) == 250.0
     if not compiled:
         assert stresses == ["[250.0, 250.0, 250.0, 250.0, 250.0]"]
+
+
+@pytest.mark.parametrize("name", ["easing friction", "elastoplastic friction"])
+def test_a_friction_that_extends_the_dry_one_may_do_all_that_it_does(name):
+    # soft bristles ring slowly: a tenth of critical damping is 5 ms there
+    simple = EFFECTS["dry friction"].parameters
+    for number, same in zip(EFFECTS[name].parameters, simple, strict=False):
+        assert (number.name, number.bounds) == (same.name, same.bounds)

@@ -558,7 +558,10 @@ class Bench:
         spread[~trial.fixed] = 1.96 * np.sqrt(np.diag(cov))
         values = layout.values(trial.x)
         found = []
-        for q, x, value, s in zip(layout.quantities, trial.x, values, spread, strict=True):
+        at_end = np.minimum(trial.x - layout.lower, layout.upper - trial.x) < 1e-9
+        for q, x, value, s, end in zip(
+            layout.quantities, trial.x, values, spread, at_end, strict=True
+        ):
             if not math.isfinite(s):
                 found.append(Estimate(q.name, q.unit, float(value), 0.0, math.inf, False, "held"))
                 continue
@@ -569,6 +572,9 @@ class Bench:
             low, high = max(float(low), bounds[0]), min(float(high), bounds[1])
             sure = is_determined(low, high)
             note = "" if sure else "these data hardly determine it"
+            if end:
+                # a law that would go further there is not quite the one that acts
+                note = "at the end of the range that it may have"
             found.append(Estimate(q.name, q.unit, float(value), low, high, sure, note))
         return tuple(found)
 

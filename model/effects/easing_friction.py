@@ -28,7 +28,7 @@ EFFECT = replace(
     parameters=(
         replace(_FRICTION, meaning="nominal stress while sliding fast"),
         replace(_PRESLIDING, starts=(1e-4, 5e-4)),
-        replace(_DAMPING, bounds=(1e-6, 3e-3)),
+        _DAMPING,
         Parameter(
             "excess", "", (0.0, 1.0), "part of it that is lost with speed", 0.1, starts=(0.15, 0.4)
         ),
