@@ -633,6 +633,43 @@ def test_what_is_exchanged_sets_out_beside_the_rest_as_it_was():
     assert set_out.network.times == pytest.approx([0.3])
 
 
+@pytest.mark.parametrize(("left", "sets_out"), [(4.0, True), (1.0, False)])
+def test_a_simpler_law_sets_out_from_where_a_leader_that_extends_it_is(left, sets_out):
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    best = made_trial([record], PLAIN, 10.0 * noise)
+
+    def tried(model: Actuator, cost: float) -> _Tried:
+        trial = made_trial([record], model, math.sqrt(cost) * noise)
+        search._keep(trial)
+        return _Tried(trial.effects[0], best, trial, 0.9)
+
+    harder = replace(PLAIN, network=Network.gent((50e3, 66e3), (1e4, 1e4), (0.3,)))
+    name, numbers = typical("easing friction")
+    told = dict(numbers) | {"friction": 37.0, "presliding": 2e-4}
+    leader = tried(replace(harder, effects=effect(name, **told)), left)
+    others = [tried(replace(PLAIN, effects=(typical(n),)), 9.0) for n in ("dry friction", "ageing")]
+    fits: list[Actuator] = []
+
+    def fit(model: Actuator, starts: list[tuple[np.ndarray, None]], *_: object) -> Trial:
+        layout = search.bench.problem(model).layout
+        ((start, _),) = starts
+        fits.append(layout.model(layout.values(start)))  # type: ignore[arg-type]
+        return search.found[frozenset({"dry friction"})]
+
+    search.bench.fit = fit  # type: ignore[method-assign, assignment]
+    # once: from the same law nothing else comes
+    for _ in range(2):
+        search._set_out_from_leader([*others, leader])
+    assert len(fits) == sets_out
+    for model in fits:
+        ((name, values),) = model.effects
+        shared = {n: pytest.approx(told[n]) for n in ("friction", "presliding", "damping")}
+        assert (name, dict(values)) == ("dry friction", shared)
+        assert model.network.times == pytest.approx([0.3])
+
+
 @pytest.mark.parametrize(("left", "sets_out"), [(1e4, True), (2.0, False)])
 def test_far_from_the_noise_a_mass_sets_out_where_the_measured_stretch_tells_it(left, sets_out):
     record = record_of(PLAIN)

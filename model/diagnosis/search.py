@@ -46,6 +46,7 @@ _OF_ITS_FORM = 0.02  # of what is explained: a law not quite the true one leaves
 _FORM_SHARE = 0.7  # of that: less is not worth one more effect
 _SOME = 0.3  # of what is asked: who has explained less will not get so far in the end
 _BY_FAR = 150.0  # of the criterion: a gain that needs no such share
+_SHOWN = 0.5  # of that: so much shows in what is promised, where little is left
 _HOPE = 0.95  # of the cost: who explains less than the rest of it is not followed on
 _BEAM = 2  # how many explanations are followed on
 _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed on
@@ -147,6 +148,7 @@ class _Search:
         self.refitted: set[tuple[frozenset[str], str]] = set()  # on top of what, and which
         self.left_out: set[tuple[frozenset[str], str]] = set()
         self.extended: set[frozenset[str]] = set()  # from where a simpler law has ended
+        self.reduced: set[tuple[frozenset[str], str]] = set()  # from a leader, and which
         self.interrupted = False
         self.held = False
 
@@ -327,7 +329,8 @@ class _Search:
             matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
             if best.effects:
                 # beside another, little of what no effect explains may go to any
-                share = 0.0 if self._is_all(fitted[0]) else self._share(best, gain)
+                took_all = gain > _BY_FAR and self._is_all(fitted[0])
+                share = 0.0 if took_all else self._share(best, gain)
                 matters &= best.cost - leader.cost > share * (best.cost - 1.0)
             taken = gain > self._asked(fitted[0].name) and matters
             if taken:
@@ -423,6 +426,10 @@ class _Search:
         order = sorted(shares, key=lambda n: -shares[n])
         if depth > 0:
             order = order[: _FOLLOWED // depth]
+        if depth > 0 and other is None and self._is_noise(parent):
+            # of so little it would have to gain by far: that much shows in what is promised
+            worth = parent.cost * self.bench.samples / max(1.0, parent.correlation)
+            order = [n for n in order if shares[n] * worth > _SHOWN * _BY_FAR]
         many = len(order)
         tried: list[_Tried] = []
 
@@ -634,6 +641,9 @@ class _Search:
                 self.found[key] = self.bench.settled(tried.trial, lead)
             lead = min(lead, self.found[key].cost)
         order = self._as_found(order)
+        if to_the_end:
+            self._set_out_from_leader(order)
+            order = self._as_found(order)
         if to_other_laws and to_the_end:
             self._set_out_from_simpler(best, order)
             order = self._as_found(order)
@@ -670,6 +680,31 @@ class _Search:
                 trial = self._extended(one, nearest)
                 self._keep(trial)
                 lead = min(lead, trial, key=lambda t: t.cost)
+
+    def _set_out_from_leader(self, tried: list[_Tried]) -> None:
+        """Fit the laws again that the leading one extends, from its numbers, each once.
+
+        One that leaves more than noise is not the right law: a simpler one may be, in whose valley
+        it is already.
+        """
+        lead = min(tried, key=lambda t: t.trial.cost)
+        if lead.trial.is_white:
+            return
+        for one in tried:
+            both = (frozenset(one.trial.effects), lead.name)
+            if both in self.reduced or not _extends(lead, one):
+                continue
+            self.reduced.add(both)
+            known = _taken_over(one.name, lead)
+            layout = one.trial.problem.layout
+            start = layout.coordinates(np.array([known[n] for n in layout.names]))
+            start = np.clip(start, layout.lower, layout.upper)
+            trial = self.bench.fit(
+                one.trial.model, [(start, None)], one.trial.fixed, lead.trial.cost
+            )
+            self._keep(trial)
+            if trial.cost < _NEAR_LEAD * lead.trial.cost:
+                self._ended(self.found[both[0]], lead.trial.cost)
 
     def _anew(self, tried: list[_Tried]) -> list[_Tried]:
         """The candidates, those fitted anew in whose way the branches stand.
@@ -746,11 +781,7 @@ class _Search:
         It can do all that the ``simpler`` one does. What it has more is scattered over its bounds.
         """
         trial, layout = tried.trial, tried.trial.problem.layout
-        law, other = EFFECTS[tried.name], EFFECTS[simpler.name]
-        known = _numbers(simpler.trial)
-        for j, i in _shared(law, other):
-            shared = known[f"{simpler.name}: {other.parameters[i].name}"]
-            known[f"{tried.name}: {law.parameters[j].name}"] = shared
+        known = _taken_over(tried.name, simpler)
         more = np.array([n not in known for n in layout.names])
         start = layout.values(trial.x)
         start[~more] = [known[n] for n in layout.names if n in known]
@@ -1142,6 +1173,16 @@ def _numbers(trial: Trial) -> dict[str, float]:
     """The numbers of a model as they were fitted, by name."""
     layout = trial.problem.layout
     return dict(zip(layout.names, layout.values(trial.x), strict=True))
+
+
+def _taken_over(name: str, other: _Tried) -> dict[str, float]:
+    """The numbers of another law's model, and by their names those that law ``name`` shares."""
+    known = _numbers(other.trial)
+    law, of = EFFECTS[name], EFFECTS[other.name]
+    for j, i in _shared(law, of):
+        shared = known[f"{other.name}: {of.parameters[i].name}"]
+        known[f"{name}: {law.parameters[j].name}"] = shared
+    return known
 
 
 def _shared(effect: Effect, other: Effect) -> list[tuple[int, int]]:
