@@ -180,8 +180,13 @@ def test_what_was_hidden_is_found(name):
 @pytest.mark.parametrize("name", HIDDEN)
 def test_its_numbers_are_the_true_ones(name):
     (step,) = of_hidden(name).steps
+    hidden = dict(HIDDEN[name])
+    if any(e.name == "frequency" and e.value > 50.0 for e in step.estimates):
+        # at 100 Hz what is above half of it looks like what is as far below, run backwards
+        hidden["frequency"] = 100.0 - hidden["frequency"]
+        hidden["sine"], hidden["third_sine"] = -hidden["sine"], -hidden["third_sine"]
     for e in step.estimates:
-        true = HIDDEN[name][e.name]
+        true = hidden[e.name]
         # intervals are of 95 %: the truth may be a little outside
         low, high = (e.value + 1.6 * (end - e.value) for end in (e.low, e.high))
         assert low <= true <= high, e.name
