@@ -34,7 +34,6 @@ from tests.engine_tools import (
     STRIP,
     effect,
     film_record_of,
-    fitted,
     made_trial,
     masked,
     record_of,
@@ -283,19 +282,18 @@ def test_who_plays_a_walk_once_it_is_left_out_predicts_nothing():
     assert predicting(walk_leaves=5.0) == ()
 
 
-@pytest.mark.parametrize(("explained", "predicting"), [(0.9, ("linear drag",)), (0.7, ())])
-def test_what_does_not_foretell_a_part_of_the_records_predicts_no_others(explained, predicting):
-    # drag, and something else by which the film is off by twice the noise
-    record = record_of(replace(PLAIN, effects=effect("linear drag", drag=6000.0)))
-    off = 2.0 * NOISE * np.sin(2.0 * np.pi * 17.0 * record.time)
-    record = replace(record, displacement=record.displacement + off)
-    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
-    bare = fitted(search.bench, PLAIN)
+@pytest.mark.parametrize(("first", "predicting"), [(0.5, ("linear drag",)), (2.0, ())])
+def test_what_one_of_the_records_is_the_worse_for_predicts_no_others(first, predicting):
+    # drag, and something else by which the films are off
     dragged = replace(PLAIN, effects=effect("linear drag", drag=6000.0))
-    search.found = {frozenset(): bare, frozenset({"linear drag"}): fitted(search.bench, dragged)}
-    best = search.found[frozenset({"linear drag"})]
-    unseen = {id(best): 1.0 + (1.0 - explained) * (bare.cost - 1.0), id(bare): bare.cost}
-    search.bench.foretold = lambda trial: unseen[id(trial)]  # type: ignore[method-assign]
+    record = record_of(dragged)
+    search = _Search([record, record], PLAIN, 1, lambda *_: None, lambda: False)
+    search.bench.polished = lambda trial, _: trial  # type: ignore[method-assign]
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    bare = made_trial([record, record], PLAIN, np.concatenate([3.0 * noise, 30.0 * noise]))
+    left = np.concatenate([3.0 * first * noise, 2.0 * noise])
+    best = made_trial([record, record], dragged, left)
+    search.found = {frozenset(): bare, frozenset({"linear drag"}): best}
     found = search._finding(bare, best)
     assert found.verdict == PARTLY_EXPLAINED
     assert tuple(name for name, _ in found.final.predicting.effects) == predicting

@@ -127,6 +127,14 @@ class Trial:
             return False
         return all(is_flat(part) for part in _by_record(self.problem, self.residuals))
 
+    @property
+    def record_costs(self) -> list[float]:
+        """Mean square of residual over noise in each record."""
+        parts = _by_record(self.problem, self.residuals)
+        scales = _by_record(self.problem, self.problem.sigma)
+        counts = [max(int(np.count_nonzero(np.isfinite(s))), 1) for s in scales]
+        return [float(np.sum(p**2)) / n for p, n in zip(parts, counts, strict=True)]
+
     def jacobian(self, quick: bool = False) -> np.ndarray:
         """d(residuals)/dx (N, f) over the free numbers; ``quick`` by one-sided differences."""
         return self.problem.jacobian(self.x, ~self.fixed, self.residuals if quick else None)
@@ -471,33 +479,6 @@ class Bench:
             ]
             found.append(Problem(corrected, plain.layout, self.workers, kernel.QUICK, self._count))
         return found
-
-    def foretold(self, trial: Trial) -> float:
-        """Mean square over noise of each part of the records, as a fit to the others predicts it.
-
-        Parts are records, or the halves of a single one. The fits set out from the trial's, and are
-        simulated: what is far from the noise is not linear over what a part changes.
-        """
-        problem = trial.problem
-        sizes = [r.measured.size for r in problem.records]
-        edges = np.cumsum([0, *sizes]) if len(sizes) > 1 else [0, sizes[0] // 2, sizes[0]]
-
-        def left(part: tuple[int, int]) -> float:
-            kept = np.isfinite(problem.sigma)
-            kept[slice(*part)] = False
-            if not kept.any():
-                return math.inf
-            records = [
-                replace(r, valid=valid)
-                for r, valid in zip(problem.records, _by_record(problem, kept), strict=True)
-            ]
-            others = Problem(records, problem.layout, self.workers, problem.haste, self._count)
-            gain = max(0.5, _WORTH * trial.cost * others.samples)
-            fit = descend_by_secants(others, trial.x, trial.fixed, iterations=_ENDING, gain=gain)
-            _, residuals = problem.evaluate(fit.x[None])
-            return float(np.sum(residuals[0][slice(*part)] ** 2))
-
-        return sum(self.together(left, list(pairwise(edges)))) / problem.samples
 
     def polished(self, trial: Trial, in_haste: bool = False) -> Trial:
         """``trial`` fitted to every sample, to the end; ``in_haste`` as it is, on every sample."""

@@ -79,8 +79,7 @@ _KEPT = 0.8  # of a promise, or of what the leader explains
 _FOLLOWED = 12  # candidates refitted beside an effect, the most promising ones; half beside two
 _EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
-_TRUSTED = 0.8  # of the same: what explains less may be a disguise, and predicts nothing else;
-# nor does what explains less of one part of the records, fitted to the others
+_TRUSTED = 0.8  # of the same: what explains less may be a disguise, and predicts nothing else
 _TAKEN_OVER = 2.0  # times what others explain beside a walk: explaining more without, they play it
 
 
@@ -909,17 +908,6 @@ class _Search:
             return base
         return kept
 
-    def _foretold(self, trial: Trial, baseline: Trial) -> float:
-        """The part that ``trial`` explains of parts of the records, fitted to the rest of them.
-
-        What leaves more than noise is not the right law: it may be of no use on what it has not
-        seen, however much it explains of what it was fitted to.
-        """
-        if self.interrupted or not trial.effects:
-            return 1.0
-        left, before = (self.bench.foretold(t) for t in (trial, baseline))
-        return 1.0 - max(left - 1.0, 0.0) / max(before - 1.0, 1e-9)
-
     def _recurred(self, trial: Trial, without: Trial) -> bool:
         """Whether each of several recordings is decisively better explained than ``without``."""
         sizes = [r.measured.size for r in trial.problem.records]
@@ -1023,7 +1011,7 @@ class _Search:
         explained = _explained(first, last)
         small = last.cost < _EXPLAINED_RMS**2
         others = self._for_others(best)
-        doubtful = not small and min(explained, self._foretold(best, baseline)) < _TRUSTED
+        doubtful = not small and (explained < _TRUSTED or _is_worse_in_one(first, last))
         if doubtful or not others.effects:
             others = first
         else:
@@ -1051,8 +1039,8 @@ class _Search:
         gone = [n for n in best.effects if n not in {name for name, _ in others.model.effects}]
         if gone and doubtful:
             notes.append(
-                "what was found explains too little, or a part of these recordings too badly from "
-                "the rest, to be trusted elsewhere: other recordings are predicted without it"
+                "what was found explains too little, or does worse in one of these recordings than "
+                "nothing does, to be trusted elsewhere: other recordings are predicted without it"
             )
         elif gone:
             notes.append(
@@ -1212,6 +1200,12 @@ def _extends(tried: _Tried, other: _Tried) -> bool:
 def _explained(base: Trial, trial: Trial) -> float:
     """The part that ``trial`` explains of what ``base`` leaves above the noise."""
     return 1.0 - max(trial.cost - 1.0, 0.0) / max(base.cost - 1.0, 1e-9)
+
+
+def _is_worse_in_one(base: Trial, trial: Trial) -> bool:
+    """Whether a record is the worse for what explains the others: no law of the rig does that."""
+    costs = zip(base.record_costs, trial.record_costs, strict=True)
+    return any(after > max(before, _EXPLAINED_RMS**2) for before, after in costs)
 
 
 def _promised_as_much(tried: _Tried, lead: float) -> bool:
