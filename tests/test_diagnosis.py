@@ -861,6 +861,37 @@ def test_another_law_of_a_family_is_asked_for_beside_what_was_found_since():
     assert rounds == []
 
 
+@pytest.mark.parametrize(("name", "more"), [("slow branch", 2), ("linear drag", 0)])
+def test_without_a_branch_as_many_are_tried_in_other_places(name, more):
+    limits = (1e4,) * 3
+    two = replace(PLAIN, network=Network.gent((42e3, 48e3, 51e3), limits, (0.6, 0.4)))
+    record = record_of(two)
+    search = _Search([record], two, 1, lambda *_: None, lambda: False)
+    noise = 2.0 * NOISE * np.ones(record.measured.size)
+    slow = {"modulus": 700.0, "relaxation_time": 6.0}
+    own = effect(name, **slow) if more else (typical(name),)
+    trial = made_trial([record], replace(two, effects=own), noise)
+    search.found = {frozenset(): made_trial([record], two, 1.5 * noise)}
+    starts: list[np.ndarray] = []
+
+    def fit(model: Actuator, given: list[tuple[np.ndarray, None]], *_: object, **__: object):
+        ((start, _),) = given
+        starts.append(search.bench.problem(model).layout.values(start))
+        return made_trial([record], model, noise / len(starts))
+
+    search.bench.fit = fit  # type: ignore[method-assign]
+    layout = search.found[frozenset()].problem.layout
+    best = search._without(trial, name)
+    assert len(starts) == 1 + more
+    assert starts[0] == pytest.approx(layout.values(search.found[frozenset()].x))
+    for start in starts[1:]:
+        # all of its modulus is there, and one of its places
+        assert start[layout.column("mu")].sum() == pytest.approx(141e3 + 700.0)
+        assert start[layout.column("T")].max() > 0.6
+    # who does best is kept
+    assert best.cost == pytest.approx(4.0 / (1 + more) ** 2)
+
+
 @pytest.mark.parametrize(("better", "turns"), [(1.0, 1), (0.5, 2)])
 def test_an_effect_that_stays_alone_is_asked_for_its_law_in_the_end(better, turns):
     record = record_of(PLAIN)

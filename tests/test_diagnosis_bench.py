@@ -12,7 +12,7 @@ import pytest
 
 from model import kernel
 from model.actuator import Drive
-from model.diagnosis.bench import Bench, information, relieved
+from model.diagnosis.bench import Bench, information, merged, relieved
 from model.diagnosis.screening import Screen
 from model.effects import EFFECTS
 from model.excitation import Chirp, Ramp, Sequence
@@ -212,6 +212,21 @@ def test_a_branch_that_stands_in_for_creep_is_relieved():
     assert (found.cost - made.cost) * found.problem.samples < 9.0
     # one branch alone has nothing to be relieved of
     assert relieved(fitted(bench, PLAIN)) == []
+
+
+def test_one_branch_more_is_made_one_with_its_neighbour():
+    network = Network.gent((42e3, 40e3, 17e3, 41e3), (1e4,) * 4, (0.58, 0.43, 0.39))
+    layout = Layout(replace(PLAIN, network=network))
+    start = layout.coordinates(layout.initial())
+    found = [layout.values(x) for x in merged(layout, start, 700.0, 3.2)]
+    mu, tau = layout.column("mu"), layout.column("T")
+    # next to each other on the axis of time; what is made one lies nearer to the stiffer
+    ones = [(0.402, 0.58, 3.2), (0.39, 0.5305, 3.2), (0.39, 0.43, 0.597)]
+    shares = [(58e3, 40e3, 700.0), (41e3, 57e3, 700.0), (41e3, 17e3, 40.7e3)]
+    assert len(found) == 3
+    for values, times, moduli in zip(found, ones, shares, strict=True):
+        assert values[mu] == pytest.approx([42e3, *moduli])
+        assert values[tau] == pytest.approx(times, rel=2e-3)
 
 
 # --- branches that stand in the way of an effect

@@ -31,7 +31,7 @@ from model.fitting.secant import descend_by_secants
 from model.fitting.threads import Job, Result, together
 from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
-__all__ = ["FILM_MODEL_ERROR", "Bench", "Trial", "information", "relieved"]
+__all__ = ["FILM_MODEL_ERROR", "Bench", "Trial", "information", "merged", "relieved"]
 
 _RATE = 200.0  # Hz, to which records are thinned: mains and a load's ringing still show
 _QUIET_MIN = 100  # samples of a lead-in from which a thinned record's noise is read again
@@ -630,6 +630,30 @@ def relieved(trial: Trial) -> list[tuple[np.ndarray, float, float]]:
         there[times[both]] = beside * np.array(_BESIDE)
         x = np.clip(layout.coordinates(there), layout.lower, layout.upper)
         found.append((x, float(values[moduli[slow]]), float(values[times[slow]])))
+    return found
+
+
+def merged(layout: Layout, start: np.ndarray, modulus: float, time: float) -> list[np.ndarray]:
+    """Coordinates ``start`` (d,) with one more branch (Pa, s), two that are neighbours made one.
+
+    One for each two: what one more branch explains, as many as there were may do in other places.
+    """
+    values = layout.values(start)
+    times = layout.column("T")
+    if not times.size:
+        return []
+    moduli = layout.column("mu")[-times.size :]  # of the branches
+    all_times = np.append(values[times], time)
+    order = np.argsort(all_times)
+    there, weight = np.log(all_times[order]), np.append(values[moduli], modulus)[order]
+    found = []
+    for i in range(times.size):
+        both = slice(i, i + 2)
+        one = np.average(there[both], weights=np.maximum(weight[both], 1e-9))
+        fewer = values.copy()
+        fewer[times] = np.exp(np.concatenate([there[:i], [one], there[i + 2 :]]))
+        fewer[moduli] = np.concatenate([weight[:i], [weight[both].sum()], weight[i + 2 :]])
+        found.append(np.clip(layout.coordinates(fewer), layout.lower, layout.upper))
     return found
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from model.actuator import Actuator
-from model.diagnosis.bench import Bench, Trial, information, relieved
+from model.diagnosis.bench import Bench, Trial, information, merged, relieved
 from model.diagnosis.findings import (
     EXPLAINED,
     NOISE_RMS,
@@ -870,7 +870,15 @@ class _Search:
             fixed = np.concatenate([fixed, np.zeros(layout.size - fixed.size, dtype=bool)])
             start = layout.coordinates(layout.initial())
             # to its end, however far behind: what is needless shows only there
-            self._keep(self.bench.fit(model, [(start, None)], fixed, leader=math.inf))
+            starts = [start]
+            if EFFECTS[name].relaxes and isinstance(model, Actuator):
+                known = _numbers(trial)
+                numbers = [known[f"{name}: {p.name}"] for p in EFFECTS[name].parameters[:2]]
+                starts += merged(layout, start, *numbers)
+            fits = self.bench.together(
+                lambda x: self.bench.fit(model, [(x, None)], fixed, leader=math.inf), starts
+            )
+            self._keep(min(fits, key=lambda t: t.cost))
             self.left_out.add((frozenset(trial.effects), name))
         return self.found[key]
 
