@@ -14,6 +14,7 @@ from model.errors import ModelError
 
 __all__ = ["ActuatorRecord", "FilmRecord", "Record", "counted", "noise_at_rest", "noise_of"]
 
+_MATCHING = 10  # rounds; each leaves a third of what the one before did
 _READINGS_MIN = 4  # to read a noise from
 _READINGS_A_LINE = 4  # a periodic line takes three numbers away, of many more
 _SLOWEST_LINE = 15.0  # Hz; what is slower may be a drift, or noise that a sensor has averaged
@@ -38,7 +39,8 @@ class ActuatorRecord:
     a reading is older than its time stamp (an averaging sensor), less the converter's skew: the
     model is evaluated at ``time - lag``. ``valid`` (N,) bool is False where a reading must not be
     used (a dropout, a clipped sensor), None where all are good. Over the first ``lead_in`` samples,
-    at 0 V, the displacement is 0 on average, because it is counted from there.
+    at 0 V, the displacement is 0 on average, because it is counted from there. Each reading is the
+    mean of ``means_of`` that were taken, evenly about its time.
     """
 
     name: str
@@ -48,6 +50,7 @@ class ActuatorRecord:
     lag: float = 0.0
     valid: np.ndarray | None = None
     lead_in: int = 0
+    means_of: int = 1
 
     def __post_init__(self) -> None:
         _check(self.name, self.measured, self.drive.time, self.noise)
@@ -62,23 +65,32 @@ class ActuatorRecord:
         """(N,) m."""
         return self.displacement
 
-    def coarse(self, rate: float) -> ActuatorRecord:
-        """The record at no more than about ``rate`` Hz, for a first search; noise averages down.
+    def seen(self, displacement: np.ndarray) -> np.ndarray:
+        """What these readings are of a ``displacement`` (N,) at their times: means, and counted."""
+        return counted(_mean_about(displacement, self.means_of), self.lead_in)
 
-        A held voltage is, on average, half a sample late: the coarse drive keeps that.
-        """
-        steps = np.diff(self.time)
+    def coarse(self, rate: float) -> ActuatorRecord:
+        """The record at no more than about ``rate`` Hz, in means of neighbours."""
+        step = float(np.median(np.diff(self.time)))
         # the steps of a clock are even to rounding only: 4.9999999 samples are 5
-        every = int(1.0 / (rate * float(np.median(steps))) + 1e-6)
+        return self.in_means(int(1.0 / (rate * step) + 1e-6))
+
+    def in_means(self, every: int) -> ActuatorRecord:
+        """The record in means of ``every`` readings, the noise of which averages down.
+
+        The voltage between two means is linear, and pulls as much over the time of each as the
+        voltage that was applied: the mean of its square is the same.
+        """
         if every < 2:
             return self
-        every -= 1 - every % 2  # odd, so that a mean lies on a sample
-        count = (self.time.size - every) // every + 1
+        steps = np.diff(self.time)
+        count = self.time.size // every
         rows = np.arange(count * every).reshape(count, every)
         t = self.time[rows].mean(axis=1)
-        late = 0.5 * float(np.median(steps)) if self.drive.hold else 0.0
-        drive = Drive(t, np.interp(t - late, self.time, self.drive.voltage), hold=False)
-        x = self.displacement[rows].mean(axis=1)
+        starts, last = self.time[rows[:, 0]], self.time[rows[-1, -1]]
+        before = np.append(steps[:1], steps)[rows[:, 0]]
+        edges = np.append(starts - 0.5 * before, last + 0.5 * steps[-1])
+        drive = Drive(t, _pulling_alike(self.drive, edges), hold=False)
         warmth = self.drive.warmth
         if warmth is not None:
             drive = replace(drive, warmth=warmth[rows].mean(axis=1))
@@ -86,11 +98,68 @@ class ActuatorRecord:
         return replace(
             self,
             drive=drive,
-            displacement=x,
+            displacement=self.displacement[rows].mean(axis=1),
             noise=self.noise / math.sqrt(every),
             valid=valid,
             lead_in=self.lead_in // every,
+            means_of=every * self.means_of,
         )
+
+
+def _mean_about(values: np.ndarray, many: int) -> np.ndarray:
+    """Means over each of the intervals in the middle of which ``values`` (N,) are, of ``many``.
+
+    Of as many samples of each interval, evenly spaced. From neighbours, to the fourth order in the
+    interval's length; the ends are copied.
+    """
+    if many == 1:
+        return values
+    # the mean of a wave that turns by an angle from one interval to the next, as a series in it
+    bend = (1.0 - many**-2.0) / 24.0
+    curl = 1.0 / 1920.0 - many**-2.0 / 576.0 + 7.0 * many**-4.0 / 5760.0 - bend / 12.0
+    means = values.copy()
+    second = np.diff(values, 2)
+    means[1:-1] += bend * second
+    means[2:-2] += curl * np.diff(second, 2)
+    return means
+
+
+def _pulling_alike(drive: Drive, edges: np.ndarray) -> np.ndarray:
+    """Voltages (N,) amid ``edges`` (N + 1,), linear between, that pull as ``drive`` does.
+
+    Between each two of the edges the mean of the square is that of the drive, as far as a square
+    can be made so.
+    """
+    at = np.union1d(drive.time, edges)
+    if drive.hold:
+        place = np.searchsorted(drive.time, at, side="right") - 1
+        v = drive.voltage[np.maximum(place, 0)]
+        squares = v[:-1] ** 2
+        means = v[:-1]
+    else:
+        v = np.interp(at, drive.time, drive.voltage)
+        squares = (v[:-1] ** 2 + v[:-1] * v[1:] + v[1:] ** 2) / 3.0
+        means = 0.5 * (v[:-1] + v[1:])
+    widths = np.diff(at)
+    inside = np.searchsorted(at, edges)
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        total = np.append(0.0, np.cumsum(values * widths))[inside]
+        return np.asarray(np.diff(total) / np.diff(edges))
+
+    wanted, sign = mean(squares), np.where(mean(means) < 0.0, -1.0, 1.0)
+    found = wanted.copy()
+    for _ in range(_MATCHING):
+        found = np.maximum(found + wanted - _mean_square(sign * np.sqrt(found)), 0.0)
+    return sign * np.sqrt(found)
+
+
+def _mean_square(voltage: np.ndarray) -> np.ndarray:
+    """Means (N,) of the square of what is linear between ``voltage`` (N,), half-way each way."""
+    to_next = np.diff(voltage, append=voltage[-1])
+    to_last = np.diff(voltage[::-1], append=voltage[0])[::-1]
+    halves = [voltage**2 + 0.5 * voltage * to + to**2 / 12.0 for to in (to_next, to_last)]
+    return 0.5 * (halves[0] + halves[1])
 
 
 @dataclass(frozen=True)

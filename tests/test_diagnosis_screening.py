@@ -33,7 +33,7 @@ def screened(truth, rate=100.0, quiet=True, base=PLAIN):
     then that of the effect alone.
     """
     record = record_of(truth, thesis_drive(rate), noise=0.01 * NOISE if quiet else NOISE)
-    bench = Bench([replace(record, noise=NOISE)], workers=1)
+    bench = Bench([replace(record, noise=NOISE)], PLAIN, workers=1)
     trial = fitted(bench, base)
     return bench, trial, Screen(bench, trial)
 
@@ -212,7 +212,7 @@ def test_sizes_stay_within_their_bounds():
     record = record_of(PLAIN)
     rate = PLAIN.simulate(record.drive).rate
     helped = replace(record, displacement=record.displacement + 3e-5 * rate)
-    bench = Bench([helped], workers=1)
+    bench = Bench([helped], PLAIN, workers=1)
     trial = fitted(bench, PLAIN)
     best = Screen(bench, trial).promises(EFFECTS["linear drag"])[0]
     assert best.start[-1] == 0.0
@@ -223,7 +223,7 @@ def test_rubbish_does_not_move_where_shapes_are_sought():
     bad = (record.time > 5.0) & (record.time < 5.1)
     onsets = []
     for one in (record, masked(record, bad)):
-        bench = Bench([one], workers=1)
+        bench = Bench([one], PLAIN, workers=1)
         screen = Screen(bench, fitted(bench, PLAIN))
         promises = screen.promises(EFFECTS["stress beyond a displacement"])
         onsets.append(sorted(float(np.exp(p.start[-3])) for p in promises))
@@ -232,9 +232,9 @@ def test_rubbish_does_not_move_where_shapes_are_sought():
 
 def test_which_effects_make_sense():
     drive = thesis_drive()
-    cold = Bench([record_of(PLAIN)], workers=1)
-    warm = Bench([record_of(PLAIN, replace(drive, warmth=0.01 * drive.time))], workers=1)
-    film = Bench([film_record_of(STRIP)], workers=1)
+    cold = Bench([record_of(PLAIN)], PLAIN, workers=1)
+    warm = Bench([record_of(PLAIN, replace(drive, warmth=0.01 * drive.time))], PLAIN, workers=1)
+    film = Bench([film_record_of(STRIP)], STRIP, workers=1)
     assert not is_of(EFFECTS["temperature"], cold)
     assert is_of(EFFECTS["temperature"], warm)
     assert is_of(EFFECTS["slack"], film)

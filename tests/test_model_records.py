@@ -101,7 +101,9 @@ def test_at_sensor_is_the_value_of_a_little_earlier(lag):
     assert (shown[time - lag <= time[0]] == np.sin(w * time[0])).all()
 
 
-@pytest.mark.parametrize(("rate", "bent", "shifted"), [(125.0, 0.2e-6, 5e-6), (40.0, 1.2e-6, 5e-5)])
+@pytest.mark.parametrize(
+    ("rate", "bent", "shifted"), [(125.0, 0.15e-6, 2e-6), (40.0, 0.4e-6, 2e-5)]
+)
 @pytest.mark.parametrize("hold", [True, False])
 def test_a_coarse_record_still_fits_its_model(rate, bent, shifted, hold):
     fine = record(hold=hold)
@@ -109,32 +111,67 @@ def test_a_coarse_record_still_fits_its_model(rate, bent, shifted, hold):
     assert rate / 1.3 < 1.0 / np.diff(coarse.time).max() < 1.3 * rate
     assert coarse.noise < fine.noise
     assert not coarse.drive.hold
-    model = THESIS.simulate(coarse.drive).displacement
+    model = coarse.seen(THESIS.simulate(coarse.drive).displacement)
     assert np.abs(model - coarse.displacement).max() < bent
-    # means bend the crests, and shift the curve by less than a thousandth of a sample
+    # shifted by less than a thousandth of a sample
     speed = np.gradient(model, coarse.time)
     late = np.sum((model - coarse.displacement) * speed) / np.sum(speed**2)
     assert abs(late) < shifted
 
 
-def test_a_coarse_record_matches_to_a_twentieth_of_a_micrometre():
-    fine = record()
-    coarse = fine.coarse(125.0)
-    error = THESIS.simulate(coarse.drive).displacement - coarse.displacement
-    assert np.sqrt(np.mean(error**2)) < 0.05e-6
-
-
-def test_what_coarse_takes_the_mean_of():
+@pytest.mark.parametrize("every", [2, 3, 5])
+def test_what_coarse_takes_the_mean_of(every):
     time = np.arange(100) * 1e-3
     fine = ActuatorRecord("x", Drive(time, 1e3 * time, True), 2.0 * time, 1e-3, lag=0.01)
-    coarse = fine.coarse(200.0)
-    np.testing.assert_allclose(coarse.time, time[2::5])
+    coarse = fine.in_means(every)
+    np.testing.assert_allclose(coarse.time, time[: 100 // every * every].reshape(-1, every).mean(1))
     np.testing.assert_allclose(coarse.displacement, 2.0 * coarse.time)
-    # a held voltage is half a sample late
-    np.testing.assert_allclose(coarse.drive.voltage, 1e3 * (coarse.time - 0.5e-3))
-    assert coarse.noise == pytest.approx(1e-3 / math.sqrt(5.0))
+    # a held voltage is half a sample late, and steps pull by no more than their mean square
+    inside = slice(5, -5)
+    expected = 1e3 * (coarse.time - 0.5e-3)
+    np.testing.assert_allclose(coarse.drive.voltage[inside], expected[inside], rtol=1e-3)
+    assert coarse.noise == pytest.approx(1e-3 / math.sqrt(every))
     assert coarse.lag == 0.01
+    assert coarse.means_of == every
+    assert fine.in_means(1) is fine
     assert fine.coarse(1000.0) is fine
+    assert fine.coarse(200.0).means_of == 5
+    assert fine.coarse(200.0).in_means(3).means_of == 15
+
+
+@pytest.mark.parametrize("every", [2, 3, 5, 40])
+@pytest.mark.parametrize("turn", [0.2, 0.5, 1.0])
+def test_means_of_a_wave_are_known_from_their_neighbours(every, turn):
+    time = np.arange(4000) * 1e-3
+    # turns by so much from one mean to the next
+    wave = np.sin(turn * time / (every * 1e-3))
+    coarse = ActuatorRecord("x", Drive(time, time), wave, 1e-3).in_means(every)
+    about = coarse.seen(np.sin(turn * coarse.time / (every * 1e-3)))[2:-2]
+    # the series ends with the sixth power
+    assert np.abs(about - coarse.displacement[2:-2]).max() < 5e-4 * turn**6
+    assert np.abs(about - coarse.displacement[2:-2]).max() < 0.02 * turn**2
+
+
+@pytest.mark.parametrize("hold", [True, False])
+def test_a_coarse_voltage_pulls_as_much_between_any_two_of_its_samples(hold):
+    time = np.arange(3000) * 1e-3
+    voltage = 4e3 * (1.0 - np.cos(2.0 * np.pi * 7.0 * time)) * (time < 2.0) - 3e3 * (time > 2.5)
+    fine = ActuatorRecord("x", Drive(time, voltage, hold), np.zeros(3000), 1e-6)
+    coarse = fine.in_means(10)
+
+    def pull(drive, edges):  # in MV^2 s, by many small pieces
+        at = np.linspace(edges[0], edges[1], 401)
+        at = 0.5 * (at[:-1] + at[1:])
+        if drive.hold:
+            there = drive.voltage[np.searchsorted(drive.time, at, side="right") - 1]
+        else:
+            there = np.interp(at, drive.time, drive.voltage)
+        return float(np.mean(there**2)) * 1e-12
+
+    for k in (3, 50, 100, 198, 251, 270):
+        edges = coarse.time[k] - 5e-3, coarse.time[k] + 5e-3
+        assert pull(coarse.drive, edges) == pytest.approx(pull(fine.drive, edges), abs=2e-3)
+    assert coarse.drive.voltage[280] == pytest.approx(-3e3)
 
 
 def test_a_coarse_film_record_keeps_its_ends():

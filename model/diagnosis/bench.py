@@ -1,8 +1,7 @@
 """The bench on which models are tried: records thinned to what matters, fits, and how they compare.
 
 Everything that chooses happens here, on the training records alone. A dense record is averaged over
-a few samples first, which costs nothing below half of the rate that is left; what is chosen is then
-fitted once more to every sample.
+a few samples first, as many as cost nothing; what is chosen is fitted once more to every sample.
 """
 
 from __future__ import annotations
@@ -28,12 +27,13 @@ from model.fitting.parameters import Estimate, Layout
 from model.fitting.problem import Problem
 from model.fitting.search import moving_starts, voltage_misfit, voltage_starts
 from model.fitting.secant import descend_by_secants
+from model.fitting.thinning import thinned
 from model.fitting.threads import Job, Result, together
 from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
 __all__ = ["FILM_MODEL_ERROR", "Bench", "Trial", "information", "merged", "relieved"]
 
-_RATE = 200.0  # Hz, to which records are thinned: mains and a load's ringing still show
+_RATE = 200.0  # Hz, to which records may be thinned: mains and a load's ringing still show
 _QUIET_MIN = 100  # samples of a lead-in from which a thinned record's noise is read again
 _FILM_SAMPLES = 1500
 #: of the largest stress: no model of a rubber is better than that, and none is asked to be
@@ -147,15 +147,21 @@ def _unwatched() -> None:
 class Bench:
     """Training records of one kind, ``full`` and thinned, and the fits made to them.
 
-    ``watched`` is called often while they run, from any thread, and may raise to end them.
+    ``model`` is asked how far records may be thinned, and what is fitted to them as the baseline is
+    asked again. ``watched`` is called often while they run, from any thread, and may raise to end
+    them.
     """
 
     def __init__(
-        self, records: Sequence[Record], workers: int, watched: Callable[[], None] = _unwatched
+        self,
+        records: Sequence[Record],
+        model: Actuator | Strip,
+        workers: int,
+        watched: Callable[[], None] = _unwatched,
     ) -> None:
         self.watched = watched
         self.full = tuple(_with_model_error(r) for r in records)
-        self.records = tuple(_thinned(r) for r in self.full)
+        self.records = tuple(_thinned(r, model) for r in self.full)
         self.workers = workers
         self.simulations = 0
         self._counting = Lock()
@@ -210,8 +216,22 @@ class Bench:
                 lambda f: descend(problem, f.x, fixed, iterations=_BASELINE), _leaders(fits)
             )
             fit = min(fits, key=lambda f: f.cost)
+            problem, fit = self._thinned_anew(problem, fit, fixed)
         progress("descents", 1.0)
         return _trial(problem, fit, fixed)
+
+    def _thinned_anew(
+        self, problem: Problem, fit: LocalFit, fixed: np.ndarray
+    ) -> tuple[Problem, LocalFit]:
+        """The ``fit`` to records thinned as its own model asks, where it asks for other rates."""
+        layout = problem.layout
+        model = layout.model(layout.values(fit.x))
+        records = tuple(_thinned(r, model) for r in self.full)
+        if [r.measured.size for r in records] == [r.measured.size for r in self.records]:
+            return problem, fit
+        self.records = records
+        problem = self.problem(layout.base)
+        return problem, descend(problem, fit.x, fixed, iterations=_BASELINE)
 
     def fit(
         self,
@@ -686,11 +706,11 @@ def _by_record(problem: Problem, residuals: np.ndarray) -> list[np.ndarray]:
     return np.split(residuals, edges[:-1])
 
 
-def _thinned(record: Record) -> Record:
+def _thinned(record: Record, model: Actuator | Strip) -> Record:
     """The record at a rate that is enough, with its noise read again from its quiet lead-in."""
-    if isinstance(record, FilmRecord):
+    if isinstance(record, FilmRecord) or isinstance(model, Strip):
         return record.coarse(_FILM_SAMPLES)
-    thin = record.coarse(_RATE)
+    thin = thinned(record, _RATE, model)
     if thin is record:
         return record
     moving = np.flatnonzero(thin.drive.voltage)

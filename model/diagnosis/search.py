@@ -132,7 +132,7 @@ class _Search:
         progress: Progress,
         stop: Callable[[], bool],
     ) -> None:
-        self.bench = Bench(records, workers, self._watch)
+        self.bench = Bench(records, base, workers, self._watch)
         self.base = base
         self._progress = progress
         self._reached = 0.0
@@ -257,7 +257,7 @@ class _Search:
         held = self._if_held()
         if self._is_noise(baseline) or held is None:
             return baseline
-        bench = Bench(held, self.bench.workers, self._watch)
+        bench = Bench(held, self.base, self.bench.workers, self._watch)
         trial = bench.baseline(self.base, lambda *_: self.report("baseline", 0.1))
         self.bench.simulations += bench.simulations
         if not self._is_noise(trial) or trial.cost > baseline.cost - _MATTERS:
@@ -275,7 +275,7 @@ class _Search:
         if held is None or not best.effects:
             return best
         before = (self.bench, self.found, self.settled, self.ended, self.left_out)
-        bench = Bench(held, self.bench.workers, self._watch)
+        bench = Bench(held, self.base, self.bench.workers, self._watch)
         bench.simulations = self.bench.simulations
         fits = [bench.fit(t.model, [(t.x, None)], t.fixed) for t in (self.found[frozenset()], best)]
         self.bench, self.settled, self.ended, self.left_out = bench, set(), {}, set()

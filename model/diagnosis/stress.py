@@ -22,7 +22,7 @@ from model.film import Strip, unit_stresses
 from model.fitting.search import SMOOTHING
 from model.kinematics import thinning
 from model.network import HEAD
-from model.records import ActuatorRecord, FilmRecord, Record, counted
+from model.records import ActuatorRecord, FilmRecord, Record
 
 __all__ = ["missing_stress"]
 
@@ -91,9 +91,7 @@ def _of_actuator(record: ActuatorRecord, model: Actuator) -> MissingStress | Non
         network = c[HEAD + MODULUS :: WIDTH] @ parts
         return network + c[INERTIA] * bend, stretch, rate
 
-    residual = _bridged(
-        record, record.displacement - counted(response.displacement, record.lead_in)
-    )
+    residual = _bridged(record, record.displacement - record.seen(response.displacement))
     measured, stretch, rate = lacking(response.displacement + residual)
     predicted, there, _ = lacking(response.displacement)
     late = np.interp(time - record.lag, time, record.drive.voltage)

@@ -16,8 +16,9 @@ from model.fitting.levenberg import LocalFit, descend
 from model.fitting.parameters import Estimate, Layout, require_free
 from model.fitting.problem import Problem
 from model.fitting.search import Progress, algorithm_1, film_starts, voltage_starts
+from model.fitting.thinning import thinned
 from model.material import Network
-from model.records import ActuatorRecord, Record
+from model.records import ActuatorRecord, FilmRecord, Record
 
 __all__ = [
     "METHODS",
@@ -179,8 +180,11 @@ def _result(
 
 def _coarse(problem: Problem) -> Problem:
     """The same problem on means of neighbouring samples, where the record is denser than needed."""
+    base = problem.layout.base
     records = [
-        r.coarse(_COARSE_RATE) if isinstance(r, ActuatorRecord) else r.coarse(_COARSE_SAMPLES)
+        r.coarse(_COARSE_SAMPLES)
+        if isinstance(r, FilmRecord) or not isinstance(base, Actuator)
+        else thinned(r, _COARSE_RATE, base)
         for r in problem.records
     ]
     return Problem(records, problem.layout, problem.workers)
@@ -200,10 +204,11 @@ def _coarse_about(problem: Problem, values: np.ndarray) -> Problem:
     for i, record in enumerate(problem.records):
         model = full[0, edges_full[i] : edges_full[i + 1]]
         part = slice(edges_thin[i], edges_thin[i + 1])
-        if isinstance(record, ActuatorRecord):
+        thinner = coarse.records[i]
+        if isinstance(record, ActuatorRecord) and isinstance(thinner, ActuatorRecord):
             moved = replace(record, displacement=record.displacement - model)
-            left = moved.coarse(_COARSE_RATE).measured
-        else:
+            left = moved.in_means(thinner.means_of // record.means_of).measured
+        elif isinstance(record, FilmRecord):
             pulled = replace(record, stress=record.stress - model)
             left = pulled.coarse(_COARSE_SAMPLES).measured
         coarse.measured[part] = thin[0, part] + left

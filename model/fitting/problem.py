@@ -12,7 +12,7 @@ from model.errors import ModelError
 from model.film import stress_of
 from model.fitting.parameters import Layout
 from model.fitting.threads import together
-from model.records import ActuatorRecord, FilmRecord, Record, counted
+from model.records import ActuatorRecord, FilmRecord, Record
 
 __all__ = ["Problem"]
 
@@ -90,7 +90,7 @@ class Problem:
         base = self.layout.base
         length = base.film.length if isinstance(base, Actuator) else 1.0
         moved, status = reading_of(c, length, record.drive, record.lag, self.haste)
-        return counted(moved, record.lead_in), status
+        return record.seen(moved), status
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """(model - measured)/noise, (N,), at coordinates ``x`` (d,)."""
