@@ -112,6 +112,7 @@ def as_record(recording: Recording, drive: str = "command") -> Record:
             recording.displacement_delay - recording.displacement_skew,
             valid,
             _lead_in(recording),
+            lag_error=recording.displacement_delay_error,
         )
     except ModelError as error:
         raise InputError(f"{recording.path}: {error}") from error

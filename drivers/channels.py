@@ -71,7 +71,8 @@ class Channel:
 
     ``skew`` is the time in s after the sample clock's tick at which this channel is converted (a
     multiplexed converter takes one channel after another). ``delay`` is the known lag in s of the
-    instrument itself, such as half a laser's averaging window.
+    instrument itself, such as half a laser's averaging window; ``delay_error`` that by which it may
+    be more or less, in one run as against another.
     """
 
     name: str
@@ -79,3 +80,4 @@ class Channel:
     scaling: Scaling
     skew: float = 0.0
     delay: float = 0.0
+    delay_error: float = 0.0

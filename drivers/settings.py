@@ -166,6 +166,11 @@ class LaserSettings(Section):
         """
         return 0.5 * self.window
 
+    @property
+    def delay_error(self) -> float:
+        """Time in s by which a reading may be older, or younger: its clock is not the card's."""
+        return 0.5 * self.sampling_us * 1e-6
+
 
 class CardSettings(Section):
     """The multifunction card: one output clock, on whose ticks the inputs are converted too."""
@@ -483,6 +488,7 @@ class RigSettings(Section):
                     # the command is put out on the tick itself; the inputs follow one by one
                     skew=skews[place - 1] if place else 0.0,
                     delay=laser.delay if name == "displacement" else 0.0,
+                    delay_error=laser.delay_error if name == "displacement" else 0.0,
                 )
             )
         return tuple(channels)

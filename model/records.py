@@ -37,10 +37,11 @@ class ActuatorRecord:
 
     ``noise`` is the standard deviation of one reading in m. ``lag`` is the known time in s by which
     a reading is older than its time stamp (an averaging sensor), less the converter's skew: the
-    model is evaluated at ``time - lag``. ``valid`` (N,) bool is False where a reading must not be
-    used (a dropout, a clipped sensor), None where all are good. Over the first ``lead_in`` samples,
-    at 0 V, the displacement is 0 on average, because it is counted from there. Each reading is the
-    mean of ``means_of`` that were taken, evenly about its time.
+    model is evaluated at ``time - lag``; by ``lag_error`` it may be more or less. ``valid`` (N,)
+    bool is False where a reading must not be used (a dropout, a clipped sensor), None where all are
+    good. Over the first ``lead_in`` samples, at 0 V, the displacement is 0 on average, because it
+    is counted from there. Each reading is the mean of ``means_of`` that were taken, evenly about
+    its time.
     """
 
     name: str
@@ -51,6 +52,7 @@ class ActuatorRecord:
     valid: np.ndarray | None = None
     lead_in: int = 0
     means_of: int = 1
+    lag_error: float = 0.0
 
     def __post_init__(self) -> None:
         _check(self.name, self.measured, self.drive.time, self.noise)

@@ -19,7 +19,12 @@ CHANNELS = (
     Channel("voltage_monitor", "V", Scaling((1e-3, VOLTS_PER_COUNT), 1000.0), skew=2e-6),
     Channel("current_monitor", "A", Scaling((0.0, VOLTS_PER_COUNT), 4e-3), skew=4e-6),
     Channel(
-        "displacement", "m", Scaling((0.0, VOLTS_PER_COUNT), 4e-3, 1e-3), skew=6e-6, delay=1e-3
+        "displacement",
+        "m",
+        Scaling((0.0, VOLTS_PER_COUNT), 4e-3, 1e-3),
+        skew=6e-6,
+        delay=1e-3,
+        delay_error=1e-5,
     ),
 )
 IDENTITY = RigIdentity(

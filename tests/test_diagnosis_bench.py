@@ -485,3 +485,31 @@ def test_records_are_fitted_together():
     assert trial.effects == ()
     stage = bench_of(a, b).stage(trial, 1.0)
     assert stage.train_rms == pytest.approx(math.sqrt(5.0) * 1e-6, rel=0.05)
+
+
+# --- the age of a reading
+
+
+@pytest.mark.parametrize(("late", "suits"), [(8e-6, True), (-8e-6, True), (30e-6, False)])
+def test_readings_are_as_old_as_suits_as_far_as_that_is_not_known(late, suits):
+    time, voltage = Sequence(
+        "fast", (Ramp(4e3, 1.0), Chirp(3.5e3, 5.0, 40.0, 10.0), Ramp(0.0, 1.0))
+    ).sample(1000.0)
+    drive = Drive(time, voltage, hold=True)
+    shown = PLAIN.simulate(drive, 1e-4 + late).displacement
+    rng = np.random.default_rng(3)
+    record = ActuatorRecord(
+        "late", drive, shown + 1e-7 * rng.standard_normal(time.size), 1e-7, lag=1e-4, lag_error=1e-5
+    )
+    bench = bench_of(record)
+    layout = bench.problem(PLAIN).layout
+    start = layout.coordinates(layout.initial())
+    trial = bench.fit(PLAIN, [(start, None)], np.ones(layout.size, dtype=bool))
+    assert trial.cost > 1.3
+    there = bench.cost_at_any_age(trial)
+    assert (there == pytest.approx(1.0, abs=0.05)) is suits
+    assert there < trial.cost
+    # where it is known, it is as it is
+    known = bench_of(replace(record, lag_error=0.0))
+    trial = known.fit(PLAIN, [(start, None)], np.ones(layout.size, dtype=bool))
+    assert known.cost_at_any_age(trial) == trial.cost

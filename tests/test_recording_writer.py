@@ -66,6 +66,7 @@ def test_the_layout_is_the_contract(tmp_path: Path) -> None:
             assert entry[f"instrument/channels/{channel.name}"] == raw
             assert raw.attrs["skew_s"] == channel.skew
             assert raw.attrs["delay_s"] == channel.delay
+            assert raw.attrs["delay_error_s"] == channel.delay_error
         monitor = data["voltage_monitor_counts"]
         assert tuple(monitor.attrs["coefficients"]) == CHANNELS[1].scaling.coefficients
         assert monitor.attrs["gain"] == 1000.0
@@ -120,6 +121,7 @@ def test_a_reader_gets_back_what_was_given(tmp_path: Path) -> None:
     assert run.channels == CHANNELS
     assert run.instruments == IDENTITY.instruments
     assert (run.displacement_skew, run.displacement_delay) == (6e-6, 1e-3)
+    assert run.displacement_delay_error == 1e-5
     assert run.sequence_toml == SEQUENCE
     assert run.provenance["rig"] == "sim:7"
     assert run.provenance["simulated"] is True

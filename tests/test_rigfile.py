@@ -159,6 +159,9 @@ def test_channels_carry_scaling_and_timing():
     assert by_name["current_monitor"].scaling.gain == pytest.approx(4e-3)
     assert by_name["displacement"].scaling.gain == pytest.approx(-4e-3)
     assert by_name["displacement"].delay == pytest.approx(320e-6)
+    # the laser samples every 10 us, whenever that is
+    assert by_name["displacement"].delay_error == pytest.approx(5e-6)
+    assert by_name["voltage_monitor"].delay_error == 0.0
     assert by_name["temperature"].scaling.offset == 273.15
     skews = [channel.skew * 1e6 for channel in channels]
     assert skews == pytest.approx([0.0, 50.0, 60.0, 70.0, 80.0])

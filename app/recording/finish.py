@@ -90,7 +90,10 @@ def _write_physical(entry: h5py.Group) -> int:
     if samples > PHYSICAL_MAX:
         _write_overview(entry, counts)
         return samples
-    timing = {c.name: {"skew_s": c.skew, "delay_s": c.delay} for c in counts.channels}
+    timing = {
+        c.name: {"skew_s": c.skew, "delay_s": c.delay, "delay_error_s": c.delay_error}
+        for c in counts.channels
+    }
     for name in counts.names:
         field = _write_field(data, name, samples, timing.get(name, {}))
         for start in range(0, samples, SLICE):

@@ -56,6 +56,7 @@ def write_channel(counts: h5py.Dataset, channel: Channel) -> None:
     attrs["offset"] = float(channel.scaling.offset)
     attrs["skew_s"] = float(channel.skew)
     attrs["delay_s"] = float(channel.delay)
+    attrs["delay_error_s"] = float(channel.delay_error)
 
 
 def read_channels(data: h5py.Group) -> tuple[Channel, ...]:
@@ -73,6 +74,7 @@ def read_channels(data: h5py.Group) -> tuple[Channel, ...]:
                 scaling=Scaling(coefficients, float(attrs["gain"]), float(attrs["offset"])),
                 skew=float(attrs["skew_s"]),
                 delay=float(attrs["delay_s"]),
+                delay_error=float(attrs.get("delay_error_s", 0.0)),
             )
         )
     return tuple(found)

@@ -140,7 +140,7 @@ class _Reader:
                 f"{self.path}: kinematics {kinematics!r} of /entry/data is not one of "
                 f"{', '.join(KINEMATICS)}"
             )
-        skew, delay = self._timing(data)
+        skew, delay, delay_error = self._timing(data)
         expected = data.attrs.get("samples_expected")
         step = {c.name: resolution(c) for c in channels}.get("voltage_command", 0.0)
         complete = bool(entry.attrs.get("complete", False))
@@ -156,6 +156,7 @@ class _Reader:
             complete=complete,
             displacement_skew=skew,
             displacement_delay=delay,
+            displacement_delay_error=delay_error,
             rest_reading=self._rest_reading(data, rest),
             voltage_step=step,
             film=film,
@@ -247,12 +248,15 @@ class _Reader:
             return float(data["displacement"].attrs.get("rest_reading", 0.0))
         return 0.0 if rest is None else rest.reading
 
-    def _timing(self, data: h5py.Group) -> tuple[float, float]:
+    def _timing(self, data: h5py.Group) -> tuple[float, float, float]:
         for name in ("displacement", counts_name("displacement")):
             if name in data:
                 attrs = data[name].attrs
-                return float(attrs.get("skew_s", 0.0)), float(attrs.get("delay_s", 0.0))
-        return 0.0, 0.0
+                skew, delay, error = (
+                    float(attrs.get(key, 0.0)) for key in ("skew_s", "delay_s", "delay_error_s")
+                )
+                return skew, delay, error
+        return 0.0, 0.0, 0.0
 
     def _hold(self, data: h5py.Group) -> bool:
         for name in ("voltage_command", counts_name("voltage_command")):

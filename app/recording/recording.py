@@ -44,7 +44,8 @@ class Recording:
     increases and need not be even. ``hold``: the voltage stands between samples (a converter);
     otherwise it is linear. ``displacement_skew`` and ``displacement_delay`` in s are the known time
     at which the sensor is converted after the tick, and the sensor's own lag; neither has been
-    taken off ``time``. ``temperature`` is in degrees Celsius. ``complete`` is False for a run that
+    taken off ``time``; by ``displacement_delay_error`` the lag may be more or less.
+    ``temperature`` is in degrees Celsius. ``complete`` is False for a run that
     was killed; ``outcome`` says how it ended. ``rate`` in Hz is the sample clock's, None for data
     that had none.
     """
@@ -60,6 +61,7 @@ class Recording:
     rate: float | None = None
     displacement_skew: float = 0.0
     displacement_delay: float = 0.0
+    displacement_delay_error: float = 0.0
     rest_reading: float = 0.0
     voltage_step: float = 0.0
     film: Film | None = None

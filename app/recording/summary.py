@@ -65,6 +65,7 @@ def describe(recording: Recording, checksum: bool = True) -> dict[str, Any]:
         "rest_reading_m": recording.rest_reading,
         "displacement_skew_s": recording.displacement_skew,
         "displacement_delay_s": recording.displacement_delay,
+        "displacement_delay_error_s": recording.displacement_delay_error,
         "film": asdict(film) | {"id": recording.film_id} if film else None,
         "load": asdict(load) if load else None,
         "notes": recording.notes,

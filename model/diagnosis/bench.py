@@ -500,6 +500,29 @@ class Bench:
             found.append(Problem(corrected, plain.layout, self.workers, kernel.QUICK, self._count))
         return found
 
+    def cost_at_any_age(self, trial: Trial) -> float:
+        """The cost, had the readings of each record the age that suits the trial best.
+
+        As far as it is not known: a sensor's clock is not the card's, and what is missing is then
+        no effect of the rig.
+        """
+        problem = trial.problem
+        open_ages = [r for r in problem.records if isinstance(r, ActuatorRecord) and r.lag_error]
+        if not open_ages:
+            return trial.cost
+        older = [
+            replace(r, lag=r.lag + r.lag_error) if isinstance(r, ActuatorRecord) else r
+            for r in problem.records
+        ]
+        there = Problem(older, problem.layout, self.workers, problem.haste, self._count)
+        moved = _by_record(problem, there.residuals(trial.x) - trial.residuals)
+        total = 0.0
+        for residuals, by in zip(_by_record(problem, trial.residuals), moved, strict=True):
+            size = float(by @ by)
+            share = np.clip(-float(by @ residuals) / size, -1.0, 1.0) if size > 0.0 else 0.0
+            total += float(np.sum((residuals + share * by) ** 2))
+        return total / problem.samples
+
     def polished(self, trial: Trial, in_haste: bool = False) -> Trial:
         """``trial`` fitted to every sample, to the end; ``in_haste`` as it is, on every sample."""
         problem = self.problem(trial.model, kernel.CAREFUL)

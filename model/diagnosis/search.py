@@ -847,9 +847,9 @@ class _Search:
         while best.effects:
             smaller = {name: self._ended(self._without(best, name)) for name in best.effects}
             correlation = self._correlation([best, *smaller.values()])
-            mark = self._criterion(best, correlation)
+            mark = self._criterion(self._of_any_age(best), correlation)
             spare = {
-                name: self._criterion(t, correlation) - mark - self._asked(name)
+                name: self._criterion(self._of_any_age(t), correlation) - mark - self._asked(name)
                 for name, t in smaller.items()
             }
             least = min(spare, key=lambda n: spare[n])
@@ -857,6 +857,10 @@ class _Search:
                 break
             best = smaller[least]
         return best
+
+    def _of_any_age(self, trial: Trial) -> Trial:
+        """``trial`` with the cost that it has where each record's readings are as old as suits."""
+        return replace(trial, cost=self.bench.cost_at_any_age(trial))
 
     def _without(self, trial: Trial, name: str) -> Trial:
         key = frozenset(trial.effects) - {name}
