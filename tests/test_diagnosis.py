@@ -479,6 +479,44 @@ def test_a_law_that_leaves_nothing_took_all_that_there_was(name, white, is_all):
     assert _Search._is_all(_Tried(name, trial, trial, 0.0)) == is_all
 
 
+@pytest.mark.parametrize("white", [True, False])
+def test_who_rivals_a_leader_that_leaves_but_noise_is_followed_to_its_end(white):
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    noise /= np.sqrt(np.mean((noise / NOISE) ** 2))
+    best = made_trial([record], PLAIN, math.sqrt(3.0) * noise)
+    fits = [
+        _Tried(n, best, made_trial([record], replace(PLAIN, effects=(typical(n),)), left), 0.0)
+        for n, left in {
+            "amplifier resonance": (1.0 if white else 1.2) * noise,
+            "sensor averaging": math.sqrt(1.4) * noise,
+            "sensor lag": math.sqrt(1.3) * noise,
+            "dry friction": math.sqrt(1.5) * noise,
+            "easing friction": math.sqrt(1.6) * noise,  # follows the path, as the one before does
+            "attached mode": math.sqrt(1.7) * noise,  # names no cause
+            "ageing": math.sqrt(2.5) * noise,  # explains a quarter of what the leader does
+        }.items()
+    ]
+    search.found = {frozenset(t.trial.effects): t.trial for t in fits}
+    ended: list[str] = []
+
+    def on(trial: Trial, leader: float = math.inf) -> Trial:
+        assert leader == math.inf
+        ended.append(trial.effects[0])
+        # a law with a number less than the leader's does as well, once it is at its end
+        key = frozenset(trial.effects)
+        if trial.effects[0] == "sensor averaging":
+            search.found[key] = made_trial([record], trial.model, noise)
+        return search.found[key]
+
+    search._ended = on  # type: ignore[method-assign]
+    order, _ = search._rivals_ended(best, fits)
+    wanted = ["sensor lag", "sensor averaging", "dry friction"]
+    assert ended == (["amplifier resonance", *wanted] if white else [])
+    assert order[0].name == ("sensor averaging" if white else "amplifier resonance")
+
+
 def test_who_is_seen_not_to_come_near_a_leader_is_not_followed_again():
     record = record_of(PLAIN)
     search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)

@@ -26,7 +26,7 @@ from model.diagnosis.residual import signatures
 from model.diagnosis.screening import Promise, Screen, is_of, sizes_of
 from model.diagnosis.stress import missing_stress
 from model.diagnosis.unnamed import describe_unnamed
-from model.effects import EFFECTS, Effect
+from model.effects import EFFECTS, Effect, follows_path
 from model.film import Strip
 from model.fitting import Estimate
 from model.records import ActuatorRecord, Record
@@ -69,6 +69,7 @@ _IN_THE_WAY = 0.9  # of what no branches account for: with an effect that leaves
 _CLEARLY = 2.0  # of the least that is left: more, and it is not the one that they hid
 _AS_WELL = 1.1  # of what is left beside a leader that explains all: these may do so too
 _ANEW = 6  # of such effects that are fitted anew
+_RIVALS = 0.5  # of what a leader explains that leaves but noise: such are followed to their ends
 _OUT_OF_REACH = 30.0  # times the leader's cost: from there no branches elsewhere lead to it
 _CONTENDERS = 4  # of those that promised as much as a leader that explains all
 _ANEW_SIZES = (0.3, 1.0, 3.0, 10.0, 30.0)  # times the typical one, tried for that
@@ -323,6 +324,7 @@ class _Search:
             promising = gain > self._asked(fitted[0].name) or not self._is_noise(best)
             if promising and best.cost - leader.cost > least:
                 fitted, correlation = self._settled(best, self._anew(fitted), least)
+                fitted, correlation = self._rivals_ended(best, fitted)
             leader = fitted[0].trial
             gain = self._gain(best, leader, correlation)
             matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
@@ -648,6 +650,27 @@ class _Search:
             order = self._as_found(order)
         correlation = self._correlation([best, *(t.trial for t in order)])
         return sorted(order, key=rank), correlation
+
+    def _rivals_ended(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
+        """The candidates, best first, those that rival the leader at their ends.
+
+        A leader that leaves but noise has shown where the noise is, and held others back on their
+        way there: who explains a good part of what it does may yet do so with fewer numbers. Of
+        families that follow the path only the best law: the others take long to be no better.
+        """
+        leader = tried[0].trial
+        order = sorted(tried, key=lambda t: t.trial.cost)
+        names = [t.name for t in order]
+        if self._is_noise(leader):
+            for one in order:
+                rivals = best.cost - one.trial.cost > _RIVALS * (best.cost - leader.cost)
+                named = EFFECTS[one.name].family != "unknown"
+                quick = not follows_path(one.trial.model.effects)
+                if rivals and named and (quick or _is_first_of_family(one.name, names)):
+                    self._ended(one.trial)
+        order = self._as_found(order)
+        correlation = self._correlation([best, *(t.trial for t in order)])
+        return sorted(order, key=lambda t: self._demerit(t.trial, correlation)), correlation
 
     def _as_found(self, tried: list[_Tried]) -> list[_Tried]:
         """The candidates as the best fits of them are by now."""
