@@ -738,6 +738,8 @@ def diagnose(
             _print(console, f"{label}: {path}")
     if json is not None:
         write_json(diagnosis_json(outcome), json)
+    if outcome.ended is not None and not isinstance(outcome.ended, Interrupted):
+        raise type(outcome.ended)(f"{outcome.ended}; what had been found until then was kept")
     if outcome.finding.interrupted:
         raise Interrupted("interrupted: what had been found until then was kept")
 

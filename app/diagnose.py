@@ -9,7 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from app.cores import for_simulations
-from app.errors import InputError, Interrupted
+from app.errors import (
+    DearigError,
+    DiskFault,
+    InputError,
+    InstrumentFault,
+    Interrupted,
+    NotSafe,
+    SafetyStop,
+)
 from app.experiment import separating_experiment
 from app.interrupts import Interrupts
 from app.modelfile import save_model
@@ -34,6 +42,8 @@ __all__ = ["VALIDATION", "diagnose_recordings", "diagnose_rig"]
 
 #: What a rig is asked for at the end, to validate on: one run of each of the thesis's tables.
 VALIDATION = ("validation-a-0.6", "validation-b-7.0")
+
+_ENDS = (Interrupted, SafetyStop, InstrumentFault, DiskFault)  # of a run, the rig safe
 
 
 def diagnose_recordings(
@@ -86,7 +96,9 @@ def diagnose_rig(
     The first recording is the thesis's (unless ``train`` are given), then come at most
     ``experiments`` more, for as long as rivals are left; at the end ``VALIDATION`` are recorded
     (unless ``validation`` are given) and read once. All recordings go to the folder ``out``.
-    ``seed`` is of a simulated rig's noise. Ctrl-C during a run ends everything, the rig safe.
+    ``seed`` is of a simulated rig's noise. What ends a run, ctrl-C, an interlock, an instrument or
+    the disk, ends the recording, the rig safe: what was found before is kept, and ``ended`` of the
+    outcome says why. Raises what ends the first run, and ``NotSafe`` at once.
     """
     started = clock()
     _check_outputs(train, validation, model_out, overwrite)
@@ -124,7 +136,7 @@ def diagnose_rig(
     if not files:
         files.append(run("", "thesis"))
     performed: list[str] = []
-    ended = ""
+    ended: DearigError | None = None
     while True:
         recordings = open_all(files)
         base, _ = _prepared(recordings, [], branches, drive, rig_file)
@@ -138,25 +150,34 @@ def diagnose_rig(
         name = f"experiment-{len(performed) + 1}"
         try:
             files.append(run(experiment.sequence, name))
-        except Interrupted as error:
-            ended = str(error)  # the rig is safe, and what was found before still holds
+        except NotSafe:
+            raise
+        except _ENDS as error:
+            ended = error  # the rig is safe, and what was found before still holds
             break
         performed.append(f"{words}. It was run, and its recording, {name}.h5, was added.")
     others: list[Recording] = []
     if validation:
         others = open_all(validation)
     elif not (ended or finding.interrupted):
+        recorded = len(made)
         try:
-            others = open_all([run("", name) for name in VALIDATION])
-        except Interrupted as error:
-            ended = str(error)
-    if ended:
-        finding = replace(finding, interrupted=True, notes=(*finding.notes, ended))
+            for name in VALIDATION:
+                run("", name)
+        except NotSafe:
+            raise
+        except _ENDS as error:
+            ended = error
+        others = open_all(made[recorded:])
+    if ended is not None:
+        stopped = finding.interrupted or isinstance(ended, Interrupted)
+        notes = (*finding.notes, f"No more was recorded: {ended}")
+        finding = replace(finding, interrupted=stopped, notes=notes)
     _, quality = _prepared(recordings, others, branches, drive, rig_file)
     outcome = _outcome(
         recordings, others, finding, quality, drive, rig_file, address, started, clock, performed
     )
-    return _saved(outcome, recordings, model_out, overwrite)
+    return _saved(replace(outcome, ended=ended), recordings, model_out, overwrite)
 
 
 # ---------------------------------------------------------------- before

@@ -14,11 +14,12 @@ import tomli_w
 
 from app.errors import InputError
 from app.outcomes import SeparatingExperiment
-from app.plan import plan
+from app.plan import Plan, plan
 from app.presets import PRESETS
 from app.rigfile import RigFile
 from app.sequencefile import LoadedSequence, parse_sequence
 from drivers.gate import GatedWaveform
+from drivers.interlocks import would_trip
 from model.actuator import Actuator, Drive
 from model.excitation import THESIS_AMPLITUDES
 from model.kernel import OK
@@ -28,8 +29,10 @@ __all__ = ["SEPARATES", "candidates", "separating_experiment"]
 #: RMS difference of two predictions, in noise floors, from which on an experiment tells them apart.
 SEPARATES = 0.5
 
-# amplitudes are lowered in these steps until the gate admits a sequence
+# amplitudes are lowered in these steps until a sequence can be played, and read
 _SCALES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
+_CALM = 0.7  # of what trips an interlock: a film does not do quite what any of the rivals foresees
+_BLURRED = 1.0  # of the noise: what the film may move while it is not known when the laser looks
 _NEARLY = 0.9  # of the best separation: among such, the one that separates most a second
 
 
@@ -98,8 +101,9 @@ def separating_experiment(
     Two that no sequence at all would separate do not count: others may be told from both.
 
     ``rivals`` are (label, family, fitted model), the final model among them; ``noise`` is the floor
-    of one reading in m. Every sequence has passed the gate of ``rig_file``. Also returned is a
-    sentence, which says why where there is no such sequence.
+    of one reading in m. Every sequence has passed the gate of ``rig_file``, and trips no interlock
+    where the film does what any of the rivals foresees. Also returned is a sentence, which says why
+    where there is no such sequence.
     """
     labels = tuple(label for label, _, _ in rivals)
     families = tuple(dict.fromkeys(family for _, family, _ in rivals))
@@ -107,20 +111,20 @@ def separating_experiment(
     top = math.floor(min(rig_file.gate_limits().voltage_max / 1e3, 8.0) * 1e3) / 1e3
     made: list[tuple[str, dict[tuple[str, str], float], float, str]] = []
     for name, text in candidates(top).items():
-        admitted = _admitted(text, name, rig_file)
-        if admitted is None:
+        playable = _playable(text, name, rivals, rig_file, noise)
+        if playable is None:
             continue
-        loaded, waveform = admitted
-        predictions = _predictions(rivals, waveform)
-        if predictions is None:
-            continue
+        loaded, waveform, predictions = playable
         apart = {
             (labels[i], labels[j]): _rms(predictions[i] - predictions[j]) / noise
             for i, j in combinations(range(len(rivals)), 2)
         }
         made.append((name, apart, waveform.duration, loaded.toml))
     if not made:
-        return None, "The limits of the rig file admit none of the excitations that were considered"
+        return None, (
+            "None of the excitations that were considered could be played: the limits or the "
+            "interlocks of the rig file would end them"
+        )
     pairs = list(made[0][1])
     separable = [p for p in pairs if max(apart[p] for _, apart, _, _ in made) >= SEPARATES]
     tried: list[tuple[str, float, float, tuple[str, str], str]] = []
@@ -155,17 +159,48 @@ def separating_experiment(
     )
 
 
-def _admitted(
-    text: str, name: str, rig_file: RigFile
-) -> tuple[LoadedSequence, GatedWaveform] | None:
-    """The sequence as high as the gate lets it pass; None where it does not at any height."""
+def _playable(
+    text: str,
+    name: str,
+    rivals: Sequence[tuple[str, str, Actuator]],
+    rig_file: RigFile,
+    noise: float,
+) -> tuple[LoadedSequence, GatedWaveform, list[np.ndarray]] | None:
+    """The sequence as high as it can be played and read, and what the ``rivals`` foresee (m).
+
+    None where that is at no height.
+    """
     for scale in _SCALES:
         try:
             loaded = parse_sequence(_scaled(text, scale), name, Path())
-            return loaded, plan(loaded, rig_file).admitted()
+            planned = plan(loaded, rig_file)
+            waveform = planned.admitted()
         except InputError:
             continue
+        predictions = _predictions(rivals, waveform)
+        if predictions is None:
+            continue
+        if not any(_would_end(planned, waveform, p, rig_file, noise) for p in predictions):
+            return loaded, waveform, predictions
     return None
+
+
+def _would_end(
+    planned: Plan, waveform: GatedWaveform, moved: np.ndarray, rig_file: RigFile, noise: float
+) -> bool:
+    """Whether a film that is ``moved`` (N,) m would trip an interlock, or outrun the laser.
+
+    The laser has a clock of its own: how old a reading is, is not known to less than its period.
+    """
+    speed = float(np.max(np.abs(np.diff(moved)))) * waveform.rate
+    if speed * rig_file.laser.delay_error > _BLURRED * noise:
+        return True
+    foreseen = planned.displacement_of_samples
+    # further than the film is foreseen to go, and not as far
+    return any(
+        would_trip(rig_file, waveform.rate, waveform.voltage, part * moved, foreseen)
+        for part in (1.0 / _CALM, _CALM)
+    )
 
 
 def _scaled(text: str, scale: float) -> str:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from app.errors import DearigError
 from model.diagnosis.findings import Diagnosis
 from model.fitting import Identification
 from model.measures import Errors
@@ -140,6 +141,7 @@ class DiagnoseOutcome:
     pooled noise floor of the training recordings in m or Pa. ``experiment`` separates what the data
     do not; ``experiment_words`` says of it, or of why there is none. ``performed`` tells of the
     experiments that were run on a rig, one sentence each. ``quality`` are sentences on recordings.
+    ``ended`` is why no more was recorded on the rig than was, None where all was.
     """
 
     title: str
@@ -155,6 +157,7 @@ class DiagnoseOutcome:
     seconds: float
     performed: tuple[str, ...] = ()
     rig: str = ""
+    ended: DearigError | None = None
 
     @property
     def before(self) -> Stand:

@@ -16,12 +16,13 @@ from drivers.channels import COUNT_MAX, COUNT_MIN, Channel, Scaling
 from drivers.rig import Block
 from drivers.settings import Action, RigSettings
 
-__all__ = ["Interlocks", "Trip"]
+__all__ = ["Interlocks", "Trip", "would_trip"]
 
 _JUMP_WITHIN = 2e-3  # s
 # s; at longer sample intervals what a film can do between samples looks like a jump
 _JUMP_INTERVAL = 4e-3
 
+_NOMINAL = (0.0, 10.0 / 32768)  # V over counts of a converter of +-10 V
 _AT_END = 0.999  # of the laser's range: where an alarm holds the analog output
 _FOLLOWS = 2  # counts between a command and the plan that it follows
 
@@ -369,6 +370,29 @@ class Interlocks:
         self._tripped.add(name)
         sample = self._watched + at
         return Trip(name, sample, action, f"at {sample / self._rate:.4g} s {words}")
+
+
+def would_trip(
+    settings: RigSettings,
+    rate: float,
+    voltage: np.ndarray,
+    displacement: np.ndarray,
+    predicted: np.ndarray | None = None,
+) -> tuple[str, ...]:
+    """Names of the interlocks that would end a run at ``rate`` Hz in which all goes as foreseen.
+
+    The amplifier follows ``voltage`` (N,) V, and the film moves by ``displacement`` (N,) m.
+    ``predicted`` is what the run would be judged by, as ``Interlocks`` takes it. That a reading
+    stands still tells nothing here, where it has no noise.
+    """
+    locks = settings.interlocks.model_copy(update={"laser_stuck_s": 0.0})
+    settings = settings.model_copy(update={"interlocks": locks})
+    channels = settings.channels(dict.fromkeys(settings.channel_names, _NOMINAL))
+    still = np.zeros(voltage.size)
+    shown = {"voltage_command": voltage, "voltage_monitor": voltage, "displacement": displacement}
+    counts = np.array([c.scaling.counts(shown.get(c.name, still)) for c in channels])
+    watch = Interlocks(settings, channels, rate, predicted, voltage)
+    return tuple(trip.interlock for trip in watch.watch(Block(0, counts)))
 
 
 class _Debounce:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from app import diagnose as app_diagnose
+from app.errors import DiskFault, InstrumentFault, Interrupted, NotSafe, SafetyStop
 from app.modelfile import load_model, save_model
 from app.recording import open_recording
 from app.sequencefile import parse_sequence
@@ -287,3 +288,66 @@ class TestRig:
         )
         assert answer.code == 130
         assert names(tmp_path / "d") == {"thesis.h5", "report.html", "model.toml"}
+
+    @pytest.mark.parametrize(
+        ("ends", "code", "interrupted"),
+        [
+            (SafetyStop("displacement: at 3 s the film stood 30 mm away"), 3, False),
+            (InstrumentFault("the card does not answer"), 4, False),
+            (DiskFault("the disk is full"), 4, False),
+            (Interrupted("interrupted: the voltage was ramped down"), 130, True),
+        ],
+    )
+    @pytest.mark.parametrize("at", ["experiment-1", "validation-b-7.0"])
+    def test_what_ends_a_run_loses_nothing_of_what_was_found(
+        self, bench, tmp_path, monkeypatch, ends, code, interrupted, at
+    ):
+        far = replace(RIVAL, effects=(("amplifier lag", (("time_constant", 0.05),)),))
+        instead(monkeypatch, replace(OPEN, rivals=(("amplifier", far),)), NAMED)
+        self.end(monkeypatch, at, ends)
+        answer = dearig(
+            "diagnose", "--rig", "sim:7", "--rig-file", bench / "rig.toml", "--out", tmp_path / "d",
+            "--json", tmp_path / "d.json",
+        )  # fmt: skip
+        assert answer.code == code
+        assert "what had been found until then was kept" in answer.err.splitlines()[-1]
+        kept = strict_json((tmp_path / "d.json").read_text())
+        assert kept["interrupted"] is interrupted
+        assert f"No more was recorded: {ends}" in kept["notes"]
+        assert kept["steps"]
+        validation = kept["records"]["validation"]
+        assert validation == (["validation-a-0.6"] if at.startswith("validation") else [])
+        assert "No more was recorded" in check(tmp_path / "d" / "report.html").words
+        assert load_model(tmp_path / "d" / "model.toml").model.effects
+
+    @pytest.mark.parametrize(
+        ("ends", "at", "code"),
+        [
+            (SafetyStop("the film broke down"), "thesis", 3),
+            (NotSafe("the voltage may still be up"), "experiment-1", 4),
+            (NotSafe("the voltage may still be up"), "validation-a-0.6", 4),
+        ],
+    )
+    def test_what_is_not_safe_or_is_the_first_run_ends_at_once(
+        self, bench, tmp_path, monkeypatch, ends, at, code
+    ):
+        far = replace(RIVAL, effects=(("amplifier lag", (("time_constant", 0.05),)),))
+        instead(monkeypatch, replace(OPEN, rivals=(("amplifier", far),)), NAMED)
+        self.end(monkeypatch, at, ends)
+        answer = dearig(
+            "diagnose", "--rig", "sim:7", "--rig-file", bench / "rig.toml", "--out", tmp_path / "d"
+        )
+        assert (answer.code, answer.err.splitlines()[-1]) == (code, f"dearig: {ends}")
+        assert "report.html" not in names(tmp_path / "d")
+
+    @staticmethod
+    def end(monkeypatch, at: str, error: Exception) -> None:
+        """Have the run whose recording is named ``at`` end with ``error``."""
+        record = app_diagnose.record
+
+        def ending(loaded, address, settings, configuration, path, **more):
+            if path.stem == at:
+                raise error
+            return record(loaded, address, settings, configuration, path, **more)
+
+        monkeypatch.setattr(app_diagnose, "record", ending)

@@ -13,6 +13,7 @@ from app.plan import plan
 from app.rigfile import RigFile
 from app.sequencefile import parse_sequence
 from app.together import of_rig
+from drivers.interlocks import would_trip
 from drivers.settings import CardSettings
 from model.actuator import Actuator, Drive
 from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load
@@ -87,7 +88,7 @@ def test_twins_do_not_stand_in_the_way_of_a_third():
 
 def test_limits_lower_every_candidate():
     low = SLOW.model_copy(update={"limits": SLOW.limits.model_copy(update={"voltage_max_kV": 3.0})})
-    found, _ = separating_experiment(RIVALS, low, 1e-9)
+    found, _ = separating_experiment(RIVALS, low, NOISE)
     assert len(found.tried) == len(candidates(3.0))
     waveform = plan(parse_sequence(found.sequence, "x", Path()), low).admitted()
     assert 2e3 < waveform.voltage.max() <= 3e3
@@ -97,6 +98,50 @@ def test_every_candidate_passes_the_gate_of_the_thesis_rig():
     for name, text in candidates(8.0).items():
         waveform = plan(parse_sequence(text, name, Path()), SLOW).admitted()
         assert waveform.voltage.max() > 5e3, name
+
+
+def played(found, settings: RigFile) -> tuple[np.ndarray, float, list[np.ndarray]]:
+    """Voltage, its rate, and what each of the two foresees of the film."""
+    waveform = plan(parse_sequence(found.sequence, "x", Path()), settings).admitted()
+    time = np.arange(waveform.voltage.size) / waveform.rate
+    drive = Drive(time, waveform.voltage, hold=True)
+    moved = [model.simulate(drive).displacement for model in (LAG, DRAG)]
+    return waveform.voltage, waveform.rate, moved
+
+
+def with_interlocks(**changes: float) -> RigFile:
+    locks = RigFile().interlocks.model_copy(update=changes)
+    return RigFile().model_copy(update={"interlocks": locks})
+
+
+@pytest.mark.parametrize("most", [3.0, 0.5])
+def test_it_trips_no_interlock_of_its_own(most):
+    settings = with_interlocks(displacement_max_mm=most)
+    found, _ = separating_experiment(RIVALS, settings, NOISE)
+    voltage, rate, moved = played(found, settings)
+    for each in moved:
+        # with room for a film that goes further than any of them foresees
+        assert would_trip(settings, rate, voltage, each / 0.75) == ()
+    assert max(each.max() for each in moved) < 0.75e-3 * most
+
+
+def test_where_interlocks_would_end_everything_it_says_so():
+    found, words = separating_experiment(RIVALS, with_interlocks(displacement_max_mm=1e-3), NOISE)
+    assert found is None
+    assert "could be played: the limits or the interlocks" in words
+
+
+def test_it_is_no_faster_than_the_laser_can_tell():
+    # a laser that looks every 0.2 ms, whenever that is
+    laser = RigFile().laser.model_copy(update={"sampling_us": 200.0})
+    settings = RigFile().model_copy(update={"laser": laser})
+    found, _ = separating_experiment(RIVALS, settings, NOISE)
+    _, rate, moved = played(found, settings)
+    fastest = max(np.abs(np.diff(each)).max() for each in moved) * rate
+    assert fastest * 100e-6 < NOISE
+    quick, _ = separating_experiment(RIVALS, RigFile(), NOISE)
+    _, rate, moved = played(quick, RigFile())
+    assert max(np.abs(np.diff(each)).max() for each in moved) * rate > fastest
 
 
 def test_the_rig_file_takes_on_the_film_that_was_measured():

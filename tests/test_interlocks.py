@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.interlocks import Interlocks, Trip
+from drivers.interlocks import Interlocks, Trip, would_trip
 from drivers.rig import Block
 from drivers.settings import AmplifierSettings, InterlockSettings, LaserSettings, RigSettings
 
@@ -606,3 +606,49 @@ def test_a_thermometer_among_the_channels_is_passed_over():
     counts = np.concatenate((signals.counts(), np.full((1, 2000), 32767, dtype=np.int16)))
     interlocks = Interlocks(signals.settings, channels, RATE, signals.predicted, signals.planned)
     assert watch(interlocks, counts) == []
+
+
+# --- what a run would end by, before it is run
+
+
+def foreseen(s: Signals, displacement: np.ndarray) -> tuple[str, ...]:
+    return would_trip(s.settings, s.rate, s.planned, displacement, s.predicted)
+
+
+def test_a_run_as_foreseen_would_trip_nothing():
+    s = Signals()
+    assert foreseen(s, s.predicted) == ()
+    # nor with a laser that counts the other way, or a film that nobody foresees
+    s = Signals(laser=LaserSettings(direction=-1))
+    assert would_trip(s.settings, s.rate, s.planned, s.predicted) == ()
+
+
+@pytest.mark.parametrize(
+    ("part", "locks", "tripped"),
+    [
+        (1.0, {"displacement_max_mm": 1.0}, ("displacement",)),
+        (0.9, {"displacement_max_mm": 1.0}, ()),
+        (0.1, {}, ("following",)),
+        (0.1, {"following_fraction": 0.05}, ()),
+        (40.0, {"displacement_max_mm": 50.0}, ("laser",)),
+    ],
+)
+def test_a_film_that_moves_otherwise_would_trip(part, locks, tripped):
+    s = Signals(**locks)
+    assert foreseen(s, part * s.predicted) == tripped
+    # as it does where it is run
+    s.displacement = part * s.predicted + 1e-6 * np.random.default_rng(1).standard_normal(2000)
+    assert tuple(s.tripped()) == tripped
+
+
+def test_a_step_of_the_film_would_trip():
+    s = Signals(displacement_jump_mm=0.5)
+    jumps = s.predicted + 1e-3 * (np.arange(2000) > 1000)
+    assert foreseen(s, jumps) == ("jump",)
+
+
+def test_a_film_that_is_told_to_stand_still_is_no_stuck_laser():
+    s = Signals(laser_stuck_s=0.1, following_fraction=0.0)
+    assert foreseen(s, np.zeros(2000)) == ()
+    s.displacement = np.full(2000, REST)
+    assert "laser-stuck" in s.tripped()
