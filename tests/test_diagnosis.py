@@ -489,7 +489,7 @@ def test_who_rivals_a_leader_that_leaves_but_noise_is_followed_to_its_end(white)
     fits = [
         _Tried(n, best, made_trial([record], replace(PLAIN, effects=(typical(n),)), left), 0.0)
         for n, left in {
-            "amplifier resonance": (1.0 if white else 1.2) * noise,
+            "amplifier resonance": (1.0 if white else 1.12) * noise,
             "sensor averaging": math.sqrt(1.4) * noise,
             "sensor lag": math.sqrt(1.3) * noise,
             "dry friction": math.sqrt(1.5) * noise,
