@@ -194,6 +194,25 @@ def test_the_mains_are_told_from_their_third_harmonic_that_folds_beside_them():
         assert found[name] == pytest.approx(number, rel=1e-4, abs=3e-6)
 
 
+def test_a_line_and_its_mirror_image_are_both_promised():
+    # at 200 Hz, three times 50.0073 Hz shows at 49.978, and plays a line there
+    numbers = {
+        "cosine": -3e-6, "sine": 8e-6, "third_cosine": -9e-7, "third_sine": -2e-7,
+        "frequency": 49.978,
+    }  # fmt: skip
+    record = record_of(
+        replace(PLAIN, effects=effect("mains interference", **numbers)), thesis_drive(200.0, 3)
+    )
+    bench = Bench([record], PLAIN, workers=1)
+    trial = fitted(bench, PLAIN)
+    line, image = Screen(bench, trial).promises(EFFECTS["mains interference"])[:2]
+    assert [p.model.effects[-1][1][-1][1] for p in (line, image)] == [
+        pytest.approx(49.978, abs=3e-3),
+        pytest.approx(50.0073, abs=3e-3),
+    ]
+    assert line.share > image.share > 0.9
+
+
 def test_the_right_one_promises_most():
     # of those that have no shape to be searched for
     for name, numbers, *_ in SIZES[:4]:

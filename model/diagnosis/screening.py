@@ -30,7 +30,7 @@ from model.records import ActuatorRecord, FilmRecord
 __all__ = ["Promise", "Screen", "is_of", "sizes_of", "with_effect"]
 
 _MOMENTS = 20  # sought along the longest record
-_CLOSER = ((1.0, 9), (0.3, 9), (0.1, 9))  # parts of their distance, and how many there
+_CLOSER = ((0.5, 9), (0.3, 9), (0.1, 9))  # parts of their distance, and how many there
 _LINES = 400  # frequencies within an effect's bounds
 _SIMULATED = 2  # leading promises that are held against a simulation
 _DONE_WELL = (1e-2, 1e-3)  # of what a model's numbers do best: what is left to them
@@ -93,16 +93,22 @@ class Screen:
         found = self._scored(effect, shapes)
         only = effect.shapes[0] if len(effect.shapes) == 1 else None
         step = self._step(only) if only else 0.0
-        if found and only and step:
-            low, high = only.bounds
-            for part, count in _CLOSER:
-                best = max(found, key=lambda p: p.share)
-                place = best.model.effects[-1][1][-1][1]
-                finer = [(place + f * part * step,) for f in np.linspace(-1.0, 1.0, count)]
-                found += self._scored(effect, [s for s in finer if low < s[0] < high])
         found.sort(key=lambda p: -p.share)
+        if only and step:
+            found = [self._closer(effect, only, p, step) for p in _apart(found, step)]
+            found.sort(key=lambda p: -p.share)
         tried = self._simulated(effect, found, several=not step and len(effect.sizes) == 1)
         return sorted(tried, key=lambda p: -p.share)
+
+    def _closer(self, effect: Effect, shape: Parameter, near: Promise, step: float) -> Promise:
+        """The best promise within half a ``step`` or so of one that is ``near``."""
+        low, high = shape.bounds
+        best = near
+        for part, count in _CLOSER:
+            finer = [(_place(best) + f * part * step,) for f in np.linspace(-1.0, 1.0, count)]
+            found = self._scored(effect, [s for s in finer if low < s[0] < high])
+            best = max([best, *found], key=lambda p: p.share)
+        return best
 
     def _simulated(self, effect: Effect, found: list[Promise], several: bool) -> list[Promise]:
         """The leading promises as a simulation keeps them, and with ``several`` other sizes too.
@@ -295,6 +301,22 @@ class Screen:
         left = self._residual + across @ size
         share = 1.0 - float(left @ left) / max(total, 1e-300)
         return size, max(share, 0.0) if math.isfinite(share) else 0.0
+
+
+def _place(promise: Promise) -> float:
+    """The last number of the promised effect: its shape, where it has one."""
+    return float(promise.model.effects[-1][1][-1][1])
+
+
+def _apart(promises: Sequence[Promise], step: float) -> list[Promise]:
+    """The first of ``promises``, and the first that is not next to it, if any.
+
+    A line has a mirror image, in which another of its harmonics plays it nearly as well.
+    """
+    first, *others = promises if promises else (None,)
+    if first is None:
+        return []
+    return [first, *[p for p in others if abs(_place(p) - _place(first)) > 0.5 * step][:1]]
 
 
 def is_of(effect: Effect, bench: Bench) -> bool:
