@@ -118,7 +118,7 @@ def diagnose_rig(
     files = [Path(path) for path in train]
     made: list[Path] = []
 
-    def run(sequence: str, name: str) -> Path:
+    def run(sequence: str, name: str) -> None:
         nonlocal done
         path = out / f"{name}.h5"
         loaded = load_sequence(name) if not sequence else parse_sequence(sequence, name, Path())
@@ -131,10 +131,20 @@ def diagnose_rig(
         )  # fmt: skip
         made.append(path)
         done += 1.0 / runs
-        return path
+
+    def run_until_ended(sequence: str, *names: str) -> DearigError | None:
+        try:
+            for name in names:
+                run(sequence, name)
+        except NotSafe:
+            raise
+        except _ENDS as error:
+            return error  # the rig is safe, and what was found before still holds
+        return None
 
     if not files:
-        files.append(run("", "thesis"))
+        run("", "thesis")
+        files += made
     performed: list[str] = []
     ended: DearigError | None = None
     while True:
@@ -148,26 +158,17 @@ def diagnose_rig(
         if experiment is None:
             break
         name = f"experiment-{len(performed) + 1}"
-        try:
-            files.append(run(experiment.sequence, name))
-        except NotSafe:
-            raise
-        except _ENDS as error:
-            ended = error  # the rig is safe, and what was found before still holds
+        ended = run_until_ended(experiment.sequence, name)
+        if ended is not None:
             break
+        files.append(made[-1])
         performed.append(f"{words}. It was run, and its recording, {name}.h5, was added.")
     others: list[Recording] = []
     if validation:
         others = open_all(validation)
     elif not (ended or finding.interrupted):
         recorded = len(made)
-        try:
-            for name in VALIDATION:
-                run("", name)
-        except NotSafe:
-            raise
-        except _ENDS as error:
-            ended = error
+        ended = run_until_ended("", *VALIDATION)
         others = open_all(made[recorded:])
     if ended is not None:
         stopped = finding.interrupted or isinstance(ended, Interrupted)
