@@ -96,7 +96,7 @@ class Overlay:
             warmth = np.full(time.size, now)
         stretch, speed = np.empty(time.size), np.empty(time.size)
         status, reached = kernel.drive_by_voltage(
-            self._coefficients, time, voltage, True, warmth, self._state, stretch, speed
+            self._coefficients, time, voltage, voltage, warmth, self._state, stretch, speed
         )
         moved = (stretch - self._rest) * self._length
         out = self._sensed(time[first:], moved[first:], speed[first:] * self._length)
@@ -107,14 +107,13 @@ class Overlay:
 
     def _sensed(self, time: np.ndarray, moved: np.ndarray, speed: np.ndarray) -> np.ndarray:
         known = np.concatenate((self._past, np.stack((time, moved, speed))), axis=1)
-        self._past = known[:, -self._keep :].copy()  # at_sensor overwrites the velocity
-        at, value, rate = (np.ascontiguousarray(row) for row in known)
-        late = np.empty_like(value)
-        at_sensor(at, value, rate, self._lag, late)
+        self._past = known[:, -self._keep :].copy()
         begin = known.shape[1] - time.size
         before = 1 if begin else 0
-        times = at[begin - before :].copy()
-        reading, velocity = late[begin - before :].copy(), rate[begin - before :].copy()
+        times = known[0, begin - before :].copy()
+        reading, velocity = np.empty(times.size), np.empty(times.size)
+        at, value, rate = (np.ascontiguousarray(row) for row in known)
+        at_sensor(at, value, rate, times - self._lag, reading, velocity)
         if before:
             reading[0], velocity[0] = self._read
         self._read = (float(reading[-1]), float(velocity[-1]))

@@ -67,6 +67,11 @@ class Drive:
             raise ModelError(f"{self.warmth.size} temperatures at {self.time.size} times")
 
     @property
+    def ends(self) -> np.ndarray:
+        """Voltages (N,) at the end of what follows each sample, as the kernel takes them."""
+        return ends_of(self.voltage, self.hold)
+
+    @property
     def temperature(self) -> np.ndarray:
         """``warmth`` as the kernel takes it: (N,), or (0,) where there is none."""
         return np.zeros(0) if self.warmth is None else self.warmth
@@ -158,10 +163,12 @@ class Actuator:
         y = initial_state(c, rest)
         if status == kernel.OK:
             status, reached = kernel.drive_by_voltage(
-                c, drive.time, drive.voltage, drive.hold, drive.temperature, y, stretch, rate
+                c, drive.time, drive.voltage, drive.ends, drive.temperature, y, stretch, rate
             )
-        displacement, velocity = np.empty_like(stretch), rate * self.film.length
-        at_sensor(drive.time, (stretch - rest) * self.film.length, velocity, lag, displacement)
+        displacement, velocity = np.empty_like(stretch), np.empty_like(rate)
+        moved = (stretch - rest) * self.film.length
+        speed = rate * self.film.length
+        at_sensor(drive.time, moved, speed, drive.time - lag, displacement, velocity)
         kernel.read_sensor(c, drive.time, displacement, velocity, np.zeros(SENSOR_MEMORY))
         return Response(
             time=drive.time,
@@ -173,6 +180,11 @@ class Actuator:
             status=status,
             reached=reached,
         )
+
+
+def ends_of(voltage: np.ndarray, hold: bool) -> np.ndarray:
+    """Voltages (N,) at which each interval ends that begins at one of ``voltage`` (N,)."""
+    return voltage if hold else np.append(voltage[1:], voltage[-1])
 
 
 def effect_values(effects: EffectValues, drive: str) -> np.ndarray:
@@ -240,25 +252,31 @@ def initial_state(c: np.ndarray, rest: float) -> np.ndarray:
 
 
 def reading_of(
-    c: np.ndarray, length: float, drive: Drive, lag: float = 0.0, haste: int = kernel.CAREFUL
+    c: np.ndarray,
+    length: float,
+    drive: Drive,
+    lag: float = 0.0,
+    haste: int = kernel.CAREFUL,
+    times: np.ndarray | None = None,
 ) -> tuple[np.ndarray, int]:
     """``(reading, status)`` of coefficient vector ``c`` (see ``model.coefficients``): (N,) m.
 
-    ``lag`` s is the known age of a reading, ``haste`` as the kernel has it. What the model did not
-    reach reads 0.
+    At ``times`` (N,) s, those of the drive where none are given. ``lag`` s is the known age of a
+    reading, ``haste`` as the kernel has it. What the model did not reach reads 0.
     """
+    times = drive.time if times is None else times
     c = c.copy()
-    reading = np.zeros(drive.time.size)
+    reading, speed = np.zeros(times.size), np.zeros(times.size)
     status, rest = at_rest(c)
     if status == kernel.OK:
         x, u = np.zeros(drive.time.size), np.zeros(drive.time.size)
         status, _ = kernel.drive_by_voltage(
-            c, drive.time, drive.voltage, drive.hold, drive.temperature,
+            c, drive.time, drive.voltage, drive.ends, drive.temperature,
             initial_state(c, rest), x, u, haste,
         )  # fmt: skip
         x -= rest
         x *= length
         u *= length
-        at_sensor(drive.time, x, u, lag, reading)
-        kernel.read_sensor(c, drive.time, reading, u, np.zeros(SENSOR_MEMORY))
+        at_sensor(drive.time, x, u, times - lag, reading, speed)
+        kernel.read_sensor(c, times, reading, speed, np.zeros(SENSOR_MEMORY))
     return reading, status

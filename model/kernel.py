@@ -59,7 +59,9 @@ __all__ = [
     "PULL_IN",
     "QUICK",
     "ROUGH",
+    "SKETCHED",
     "drive_by_voltage",
+    "is_swift",
     "read_sensor",
     "rest_stretch",
 ]
@@ -74,10 +76,12 @@ BAD_INPUT = 5  #: not finite, or time that does not increase
 CAREFUL = 0  #: good to some hundredths of a micrometre
 QUICK = 1  #: to a tenth (some tenths on a step of 8 kV); careful where an effect follows the path
 ROUGH = 2  #: nor careful there: to a tenth of what such an effect does, or some while it rings
+SKETCHED = 3  #: as rough, in steps from sample to sample, however far: ``model.fitting.sketch``
 
 _STRETCH_MAX = 100.0  # beyond any elastomer: a runaway, whatever the springs say
 _RK4_STEP_MAX = 2.5e-3  # s; a thesis record is then good to 0.03 um
 _QUICK_STEP_MAX = 5e-3  # s; where quick is what matters
+_SKETCH_STEP_MAX = 5e-2  # s; where it was looked at first how long they may be
 _RK4_PHASE_MAX = 1.20  # (angular frequency or flow rate) times step
 _RK4_KICK = 5e-8  # in stretch: the error allowed in following one kick of the drive
 _RK4_RINGING = 5e-9  # in stretch a radian of ringing, which lasts for some hundred radians
@@ -235,10 +239,13 @@ def _bound(springy: float, more: float, drag: float, fastest: float) -> float:
 
 
 @inlined
-def _lean_bound(springy: float, more: float, fastest: float, quick: bool) -> float:
-    """Exponential steps that the same take a second; a drag is in closed form, springs nearly."""
-    if quick:
-        return max(max(math.sqrt(more), fastest) / _RK4_PHASE_MAX, 1.0 / _QUICK_STEP_MAX)
+def _lean_bound(springy: float, more: float, fastest: float, longest: float) -> float:
+    """Exponential steps that the same take a second; a drag is in closed form, springs nearly.
+
+    With a ``longest`` of 0 as many as it takes to see each radian of ringing.
+    """
+    if longest > 0.0:
+        return max(max(math.sqrt(more), fastest) / _RK4_PHASE_MAX, 1.0 / longest)
     return _bound(springy, more, 0.0, fastest)
 
 
@@ -979,12 +986,22 @@ def _refined(
     return refine, forced
 
 
+@jit
+def is_swift(c: np.ndarray) -> bool:
+    """Whether the film is one whose swinging is in closed form: the thesis's case."""
+    count = branch_count(c) + 1
+    swift = int(c[HELD]) == 0 and count <= 4
+    for i in range(count):
+        swift = swift and c[HEAD + WIDTH * i + KIND] <= _GENT
+    return swift
+
+
 @allocating
 def drive_by_voltage(
     c: np.ndarray,
     time: np.ndarray,
     voltage: np.ndarray,
-    hold: bool,
+    ends: np.ndarray,
     warmth: np.ndarray,
     y: np.ndarray,
     stretch: np.ndarray,
@@ -993,11 +1010,12 @@ def drive_by_voltage(
 ) -> tuple[int, int]:
     """Carry state ``y`` (2 + n + MEMORY,) along a record; fill ``stretch`` and ``rate`` (N,).
 
-    ``time`` s and ``voltage`` V are (N,), increasing and not necessarily even. With ``hold`` each
-    voltage stands until the next sample (a converter's output), else the voltage is linear between
-    samples. ``warmth`` (N,) K is the temperature above that of the start, or (0,) where none was
-    recorded. ``haste`` says how long steps may be: ``CAREFUL``, ``QUICK``, ``ROUGH``. Element 0 is
-    the state as given, so a record can be cut and continued. ``c`` must know the stretch at rest
+    ``time`` s and ``voltage`` V are (N,), increasing and not necessarily even. From each sample to
+    the next the voltage goes linearly to that in ``ends`` (N,), from where it may jump: of a
+    converter's output, which stands until the next, that is ``voltage`` itself. ``warmth`` (N,) K
+    is the temperature above that of the start, or (0,) where none was recorded. ``haste`` says how
+    long steps may be: ``CAREFUL``, ``QUICK``, ``ROUGH``, ``SKETCHED``. Element 0 is the state as
+    given, so a record can be cut and continued. ``c`` must know the stretch at rest
     (``model.actuator.at_rest``).
 
     Returns ``(status, reached)``: on any status but ``OK`` the samples from ``reached`` on are
@@ -1011,14 +1029,17 @@ def drive_by_voltage(
     c[INERTIA] += _inertia(acting, c, y)
     moves = acting & _MOVING != 0
     warm = warmth.shape[0] == samples
-    lean = held == 0 and springs.shape[1] <= 4 and np.max(springs[KIND]) <= _GENT
+    lean = is_swift(c)
     table = _lean_table(c, springs) if lean else np.zeros(0)
     most = _LEAN_SUBSTEPS_MAX if lean else _RK4_SUBSTEPS_MAX
     if moves:
         most = _EFFECT_SUBSTEPS_MAX
     drags = acting & _STIFFNESS != 0
     # ringing is in closed form, but its turns are not, where a path is followed
-    quick = haste == ROUGH or (haste == QUICK and acting & _TURNS == 0)
+    quick = haste >= ROUGH or (haste == QUICK and acting & _TURNS == 0)
+    longest = 0.0
+    if quick:
+        longest = _SKETCH_STEP_MAX if haste == SKETCHED else _QUICK_STEP_MAX
     work = np.zeros((15, y.shape[0]))
     before = np.empty(y.shape[0])
     trace = np.zeros(3)
@@ -1032,7 +1053,8 @@ def drive_by_voltage(
     kick_gain, ring_gain, fading, per_phase2 = 0.0, 0.0, 1.0, 1.0
     ring, kick, lam_seen, rate_before, drag = 0.0, 0.0, y[0], y[1], 0.0
     fresh = True
-    last = voltage[0]
+    last = last_begin = voltage[0]
+    dt_before = 1.0
     for k in range(samples):
         stretch[k] = y[0]
         rate[k] = y[1]
@@ -1040,7 +1062,7 @@ def drive_by_voltage(
             break
         dt = time[k + 1] - time[k]
         v0 = voltage[k]
-        v1 = v0 if hold else voltage[k + 1]
+        v1 = ends[k]
         if not (dt > 0.0 and math.isfinite(v0) and math.isfinite(v1) and math.isfinite(dt)):
             status, reached = BAD_INPUT, k + 1
             break
@@ -1054,7 +1076,7 @@ def drive_by_voltage(
             if k % 64 == 0:
                 springy, more, drag, fastest = _speeds(acting, c, y, branches)
                 swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
-                lean_bound = _lean_bound(springy, more, fastest, quick)
+                lean_bound = _lean_bound(springy, more, fastest, longest)
                 lam_seen = y[0]
                 if stiffness_step == 0.0:
                     stiffness_step = _STIFFNESS_NEAR * max(springy, 1.0)
@@ -1073,7 +1095,9 @@ def drive_by_voltage(
             per_phase2 = 1.0 / phase**2
         explicit = gentle
         if explicit:
-            field2 = v0 * v0 - last * last if hold else v1 * v1 - 2.0 * v0 * v0 + last * last
+            # how it jumps, and how its slope does
+            sloped = (last * last - last_begin * last_begin) * (dt / dt_before)
+            field2 = (v0 * v0 - last * last) + (v1 * v1 - v0 * v0) - sloped
             kick_before = abs(kick)
             kick = c[ELECTRIC] * field2 * electric(held, y[0]) / c[INERTIA]
             for j in range(y.shape[0]):
@@ -1084,10 +1108,10 @@ def drive_by_voltage(
             forced = 0.0
             if not quick:
                 refine, forced = _refined(
-                    kick_gain, ring_gain, kick, kick_before, ring, hold and steps > 1, trace
+                    kick_gain, ring_gain, kick, kick_before, ring, v0 != last and steps > 1, trace
                 )
                 fine = steps * refine
-            elif max(ring * fading, abs(kick)) > _RINGING * springy:
+            elif haste != SKETCHED and max(ring * fading, abs(kick)) > _RINGING * springy:
                 finer = swing * dt / _RK4_PHASE_MAX
                 fine = max(fine, math.ceil(min(finer - 1e-6, _EFFECT_SUBSTEPS_MAX)))
             if drags:
@@ -1102,7 +1126,7 @@ def drive_by_voltage(
                 rate_before = y[1]
             h_fine = dt / fine
             # a film that the field pulls on is softer by that
-            pulling2 = v0 * v0 if hold else 0.5 * (v0 * v0 + v1 * v1)
+            pulling2 = 0.5 * (v0 * v0 + v1 * v1)
             stiff = springy - c[ELECTRIC] * pulling2 / c[INERTIA]
             kind = _kind_of_drag(drag)
             if not _fits(course, stiff, 0.5 * stiffness_step, kind, h_fine):
@@ -1118,7 +1142,7 @@ def drive_by_voltage(
             ring = max(ring * fading, trace[2] * per_phase2 - forced)
         elif explicit:
             refine, forced = _refined(
-                kick_gain, ring_gain, kick, kick_before, ring, hold and steps > 1, trace
+                kick_gain, ring_gain, kick, kick_before, ring, v0 != last and steps > 1, trace
             )
             fine = steps * refine
             h_fine = dt / fine
@@ -1136,13 +1160,13 @@ def drive_by_voltage(
                 bound_before = bound
                 springy, more, drag, fastest = _speeds(acting, c, y, branches)
                 swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
-                lean_bound = _lean_bound(springy, more, fastest, quick)
+                lean_bound = _lean_bound(springy, more, fastest, longest)
                 lam_seen, step_before = y[0], 0.0
                 explicit = moves or bound <= _STIFFER * bound_before
             if not explicit:
                 for j in range(y.shape[0]):
                     y[j] = before[j]
-        last = v0
+        last, last_begin, dt_before = v1, v0, dt
         if not explicit:
             fresh = True
             if moves:

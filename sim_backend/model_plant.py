@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from model import kernel
-from model.actuator import STATUS_WORDS, Actuator, at_rest, initial_state
+from model.actuator import STATUS_WORDS, Actuator, at_rest, ends_of, initial_state
 from model.effects import SENSOR_MEMORY
 from sim_backend.plant import Motion
 
@@ -50,8 +50,9 @@ class ModelPlant:
         if not self.failed:
             state = self.state.copy()
             status, reached = kernel.drive_by_voltage(
-                self.coefficients, time, voltage, hold, np.zeros(0), state, stretch, rate
-            )
+                self.coefficients, time, voltage, ends_of(voltage, hold), np.zeros(0),
+                state, stretch, rate,
+            )  # fmt: skip
             if status != kernel.OK:
                 fault, fault_at = STATUS_WORDS[status], int(reached)
                 state = np.concatenate((stretch[-1:], [0.0], state[2:]))

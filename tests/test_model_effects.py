@@ -548,8 +548,9 @@ def test_a_run_in_two_pieces_is_the_run(name):
             time = drive.time[part]
             stretch, rate = np.zeros(time.size), np.zeros(time.size)
             status, _ = kernel.drive_by_voltage(
-                c, time, drive.voltage[part], False, drive.temperature[part], y, stretch, rate
-            )
+                c, time, drive.voltage[part], drive.ends[part], drive.temperature[part],
+                y, stretch, rate,
+            )  # fmt: skip
             assert status == kernel.OK
             shown = (stretch - rest) * LENGTH
             kernel.read_sensor(c, time, shown, rate * LENGTH, memory)

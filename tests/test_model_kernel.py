@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from model import coefficients as at
 from model import kernel
-from model.actuator import Actuator, Drive, at_rest, initial_state, reading_of
+from model.actuator import Actuator, Drive, at_rest, ends_of, initial_state, reading_of
 from model.effects import EFFECTS, assembly
 from model.errors import ModelError
 from model.excitation import Sequence
@@ -226,7 +226,9 @@ def test_wild_coefficients_give_finite_numbers(held, kinds, moduli, limits, rate
     if status == kernel.OK:
         stretch, rate = np.zeros(time.size), np.zeros(time.size)
         y = initial_state(c, rest)
-        kernel.drive_by_voltage(c, time, voltage, False, np.zeros(0), y, stretch, rate)
+        kernel.drive_by_voltage(
+            c, time, voltage, ends_of(voltage, False), np.zeros(0), y, stretch, rate
+        )
         np.testing.assert_array_equal((stretch - rest) * LENGTH, reading)
         assert np.isfinite(rate).all()
 
@@ -246,7 +248,14 @@ def test_a_record_cut_into_blocks_is_the_record(drive, hold):
         part = slice(start, min(start + 38, time.size))
         stretch, rate = np.zeros(time[part].size), np.zeros(time[part].size)
         status, _ = kernel.drive_by_voltage(
-            c, time[part], voltage[part], hold, np.zeros(0), y, stretch, rate
+            c,
+            time[part],
+            voltage[part],
+            ends_of(voltage[part], hold),
+            np.zeros(0),
+            y,
+            stretch,
+            rate,
         )
         assert status == kernel.OK
         joined[part] = stretch

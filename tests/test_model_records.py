@@ -94,10 +94,11 @@ def test_noise_of_nothing():
 def test_at_sensor_is_the_value_of_a_little_earlier(lag):
     time = np.cumsum(np.random.default_rng(3).uniform(0.5e-3, 1.5e-3, 2000))
     w = 2.0 * math.pi * 3.0
-    shown = np.zeros(time.size)
-    at_sensor(time, np.sin(w * time), w * np.cos(w * time), lag, shown)
+    shown, rate = np.zeros(time.size), np.zeros(time.size)
+    at_sensor(time, np.sin(w * time), w * np.cos(w * time), time - lag, shown, rate)
     inside = (time - lag > time[0]) & (time - lag < time[-1])
     np.testing.assert_allclose(shown[inside], np.sin(w * (time - lag))[inside], atol=1e-9)
+    np.testing.assert_allclose(rate[inside], w * np.cos(w * (time - lag))[inside], atol=1e-5)
     assert (shown[time - lag <= time[0]] == np.sin(w * time[0])).all()
 
 

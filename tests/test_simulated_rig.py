@@ -72,7 +72,7 @@ def expected_displacement(voltage, rate, shift):
     _, rest = at_rest(c)
     stretch, speed = np.empty(time.size), np.empty(time.size)
     status, _ = kernel.drive_by_voltage(
-        c, time, at_time, True, np.zeros(0), initial_state(c, rest), stretch, speed
+        c, time, at_time, at_time, np.zeros(0), initial_state(c, rest), stretch, speed
     )
     assert status == kernel.OK
     at = np.searchsorted(time, np.maximum(wanted, 0.0) - 1e-9)
