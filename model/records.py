@@ -41,7 +41,8 @@ class ActuatorRecord:
     bool is False where a reading must not be used (a dropout, a clipped sensor), None where all are
     good. Over the first ``lead_in`` samples, at 0 V, the displacement is 0 on average, because it
     is counted from there. Each reading is the mean of ``means_of`` that were taken, evenly about
-    its time.
+    its time. By ``sketch``, where there is one, it is told what a number of a model does: the drive
+    in fewer and longer steps (``model.fitting.sketch``).
     """
 
     name: str
@@ -53,6 +54,7 @@ class ActuatorRecord:
     lead_in: int = 0
     means_of: int = 1
     lag_error: float = 0.0
+    sketch: Drive | None = None
 
     def __post_init__(self) -> None:
         _check(self.name, self.measured, self.drive.time, self.noise)

@@ -27,6 +27,7 @@ from model.fitting.parameters import Estimate, Layout
 from model.fitting.problem import Problem
 from model.fitting.search import moving_starts, voltage_misfit, voltage_starts
 from model.fitting.secant import descend_by_secants
+from model.fitting.sketch import sketched
 from model.fitting.thinning import thinned
 from model.fitting.threads import Job, Result, together
 from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
@@ -164,6 +165,7 @@ class Bench:
         self.records = tuple(_thinned(r, model) for r in self.full)
         self.workers = workers
         self.simulations = 0
+        self._sketched: dict[tuple[str, ...], np.ndarray] = {}
         self._counting = Lock()
         longest = max(float(r.time[-1] - r.time[0]) for r in records)
         self.times = (
@@ -184,7 +186,10 @@ class Bench:
         """The thinned records, or with ``CAREFUL`` all samples, with ``model``'s numbers free."""
         layout = Layout(model, self.times)
         records = self.full if haste == kernel.CAREFUL else self.records
-        return Problem(records, layout, self.workers, haste, self._count)
+        problem = Problem(records, layout, self.workers, haste, self._count)
+        if haste != kernel.CAREFUL:
+            problem.sketched = self._sketched.get(layout.names)
+        return problem
 
     def _count(self, simulations: int) -> None:
         with self._counting:
@@ -217,6 +222,7 @@ class Bench:
             )
             fit = min(fits, key=lambda f: f.cost)
             problem, fit = self._thinned_anew(problem, fit, fixed)
+            problem = self._with_sketches(problem, fit)
         progress("descents", 1.0)
         return _trial(problem, fit, fixed)
 
@@ -232,6 +238,18 @@ class Bench:
         self.records = records
         problem = self.problem(layout.base)
         return problem, descend(problem, fit.x, fixed, iterations=_BASELINE)
+
+    def _with_sketches(self, problem: Problem, fit: LocalFit) -> Problem:
+        """The ``problem``, and those to come, with sketches as ``fit`` foresees the records."""
+        layout = problem.layout
+        model = layout.model(layout.values(fit.x))
+        self.records = tuple(
+            replace(r, sketch=sketched(r, model))
+            if isinstance(r, ActuatorRecord) and isinstance(model, Actuator)
+            else r
+            for r in self.records
+        )
+        return self.problem(layout.base)
 
     def fit(
         self,
@@ -252,6 +270,7 @@ class Bench:
         ``noise`` is True where there is but noise to explain: then what a Jacobian from nearby
         promises is believed.
         """
+        self._ask_sketches(model, fixed)
         problem, scouted = self.problem(model), self.problem(model, kernel.ROUGH)
         scouts = [
             descend_by_secants(scouted, start, fixed, jacobian, _SCOUTING, sure=False)
@@ -282,6 +301,14 @@ class Bench:
             return _trial(trial.problem, fit, fixed)
 
         return self._as_near(_trial(problem, best, fixed), down)
+
+    def _ask_sketches(self, model: Actuator | Strip, fixed: np.ndarray) -> None:
+        """Ask once of a model with these numbers what sketches tell of it."""
+        problem = self.problem(model, kernel.ROUGH)
+        layout = problem.layout
+        if layout.names not in self._sketched:
+            x = layout.coordinates(layout.initial())
+            self._sketched[layout.names] = problem.told_by_sketches(x, ~fixed)
 
     def settled(self, trial: Trial, leader: float = math.inf) -> Trial:
         """``trial`` followed towards the end of its valley, on the thinned records.

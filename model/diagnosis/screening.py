@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from model.actuator import Actuator
 from model.diagnosis.bench import Bench, Trial
 from model.effects import EFFECTS, Effect, EffectValues, Parameter, follows_path
 from model.film import Strip
-from model.fitting.problem import Problem
+from model.fitting.problem import Problem, is_told
 from model.records import ActuatorRecord, FilmRecord
 
 __all__ = ["Promise", "Screen", "is_of", "sizes_of", "with_effect"]
@@ -78,14 +78,9 @@ class Screen:
         self.jacobian = trial.jacobian()
         self._q, self._r = np.linalg.qr(self.jacobian)
         self._residual = trial.residuals - self._q @ (self._q.T @ trial.residuals)
-        # what must not be used has no residual: 0 times inf would be no number
-        sigma = trial.problem.sigma
-        self._base = np.where(
-            np.isfinite(sigma), trial.residuals * np.where(np.isfinite(sigma), sigma, 0.0), 0.0
-        )
-        self._weight = 1.0 / trial.problem.sigma
         # what the base model does must be as it was
         self._haste = trial.problem.haste if follows_path(trial.model.effects) else kernel.ROUGH
+        self._sketch = trial.problem.sketch(trial.x, trial.residuals)
 
     def promises(self, effect: Effect) -> list[Promise]:
         """Promises of ``effect``, best first: one for each shape on its grid."""
@@ -128,8 +123,11 @@ class Screen:
                 other = values.copy()
                 other[first] = size
                 rows.append((place, other))
-        predicted, status = problem.predict(np.array([values for _, values in rows]))
-        there = (predicted - problem.measured) * self._weight
+        population = np.array([values for _, values in rows])
+        # what they tell of a large size they tell of smaller ones
+        largest = int(np.argmax(np.abs(population[:, first])))
+        moved, status = self._moved(problem, population, [largest])
+        there = moved + self.trial.residuals
         total = float(self._residual @ self._residual)
         kept = [replace(promise, share=0.0) for promise in found]
         off: dict[int, np.ndarray] = {}  # what the base model's own numbers could take off
@@ -264,8 +262,7 @@ class Screen:
         layout = problem.layout
         base_values = self.trial.problem.layout.values(self.trial.x)
         population = np.array([np.concatenate([base_values, row]) for row in rows])
-        predicted, status = problem.predict(population)
-        there = (predicted - problem.measured) - self._base
+        moved, status = self._moved(problem, population, sorted({0, len(population) - 1}))
         total = float(self._residual @ self._residual)
         found = []
         per = len(sizes)
@@ -274,7 +271,7 @@ class Screen:
             if status[part].any():
                 continue
             probes = np.array([self._probe(p) for p in sizes])
-            columns = (there[part] * self._weight).T / probes
+            columns = moved[part].T / probes
             across = columns - self._q @ (self._q.T @ columns)
             size, share = self._solve(across, columns, total)
             size = np.clip(size, [p.bounds[0] for p in sizes], [p.bounds[1] for p in sizes])
@@ -282,6 +279,33 @@ class Screen:
             start = np.clip(layout.coordinates(there_too), layout.lower, layout.upper)
             found.append(Promise(models[n * per], start, columns, share))
         return found
+
+    def _moved(
+        self, problem: Problem, population: np.ndarray, asked: Sequence[int]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """By how much (P, N), over the noise, members move the readings; statuses (P,).
+
+        By sketches, where these tell what the members ``asked`` do.
+        """
+        by_sketch = np.zeros(len(population), dtype=bool)
+        moved, status = self._moved_by(problem, population[asked], by_sketch[asked])
+        if self._sketch is not None and len(asked) < len(population):
+            sketched, failed = self._moved_by(problem, population[asked], ~by_sketch[asked])
+            told = all(is_told(w, s) for w, s in zip(moved, sketched, strict=True))
+            by_sketch[:] = told and not (status.any() or failed.any())
+        rest = np.setdiff1d(np.arange(len(population)), asked)
+        others, failed = self._moved_by(problem, population[rest], by_sketch[rest])
+        order = np.argsort(np.append(asked, rest))
+        return np.vstack([moved, others])[order], np.append(status, failed)[order]
+
+    def _moved_by(
+        self, problem: Problem, population: np.ndarray, by_sketch: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        predicted, status = problem.predict(population, by_sketch)
+        moved = (predicted - problem.measured) / problem.sigma
+        for row, sketched in zip(moved, by_sketch, strict=True):
+            row -= self._sketch if sketched else self.trial.residuals
+        return moved, status
 
     @staticmethod
     def _probe(parameter: Parameter) -> float:
@@ -313,10 +337,10 @@ def _apart(promises: Sequence[Promise], step: float) -> list[Promise]:
 
     A line has a mirror image, in which another of its harmonics plays it nearly as well.
     """
-    first, *others = promises if promises else (None,)
-    if first is None:
+    if not promises:
         return []
-    return [first, *[p for p in others if abs(_place(p) - _place(first)) > 0.5 * step][:1]]
+    far = (p for p in promises if abs(_place(p) - _place(promises[0])) > 0.5 * step)
+    return [promises[0], *islice(far, 1)]
 
 
 def is_of(effect: Effect, bench: Bench) -> bool:

@@ -62,6 +62,7 @@ _MAY_LEAD = 6.0  # of the leader's cost: what has come so near may lead by its l
 _UNNAMED_MARGIN = (
     20.0  # of the criterion, by which an unnamed effect must be better than named ones
 )
+_SCREENED = 8  # effects at a time
 _PROMISES = 2  # of one effect, in different shapes, from which a fit sets out
 _NEARLY = 0.8  # of the best promise of an effect: another shape that is worth a start
 _BETTER = 1e-4  # of the cost: less is the same place
@@ -501,9 +502,11 @@ class _Search:
         screen, known = self.screened[key]
         wanted = [e for e in self.effects if family in ("", e.family) and e.name not in key]
         asked = [e for e in wanted if e.name not in known]
-        for n, effect in enumerate(asked):
-            known[effect.name] = screen.promises(effect)[:_PROMISES]
-            part = 0.25 * (n + 1) / len(asked)
+        for n in range(0, len(asked), _SCREENED):
+            some = asked[n : n + _SCREENED]
+            found = self.bench.together(screen.promises, some)
+            known.update({e.name: p[:_PROMISES] for e, p in zip(some, found, strict=True)})
+            part = 0.25 * (n + len(some)) / len(asked)
             self.report(_stage(parent, "screening"), span[0] + span[1] * part)
         return {e.name: known[e.name] for e in wanted if known[e.name]}, screen.jacobian
 

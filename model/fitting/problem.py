@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 
 import numpy as np
 
@@ -14,7 +15,16 @@ from model.fitting.parameters import Layout
 from model.fitting.threads import together
 from model.records import ActuatorRecord, FilmRecord, Record
 
-__all__ = ["Problem"]
+__all__ = ["Problem", "is_told"]
+
+_SAME = 1.0  # of the noise: a sketch that is further from the whole is none
+_MOST = 0.6  # of the numbers
+_ALIKE = 0.15  # of what a number does: as near must a sketch tell it
+
+
+def is_told(whole: np.ndarray, sketch: np.ndarray) -> bool:
+    """Whether a ``sketch`` (N,) of what a number does is near enough to the ``whole``."""
+    return float(np.linalg.norm(sketch - whole)) <= _ALIKE * float(np.linalg.norm(whole))
 
 
 class Problem:
@@ -23,7 +33,8 @@ class Problem:
     ``records`` are all of actuators or all of films, and ``layout`` says what is free. Members of a
     population whose simulation ends early keep the last value they reached: a large but finite
     residual, which a search walks away from. ``haste`` is as the kernel has it. ``simulations``
-    counts records simulated, and ``told`` is called with each such number.
+    counts records simulated, and ``told`` is called with each such number. What the numbers
+    ``sketched`` (d,) bool do is told by the records' sketches, None where nothing is.
     """
 
     def __init__(
@@ -46,6 +57,8 @@ class Problem:
         self.workers = workers
         self.haste = haste
         self.told = told
+        self.sketched: np.ndarray | None = None
+        self._missed: np.ndarray | None = None  # by sketches, of all readings, where they are used
         self.simulations = 0
         self.measured = np.concatenate([r.measured for r in records])
         # a reading that must not be used has no weight
@@ -64,32 +77,48 @@ class Problem:
         """How many readings are fitted."""
         return int(np.count_nonzero(np.isfinite(self.sigma)))
 
-    def predict(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Model readings (P, N) and statuses (P,) of a population ``values`` (P, d), natural."""
+    def predict(
+        self, values: np.ndarray, sketched: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Model readings (P, N) and statuses (P,) of a population ``values`` (P, d), natural.
+
+        Of members ``sketched`` (P,) bool, if any, by the sketches of the records that have one.
+        """
         c = self.layout.coefficients(values)
+        by_sketch = np.full(c.shape[0], self._missed is not None) if sketched is None else sketched
         out = np.zeros((c.shape[0], self.measured.size))
         status = np.zeros((c.shape[0], len(self.records)), dtype=np.int64)
 
-        def run(job: tuple[int, int]) -> None:
-            member, i = job
-            part = slice(self._edges[i], self._edges[i + 1])
-            out[member, part], status[member, i] = self._reading(c[member], self.records[i])
+        jobs = list(np.ndindex(status.shape))
 
-        together(run, list(np.ndindex(status.shape)), self.workers)
+        def run(first: int) -> None:
+            # some in one go: to hand them over one by one would take a part of the time
+            for member, i in jobs[first :: self.workers]:
+                part = slice(self._edges[i], self._edges[i + 1])
+                out[member, part], status[member, i] = self._reading(
+                    c[member], self.records[i], bool(by_sketch[member])
+                )
+
+        together(run, range(min(self.workers, len(jobs))), self.workers)
         self.simulations += status.size
         if self.told is not None:
             self.told(status.size)
+        if self._missed is not None:
+            out += self._missed
         # of several records the first that fails speaks
         failed = np.argmax(status != kernel.OK, axis=1)
         return out, np.take_along_axis(status, failed[:, None], axis=1)[:, 0]
 
-    def _reading(self, c: np.ndarray, record: Record) -> tuple[np.ndarray, int]:
+    def _reading(self, c: np.ndarray, record: Record, sketched: bool) -> tuple[np.ndarray, int]:
         if isinstance(record, FilmRecord):
             stress, status, _ = stress_of(c, record.time, record.stretch)
             return stress, status
         base = self.layout.base
         length = base.film.length if isinstance(base, Actuator) else 1.0
-        moved, status = reading_of(c, length, record.drive, record.lag, self.haste)
+        drive, haste = record.drive, self.haste
+        if sketched and record.sketch is not None:
+            drive, haste = record.sketch, kernel.SKETCHED
+        moved, status = reading_of(c, length, drive, record.lag, haste, record.time)
         return record.seen(moved), status
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
@@ -113,16 +142,22 @@ class Problem:
         return np.where(status == kernel.OK, costs, 10.0 * still + costs), residuals
 
     def jacobian(
-        self, x: np.ndarray, free: np.ndarray, residuals: np.ndarray | None = None
+        self,
+        x: np.ndarray,
+        free: np.ndarray,
+        residuals: np.ndarray | None = None,
+        sketched: bool = False,
     ) -> np.ndarray:
         """d(residuals)/dx (N, f) over the ``free`` (d,) coordinates, as one population.
 
         Central differences: two branches of nearly one relaxation time have nearly parallel columns
         (to 1e-5), and a one-sided difference would blur just the direction that is hard to see.
-        With the ``residuals`` at ``x`` given, one-sided ones, for half of the cost.
+        With the ``residuals`` at ``x`` given, one-sided ones, for half of the cost; if they may be
+        ``sketched``, those that sketches tell for a quarter of that.
         """
         if residuals is not None:
-            return self._one_sided(x, free, residuals)
+            by_sketch = None if self.sketched is None or not sketched else self.sketched[free]
+            return self._one_sided(x, free, residuals, by_sketch)
         steps = np.diag(self.layout.differences(x))[free]
         up = np.minimum(x + steps, self.layout.upper)
         down = np.maximum(x - steps, self.layout.lower)
@@ -131,10 +166,55 @@ class Problem:
         half = width.size
         return ((predicted[:half] - predicted[half:]) / self.sigma).T / width
 
-    def _one_sided(self, x: np.ndarray, free: np.ndarray, residuals: np.ndarray) -> np.ndarray:
+    def told_by_sketches(self, x: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """Which numbers (d,) bool sketches tell at ``x`` (d,) what they do, of those ``free``."""
+        told = np.zeros(x.size, dtype=bool)
+        residuals = self.residuals(x)
+        if self.sketch(x, residuals) is None:
+            return told  # much of what they miss would show in differences too
+        wholly = self._one_sided(x, free, residuals, None)
+        there = self._one_sided(x, free, residuals, np.ones(wholly.shape[1], dtype=bool))
+        told[free] = [is_told(w, t) for w, t in zip(wholly.T, there.T, strict=True)]
+        # where few are told, these are hardly to be trusted either
+        return told if np.mean(told[free]) > _MOST else np.zeros_like(told)
+
+    def anchored(self, x: np.ndarray, residuals: np.ndarray, free: np.ndarray) -> Problem | None:
+        """The problem by sketches, which have the ``residuals`` (N,) at ``x`` (d,) as the whole.
+
+        None where these do not tell what all ``free`` (d,) numbers do.
+        """
+        if self.sketched is None or not self.sketched[free].all():
+            return None
+        sketch = self.sketch(x, residuals)
+        if sketch is None:
+            return None
+        other = copy(self)
+        other.sketched = None
+        # a reading that must not be used is missed by nothing
+        sigma = np.where(np.isfinite(self.sigma), self.sigma, 0.0)
+        other._missed = (residuals - sketch) * sigma
+        return other
+
+    def sketch(self, x: np.ndarray, residuals: np.ndarray) -> np.ndarray | None:
+        """The ``residuals`` (N,) at ``x`` (d,) as sketches have them; None where these are none."""
+        if not any(isinstance(r, ActuatorRecord) and r.sketch for r in self.records):
+            return None
+        predicted, _ = self.predict(self.layout.values(x), np.ones(1, dtype=bool))
+        sketch = np.asarray((predicted[0] - self.measured) / self.sigma)
+        return sketch if np.sum((sketch - residuals) ** 2) < _SAME**2 * self.samples else None
+
+    def _one_sided(
+        self, x: np.ndarray, free: np.ndarray, residuals: np.ndarray, sketched: np.ndarray | None
+    ) -> np.ndarray:
         steps = self.layout.differences(x)
         # away from a bound that is near
         steps = np.where(x + steps > self.layout.upper, -steps, steps)
         there = x + np.diag(steps)[free]
-        predicted, _ = self.predict(self.layout.values(there))
-        return ((predicted - self.measured) / self.sigma - residuals).T / steps[free]
+        if sketched is None or not sketched.any():
+            predicted, _ = self.predict(self.layout.values(there))
+            return ((predicted - self.measured) / self.sigma - residuals).T / steps[free]
+        rows = np.vstack([there, x])
+        predicted, _ = self.predict(self.layout.values(rows), np.append(sketched, True))
+        moved = (predicted - self.measured) / self.sigma
+        here = np.where(sketched[:, None], moved[-1], residuals)
+        return (moved[:-1] - here).T / steps[free]

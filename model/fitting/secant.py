@@ -7,10 +7,13 @@ the direction gone, and it is computed anew only where it has led astray or noth
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
+from model.fitting.anchored import by_sketches
 from model.fitting.levenberg import LocalFit
 from model.fitting.problem import Problem
 
@@ -58,23 +61,62 @@ def descend_by_secants(
 ) -> LocalFit:
     """From ``start`` (d,) down, the numbers ``fixed`` (d,) held, inside the layout's bounds.
 
+    On the records' sketches, as far as these lead, then on the whole records.
+
     ``jacobian`` (N, f) is one known near the start, None to compute it; columns of it that are not
     finite are computed. Has converged where the quadratic model promises less than ``gain`` in
     chi-square, with ``sure`` only by a Jacobian of that place; gives up where several Jacobians
     together have gained no more.
     """
-    layout = problem.layout
     free = ~fixed
-    x = np.clip(start, layout.lower, layout.upper)
+    x = np.clip(start, problem.layout.lower, problem.layout.upper)
     costs, residuals = problem.evaluate(x[None])
-    r, chi2 = residuals[0], float(costs[0]) * problem.samples
-    jac, fresh = jacobian, False
+    unknown = np.full((residuals.shape[1], int(free.sum())), np.nan)
+    here = LocalFit(
+        x, float(costs[0]), residuals[0], unknown if jacobian is None else jacobian, 0, False
+    )
+
+    def on_sketches(sketch: Problem, here: LocalFit, iterations: int) -> LocalFit:
+        return _by_secants(sketch, here, free, iterations, gain, sure, by_sketch=False)
+
+    reached = by_sketches(on_sketches, problem, here, free, iterations, gain)
+    if reached.iterations >= iterations or (reached.converged and not sure):
+        return reached
+    # where they led all the way, or nowhere, they have told what they can
+    by_sketch = problem.sketched is not None and bool(problem.sketched[free].any())
+    by_sketch = (
+        by_sketch and not reached.iterations and problem.sketch(x, here.residuals) is not None
+    )
+    rest = _by_secants(
+        problem, reached, free, iterations - reached.iterations, gain, sure, by_sketch
+    )
+    return replace(rest, iterations=reached.iterations + rest.iterations)
+
+
+def _by_secants(
+    problem: Problem,
+    here: LocalFit,
+    free: np.ndarray,
+    iterations: int,
+    gain: float,
+    sure: bool,
+    by_sketch: bool,
+) -> LocalFit:
+    """From ``here`` down; its Jacobian is one known nearby, or not finite where it is not known.
+
+    Others are ``by_sketch`` as far as they lead: along a valley numbers nearly cancel, and what is
+    left there sketches do not tell.
+    """
+    layout = problem.layout
+    x, r, chi2 = here.x, here.residuals, here.cost * problem.samples
+    jac = None if np.isnan(here.jacobian).all() else here.jacobian
+    fresh = False
     if jac is not None and not np.isfinite(jac).all():
         unknown = ~np.isfinite(jac).all(axis=0)
         which = free.copy()
         which[free] = unknown
         jac = jac.copy()
-        jac[:, unknown] = problem.jacobian(x, which, r)
+        jac[:, unknown] = problem.jacobian(x, which, r, by_sketch)
     damping, done, converged, carried = 1e-2, 0, False, 0
     marks: list[float] = []
     while done < iterations:
@@ -83,7 +125,7 @@ def descend_by_secants(
             marks.append(chi2)
             if len(marks) > _PATIENCE and marks[-1 - _PATIENCE] - chi2 < gain:
                 break
-            jac, fresh, carried = problem.jacobian(x, free, r), True, 0
+            jac, fresh, carried = problem.jacobian(x, free, r, by_sketch), True, 0
         done += 1
         scale = np.linalg.norm(jac, axis=0)
         scale = np.where(scale > 0.0, scale, np.inf)  # what is not seen does not move
@@ -94,9 +136,12 @@ def descend_by_secants(
         high = np.minimum(layout.upper[free] - part, reach) * finite
         best_step = boxed_step(normal, gradient, _FLAT, low, high)
         if -float(best_step @ (2.0 * gradient + normal @ best_step)) < gain:
-            if fresh or not sure:
+            if not sure or (fresh and not by_sketch):
                 converged = True
                 break
+            if fresh:
+                by_sketch = False
+                marks.clear()
             jac = None
             continue
         dampings = damping * _DAMPINGS
@@ -109,6 +154,10 @@ def descend_by_secants(
         if not better < chi2:
             if not fresh:
                 jac = None
+                continue
+            if by_sketch:
+                jac, by_sketch = None, False
+                marks.clear()
                 continue
             damping *= 1e2
             if damping > _DAMPING_MAX:
