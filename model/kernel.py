@@ -1097,7 +1097,7 @@ def drive_by_voltage(
         if explicit:
             # how it jumps, and how its slope does
             sloped = (last * last - last_begin * last_begin) * (dt / dt_before)
-            field2 = (v0 * v0 - last * last) + (v1 * v1 - v0 * v0) - sloped
+            field2 = v1 * v1 - last * last - sloped
             kick_before = abs(kick)
             kick = c[ELECTRIC] * field2 * electric(held, y[0]) / c[INERTIA]
             for j in range(y.shape[0]):

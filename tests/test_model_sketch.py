@@ -23,8 +23,8 @@ from tests.engine_tools import NOISE, PLAIN, effect, record_of
 
 RATE = 200.0
 SLOW = (Lobes(periods=1),)
-CHIRP = (Ramp(4e3, 1.0), Chirp(3.5e3, 0.5, 12.0, 12.0), Ramp(0.0, 1.0))
-STEPS = (Steps((3e3, 7e3, 2e3, 0.0), 1.5, 0.02),)
+CHIRP = (Ramp(4e3, 1.0), Chirp(3.5e3, 0.2, 1.0, 12.0), Ramp(0.0, 1.0))
+STEPS = (Steps((3e3, 7e3, 2e3, 0.0), 8.0, 0.02),)
 
 
 def played(*segments, hold=True, rate=RATE):
@@ -52,13 +52,11 @@ def with_sketch(record, model=PLAIN):
 
 @pytest.mark.parametrize("lag", [0.0, 9e-5, 3e-3])
 @pytest.mark.parametrize("hold", [True, False])
-@pytest.mark.parametrize(("segments", "part"), [(SLOW, 0.3), (CHIRP, 0.7), (STEPS, 0.7)])
+@pytest.mark.parametrize(("segments", "part"), [(SLOW, 0.3), (CHIRP, 0.4), (STEPS, 0.5)])
 def test_a_sketch_is_shorter_and_shows_the_same(segments, part, hold, lag):
     one = replace(record(*segments, hold=hold), lag=lag)
     sketch = sketched(one, PLAIN)
-    if sketch is None:
-        assert segments is not SLOW  # a film that rings all the time is not sketched
-        return
+    assert sketch is not None
     assert sketch.time.size < part * one.time.size
     off = seen(one, PLAIN, sketch, kernel.SKETCHED) - seen(one, PLAIN)
     assert np.sqrt(np.mean(off**2)) < 0.5 * NOISE

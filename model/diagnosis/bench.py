@@ -222,9 +222,8 @@ class Bench:
             )
             fit = min(fits, key=lambda f: f.cost)
             problem, fit = self._thinned_anew(problem, fit, fixed)
-            problem = self._with_sketches(problem, fit)
         progress("descents", 1.0)
-        return _trial(problem, fit, fixed)
+        return self._with_sketches(_trial(problem, fit, fixed))
 
     def _thinned_anew(
         self, problem: Problem, fit: LocalFit, fixed: np.ndarray
@@ -239,17 +238,16 @@ class Bench:
         problem = self.problem(layout.base)
         return problem, descend(problem, fit.x, fixed, iterations=_BASELINE)
 
-    def _with_sketches(self, problem: Problem, fit: LocalFit) -> Problem:
-        """The ``problem``, and those to come, with sketches as ``fit`` foresees the records."""
-        layout = problem.layout
-        model = layout.model(layout.values(fit.x))
+    def _with_sketches(self, trial: Trial) -> Trial:
+        """The ``trial``, and those to come, with sketches as it foresees the records."""
+        model = trial.model
         self.records = tuple(
             replace(r, sketch=sketched(r, model))
             if isinstance(r, ActuatorRecord) and isinstance(model, Actuator)
             else r
             for r in self.records
         )
-        return self.problem(layout.base)
+        return replace(trial, problem=self.problem(trial.problem.layout.base))
 
     def fit(
         self,
@@ -270,8 +268,12 @@ class Bench:
         ``noise`` is True where there is but noise to explain: then what a Jacobian from nearby
         promises is believed.
         """
-        self._ask_sketches(model, fixed)
-        problem, scouted = self.problem(model), self.problem(model, kernel.ROUGH)
+        scouted = self.problem(model, kernel.ROUGH)
+        layout = scouted.layout
+        if layout.names not in self._sketched:  # asked once of each combination of effects
+            x = layout.coordinates(layout.initial())
+            scouted.sketched = self._sketched[layout.names] = scouted.told_by_sketches(x, ~fixed)
+        problem = self.problem(model)
         scouts = [
             descend_by_secants(scouted, start, fixed, jacobian, _SCOUTING, sure=False)
             for start, jacobian in starts
@@ -301,14 +303,6 @@ class Bench:
             return _trial(trial.problem, fit, fixed)
 
         return self._as_near(_trial(problem, best, fixed), down)
-
-    def _ask_sketches(self, model: Actuator | Strip, fixed: np.ndarray) -> None:
-        """Ask once of a model with these numbers what sketches tell of it."""
-        problem = self.problem(model, kernel.ROUGH)
-        layout = problem.layout
-        if layout.names not in self._sketched:
-            x = layout.coordinates(layout.initial())
-            self._sketched[layout.names] = problem.told_by_sketches(x, ~fixed)
 
     def settled(self, trial: Trial, leader: float = math.inf) -> Trial:
         """``trial`` followed towards the end of its valley, on the thinned records.

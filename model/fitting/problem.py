@@ -169,6 +169,8 @@ class Problem:
     def told_by_sketches(self, x: np.ndarray, free: np.ndarray) -> np.ndarray:
         """Which numbers (d,) bool sketches tell at ``x`` (d,) what they do, of those ``free``."""
         told = np.zeros(x.size, dtype=bool)
+        if not self._has_sketches:
+            return told
         residuals = self.residuals(x)
         if self.sketch(x, residuals) is None:
             return told  # much of what they miss would show in differences too
@@ -197,11 +199,15 @@ class Problem:
 
     def sketch(self, x: np.ndarray, residuals: np.ndarray) -> np.ndarray | None:
         """The ``residuals`` (N,) at ``x`` (d,) as sketches have them; None where these are none."""
-        if not any(isinstance(r, ActuatorRecord) and r.sketch for r in self.records):
+        if not self._has_sketches:
             return None
         predicted, _ = self.predict(self.layout.values(x), np.ones(1, dtype=bool))
         sketch = np.asarray((predicted[0] - self.measured) / self.sigma)
         return sketch if np.sum((sketch - residuals) ** 2) < _SAME**2 * self.samples else None
+
+    @property
+    def _has_sketches(self) -> bool:
+        return any(isinstance(r, ActuatorRecord) and r.sketch is not None for r in self.records)
 
     def _one_sided(
         self, x: np.ndarray, free: np.ndarray, residuals: np.ndarray, sketched: np.ndarray | None

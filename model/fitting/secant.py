@@ -82,11 +82,10 @@ def descend_by_secants(
     reached = by_sketches(on_sketches, problem, here, free, iterations, gain)
     if reached.iterations >= iterations or (reached.converged and not sure):
         return reached
-    # where they led all the way, or nowhere, they have told what they can
-    by_sketch = problem.sketched is not None and bool(problem.sketched[free].any())
-    by_sketch = (
-        by_sketch and not reached.iterations and problem.sketch(x, here.residuals) is not None
-    )
+    # a descent on sketches needs all numbers told, a Jacobian takes what columns there are
+    told = np.zeros(1, dtype=bool) if problem.sketched is None else problem.sketched[free]
+    some = bool(told.any()) and not told.all()
+    by_sketch = some and problem.sketch(x, here.residuals) is not None
     rest = _by_secants(
         problem, reached, free, iterations - reached.iterations, gain, sure, by_sketch
     )

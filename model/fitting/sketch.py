@@ -1,7 +1,7 @@
 """A record's drive in fewer and longer steps, by which a fit is told what a number of a model does.
 
 A search asks far more often how readings change with a number than what they are. In the change,
-what a long step gets wrong is gone but for a few hundredths; so such questions are answered by a
+what a long step gets wrong is gone but for some hundredths; so such questions are answered by a
 drive that is cut only where something happens. Every reading and every error comes from the whole.
 """
 
@@ -14,6 +14,7 @@ import numpy as np
 from model import kernel
 from model.actuator import Actuator, Drive, reading_of
 from model.records import ActuatorRecord
+from model.sensor import at_sensor
 
 __all__ = ["Sketch", "sketched"]
 
@@ -97,6 +98,7 @@ def _joined(
     """Samples (B + 1,) between which a step may go: twice as far, as long as nothing is missed."""
     edges = np.arange(time.size)
     step = float(np.median(np.diff(time)))
+    rate = np.gradient(foreseen, time)
     size = 2
     while size * step <= _LONGEST * (1.0 + 1e-6):
         first = np.arange(0, time.size - size, size)
@@ -104,8 +106,9 @@ def _joined(
         first = first[np.all(np.isin(at, edges), axis=1)]
         inner = first[:, None] + np.arange(1, size)
         good = ~np.any(shown[first[:, None] + np.arange(size)], axis=1)
-        moved = _between(time, foreseen, first, size) - foreseen[inner]
-        good &= np.max(np.abs(moved), axis=1) < _NEAR
+        moved, moving = np.empty_like(time), np.empty_like(time)
+        at_sensor(time[::size], foreseen[::size], rate[::size], time, moved, moving)
+        good &= np.max(np.abs(moved - foreseen)[inner], axis=1) < _NEAR
         left, right, possible = _line(time, begins, ends, first, size)
         there = left[:, None] + (right - left)[:, None] * (np.arange(1, size) / size)
         pulls = pulled * (there**2 - begins[inner] ** 2)
@@ -113,19 +116,6 @@ def _joined(
         edges = np.setdiff1d(edges, inner[good & possible])
         size *= 2
     return edges
-
-
-def _between(time: np.ndarray, x: np.ndarray, first: np.ndarray, size: int) -> np.ndarray:
-    """Cubic Hermite (B, size - 1) inside each ``size`` intervals that begin at ``first`` (B,)."""
-    rate = np.gradient(x, time)
-    last = first + size
-    h = (time[last] - time[first])[:, None]
-    s = (time[first[:, None] + np.arange(1, size)] - time[first][:, None]) / h
-    r = 1.0 - s
-    x0, x1, u0, u1 = x[first, None], x[last, None], rate[first, None], rate[last, None]
-    return np.asarray(
-        x0 * (1 + 2 * s) * r * r + x1 * (3 - 2 * s) * s * s + h * (u0 * s * r * r - u1 * s * s * r)
-    )
 
 
 def _line(
