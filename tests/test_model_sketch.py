@@ -19,7 +19,7 @@ from model.fitting.problem import Problem
 from model.fitting.secant import descend_by_secants
 from model.fitting.sketch import sketched
 from model.material import Branch, Network, Spring
-from tests.engine_tools import NOISE, PLAIN, effect, record_of
+from tests.engine_tools import NOISE, PLAIN, effect, record_of, typical
 
 RATE = 200.0
 SLOW = (Lobes(periods=1),)
@@ -131,6 +131,9 @@ def test_which_numbers_are_told():
     problem, x, free = posed(replace(PLAIN, effects=late), slow)
     moment = problem.layout.names.index("sudden change of force: moment")
     assert not problem.told_by_sketches(x, free)[moment]
+    bristles = replace(PLAIN, effects=(typical("easing friction"),))
+    problem, x, free = posed(bristles, slow)
+    assert not problem.told_by_sketches(x, free).any()
     problem, x, free = posed(PLAIN, record(*SLOW))
     assert not problem.told_by_sketches(x, free).any()
 

@@ -25,6 +25,8 @@ from model.actuator import Actuator, Drive, at_rest, initial_state, reading_of
 from model.coefficients import REST
 from model.effects import EFFECTS, EffectValues
 from model.excitation import Sequence
+from model.fitting.parameters import Layout
+from model.fitting.problem import Problem
 from model.fitting.sketch import sketched
 from model.material import (
     STANDARD_GRAVITY,
@@ -140,7 +142,8 @@ def what_quick_steps_save(actuator: Actuator, sequence: Sequence) -> None:
 
     Hasty are those of a search, and, of what follows the path, those of its first look. Sketched
     are those by which a search is told what a number of the model does, with the reading at each
-    sample; what they get wrong is nearly the same of neighbours, and gone in their difference.
+    sample; what they get wrong is nearly the same of neighbours, and gone in their difference but
+    for the last column: the worst of any number, relative to what it does.
     """
     t = np.arange(math.ceil(sequence.segments[0].duration * STAIRCASE)) / STAIRCASE
     drive = Drive(t, sequence.segments[0].voltage(t), hold=True)
@@ -149,11 +152,12 @@ def what_quick_steps_save(actuator: Actuator, sequence: Sequence) -> None:
     assert sketch is not None
     print(
         f"{'staircase of 200 Hz':<28}{'careful ms':>11}{'hasty ms':>10}{'ratio':>8}{'um':>8}"
-        f"{'sketch ms':>11}{'ratio':>8}{'um':>8}"
+        f"{'sketch ms':>11}{'ratio':>8}{'um':>8}{'worst':>8}"
     )
     for name in ("", "linear drag", "electrode resistance", "Mullins softening", "dry friction"):
         effects = (typical(name),) if name else ()
-        c = replace(actuator, effects=effects).coefficients()
+        model = replace(actuator, effects=effects)
+        c = model.coefficients()
         at_rest(c)
         careful, expected = timed(partial(followed, c, drive), 21)
         quick, found = timed(partial(followed, c, drive, kernel.ROUGH), 21)
@@ -163,12 +167,26 @@ def what_quick_steps_save(actuator: Actuator, sequence: Sequence) -> None:
             f"{name or 'no effect':<28}{careful * 1e3:>11.3f}{quick * 1e3:>10.3f}"
             f"{quick / careful:>7.2f}x{_rms_um((found - expected) * THESIS_FILM.length):>8.3f}"
             f"{drawn * 1e3:>11.3f}{drawn / careful:>7.2f}x{_rms_um(shown - moved):>8.3f}"
+            f"{100.0 * missed_by(model, replace(record, sketch=sketch)):>7.1f}%"
         )
 
 
 def drawn_up(c: np.ndarray, sketch: Drive, times: np.ndarray) -> np.ndarray:
     """Readings (N,) at ``times`` by a sketch."""
     return reading_of(c, THESIS_FILM.length, sketch, 0.0, kernel.SKETCHED, times)[0]
+
+
+def missed_by(model: Actuator, record: ActuatorRecord) -> float:
+    """How far the sketch of ``record`` is from telling what a number does, at worst, of 1."""
+    layout = Layout(model)
+    problem = Problem([record], layout, workers=1, haste=kernel.ROUGH)
+    x, free = layout.coordinates(layout.initial()), np.ones(layout.size, dtype=bool)
+    free[layout.column("J")] = False
+    residuals = problem.residuals(x)
+    whole = problem.jacobian(x, free, residuals)
+    problem.sketched = free
+    off = problem.jacobian(x, free, residuals, sketched=True) - whole
+    return float(np.max(np.linalg.norm(off, axis=0) / np.linalg.norm(whole, axis=0)))
 
 
 def _rms_um(off: np.ndarray) -> float:
