@@ -74,7 +74,7 @@ NO_REST = 4  #: no rest state under the load
 BAD_INPUT = 5  #: not finite, or time that does not increase
 
 CAREFUL = 0  #: good to some hundredths of a micrometre
-QUICK = 1  #: to a tenth (some tenths on a step of 8 kV); careful where an effect follows the path
+QUICK = 1  #: to a tenth (some tenths on a step of 8 kV); careful where a force follows the path
 ROUGH = 2  #: nor careful there: to a tenth of what such an effect does, or some while it rings
 SKETCHED = 3  #: as rough, in steps from sample to sample, however far: ``model.fitting.sketch``
 
@@ -96,13 +96,15 @@ _EFFECT_SUBSTEPS_MAX = 25
 # change of a drag over a step, as a phase: that part is not in closed form
 _GROWN, _GROWN_QUICK = 1.0, 6.0
 _RINGING = 1e-4  # in stretch, from which on steps must see it: 7.5 um on 75 mm
+_CALM = 2e-5  # in stretch, up to which what softens on the way need not see it
+_STEEP = 0.05  # of the stiffness: what softens by so much where the film is must be seen anyway
 # numbers in closed form need not be quite the film's own: what they lack is integrated
 _STIFFNESS_NEAR = 0.005
 _DRAG_NEAR = 0.2
 _DRAG_MIN = 1e-2  # 1/s; less is none
 _COURSES = 256  # of these forms that are kept
-_SWING = 32  # numbers that say how the film goes on
-_K, _D, _W, _H, _KIND = 27, 28, 29, 30, 31  # where those that it follows from stand
+_SWING = 40  # numbers that say how the film goes on
+_K, _D, _W, _H, _KIND, _FADING = 30, 31, 32, 33, 34, 35  # where those that it follows from stand
 _RODAS_TOLERANCE = 5e-9  # in stretch, a step: 0.4 nm on 75 mm
 _RODAS_STEP_MAX = 2e-2  # s; the error estimate rules below that
 _RODAS_HALVINGS = 2.0**-17
@@ -254,6 +256,19 @@ def _drag(acting: int, c: np.ndarray, y: np.ndarray, rate: float) -> float:
     """Drag of the effects over the inertia, 1/s, at a rate of stretch."""
     _, drag = _stiffness(acting, c, y[2 + branch_count(c) :], y[0], rate)
     return drag / c[INERTIA]
+
+
+@jit
+def _softening(acting: int, c: np.ndarray, y: np.ndarray, t: float) -> float:
+    """Stiffness over the inertia, 1/s^2, that effects which soften add to the springs' or take.
+
+    The larger of those upwards and downwards: where the film turns they change.
+    """
+    m, lam, near = y[2 + branch_count(c) :], y[0], 1e-4 * y[0]
+    here = _soften(acting, c, m, lam, 0.0, t, 0.0)
+    up = abs(_soften(acting, c, m, lam + near, 0.0, t, 0.0) - here)
+    down = abs(_soften(acting, c, m, lam - near, 0.0, t, 0.0) - here)
+    return max(up, down) / near * c[FORCE] / c[INERTIA]
 
 
 @jit
@@ -629,23 +644,26 @@ def _swings(
     """What ``_lean_steps`` reads: how a film of stiffness k and drag d goes on over ``h`` s.
 
     ``swing`` (_SWING,) is filled: the matrices of Cox and Matthews's method for z'' = -k z - d z'
-    + w I + rest, I' = z, of which only the columns are needed that act on a rate or an
-    acceleration: z is how far the film has moved, I what of it the branches have seen, by which
-    they give way while it rings. Then what a force does that grows evenly over the first half, k,
-    d, w and h themselves, and the kind of drag. ``branches`` (2, 3) is ``_speeds``'s, ``room``
-    (7, 3, 3).
+    + w I + rest, I' = z - f I, of which only the columns are needed that act on a rate, on an
+    acceleration or on I: z is how far the film has moved, I what of it the branches have given way
+    to, as one branch would that flows as they do in the mean, at f 1/s. Then what a force does that
+    grows evenly over the first half, k, d, w and h themselves, the kind of drag, f, and how much of
+    a flow that fades so has gone by, in s, after half of the step and after all of it.
+    ``branches`` (2, 3) is ``_speeds``'s, ``room`` (7, 3, 3).
     """
-    w = 0.0
+    w = fades = 0.0
     for i in range(branches.shape[1]):
         w += branches[0, i] * branches[1, i]
-    doublings, part, fastest = 0, 0.5 * h, max(max(math.sqrt(k), d), w ** (1.0 / 3.0))
+        fades += branches[0, i] * branches[1, i] ** 2
+    fades = fades / w if w > 0.0 else 1.0
+    doublings, part, fastest = 0, 0.5 * h, max(max(math.sqrt(k), d), max(w ** (1.0 / 3.0), fades))
     while part * fastest > 0.5:
         part *= 0.5
         doublings += 1
     a, phi = room[0], room[1:5]
     a[:] = 0.0
     a[0, 1] = a[2, 0] = part
-    a[1, 0], a[1, 1], a[1, 2] = -part * k, -part * d, part * w
+    a[1, 0], a[1, 1], a[1, 2], a[2, 2] = -part * k, -part * d, part * w, -part * fades
     _phis(a, doublings, room[5:], phi)
     for i in range(3):
         for j in range(3):
@@ -659,7 +677,11 @@ def _swings(
         swing[18 + i] = h * (first - 3.0 * second + 4.0 * third)
         swing[21 + i] = h * (2.0 * second - 4.0 * third)
         swing[24 + i] = h * (4.0 * third - second)
+        swing[27 + i] = phi[0, i, 2]
     swing[_K], swing[_D], swing[_W], swing[_H], swing[_KIND] = k, d, w, h, _kind_of_drag(d)
+    swing[_FADING] = fades
+    swing[_FADING + 1] = -math.expm1(-0.5 * fades * h) / fades
+    swing[_FADING + 2] = -math.expm1(-fades * h) / fades
 
 
 @inlined
@@ -688,12 +710,12 @@ def _lean_steps(
     """``steps`` steps of ``h`` s for the thesis's case: width held, springs of Gent's kind, n <= 3.
 
     Exponential Runge-Kutta of order 4 (Cox and Matthews, J. Comput. Phys. 176, 2002): the film's
-    own swinging, how branches give way meanwhile, and a drag are in closed form; what is left of
-    the forces is slow. So neither ringing nor drag ask for short steps. What is left of the
-    branches' flow goes as in classical Runge-Kutta, which is the same method for what has no linear
-    part. Nothing leaves the registers on the way. ``table`` is ``_lean_table``'s, ``branches`` is
-    ``_speeds``'s, ``swing`` is ``_swings``'s. Where effects are ``acting`` it does what
-    ``_effect_steps`` does.
+    own swinging, how branches flow and give way meanwhile, and a drag are in closed form; what is
+    left of the forces is slow. So neither ringing nor drag ask for short steps. Branches flow as
+    one does that fades as they do in the mean; by what each differs it goes as in classical
+    Runge-Kutta, which is the same method for what has no linear part. Nothing leaves the registers
+    on the way. ``table`` is ``_lean_table``'s, ``branches`` is ``_speeds``'s, ``swing`` is
+    ``_swings``'s. Where effects are ``acting`` it does what ``_effect_steps`` does.
     """
     n = y.shape[0] - 2 - MEMORY
     memory = y[2 + n :]
@@ -709,7 +731,11 @@ def _lean_steps(
     p1, p2, p3, q1, q2, q3 = swing[9], swing[10], swing[11], swing[12], swing[13], swing[14]
     w1, w2, w3, a1, a2, a3 = swing[15], swing[16], swing[17], swing[18], swing[19], swing[20]
     b1, b2, b3, c1, c2, c3 = swing[21], swing[22], swing[23], swing[24], swing[25], swing[26]
-    k, d, w = swing[_K], swing[_D], swing[_W]
+    w13, w23, w33 = swing[27], swing[28], swing[29]
+    k, d, w, fades = swing[_K], swing[_D], swing[_W], swing[_FADING]
+    gone_half, gone = swing[_FADING + 1], swing[_FADING + 2]
+    left_half, left = 1.0 - fades * gone_half, 1.0 - fades * gone
+    per_w = 1.0 / w if w > 0.0 else 0.0
     k1, k2, k3 = branches[0, 0], branches[0, 1], branches[0, 2]
     s1, s2, s3 = branches[1, 0], branches[1, 1], branches[1, 2]
     x1 = y[2] if n > 0 else 1.0
@@ -741,26 +767,34 @@ def _lean_steps(
         if m % stride == 0:
             bend = max(bend, abs(a - 2.0 * last + last_but_one))
             last_but_one, last = last, a
-        push = a + d * speed
-        z, v, seen = e12 * speed + p1 * push, e22 * speed + p2 * push, e32 * speed + p3 * push
+        # branches flow already: as if all had been left behind by what one with their mean had, and
+        # by what each differs from it (in the mean by nothing), which fades alike
+        f1, f2, f3 = r1 * t1, r2 * t2, r3 * t3
+        flow = per_w * (k1 * f1 + k2 * f2 + k3 * f3)
+        f1, f2, f3 = f1 - s1 * flow, f2 - s2 * flow, f3 - s3 * flow
+        before = -flow / fades
+        push = a + d * speed - w * before
+        z = e12 * speed + e13 * before + p1 * push
+        v = e22 * speed + e23 * before + p2 * push
+        seen = e32 * speed + e33 * before + p3 * push
         if acting:
             fm, fb = _supplied(
                 acting, c, memory, t, half, lam, speed, z, v - speed, now, va, vm, vb
             )  # fmt: skip
         em, e1 = electric_gain * fm, electric_gain * fb
-        f1, f2, f3 = r1 * t1, r2 * t2, r3 * t3
-        # how the field grows and the branches flow is known ahead: no stage need take it as still
-        yielding = half * (k1 * f1 + k2 * f2 + k3 * f3)
-        rise, later = lam * (em - electric_gain * f0) + yielding, lam * (e1 - em) + yielding
+        # how the field grows is known ahead: no stage need take it as still
+        rise, later = lam * (em - electric_gain * f0), lam * (e1 - em)
         slope = rise / half
         z, v, seen = z + q1 * slope, v + q2 * slope, seen + q3 * slope
-        sum_1, sum_2, sum_3 = f1, f2, f3
-        first, sum_z, sum_v = push, w1 * speed + a1 * push, w2 * speed + a2 * push
-        sum_seen = w3 * speed + a3 * push
+        first = push
+        sum_z = w1 * speed + w13 * before + a1 * push
+        sum_v = w2 * speed + w23 * before + a2 * push
+        sum_seen = w3 * speed + w33 * before + a3 * push
         there_z, there_v, there_seen = z, v, seen
 
-        z1, z2 = x1 + half * f1 + s1 * seen, x2 + half * f2 + s2 * seen
-        z3 = x3 + half * f3 + s3 * seen
+        gave = seen - before
+        z1, z2 = x1 + s1 * gave + f1 * gone_half, x2 + s2 * gave + f2 * gone_half
+        z3 = x3 + s3 * gave + f3 * gone_half
         now = lam + z
         p = now * now
         t1, t2 = _lean_pull(p, z1 * z1, g1), _lean_pull(p, z2 * z2, g2)
@@ -775,15 +809,20 @@ def _lean_steps(
         a += load
         push = a + k * z + d * v - w * seen
         less = push - rise
-        f1, f2, f3 = r1 * t1 - s1 * z, r2 * t2 - s2 * z, r3 * t3 - s3 * z
-        z = e12 * speed + p1 * less + q1 * slope
-        v = e22 * speed + p2 * less + q2 * slope
-        seen = e32 * speed + p3 * less + q3 * slope
+        went = z - fades * seen
+        o1 = r1 * t1 - s1 * went - f1 * left_half
+        o2 = r2 * t2 - s2 * went - f2 * left_half
+        o3 = r3 * t3 - s3 * went - f3 * left_half
+        z = e12 * speed + e13 * before + p1 * less + q1 * slope
+        v = e22 * speed + e23 * before + p2 * less + q2 * slope
+        seen = e32 * speed + e33 * before + p3 * less + q3 * slope
         sum_z, sum_v, sum_seen = sum_z + b1 * push, sum_v + b2 * push, sum_seen + b3 * push
-        sum_1, sum_2, sum_3 = sum_1 + 2.0 * f1, sum_2 + 2.0 * f2, sum_3 + 2.0 * f3
+        sum_1, sum_2, sum_3 = 2.0 * o1, 2.0 * o2, 2.0 * o3
 
-        z1, z2 = x1 + half * f1 + s1 * seen, x2 + half * f2 + s2 * seen
-        z3 = x3 + half * f3 + s3 * seen
+        gave = seen - before
+        z1 = x1 + s1 * gave + f1 * gone_half + half * o1
+        z2 = x2 + s2 * gave + f2 * gone_half + half * o2
+        z3 = x3 + s3 * gave + f3 * gone_half + half * o3
         now = lam + z
         p = now * now
         t1, t2 = _lean_pull(p, z1 * z1, g1), _lean_pull(p, z2 * z2, g2)
@@ -797,17 +836,22 @@ def _lean_steps(
             )  # fmt: skip
         a += load
         push = a + k * z + d * v - w * seen
-        f1, f2, f3 = r1 * t1 - s1 * z, r2 * t2 - s2 * z, r3 * t3 - s3 * z
+        went = z - fades * seen
+        o1 = r1 * t1 - s1 * went - f1 * left_half
+        o2 = r2 * t2 - s2 * went - f2 * left_half
+        o3 = r3 * t3 - s3 * went - f3 * left_half
         sum_z, sum_v, sum_seen = sum_z + b1 * push, sum_v + b2 * push, sum_seen + b3 * push
         push = 2.0 * push - first - rise
         slope = later / half
         z = e11 * there_z + e12 * there_v + e13 * there_seen + p1 * push + q1 * slope
         v = e21 * there_z + e22 * there_v + e23 * there_seen + p2 * push + q2 * slope
         seen = e31 * there_z + e32 * there_v + e33 * there_seen + p3 * push + q3 * slope
-        sum_1, sum_2, sum_3 = sum_1 + 2.0 * f1, sum_2 + 2.0 * f2, sum_3 + 2.0 * f3
+        sum_1, sum_2, sum_3 = sum_1 + 2.0 * o1, sum_2 + 2.0 * o2, sum_3 + 2.0 * o3
 
-        z1, z2 = x1 + h * f1 + s1 * seen, x2 + h * f2 + s2 * seen
-        z3 = x3 + h * f3 + s3 * seen
+        gave = seen - before
+        z1 = x1 + s1 * gave + f1 * gone + h * o1
+        z2 = x2 + s2 * gave + f2 * gone + h * o2
+        z3 = x3 + s3 * gave + f3 * gone + h * o3
         now = lam + z
         p = now * now
         t1, t2 = _lean_pull(p, z1 * z1, g1), _lean_pull(p, z2 * z2, g2)
@@ -821,14 +865,15 @@ def _lean_steps(
             )  # fmt: skip
         a += load
         push = a + k * z + d * v - w * seen
+        went = z - fades * seen
         lam += sum_z + c1 * push
         speed = sum_v + c2 * push
-        seen = sum_seen + c3 * push
+        gave = sum_seen + c3 * push - before
         if acting & _COMMIT:
             _commit(acting, c, memory, lam, speed, lam0, h, t)
-        x1 += sixth * (sum_1 + r1 * t1 - s1 * z) + s1 * seen
-        x2 += sixth * (sum_2 + r2 * t2 - s2 * z) + s2 * seen
-        x3 += sixth * (sum_3 + r3 * t3 - s3 * z) + s3 * seen
+        x1 += sixth * (sum_1 + r1 * t1 - s1 * went - f1 * left) + s1 * gave + f1 * gone
+        x2 += sixth * (sum_2 + r2 * t2 - s2 * went - f2 * left) + s2 * gave + f2 * gone
+        x3 += sixth * (sum_3 + r3 * t3 - s3 * went - f3 * left) + s3 * gave + f3 * gone
     trace[0], trace[1], trace[2] = last, last_but_one, bend
     y[0], y[1] = lam, speed
     if n > 0:
@@ -1036,7 +1081,11 @@ def drive_by_voltage(
         most = _EFFECT_SUBSTEPS_MAX
     drags = acting & _STIFFNESS != 0
     # ringing is in closed form, but its turns are not, where a path is followed
-    quick = haste >= ROUGH or (haste == QUICK and acting & _TURNS == 0)
+    turning = acting & _TURNS
+    # what softens on the way is content with quick steps as long as the film does not ring
+    wary = lean and QUICK <= haste <= ROUGH and turning != 0 and turning & ~_SOFTEN == 0
+    quick = not wary and (haste >= ROUGH or (haste == QUICK and turning == 0))
+    calm_below = _RINGING if haste == ROUGH else _CALM
     longest = 0.0
     if quick:
         longest = _SKETCH_STEP_MAX if haste == SKETCHED else _QUICK_STEP_MAX
@@ -1052,7 +1101,7 @@ def drive_by_voltage(
     springy, swing, bound, steps, step_before, gentle = 0.0, 0.0, 0.0, 1, 0.0, True
     kick_gain, ring_gain, fading, per_phase2 = 0.0, 0.0, 1.0, 1.0
     ring, kick, lam_seen, rate_before, drag = 0.0, 0.0, y[0], y[1], 0.0
-    fresh = True
+    fresh, steep = True, False
     last = last_begin = voltage[0]
     dt_before = 1.0
     for k in range(samples):
@@ -1077,6 +1126,8 @@ def drive_by_voltage(
                 springy, more, drag, fastest = _speeds(acting, c, y, branches)
                 swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
                 lean_bound = _lean_bound(springy, more, fastest, longest)
+                quick_bound = _lean_bound(springy, more, fastest, _QUICK_STEP_MAX)
+                steep = wary and _softening(acting, c, y, time[k]) > _STEEP * springy
                 lam_seen = y[0]
                 if stiffness_step == 0.0:
                     stiffness_step = _STIFFNESS_NEAR * max(springy, 1.0)
@@ -1087,18 +1138,22 @@ def drive_by_voltage(
             if lean:
                 wanted = dt * lean_bound - 1e-6
             steps = max(math.ceil(wanted), 1) if gentle else 1
+            looks = steps
+            if wary and gentle and not steep:
+                looks = max(math.ceil(dt * quick_bound - 1e-6), 1)
+                steps = looks * math.ceil(steps / looks)
             step = dt / steps
             phase = max(swing * step, 1e-6)
             kick_gain = phase**3 * step**2 / 120.0 / _RK4_KICK
             ring_gain = phase**2 * step**2 / 120.0 / _RK4_RINGING
             fading = 1.0 / (1.0 + 0.25 * swing * dt)
-            per_phase2 = 1.0 / phase**2
+            per_phase2 = (looks / (steps * phase)) ** 2
         explicit = gentle
         if explicit:
             # how it jumps, and how its slope does
             sloped = (last * last - last_begin * last_begin) * (dt / dt_before)
             field2 = v1 * v1 - last * last - sloped
-            kick_before = abs(kick)
+            kick_before, pushed = abs(kick), kick
             kick = c[ELECTRIC] * field2 * electric(held, y[0]) / c[INERTIA]
             for j in range(y.shape[0]):
                 before[j] = y[j]
@@ -1106,11 +1161,14 @@ def drive_by_voltage(
         if explicit and lean:
             fine, refine = steps, 1
             forced = 0.0
+            hasty = quick
+            if wary and not steep:
+                hasty = max(ring * fading, abs(kick - pushed)) < calm_below * springy
             if not quick:
                 refine, forced = _refined(
-                    kick_gain, ring_gain, kick, kick_before, ring, v0 != last and steps > 1, trace
+                    kick_gain, ring_gain, kick, kick_before, ring, v0 != last and looks > 1, trace
                 )
-                fine = steps * refine
+                fine = looks if hasty else steps * refine
             elif haste != SKETCHED and max(ring * fading, abs(kick)) > _RINGING * springy:
                 finer = swing * dt / _RK4_PHASE_MAX
                 fine = max(fine, math.ceil(min(finer - 1e-6, _EFFECT_SUBSTEPS_MAX)))
@@ -1121,7 +1179,7 @@ def drive_by_voltage(
                 least_drag = _drag(acting, c, y, max(abs(y[1]) - change, 0.0))
                 drag = 0.5 * (most_drag + least_drag)
                 growth = (most_drag - least_drag) * dt
-                growth /= _GROWN_QUICK if quick else _GROWN
+                growth /= _GROWN_QUICK if hasty else _GROWN
                 fine = max(fine, math.ceil(min(growth, 4 * _EFFECT_SUBSTEPS_MAX)))
                 rate_before = y[1]
             h_fine = dt / fine
@@ -1137,7 +1195,7 @@ def drive_by_voltage(
                     _swings(stiff, drag, branches, h_fine, room, course)
             _lean_steps(
                 acting if moves else 0, c, table, branches, course, y, v0, v1, time[k], theta,
-                h_fine, fine, max(fine // steps, 1), trace,
+                h_fine, fine, max(fine // looks, 1), trace,
             )  # fmt: skip
             ring = max(ring * fading, trace[2] * per_phase2 - forced)
         elif explicit:
@@ -1161,6 +1219,8 @@ def drive_by_voltage(
                 springy, more, drag, fastest = _speeds(acting, c, y, branches)
                 swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
                 lean_bound = _lean_bound(springy, more, fastest, longest)
+                quick_bound = _lean_bound(springy, more, fastest, _QUICK_STEP_MAX)
+                steep = wary and _softening(acting, c, y, time[k]) > _STEEP * springy
                 lam_seen, step_before = y[0], 0.0
                 explicit = moves or bound <= _STIFFER * bound_before
             if not explicit:
