@@ -83,6 +83,7 @@ _RK4_STEP_MAX = 2.5e-3  # s; a thesis record is then good to 0.03 um
 _QUICK_STEP_MAX = 5e-3  # s; where quick is what matters
 _SKETCH_STEP_MAX = 5e-2  # s; where it was looked at first how long they may be
 _RK4_PHASE_MAX = 1.20  # (angular frequency or flow rate) times step
+_ROUGH_PHASE_MAX = 2.0  # the same of what effects add to the springs, in a first look
 _RK4_KICK = 5e-8  # in stretch: the error allowed in following one kick of the drive
 _RK4_RINGING = 5e-9  # in stretch a radian of ringing, which lasts for some hundred radians
 _RK4_REFINE_MAX = 20.0
@@ -241,13 +242,15 @@ def _bound(springy: float, more: float, drag: float, fastest: float) -> float:
 
 
 @inlined
-def _lean_bound(springy: float, more: float, fastest: float, longest: float) -> float:
+def _lean_bound(
+    springy: float, more: float, fastest: float, longest: float, phase_max: float
+) -> float:
     """Exponential steps that the same take a second; a drag is in closed form, springs nearly.
 
     With a ``longest`` of 0 as many as it takes to see each radian of ringing.
     """
     if longest > 0.0:
-        return max(max(math.sqrt(more), fastest) / _RK4_PHASE_MAX, 1.0 / longest)
+        return max(max(math.sqrt(more), fastest) / phase_max, 1.0 / longest)
     return _bound(springy, more, 0.0, fastest)
 
 
@@ -1086,6 +1089,7 @@ def drive_by_voltage(
     wary = lean and QUICK <= haste <= ROUGH and turning != 0 and turning & ~_SOFTEN == 0
     quick = not wary and (haste >= ROUGH or (haste == QUICK and turning == 0))
     calm_below = _RINGING if haste == ROUGH else _CALM
+    phase_max = _ROUGH_PHASE_MAX if haste == ROUGH else _RK4_PHASE_MAX
     longest = 0.0
     if quick:
         longest = _SKETCH_STEP_MAX if haste == SKETCHED else _QUICK_STEP_MAX
@@ -1125,8 +1129,8 @@ def drive_by_voltage(
             if k % 64 == 0:
                 springy, more, drag, fastest = _speeds(acting, c, y, branches)
                 swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
-                lean_bound = _lean_bound(springy, more, fastest, longest)
-                quick_bound = _lean_bound(springy, more, fastest, _QUICK_STEP_MAX)
+                lean_bound = _lean_bound(springy, more, fastest, longest, phase_max)
+                quick_bound = _lean_bound(springy, more, fastest, _QUICK_STEP_MAX, phase_max)
                 steep = wary and _softening(acting, c, y, time[k]) > _STEEP * springy
                 lam_seen = y[0]
                 if stiffness_step == 0.0:
@@ -1170,7 +1174,7 @@ def drive_by_voltage(
                 )
                 fine = looks if hasty else steps * refine
             elif haste != SKETCHED and max(ring * fading, abs(kick)) > _RINGING * springy:
-                finer = swing * dt / _RK4_PHASE_MAX
+                finer = swing * dt / phase_max
                 fine = max(fine, math.ceil(min(finer - 1e-6, _EFFECT_SUBSTEPS_MAX)))
             if drags:
                 # a drag may change with the rate: where it does within the sample, in finer steps
@@ -1218,8 +1222,8 @@ def drive_by_voltage(
                 bound_before = bound
                 springy, more, drag, fastest = _speeds(acting, c, y, branches)
                 swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
-                lean_bound = _lean_bound(springy, more, fastest, longest)
-                quick_bound = _lean_bound(springy, more, fastest, _QUICK_STEP_MAX)
+                lean_bound = _lean_bound(springy, more, fastest, longest, phase_max)
+                quick_bound = _lean_bound(springy, more, fastest, _QUICK_STEP_MAX, phase_max)
                 steep = wary and _softening(acting, c, y, time[k]) > _STEEP * springy
                 lam_seen, step_before = y[0], 0.0
                 explicit = moves or bound <= _STIFFER * bound_before

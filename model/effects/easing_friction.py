@@ -53,9 +53,10 @@ def reach(c, k, rate):
 
 @jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
-    # on the way here the rate was, in the mean, that of the way
-    passed = (lam - lam0) / since if since > 0.0 else rate
-    z = slid(m[j], lam - lam0, reach(c, k, passed))
+    z = m[j]
+    if since > 0.0:
+        # on the way here the rate was, in the mean, that of the way
+        z = slid(z, lam - lam0, reach(c, k, (lam - lam0) / since))
     return c[k] * (z + c[k + 2] * (rate - abs(rate) * z / reach(c, k, rate))) / c[k + 1]
 
 

@@ -33,9 +33,10 @@ EFFECT = replace(
 
 @jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
-    # on the way here the rate was, in the mean, that of the way
-    passed = (lam - lam0) / since if since > 0.0 else rate
-    z = bent(m[j], lam - lam0, reach(c, k, passed), c[k + 5])
+    z = m[j]
+    if since > 0.0:
+        # on the way here the rate was, in the mean, that of the way
+        z = bent(z, lam - lam0, reach(c, k, (lam - lam0) / since), c[k + 5])
     at = math.copysign(z, z * rate) / reach(c, k, rate)
     slips = bristles_slip(at, c[k + 5]) * at
     return c[k] * (z + c[k + 2] * rate * (1.0 - slips)) / c[k + 1]
