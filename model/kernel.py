@@ -1130,7 +1130,6 @@ def drive_by_voltage(
                 springy, more, drag, fastest = _speeds(acting, c, y, branches)
                 swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
                 lean_bound = _lean_bound(springy, more, fastest, longest, phase_max)
-                quick_bound = _lean_bound(springy, more, fastest, _QUICK_STEP_MAX, phase_max)
                 steep = wary and _softening(acting, c, y, time[k]) > _STEEP * springy
                 lam_seen = y[0]
                 if stiffness_step == 0.0:
@@ -1144,7 +1143,8 @@ def drive_by_voltage(
             steps = max(math.ceil(wanted), 1) if gentle else 1
             looks = steps
             if wary and gentle and not steep:
-                looks = max(math.ceil(dt * quick_bound - 1e-6), 1)
+                calmly = dt * _lean_bound(springy, more, fastest, _QUICK_STEP_MAX, phase_max)
+                looks = max(math.ceil(calmly - 1e-6), 1)
                 steps = looks * math.ceil(steps / looks)
             step = dt / steps
             phase = max(swing * step, 1e-6)
@@ -1223,7 +1223,6 @@ def drive_by_voltage(
                 springy, more, drag, fastest = _speeds(acting, c, y, branches)
                 swing, bound = math.sqrt(springy + more), _bound(springy, more, drag, fastest)
                 lean_bound = _lean_bound(springy, more, fastest, longest, phase_max)
-                quick_bound = _lean_bound(springy, more, fastest, _QUICK_STEP_MAX, phase_max)
                 steep = wary and _softening(acting, c, y, time[k]) > _STEEP * springy
                 lam_seen, step_before = y[0], 0.0
                 explicit = moves or bound <= _STIFFER * bound_before

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from model import kernel
 from model.actuator import Actuator, Drive
 from model.diagnosis.bench import Bench, Trial
 from model.effects import EFFECTS, EffectValues
@@ -73,6 +74,17 @@ def typical(name: str) -> tuple[str, tuple[tuple[str, float], ...]]:
     """The effect ``name`` with numbers that would be noticed."""
     numbers = EFFECTS[name].parameters
     return name, tuple((p.name, min(max(p.typical, p.bounds[0]), p.bounds[1])) for p in numbers)
+
+
+def posed(
+    model: Actuator, record: Record, haste: int = kernel.CAREFUL
+) -> tuple[Problem, np.ndarray, np.ndarray]:
+    """A problem, ``model``'s coordinates (d,) and which are free (d,): all but locking limits."""
+    layout = Layout(model)
+    free = np.ones(layout.size, dtype=bool)
+    free[layout.column("J")] = False
+    problem = Problem([record], layout, workers=1, haste=haste)
+    return problem, layout.coordinates(layout.initial()), free
 
 
 def made_trial(records: Several[Record], model: Actuator | Strip, residual: np.ndarray) -> Trial:

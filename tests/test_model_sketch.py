@@ -14,12 +14,10 @@ from model.diagnosis.screening import Screen
 from model.effects import EFFECTS
 from model.excitation import Chirp, Lobes, Ramp, Sequence, Steps
 from model.fitting.levenberg import descend
-from model.fitting.parameters import Layout
-from model.fitting.problem import Problem
 from model.fitting.secant import descend_by_secants
 from model.fitting.sketch import sketched
 from model.material import Branch, Network, Spring
-from tests.engine_tools import NOISE, PLAIN, effect, record_of, typical
+from tests.engine_tools import NOISE, PLAIN, effect, posed, record_of, typical
 
 RATE = 200.0
 SLOW = (Lobes(periods=1),)
@@ -111,14 +109,6 @@ def test_what_cannot_be_sketched():
     assert sketched(strong, PLAIN) is None  # it pulls in
     assert sketched(record(Chirp(3.5e3, 20.0, 60.0, 5.0)), PLAIN) is None
     assert sketched(record(*SLOW, rate=60.0), PLAIN) is None  # as long as a step may be
-
-
-def posed(model, one):
-    problem = Problem([one], Layout(model), workers=1)
-    layout = problem.layout
-    free = np.ones(layout.size, dtype=bool)
-    free[layout.column("J")] = False
-    return problem, layout.coordinates(layout.initial()), free
 
 
 def test_which_numbers_are_told():

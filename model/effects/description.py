@@ -78,11 +78,11 @@ class Effect:
     ``memory`` is how many numbers of the kernel's state are its own; they are 0 at rest. ``drives``
     says for which measurements it makes sense: under ``voltage``, under an imposed ``stretch``.
     ``turns`` is True where what it does follows the path from turning point to turning point, so
-    that not even those of a film that rings by a tenth of a micrometre must be missed. ``recurs``
-    is False for what happens in one recording and is no property of the rig: nothing says that
-    another recording has it too, or when. ``relaxes`` is True of what relaxes as the network's
-    branches do, its first two numbers being a modulus and a relaxation time: while it is missing,
-    branches stand in for it.
+    that those of a film that rings must not be missed: of a force not even a tenth of a micrometre.
+    ``recurs`` is False for what happens in one recording and is no property of the rig: nothing
+    says that another recording has it too, or when. ``relaxes`` is True of what relaxes as the
+    network's branches do, its first two numbers being a modulus and a relaxation time: while it is
+    missing, branches stand in for it.
     ``words`` is one sentence for a person: what the effect is and what betrays it.
     """
 

@@ -99,14 +99,14 @@ def _joined(
     edges = np.arange(time.size)
     step = float(np.median(np.diff(time)))
     rate = np.gradient(foreseen, time)
+    between, slope = np.empty_like(time), np.empty_like(time)
     size = 2
     while size * step <= _LONGEST * (1.0 + 1e-6):
         first = np.arange(0, time.size - size, size)
         inner = first[:, None] + np.arange(1, size)
         good = ~np.any(shown[first[:, None] + np.arange(size)], axis=1)
-        moved, moving = np.empty_like(time), np.empty_like(time)
-        at_sensor(time[::size], foreseen[::size], rate[::size], time, moved, moving)
-        good &= np.max(np.abs(moved - foreseen)[inner], axis=1) < _NEAR
+        at_sensor(time[::size], foreseen[::size], rate[::size], time, between, slope)
+        good &= np.max(np.abs(between - foreseen)[inner], axis=1) < _NEAR
         left, right, possible = _line(time, begins, ends, first, size)
         there = left[:, None] + (right - left)[:, None] * (np.arange(1, size) / size)
         pulls = pulled * (there**2 - begins[inner] ** 2)

@@ -25,8 +25,6 @@ from model.actuator import Actuator, Drive, at_rest, initial_state, reading_of
 from model.coefficients import REST
 from model.effects import EFFECTS, EffectValues
 from model.excitation import Sequence
-from model.fitting.parameters import Layout
-from model.fitting.problem import Problem
 from model.fitting.sketch import sketched
 from model.material import (
     STANDARD_GRAVITY,
@@ -36,7 +34,7 @@ from model.material import (
     VACUUM_PERMITTIVITY,
 )
 from model.records import ActuatorRecord
-from tests.engine_tools import NOISE, typical
+from tests.engine_tools import NOISE, posed, typical
 
 STAIRCASE = 200.0  # the same of a record that is diagnosed
 RATE = 400.0  # samples a second: with them the kernel stays below 0.1 um
@@ -178,10 +176,7 @@ def drawn_up(c: np.ndarray, sketch: Drive, times: np.ndarray) -> np.ndarray:
 
 def missed_by(model: Actuator, record: ActuatorRecord) -> float:
     """How far the sketch of ``record`` is from telling what a number does, at worst, of 1."""
-    layout = Layout(model)
-    problem = Problem([record], layout, workers=1, haste=kernel.ROUGH)
-    x, free = layout.coordinates(layout.initial()), np.ones(layout.size, dtype=bool)
-    free[layout.column("J")] = False
+    problem, x, free = posed(model, record, kernel.ROUGH)
     residuals = problem.residuals(x)
     whole = problem.jacobian(x, free, residuals)
     problem.sketched = free
