@@ -691,6 +691,14 @@ def diagnose(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="With --rig: where everything goes.")
     ] = Path("diagnosis"),
+    thorough: Annotated[
+        bool,
+        typer.Option(
+            "--thorough",
+            help="Search on for as long as it takes, not for about a minute: helps where the "
+            "report says that the search was ended.",
+        ),
+    ] = False,
     seed: Seed = 0,
     json: Json = None,
     force: Force = False,
@@ -719,15 +727,16 @@ def diagnose(
         if rig is None:
             outcome = diagnose_recordings(
                 given, validation=others, model_out=model_out, branches=branches,
-                drive=drive.value, rig_file=settings, overwrite=force, clock=time.monotonic,
-                progress=progress,
+                drive=drive.value, rig_file=settings, thorough=thorough, overwrite=force,
+                clock=time.monotonic, progress=progress,
             )  # fmt: skip
         else:
             outcome = diagnose_rig(
                 rig, out, experiments=experiments, train=given, validation=others,
                 model_out=model_out, branches=branches, drive=drive.value, rig_file=settings,
                 configuration="" if rig_file is None else read_text(rig_file, "rig file"),
-                seed=seed, overwrite=force, clock=time.monotonic, progress=progress,
+                seed=seed, thorough=thorough, overwrite=force, clock=time.monotonic,
+                progress=progress,
             )  # fmt: skip
         if report is not None:
             progress("report", 1.0)

@@ -23,7 +23,7 @@ from app.interrupts import Interrupts
 from app.modelfile import save_model
 from app.outcomes import Comparison, DiagnoseOutcome, SeparatingExperiment, Stand
 from app.progress import Progress, quiet
-from app.quality import check_enough, inspect
+from app.quality import beyond, check_enough, inspect
 from app.recording.files import check_output
 from app.recording.recording import Recording
 from app.records import as_record, compare, open_all
@@ -54,6 +54,7 @@ def diagnose_recordings(
     branches: int = 3,
     drive: str = "command",
     rig_file: RigFile | None = None,
+    thorough: bool = False,
     overwrite: bool = False,
     clock: Callable[[], float],
     progress: Progress = quiet,
@@ -61,15 +62,16 @@ def diagnose_recordings(
     """Find what the thesis's model of ``train`` lacks; errors on ``validation`` are read last.
 
     The improved model goes to ``model_out``. ``progress`` is told the fraction of the whole work.
-    The first ctrl-C ends the search and keeps what was found (``finding.interrupted``); the second
-    raises. Raises ``InputError`` for what cannot be diagnosed, before anything is written.
+    A search that is not ``thorough`` is ended after about a minute. The first ctrl-C ends it and
+    keeps what was found (``finding.interrupted``); the second raises. Raises ``InputError`` for
+    what cannot be diagnosed, before anything is written.
     """
     started = clock()
     _check_outputs(train, validation, model_out, overwrite)
     recordings = open_all(train)
     others = open_all(validation)
     base, quality = _prepared(recordings, others, branches, drive, rig_file)
-    finding = _search(recordings, base, drive, progress)
+    finding = _search(recordings, base, drive, thorough, progress)
     outcome = _outcome(recordings, others, finding, quality, drive, rig_file, "", started, clock)
     return _saved(outcome, recordings, model_out, overwrite)
 
@@ -87,6 +89,7 @@ def diagnose_rig(
     rig_file: RigFile | None = None,
     configuration: str = "",
     seed: int = 0,
+    thorough: bool = False,
     overwrite: bool = False,
     clock: Callable[[], float],
     progress: Progress = quiet,
@@ -96,9 +99,10 @@ def diagnose_rig(
     The first recording is the thesis's (unless ``train`` are given), then come at most
     ``experiments`` more, for as long as rivals are left; at the end ``VALIDATION`` are recorded
     (unless ``validation`` are given) and read once. All recordings go to the folder ``out``.
-    ``seed`` is of a simulated rig's noise. What ends a run, ctrl-C, an interlock, an instrument or
-    the disk, ends the recording, the rig safe: what was found before is kept, and ``ended`` of the
-    outcome says why. Raises what ends the first run, and ``NotSafe`` at once.
+    ``seed`` is of a simulated rig's noise, ``thorough`` as of ``diagnose_recordings``. What ends a
+    run, ctrl-C, an interlock, an instrument or the disk, ends the recording, the rig safe: what was
+    found before is kept, and ``ended`` of the outcome says why. Raises what ends the first run, and
+    ``NotSafe`` at once.
     """
     started = clock()
     _check_outputs(train, validation, model_out, overwrite)
@@ -150,7 +154,7 @@ def diagnose_rig(
     while True:
         recordings = open_all(files)
         base, _ = _prepared(recordings, [], branches, drive, rig_file)
-        finding = _search(recordings, base, drive, part(2.0))
+        finding = _search(recordings, base, drive, thorough, part(2.0))
         done += 2.0
         if finding.interrupted or len(performed) >= experiments:
             break
@@ -211,6 +215,7 @@ def _prepared(
         for r in (*recordings, *others)
         for sentence in inspect(r, drive, to_fit=r in recordings).findings
     ]
+    said += beyond(recordings, others, drive)
     films = sorted({r.film_id for r in (*recordings, *others) if r.film_id})
     if len(films) > 1:
         said.append(f"the recordings name different films: {', '.join(films)}")
@@ -223,12 +228,14 @@ def _prepared(
 
 @for_simulations()
 def _search(
-    recordings: Sequence[Recording], base: Any, drive: str, progress: Progress
+    recordings: Sequence[Recording], base: Any, drive: str, thorough: bool, progress: Progress
 ) -> Diagnosis:
     records = [as_record(r, drive) for r in recordings]
     try:
         with Interrupts() as interrupts:
-            return diagnose(records, base, progress=progress, stop=interrupts.asked)
+            return diagnose(
+                records, base, progress=progress, stop=interrupts.asked, thorough=thorough
+            )
     except ModelError as error:
         raise InputError(f"these recordings cannot be diagnosed: {error}") from error
 

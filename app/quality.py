@@ -15,12 +15,14 @@ from app.errors import InputError
 from app.recording.recording import Recording
 from model.material import THESIS_FILM, VACUUM_PERMITTIVITY, Film
 
-__all__ = ["Quality", "check_enough", "driven_by", "inspect", "overlap"]
+__all__ = ["Quality", "beyond", "check_enough", "driven_by", "inspect", "overlap"]
 
 #: Fewer samples than this tell nothing about what is usual in a recording.
 _SAMPLES_MIN = 20
 #: A modulus in Pa in the middle of what elastomers have, of 1e4 to 1e7.
 _MODULUS = 1e5
+_FURTHER = 1.05  # times what was trained on: errors from there on are of an extrapolation
+_LONGER = 3.0  # the same of how long a recording is
 _MARGIN = 2  # samples beside a faulty one that are taken out with it
 
 
@@ -135,6 +137,38 @@ def overlap(one: Recording, two: Recording) -> tuple[float, float] | None:
 
 _RUN = 40  # samples that have to agree
 _PROBES = 60
+
+
+def beyond(
+    train: Sequence[Recording], others: Sequence[Recording], drive: str = "command"
+) -> tuple[str, ...]:
+    """Sentences on ``others`` that go further than any of ``train``, or last much longer.
+
+    What a model foresees there was not learnt from any data: the error is one of an extrapolation.
+    """
+    farthest = max(_farthest(r, drive) for r in train)
+    longest = max(float(np.ptp(r.time)) for r in train)
+    found = []
+    for recording in others:
+        said = []
+        far, long = _farthest(recording, drive), float(np.ptp(recording.time))
+        if recording.kind == "film" and far - 1.0 > _FURTHER * (farthest - 1.0):
+            said.append(f"goes to a stretch of {far:.3g}, those that were fitted to {farthest:.3g}")
+        elif recording.kind != "film" and far > _FURTHER * farthest:
+            said.append(
+                f"goes to {far / 1e3:.3g} kV, those that were fitted to {farthest / 1e3:.3g} kV"
+            )
+        if long > _LONGER * longest:
+            said.append(f"lasts {long:.3g} s, those that were fitted {longest:.3g} s at most")
+        if said:
+            found.append(f"{recording.name} {'; and '.join(said)}: its error is extrapolated")
+    return tuple(found)
+
+
+def _farthest(recording: Recording, drive: str) -> float:
+    """The largest stretch, or the highest voltage in V."""
+    moved = driven_by(recording, drive)
+    return 0.0 if moved is None else float(np.nanmax(np.abs(moved)))
 
 
 def _is_run(recording: Recording) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from model.actuator import Actuator, Drive
-from model.diagnosis import Diagnosis, diagnose
+from model.diagnosis import Diagnosis, diagnose, search
 from model.diagnosis.bench import Trial
 from model.diagnosis.findings import (
     EXPLAINED,
@@ -456,7 +456,7 @@ def test_where_little_is_to_be_explained_rivals_are_followed_to_their_last_steps
         return seen
 
     best = left((), 1.0, noise + slow)
-    assert search._is_noise(best)
+    assert best.is_noise
     assert not best.is_white
     # also who does as well as nothing, not who does far worse; and as if none of them led
     told = ("sensor lag", "ageing", "amplifier lag")
@@ -1010,7 +1010,8 @@ def test_a_slack_strip_is_found():
     assert (step.effect, step.family) == ("slack", "slack")
     (looseness,) = step.estimates
     assert looseness.value == pytest.approx(1.0, abs=0.02)
-    assert found.final.cost < 0.01 * found.baseline.cost
+    # as good as a model of a film is asked to be: how its springs stiffen is not
+    assert found.final.cost < 1.0 < 0.05 * found.baseline.cost
     springs = found.final.model.network.springs
     assert [s.modulus for s in springs] == pytest.approx([40e3, 30e3], rel=0.03)
 
@@ -1081,6 +1082,23 @@ def test_it_ends_when_it_is_asked_to():
     assert found.steps == ()
     assert found.final.cost == pytest.approx(of_hidden("load inertia").baseline.cost, rel=1e-3)
     assert found.before[0].rms == found.after[0].rms > 3.0 * NOISE
+
+
+def test_a_search_ends_when_it_has_taken_the_work_that_it_may(monkeypatch):
+    record = record_of(plant("load inertia"))
+    whole = of_hidden("load inertia")
+    monkeypatch.setattr(search, "_EFFORT", 2e6)
+    found = diagnose([record], PLAIN, workers=1)
+    require_consistent(found)
+    assert not found.interrupted
+    assert found.simulations < whole.simulations
+    assert "ended when it had taken the work" in found.notes[0]
+    # by what is simulated, not by a clock: the same again, on as many threads as there are
+    again = diagnose([record], PLAIN, workers=1)
+    assert (again.simulations, again.final.cost) == (found.simulations, found.final.cost)
+    thorough = diagnose([record], PLAIN, workers=1, thorough=True)
+    assert (thorough.simulations, thorough.final.cost) == (whole.simulations, whole.final.cost)
+    assert thorough.notes == whole.notes
 
 
 def test_progress_goes_from_nothing_to_all():

@@ -12,7 +12,7 @@ import pytest
 
 from model import kernel
 from model.actuator import Drive
-from model.diagnosis.bench import Bench, information, merged, relieved
+from model.diagnosis.bench import FILM_MODEL_ERROR, Bench, information, merged, relieved
 from model.diagnosis.screening import Screen
 from model.effects import EFFECTS
 from model.excitation import Chirp, Ramp, Sequence
@@ -300,6 +300,35 @@ def test_the_measured_stretch_tells_a_mass_that_has_bent_everything():
     found = bench.settled(bench.fit(with_mass, [], fixed, anew=[np.append(springs, told)]))
     assert found.cost < 1.2
     assert found.x[-1] == pytest.approx(mass, rel=0.01)
+
+
+def test_what_holds_the_film_still_is_not_taken_off_the_records():
+    rubbing = replace(
+        PLAIN, effects=effect("dry friction", friction=50.0, presliding=1e-4, damping=1e-3)
+    )
+    bench = bench_of(record_of(rubbing, thesis_drive(200.0)))
+    trial = fitted(bench, rubbing)
+    size = trial.problem.layout.names.index("dry friction: friction")
+    places = np.tile(trial.x, (2, 1))
+    places[1, size] = 5e3  # more than the field can pull: twice the motion would be left
+    told, untold = bench.unaccounted(trial.problem, places)
+    assert told < 0.01
+    assert untold == math.inf
+
+
+def test_what_a_model_of_a_film_may_be_off_is_not_averaged_away():
+    record = film_record_of(STRIP)
+    time = np.linspace(0.0, 40.0, 16001)
+    stretch = np.interp(time, record.time, record.stretch)
+    stress = np.interp(time, record.time, record.stress)
+    dense = replace(record, time=time, stretch=stretch, stress=stress)
+    bench = bench_of(dense)
+    assert bench.records[0].stress.size < 2000
+    error = FILM_MODEL_ERROR * stress.max()
+    assert bench.records[0].noise == pytest.approx(
+        math.hypot(error, record.noise / 10**0.5), rel=0.01
+    )
+    assert bench.full[0].noise == pytest.approx(math.hypot(error, record.noise))
 
 
 def test_films_have_no_voltage_to_account_for():

@@ -261,3 +261,20 @@ def test_which_effects_make_sense():
     assert is_of(EFFECTS["linear drag"], film)
     assert is_of(EFFECTS["linear drag"], cold)
     assert not is_of(EFFECTS["sensor lag"], film)
+
+
+def test_what_shows_on_the_way_back_is_not_asked_of_a_film_that_is_only_held():
+    let_go = film_record_of(STRIP)
+    held = np.maximum.accumulate(let_go.stretch)
+    only_held = Bench([replace(let_go, stretch=held)], STRIP, workers=1)
+    both = Bench([replace(let_go, stretch=held), let_go], STRIP, workers=1)
+    for name in ("slack", "ageing", "Mullins softening", "distributed hysteresis"):
+        assert not is_of(EFFECTS[name], only_held)
+        assert is_of(EFFECTS[name], both)
+    for name in ("slow branch", "power-law creep", "linear drag"):
+        assert is_of(EFFECTS[name], only_held)
+
+
+def test_no_film_grows_stiffer_by_use():
+    for effect_of_use in (e for e in EFFECTS.values() if e.family == "softening"):
+        assert all(size.bounds[0] == 0.0 for size in effect_of_use.sizes)

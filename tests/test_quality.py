@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.errors import InputError
-from app.quality import check_enough, inspect, overlap
+from app.quality import beyond, check_enough, inspect, overlap
 from app.recording import open_recording
 from app.recording.recording import Recording
 from app.recording.save import save_recording
@@ -313,3 +313,29 @@ class TestThermometer:
 
     def test_without_one_there_is_none(self, keep):
         assert recording_drive(keep(lobes()), "command").warmth is None
+
+
+class TestWhatGoesBeyondTheTraining:
+    def test_a_like_run_does_not(self, tmp_path):
+        train = saved(tmp_path / "train.h5", lobes())
+        assert beyond([train], [saved(tmp_path / "other.h5", lobes(1))]) == ()
+
+    def test_higher_and_longer_ones_do(self, tmp_path):
+        train = saved(tmp_path / "train.h5", lobes(seconds=4.0))
+        higher = lobes(1)
+        higher["voltage_command"] = 1.2 * higher["voltage_command"]
+        higher["displacement"] = 1.44 * higher["displacement"]
+        long = saved(tmp_path / "long.h5", lobes(2, seconds=20.0))
+        said = beyond([train], [saved(tmp_path / "higher.h5", higher), long])
+        assert len(said) == 2
+        assert "7.2 kV, those that were fitted to 6 kV" in said[0]
+        assert "lasts" not in said[0]
+        assert "lasts 20 s, those that were fitted 4 s at most" in said[1]
+
+    def test_a_film_that_is_stretched_further_does(self, tmp_path):
+        train = saved(tmp_path / "train.h5", cycles())
+        further = cycles(1)
+        further["stretch"] = 1.0 + 2.0 * (further["stretch"] - 1.0)
+        (said,) = beyond([train], [saved(tmp_path / "further.h5", further)])
+        assert said.startswith("further goes to a stretch of 3, those that were fitted to 2")
+        assert said.endswith("its error is extrapolated")

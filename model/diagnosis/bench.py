@@ -20,7 +20,7 @@ from model.actuator import Actuator, at_rest
 from model.diagnosis.findings import NOISE_RMS, Stage
 from model.effects import follows_path
 from model.film import Strip
-from model.fitting.identify import fit_globally, is_determined
+from model.fitting.identify import fit_globally, is_determined, is_worth_freeing
 from model.fitting.intervals import correlation_time, covariance, is_flat
 from model.fitting.levenberg import LocalFit, descend
 from model.fitting.parameters import Estimate, Layout
@@ -54,6 +54,7 @@ _NO_RIVAL = 0.02  # of the same, of a fit that has come near the leader
 _ENDING = 40  # iterations of a fit that others build on
 _ROUGHLY = 100.0  # of the noise's mean square: what leaves more need not be simulated any better
 _WHITE_CORRELATION = 1.3
+_LASTING = 2.0  # samples of correlation: so much is no noise of a sensor
 _POLISHING = 8  # iterations on every sample
 _PATIENCE = 3  # iterations down a valley that together must gain something
 _NEARLY = 1.02  # of the cost: a descent from elsewhere that comes so near is followed on
@@ -74,6 +75,7 @@ _SLOWER = 3.0  # times the relaxation time of the stiffest branch: such do somet
 _ELSEWHERE = (1.0, 4.0, 16.0)  # s, where a branch that is spare may be of use
 _WORTH = 1e-4  # of chi-square: a descent that promises less has ended
 _RIDGE = 1e-3  # of a number's own curvature, so that no segment alone sets it free
+_MOST_OF_IT = 0.5  # of the motion: what does so much of it is not taken off the records
 _SLOW_RATE = 50.0  # Hz: enough to see which branches there may be
 _SEGMENTS = 10  # of time, each predicted by a fit to the others
 
@@ -119,14 +121,28 @@ class Trial:
         return int(np.count_nonzero(~self.fixed))
 
     @property
+    def is_of_actuator(self) -> bool:
+        """True where the noise is that of a sensor; of a film it is what a model may be off."""
+        return isinstance(self.problem.layout.base, Actuator)
+
+    @property
+    def is_noise(self) -> bool:
+        """True where no more is left than noise; of an actuator nothing that lasts, either."""
+        lasting = self.is_of_actuator and self.correlation >= _LASTING
+        return self.cost < NOISE_RMS**2 and not lasting
+
+    @property
     def is_white(self) -> bool:
         """True where only noise is left: no fit of the same model can be much better.
 
-        By its spectrum, as a lead-in tells the size of the noise to some 4 % only.
+        By its spectrum, as a lead-in tells the size of the noise to some 4 % only. Of a film, where
+        a model is as good as it is asked to be: what is left then is not white.
         """
-        if self.cost > NOISE_RMS**2 or self.correlation > _WHITE_CORRELATION:
+        if not self.is_noise or (self.is_of_actuator and self.correlation > _WHITE_CORRELATION):
             return False
-        return all(is_flat(part) for part in _by_record(self.problem, self.residuals))
+        return not self.is_of_actuator or all(
+            is_flat(part) for part in _by_record(self.problem, self.residuals)
+        )
 
     @property
     def record_costs(self) -> list[float]:
@@ -162,9 +178,11 @@ class Bench:
     ) -> None:
         self.watched = watched
         self.full = tuple(_with_model_error(r) for r in records)
-        self.records = tuple(_thinned(r, model) for r in self.full)
+        # what a model of a rubber gets wrong no averaging takes away
+        self.records = tuple(_with_model_error(_thinned(r, model)) for r in records)
         self.workers = workers
         self.simulations = 0
+        self.effort = 0.0  # of these, in quick steps
         self._sketched: dict[tuple[str, ...], np.ndarray] = {}
         self._counting = Lock()
         longest = max(float(r.time[-1] - r.time[0]) for r in records)
@@ -191,9 +209,10 @@ class Bench:
             problem.sketched = self._sketched.get(layout.names)
         return problem
 
-    def _count(self, simulations: int) -> None:
+    def _count(self, simulations: int, effort: float) -> None:
         with self._counting:
             self.simulations += simulations
+            self.effort += effort
         self.watched()
 
     def together(self, work: Callable[[Job], Result], jobs: Sequence[Job]) -> list[Result]:
@@ -390,13 +409,37 @@ class Bench:
         return min(near, other, key=lambda t: t.cost)
 
     def restarted(self, trial: Trial) -> Trial:
-        """``trial``, or a better fit that a new global search leads to; of films ``trial`` itself.
+        """``trial``, or a better fit that a new global search leads to.
 
-        So is one that leaves nothing to be found. The baseline's search took what its effects do
-        for work of the branches. Their part, as the trial has it, is taken off the measurement, and
-        the branches are sought anew.
+        One that leaves nothing to be found is the best. The baseline's search took what its effects
+        do for work of the branches. Their part, as the trial has it, is taken off the measurement,
+        and the branches are sought anew. Of a film it is asked whether its springs stiffen.
         """
-        return trial if trial.is_white else self.sought(trial, trial.x[None])
+        if trial.is_white:
+            return trial
+        if isinstance(trial.model, Strip):
+            return self._stiffening(trial)
+        return self.sought(trial, trial.x[None])
+
+    @staticmethod
+    def _stiffening(trial: Trial) -> Trial:
+        """``trial``, or with its locking limits free, where that explains significantly more.
+
+        While an effect was missing, what springs do at large strains was not to be seen.
+        """
+        layout, limits = trial.problem.layout, trial.problem.layout.column("J")
+        if not trial.fixed[limits].any():
+            return trial
+        fixed = trial.fixed.copy()
+        fixed[limits] = False
+        nearer = trial.x.copy()
+        nearer[limits] = np.maximum(nearer[limits] - layout.reach(nearer)[limits], 0.0)
+        fits = [descend(trial.problem, x, fixed, iterations=_ENDING) for x in (trial.x, nearer)]
+        freed = min(fits, key=lambda f: f.cost)
+        gained = trial.cost - freed.cost
+        if is_worth_freeing(gained, freed.residuals, freed.cost, limits.size):
+            return _trial(trial.problem, freed, fixed)
+        return trial
 
     def scattered(self, trial: Trial, start: np.ndarray, more: np.ndarray, leader: float) -> Trial:
         """The model of ``trial`` fitted from the best of many places, or ``trial``.
@@ -432,12 +475,18 @@ class Bench:
         """Parts (K,) of the Maxwell stress that no branches account for, beside effects at ``xs``.
 
         By the measured stretch, without what the effects do to it at the coordinates (K, d); inf
-        where that is not known. Slow samples are enough, and quick.
+        where that is not known, or most of the motion: without what holds a film still, twice its
+        motion would be left, which branches of half the stiffness account for. Slow samples are
+        enough, and quick.
         """
         left = np.full(len(xs), math.inf)
         cs = problem.layout.coefficients(problem.layout.values(xs))
+        moved = np.linalg.norm(problem.measured / problem.sigma)
         for i, searched in enumerate(self._without_effects(problem, xs)):
             if searched is not None:
+                taken = (searched.measured - problem.measured) / problem.sigma
+                if np.linalg.norm(taken) > _MOST_OF_IT * moved:
+                    continue
                 records = [r for r in searched.records if isinstance(r, ActuatorRecord)]
                 slow = [r.coarse(_SLOW_RATE) for r in records]
                 left[i] = voltage_misfit(Problem(slow, searched.layout), at_rest(cs[i])[1])

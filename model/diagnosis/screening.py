@@ -34,6 +34,8 @@ _CLOSER = ((0.5, 9), (0.3, 9), (0.1, 9))  # parts of their distance, and how man
 _LINES = 400  # frequencies within an effect's bounds
 _SIMULATED = 2  # leading promises that are held against a simulation
 _DONE_WELL = (1e-2, 1e-3)  # of what a model's numbers do best: what is left to them
+_LET_GO = 0.05  # of how far a film was stretched: less is no way back
+_ON_THE_WAY_BACK = ("softening", "rate_independent_hysteresis", "slack")  # families that show there
 _SIZES = (0.3, 1.0, 3.0, 10.0)  # times the typical one, tried of effects with a single size
 
 
@@ -343,11 +345,22 @@ def _apart(promises: Sequence[Promise], step: float) -> list[Promise]:
     return [promises[0], *islice(far, 1)]
 
 
+def _returns(stretch: np.ndarray) -> bool:
+    """Whether a film is let go again, by more than a little of how far it was stretched."""
+    back = np.maximum.accumulate(stretch) - stretch
+    return bool(np.max(back) > _LET_GO * (np.max(stretch) - stretch[0]))
+
+
 def is_of(effect: Effect, bench: Bench) -> bool:
-    """True where ``effect`` makes sense for the bench's records."""
+    """True where ``effect`` makes sense for the bench's records.
+
+    What tells loading from unloading is nothing but another elasticity to a film that is only
+    stretched and held: such an effect would be a guess about what was not done.
+    """
     first = bench.records[0]
     if isinstance(first, FilmRecord):
-        return "stretch" in effect.drives
+        returns = any(_returns(r.stretch) for r in bench.records if isinstance(r, FilmRecord))
+        return "stretch" in effect.drives and (returns or effect.family not in _ON_THE_WAY_BACK)
     if "voltage" not in effect.drives:
         return False
     if effect.name == "temperature":

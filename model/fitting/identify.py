@@ -27,6 +27,7 @@ __all__ = [
     "fit_globally",
     "identify",
     "is_determined",
+    "is_worth_freeing",
 ]
 
 METHODS = ("hybrid", "de")
@@ -220,41 +221,63 @@ def fit_globally(
 ) -> tuple[LocalFit, np.ndarray]:
     """Global search, descents from several starts, then the limits: the fit, and what is held.
 
-    The locking limits of an actuator are first held where springs do not stiffen: at a few per cent
-    of strain they would otherwise wander, and drag the relaxation times along. They are freed at
-    the end, and stay free only if that explains significantly more.
+    The locking limits are held where springs do not stiffen, and stay free only if that explains
+    significantly more: at a few per cent of strain, or where something else is missing, they would
+    wander, and drag the relaxation times along.
     """
     layout = problem.layout
-    limits = np.zeros(layout.size, dtype=bool)
-    limits[layout.column("J")] = True
-    driven_by_voltage = isinstance(layout.base, Actuator)
-    first = limits if driven_by_voltage else np.zeros_like(limits)
+    held = np.zeros(layout.size, dtype=bool)
+    held[layout.column("J")] = True
+    free = np.zeros_like(held)
     coarse = _coarse(problem)
-    starts = (
-        voltage_starts(coarse, progress) if driven_by_voltage else film_starts(coarse, progress)
-    )
-    if nested is not None:
-        starts = np.vstack([starts, layout.padded(nested)])
-    steps = len(starts) + 4
-    fits = []
-    for n, start in enumerate(starts):
-        fits.append(descend(coarse, start, first, iterations=_SCOUT_ITERATIONS))
-        progress("descents", (n + 1) / steps)
-    # two, because the one that leads after a few steps is not always the one that gets down
-    leaders = sorted(fits, key=lambda f: f.cost)[:2]
-    best = min((descend(coarse, f.x, first) for f in leaders), key=lambda f: f.cost)
-    progress("descents", (len(starts) + 2) / steps)
-    if driven_by_voltage and limits.any():
-        freed = descend(coarse, best.x, iterations=20)
-        inflation = max(1.0, freed.cost) * max(1.0, correlation_time(freed.residuals))
-        gain = (best.cost - freed.cost) * coarse.samples / inflation
-        if gain > CHI2_95 * limits.sum():
-            best, first = freed, np.zeros_like(limits)
-    progress("descents", (len(starts) + 3) / steps)
-    fit = descend(problem, best.x, first, damping=1e-4)
+    if isinstance(layout.base, Actuator):
+        best = _best_of(coarse, voltage_starts(coarse, progress), nested, held, progress)
+        freed = descend(coarse, best.x, iterations=20) if held.any() else best
+    else:
+        best = _best_of(
+            coarse, film_starts(coarse, _quiet, stiffening=False), nested, held, progress
+        )
+        freed = best
+        if held.any():
+            # strained by several times they are a matter of shape: sought, not set out for
+            freed = _best_of(coarse, film_starts(coarse, progress), nested, free, progress)
+    gained = best.cost - freed.cost
+    if is_worth_freeing(gained, freed.residuals, freed.cost, int(held.sum())):
+        best, held = freed, free
+    fit = descend(problem, best.x, held, damping=1e-4)
     progress("descents", 1.0)
     problem.simulations += coarse.simulations
-    return fit, first
+    return fit, held
+
+
+def is_worth_freeing(gained: float, residuals: np.ndarray, cost: float, numbers: int) -> bool:
+    """Whether some ``numbers`` more explain significantly more.
+
+    They have ``gained`` so much of the mean square, and left ``residuals`` (N,) over the noise of
+    mean square ``cost``. Of these, neighbours are alike, and count as what they are worth.
+    """
+    inflation = max(1.0, cost) * max(1.0, correlation_time(residuals))
+    return gained * residuals.size / inflation > CHI2_95 * numbers
+
+
+def _best_of(
+    problem: Problem,
+    starts: np.ndarray,
+    nested: Network | None,
+    fixed: np.ndarray,
+    progress: Progress,
+) -> LocalFit:
+    """The best descent from ``starts`` (K, d) and from a fit with fewer branches."""
+    if nested is not None:
+        fewer = problem.layout.padded(nested)
+        starts = np.vstack([starts, np.where(fixed, starts[0], fewer)])
+    fits = []
+    for n, start in enumerate(starts):
+        fits.append(descend(problem, start, fixed, iterations=_SCOUT_ITERATIONS))
+        progress("descents", (n + 1) / (len(starts) + 3))
+    # two, because the one that leads after a few steps is not always the one that gets down
+    leaders = sorted(fits, key=lambda f: f.cost)[:2]
+    return min((descend(problem, f.x, fixed) for f in leaders), key=lambda f: f.cost)
 
 
 def _intervals(

@@ -9,6 +9,7 @@ import numpy as np
 
 from model import kernel
 from model.actuator import Actuator, reading_of
+from model.effects import follows_path
 from model.errors import ModelError
 from model.film import stress_of
 from model.fitting.parameters import Layout
@@ -20,6 +21,10 @@ __all__ = ["Problem", "is_told"]
 _SAME = 1.0  # of the noise: a sketch that is further from the whole is none
 _MOST = 0.6  # of the numbers
 _ALIKE = 0.15  # of what a number does: as near must a sketch tell it
+# quick steps that a step takes as long as, by haste: careful, quick, rough
+_OF_MOTION = (3.0, 1.0, 1.0)
+_OF_PATH = (15.0, 15.0, 7.0)  # where a force follows the path
+_OF_FILM = 10.0  # a sample of a film
 
 
 def is_told(whole: np.ndarray, sketch: np.ndarray) -> bool:
@@ -43,7 +48,7 @@ class Problem:
         layout: Layout,
         workers: int = 2,
         haste: int = kernel.CAREFUL,
-        told: Callable[[int], None] | None = None,
+        told: Callable[[int, float], None] | None = None,
     ) -> None:
         if not records:
             raise ModelError("a fit needs at least one record")
@@ -102,12 +107,32 @@ class Problem:
         together(run, range(min(self.workers, len(jobs))), self.workers)
         self.simulations += status.size
         if self.told is not None:
-            self.told(status.size)
+            self.told(status.size, self._effort(by_sketch))
         if self._missed is not None:
             out += self._missed
         # of several records the first that fails speaks
         failed = np.argmax(status != kernel.OK, axis=1)
         return out, np.take_along_axis(status, failed[:, None], axis=1)[:, 0]
+
+    def _effort(self, by_sketch: np.ndarray) -> float:
+        """What it takes to simulate members of which some are ``by_sketch`` (P,), in quick steps.
+
+        As steps go, not seconds: the same on any machine, however busy.
+        """
+        turning = follows_path(self.layout.base.effects)
+        worth = _OF_PATH if turning else _OF_MOTION
+        whole, sketches = 0.0, 0.0
+        for record in self.records:
+            if isinstance(record, FilmRecord):
+                whole += _OF_FILM * record.time.size
+                sketches += _OF_FILM * record.time.size
+                continue
+            sketch = record.sketch
+            drive = record.drive if sketch is None else sketch
+            whole += worth[min(self.haste, kernel.ROUGH)] * record.drive.time.size
+            sketches += worth[kernel.ROUGH] * drive.time.size
+        few = int(np.count_nonzero(by_sketch))
+        return few * sketches + (by_sketch.size - few) * whole
 
     def _reading(self, c: np.ndarray, record: Record, sketched: bool) -> tuple[np.ndarray, int]:
         if isinstance(record, FilmRecord):

@@ -237,8 +237,12 @@ def _balance(
     return np.concatenate(parts, axis=1), np.concatenate(targets)
 
 
-def film_starts(problem: Problem, progress: Progress, starts: int = 8) -> np.ndarray:
+def film_starts(
+    problem: Problem, progress: Progress, stiffening: bool = True, starts: int = 8
+) -> np.ndarray:
     """Coordinates (K, d) worth a descent for records driven by stretch, best first.
+
+    Springs are ``stiffening`` or as good as neo-Hookean.
 
     With the stretch imposed the stress is linear in the moduli: an exhaustive search over sets of
     branches (each a relaxation time and a locking limit) and over the limit of the equilibrium
@@ -248,9 +252,11 @@ def film_starts(problem: Problem, progress: Progress, starts: int = 8) -> np.nda
     records = [r for r in problem.records if isinstance(r, FilmRecord)]
     greatest = max(float(np.max(r.stretch)) for r in records)
     firsts = greatest**2 * np.array([1.2, 3.0, 10.0, 100.0])
+    if not stiffening:
+        firsts = np.array([_WIDE_LIMIT])
     # a branch that locks early flows at a nearly constant stress, whatever the rate
     limits: tuple[float, ...] = (_WIDE_LIMIT, 1.0, 0.03)
-    if layout.network.springs[-1].kind != "gent":
+    if not stiffening or layout.network.springs[-1].kind != "gent":
         limits = limits[:1]
     if layout.network.equilibrium.kind == "neo-hookean":
         firsts = firsts[-1:]
