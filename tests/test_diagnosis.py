@@ -427,6 +427,25 @@ def test_who_is_worse_than_nothing_after_a_refit_is_not_followed():
     assert followed == ["linear drag", "ageing"]
 
 
+@pytest.mark.parametrize(
+    ("name", "left_out", "believed"),
+    [
+        ("sensor lag", 2.9, True),
+        ("sensor lag", 3.0, False),
+        ("sudden change of reading", 9.0, True),
+    ],
+)
+def test_what_foretells_no_part_from_the_rest_is_not_believed(name, left_out, believed):
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    residual = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    before = made_trial([record], PLAIN, 1.7 * residual)
+    after = made_trial([record], replace(PLAIN, effects=(typical(name),)), residual)
+    costs = {before.effects: 3.0, after.effects: left_out}
+    search.bench.left_out_cost = lambda trial: costs[trial.effects]  # type: ignore[method-assign]
+    assert search._foretells(before, _Tried(name, before, after, 0.5)) == believed
+
+
 def test_where_little_is_to_be_explained_rivals_are_followed_to_their_last_steps():
     record = record_of(PLAIN)
     search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)

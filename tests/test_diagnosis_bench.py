@@ -359,6 +359,8 @@ def test_segments_are_predicted_as_by_a_fit_to_the_others(effects):
         answer = others.model.simulate(record.drive).displacement
         left_out[low:high] = (answer - record.displacement)[low:high]
     assert stage.selection_rms == pytest.approx(np.sqrt(np.mean(left_out**2)), rel=2e-3)
+    cost = bench.left_out_cost(fitted(bench, PLAIN))
+    assert math.sqrt(cost) * NOISE == pytest.approx(stage.selection_rms, rel=2e-3)
     assert stage.selection_max == pytest.approx(np.abs(left_out).max(), rel=1e-2)
     # worse than what was fitted, the more the model is wrong
     assert stage.selection_rms > (1.06 if effects else 1.002) * stage.train_rms

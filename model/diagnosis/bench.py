@@ -593,6 +593,11 @@ class Bench:
             total += float(np.sum((residuals + share * by) ** 2))
         return total / problem.samples
 
+    def left_out_cost(self, trial: Trial) -> float:
+        """Mean square over the noise of each segment of time, predicted by a fit to all others."""
+        predicted = _left_out(trial, trial.jacobian(quick=True))
+        return float(predicted @ predicted) / trial.problem.samples
+
     def polished(self, trial: Trial, in_haste: bool = False) -> Trial:
         """``trial`` fitted to every sample, to the end; ``in_haste`` as it is, on every sample."""
         problem = self.problem(trial.model, kernel.CAREFUL)

@@ -201,6 +201,8 @@ class _Search:
             return self._retimed(self._explained(baseline))
         except _Enough:
             self.ran_out = True
+            # fits side by side may have gone a little further: as much is left, however far
+            self.bench.effort = self.most
             self.most *= 1.0 + _TO_PRUNE
         best = self._leading()
         try:
@@ -367,8 +369,13 @@ class _Search:
                 took_all = gain > _BY_FAR and self._is_all(fitted[0])
                 share = 0.0 if took_all else self._share(best, gain)
                 matters &= best.cost - leader.cost > share * (best.cost - 1.0)
-            taken = gain > self._asked(fitted[0].name) and matters
-            if taken:
+            significant = gain > self._asked(fitted[0].name) and matters
+            taken = significant and self._foretells(best, fitted[0])
+            if significant and not taken:
+                reason = (
+                    "what the best effect explains it does not foretell from one time to another"
+                )
+            elif taken:
                 reason = f"gains {gain:.0f} of the information criterion"
             elif gain > self._asked(fitted[0].name):
                 reason = "what the best effect explains is too little to matter"
@@ -423,6 +430,15 @@ class _Search:
         if lawful and best.cost - 1.0 < _OF_ITS_FORM * explained:
             return _FORM_SHARE
         return _SECOND_SHARE if gain < _BY_FAR else 0.0
+
+    def _foretells(self, best: Trial, tried: _Tried) -> bool:
+        """Whether each part of the records follows better from the rest than it did before.
+
+        What happens at one moment, or at none again, is not asked: nothing else foretells it.
+        """
+        if not EFFECTS[tried.name].recurs:
+            return True
+        return self.bench.left_out_cost(tried.trial) < self.bench.left_out_cost(best)
 
     @staticmethod
     def _is_all(tried: _Tried) -> bool:

@@ -24,7 +24,7 @@ _ALIKE = 0.15  # of what a number does: as near must a sketch tell it
 # quick steps that a step takes as long as, by haste: careful, quick, rough
 _OF_MOTION = (3.0, 1.0, 1.0)
 _OF_PATH = (15.0, 15.0, 7.0)  # where a force follows the path
-_OF_FILM = 10.0  # a sample of a film
+_OF_FILM = 6.0  # a sample of a film
 
 
 def is_told(whole: np.ndarray, sketch: np.ndarray) -> bool:
