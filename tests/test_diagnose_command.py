@@ -58,7 +58,7 @@ def instead(monkeypatch: pytest.MonkeyPatch, *found: Diagnosis) -> list[int]:
     seen: list[int] = []
 
     def search(
-        records: list, base: Actuator | Strip, *, progress: Callable, stop: Callable
+        records: list, base: Actuator | Strip, *, progress: Callable, stop: Callable, thorough: bool
     ) -> Diagnosis:
         seen.append(len(records))
         progress("search", 0.5)
@@ -190,7 +190,7 @@ class TestOutputs:
         assert "Found and explained." in answer.err
 
     def test_an_interruption_keeps_what_was_found(self, bench, tmp_path, monkeypatch):
-        def search(records, base, *, progress, stop):
+        def search(records, base, *, progress, stop, thorough):
             assert not stop()
             signal.raise_signal(signal.SIGINT)
             assert stop()
@@ -208,8 +208,20 @@ class TestOutputs:
         assert load_model(tmp_path / "m.toml").history["interrupted"] is True
         assert "was interrupted" in check(tmp_path / "r.html").words
 
+    @pytest.mark.parametrize("words", [(), ("--thorough",)])
+    def test_a_search_is_as_thorough_as_it_is_asked_to_be(self, bench, monkeypatch, words):
+        asked = []
+
+        def search(records, base, *, progress, stop, thorough):
+            asked.append(thorough)
+            return finding()
+
+        monkeypatch.setattr(app_diagnose, "diagnose", search)
+        done("diagnose", bench / "thesis.h5", *words, "--json", "-")
+        assert asked == [bool(words)]
+
     def test_the_second_interruption_ends_at_once(self, bench, tmp_path, monkeypatch):
-        def search(records, base, *, progress, stop):
+        def search(records, base, *, progress, stop, thorough):
             signal.raise_signal(signal.SIGINT)
             signal.raise_signal(signal.SIGINT)
             raise AssertionError("it went on")

@@ -277,4 +277,5 @@ def test_what_shows_on_the_way_back_is_not_asked_of_a_film_that_is_only_held():
 
 def test_no_film_grows_stiffer_by_use():
     for effect_of_use in (e for e in EFFECTS.values() if e.family == "softening"):
-        assert all(size.bounds[0] == 0.0 for size in effect_of_use.sizes)
+        # by a fit: a model may
+        assert all(size.fitted[0] == 0.0 > size.bounds[0] for size in effect_of_use.sizes)

@@ -63,7 +63,7 @@ def with_effect(model: Actuator | Strip, name: str, values: tuple[float, ...]) -
 
 def sizes_of(size: Parameter, parts: Sequence[float] = _SIZES) -> list[float]:
     """Sizes from small to large, ``parts`` of the typical one, of both signs where there are."""
-    low, high = size.bounds
+    low, high = size.fitted
     neutral = size.neutral or 0.0
     signs = (1.0, -1.0) if low < neutral else (1.0,)
     steps = [neutral + sign * part * size.typical for sign in signs for part in parts]
@@ -99,7 +99,7 @@ class Screen:
 
     def _closer(self, effect: Effect, shape: Parameter, near: Promise, step: float) -> Promise:
         """The best promise within half a ``step`` or so of one that is ``near``."""
-        low, high = shape.bounds
+        low, high = shape.fitted
         best = near
         for part, count in _CLOSER:
             finer = [(_place(best) + f * part * step,) for f in np.linspace(-1.0, 1.0, count)]
@@ -194,7 +194,7 @@ class Screen:
         moving = slopes[slopes > 0.0]
         if not moving.size:
             return []
-        low, high = size.bounds
+        low, high = size.fitted
         steepest = np.quantile(moving, 1.0 - np.array(size.starts))
         return [float(s) for s in 1.0 / steepest if low <= s <= high]
 
@@ -218,8 +218,8 @@ class Screen:
         elif parameter.part_of == "duration":
             starts = list((np.arange(_MOMENTS) + 0.5) / _MOMENTS * self._duration())
         elif parameter.part_of == "spectrum":
-            starts = [self._strongest_line(*parameter.bounds), *starts]
-        low, high = parameter.bounds
+            starts = [self._strongest_line(*parameter.fitted), *starts]
+        low, high = parameter.fitted
         return [min(max(s, low), high) for s in starts]
 
     def _strongest_line(self, low: float, high: float) -> float:
@@ -276,7 +276,7 @@ class Screen:
             columns = moved[part].T / probes
             across = columns - self._q @ (self._q.T @ columns)
             size, share = self._solve(across, columns, total)
-            size = np.clip(size, [p.bounds[0] for p in sizes], [p.bounds[1] for p in sizes])
+            size = np.clip(size, *np.transpose([p.fitted for p in sizes]))
             there_too = np.concatenate([base_values, size, shape])
             start = np.clip(layout.coordinates(there_too), layout.lower, layout.upper)
             found.append(Promise(models[n * per], start, columns, share))

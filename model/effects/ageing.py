@@ -19,7 +19,13 @@ EFFECT = Effect(
     words="softer with every cycle, most at the beginning",
     parameters=(
         Parameter(
-            "softening", "", (0.0, 0.9), "part of the stress that is lost in the end", 2e-3, 0.0
+            "softening",
+            "",
+            (-0.5, 0.9),
+            "part of the stress that is lost in the end",
+            2e-3,
+            0.0,
+            sought=(0.0, 0.9),
         ),
         Parameter(
             "path",

@@ -56,7 +56,8 @@ class Parameter:
     start is sought along the records, with spectrum also where the residual's spectrum is highest.
     With slope they are of a size that is the inverse of a slope of the voltage: parts of the time
     in which the voltage is steeper.
-    ``logarithmic`` numbers are sought by ratios.
+    ``logarithmic`` numbers are sought by ratios. A fit stays within ``sought``, where that is
+    given: a model may have more of a number than a measurement is ever explained by.
     """
 
     name: str
@@ -68,6 +69,12 @@ class Parameter:
     starts: tuple[float, ...] = ()
     logarithmic: bool = False
     part_of: str = ""
+    sought: tuple[float, float] | None = None
+
+    @property
+    def fitted(self) -> tuple[float, float]:
+        """The range in which a fit seeks it."""
+        return self.sought or self.bounds
 
 
 @dataclass(frozen=True)

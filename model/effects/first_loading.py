@@ -22,7 +22,15 @@ EFFECT = Effect(
     acts_on="film stress",
     words="softer at every stretch once it has been stretched: the first lobe is unlike repeats",
     parameters=(
-        Parameter("softening", "", (0.0, 0.9), "part of the stress lost in the end", 3e-3, 0.0),
+        Parameter(
+            "softening",
+            "",
+            (-0.5, 0.9),
+            "part of the stress lost in the end",
+            3e-3,
+            0.0,
+            sought=(0.0, 0.9),
+        ),
         Parameter(
             "reach",
             "",

@@ -21,7 +21,15 @@ EFFECT = Effect(
     acts_on="film stress",
     words="softer with every cycle, by the logarithm of their number",
     parameters=(
-        Parameter("softening", "", (0.0, 0.2), "part of the stress lost per factor e", 1e-3, 0.0),
+        Parameter(
+            "softening",
+            "",
+            (-0.2, 0.2),
+            "part of the stress lost per factor e",
+            1e-3,
+            0.0,
+            sought=(0.0, 0.2),
+        ),
         Parameter(
             "path",
             "",

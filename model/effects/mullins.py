@@ -23,7 +23,15 @@ EFFECT = Effect(
     acts_on="film stress",
     words="softer wherever it has been stretched further before: the first lobe is unlike repeats",
     parameters=(
-        Parameter("softening", "", (0.0, 0.9), "part of the stress that is lost", 2e-3, 0.0),
+        Parameter(
+            "softening",
+            "",
+            (-0.5, 0.9),
+            "part of the stress that is lost",
+            2e-3,
+            0.0,
+            sought=(0.0, 0.9),
+        ),
         Parameter(
             "width",
             "",

@@ -60,7 +60,7 @@ class Quantity:
     def bounds(self) -> tuple[float, float]:
         """Range in which it is sought."""
         if self.kind == "effect":
-            return self.parameter.bounds
+            return self.parameter.fitted
         return _FLOOR[self.kind], THESIS_RANGES[self.kind][1]
 
     @property
