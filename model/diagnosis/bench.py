@@ -138,11 +138,10 @@ class Trial:
         By its spectrum, as a lead-in tells the size of the noise to some 4 % only. Of a film, where
         a model is as good as it is asked to be: what is left then is not white.
         """
-        if not self.is_noise or (self.is_of_actuator and self.correlation > _WHITE_CORRELATION):
-            return False
-        return not self.is_of_actuator or all(
-            is_flat(part) for part in _by_record(self.problem, self.residuals)
-        )
+        if not (self.is_noise and self.is_of_actuator):
+            return self.is_noise
+        flat = (is_flat(part) for part in _by_record(self.problem, self.residuals))
+        return self.correlation <= _WHITE_CORRELATION and all(flat)
 
     @property
     def record_costs(self) -> list[float]:
@@ -157,6 +156,21 @@ class Trial:
         return self.problem.jacobian(self.x, ~self.fixed, self.residuals if quick else None)
 
 
+class Work:
+    """What was simulated, by all benches of a search: how many records, in how many quick steps."""
+
+    def __init__(self) -> None:
+        self.simulations = 0
+        self.effort = 0.0
+        self._counting = Lock()
+
+    def add(self, simulations: int, effort: float) -> None:
+        """Count some more, from any thread."""
+        with self._counting:
+            self.simulations += simulations
+            self.effort += effort
+
+
 def _unwatched() -> None:
     """For fits that nobody ends early."""
 
@@ -166,7 +180,7 @@ class Bench:
 
     ``model`` is asked how far records may be thinned, and what is fitted to them as the baseline is
     asked again. ``watched`` is called often while they run, from any thread, and may raise to end
-    them.
+    them. What they simulate is counted in ``work``, its own where none is handed over.
     """
 
     def __init__(
@@ -175,22 +189,26 @@ class Bench:
         model: Actuator | Strip,
         workers: int,
         watched: Callable[[], None] = _unwatched,
+        work: Work | None = None,
     ) -> None:
         self.watched = watched
+        self.work = work or Work()
         self.full = tuple(_with_model_error(r) for r in records)
         # what a model of a rubber gets wrong no averaging takes away
         self.records = tuple(_with_model_error(_thinned(r, model)) for r in records)
         self.workers = workers
-        self.simulations = 0
-        self.effort = 0.0  # of these, in quick steps
         self._sketched: dict[tuple[str, ...], np.ndarray] = {}
-        self._counting = Lock()
         longest = max(float(r.time[-1] - r.time[0]) for r in records)
         self.times = (
             (FASTEST_BRANCH, _LONGER_THAN_RECORD * longest)
             if isinstance(records[0], ActuatorRecord)
             else None
         )
+
+    @property
+    def simulations(self) -> int:
+        """How many records were simulated, here and wherever its work is counted."""
+        return self.work.simulations
 
     @property
     def samples(self) -> int:
@@ -210,9 +228,7 @@ class Bench:
         return problem
 
     def _count(self, simulations: int, effort: float) -> None:
-        with self._counting:
-            self.simulations += simulations
-            self.effort += effort
+        self.work.add(simulations, effort)
         self.watched()
 
     def together(self, work: Callable[[Job], Result], jobs: Sequence[Job]) -> list[Result]:
@@ -433,11 +449,10 @@ class Bench:
         fixed = trial.fixed.copy()
         fixed[limits] = False
         nearer = trial.x.copy()
-        nearer[limits] = np.maximum(nearer[limits] - layout.reach(nearer)[limits], 0.0)
+        nearer[limits] -= layout.reach(nearer)[limits]
         fits = [descend(trial.problem, x, fixed, iterations=_ENDING) for x in (trial.x, nearer)]
         freed = min(fits, key=lambda f: f.cost)
-        gained = trial.cost - freed.cost
-        if is_worth_freeing(gained, freed.residuals, freed.cost, limits.size):
+        if is_worth_freeing(trial.problem, trial.cost, freed, limits.size):
             return _trial(trial.problem, freed, fixed)
         return trial
 

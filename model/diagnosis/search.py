@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from model.actuator import Actuator
-from model.diagnosis.bench import Bench, Trial, information, merged, relieved
+from model.diagnosis.bench import Bench, Trial, Work, information, merged, relieved
 from model.diagnosis.findings import (
     EXPLAINED,
     NOTHING_MISSING,
@@ -148,7 +148,8 @@ class _Search:
     ) -> None:
         self.most = math.inf if thorough else _EFFORT
         self.ran_out = False
-        self.bench = Bench(records, base, workers, self._watch)
+        self.work = Work()
+        self.bench = Bench(records, base, workers, self._watch, self.work)
         self.base = base
         self._progress = progress
         self._reached = 0.0
@@ -202,7 +203,7 @@ class _Search:
         except _Enough:
             self.ran_out = True
             # fits side by side may have gone a little further: as much is left, however far
-            self.bench.effort = self.most
+            self.work.effort = self.most
             self.most *= 1.0 + _TO_PRUNE
         best = self._leading()
         try:
@@ -291,13 +292,10 @@ class _Search:
         held = self._if_held()
         if baseline.is_noise or held is None:
             return baseline
-        bench = Bench(held, self.base, self.bench.workers, self._watch)
+        bench = Bench(held, self.base, self.bench.workers, self._watch, self.work)
         trial = bench.baseline(self.base, lambda *_: self.report("baseline", 0.1))
-        self.bench.simulations += bench.simulations
-        self.bench.effort += bench.effort
         if not trial.is_noise or trial.cost > baseline.cost - _MATTERS:
             return baseline
-        bench.simulations, bench.effort = self.bench.simulations, self.bench.effort
         self.bench, self.held = bench, True
         return trial
 
@@ -310,8 +308,7 @@ class _Search:
         if held is None or not best.effects:
             return best
         before = (self.bench, self.found, self.settled, self.ended, self.left_out)
-        bench = Bench(held, self.base, self.bench.workers, self._watch)
-        bench.simulations, bench.effort = self.bench.simulations, self.bench.effort
+        bench = Bench(held, self.base, self.bench.workers, self._watch, self.work)
         fits = [bench.fit(t.model, [(t.x, None)], t.fixed) for t in (self.found[frozenset()], best)]
         self.bench, self.settled, self.ended, self.left_out = bench, set(), {}, set()
         self.found = {frozenset(t.effects): t for t in fits}
@@ -322,7 +319,6 @@ class _Search:
             self.held = gain > (0.0 if len(trial.effects) < len(best.effects) else _DECISIVE)
         finally:
             if not self.held:
-                before[0].simulations, before[0].effort = bench.simulations, bench.effort
                 self.bench, self.found, self.settled, self.ended, self.left_out = before
         return trial if self.held else best
 
@@ -371,12 +367,12 @@ class _Search:
                 matters &= best.cost - leader.cost > share * (best.cost - 1.0)
             significant = gain > self._asked(fitted[0].name) and matters
             taken = significant and self._foretells(best, fitted[0])
-            if significant and not taken:
+            if taken:
+                reason = f"gains {gain:.0f} of the information criterion"
+            elif significant:
                 reason = (
                     "what the best effect explains it does not foretell from one time to another"
                 )
-            elif taken:
-                reason = f"gains {gain:.0f} of the information criterion"
             elif gain > self._asked(fitted[0].name):
                 reason = "what the best effect explains is too little to matter"
             else:
@@ -1044,7 +1040,7 @@ class _Search:
         """End the search, wherever it is: the fits that run are given up."""
         if self._searching and self.stop():
             raise _Interrupted
-        if self._searching and self.bench.effort > self.most:
+        if self._searching and self.work.effort > self.most:
             raise _Enough
 
     # -- what is handed back
@@ -1162,7 +1158,7 @@ class _Search:
             missing_after=missing_after,
             unnamed=unnamed,
             rivals=tuple(rivals),
-            simulations=self.bench.simulations,
+            simulations=self.work.simulations,
             interrupted=self.interrupted,
             held=self.held,
             notes=tuple(notes),

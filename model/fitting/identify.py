@@ -234,15 +234,12 @@ def fit_globally(
         best = _best_of(coarse, voltage_starts(coarse, progress), nested, held, progress)
         freed = descend(coarse, best.x, iterations=20) if held.any() else best
     else:
-        best = _best_of(
-            coarse, film_starts(coarse, _quiet, stiffening=False), nested, held, progress
-        )
-        freed = best
+        starts = film_starts(coarse, progress, stiffening=False)
+        best = freed = _best_of(coarse, starts, nested, held, progress)
         if held.any():
             # strained by several times they are a matter of shape: sought, not set out for
             freed = _best_of(coarse, film_starts(coarse, progress), nested, free, progress)
-    gained = best.cost - freed.cost
-    if is_worth_freeing(gained, freed.residuals, freed.cost, int(held.sum())):
+    if is_worth_freeing(coarse, best.cost, freed, int(held.sum())):
         best, held = freed, free
     fit = descend(problem, best.x, held, damping=1e-4)
     progress("descents", 1.0)
@@ -250,14 +247,13 @@ def fit_globally(
     return fit, held
 
 
-def is_worth_freeing(gained: float, residuals: np.ndarray, cost: float, numbers: int) -> bool:
-    """Whether some ``numbers`` more explain significantly more.
+def is_worth_freeing(problem: Problem, cost: float, freed: LocalFit, numbers: int) -> bool:
+    """Whether a fit with some ``numbers`` more explains significantly more than ``cost`` leaves.
 
-    They have ``gained`` so much of the mean square, and left ``residuals`` (N,) over the noise of
-    mean square ``cost``. Of these, neighbours are alike, and count as what they are worth.
+    Readings count as what they are worth: neighbours are alike in what is left.
     """
-    inflation = max(1.0, cost) * max(1.0, correlation_time(residuals))
-    return gained * residuals.size / inflation > CHI2_95 * numbers
+    inflation = max(1.0, freed.cost) * max(1.0, correlation_time(freed.residuals))
+    return (cost - freed.cost) * problem.samples / inflation > CHI2_95 * numbers
 
 
 def _best_of(

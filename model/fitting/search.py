@@ -252,14 +252,12 @@ def film_starts(
     records = [r for r in problem.records if isinstance(r, FilmRecord)]
     greatest = max(float(np.max(r.stretch)) for r in records)
     firsts = greatest**2 * np.array([1.2, 3.0, 10.0, 100.0])
-    if not stiffening:
+    if not stiffening or layout.network.equilibrium.kind == "neo-hookean":
         firsts = np.array([_WIDE_LIMIT])
     # a branch that locks early flows at a nearly constant stress, whatever the rate
     limits: tuple[float, ...] = (_WIDE_LIMIT, 1.0, 0.03)
     if not stiffening or layout.network.springs[-1].kind != "gent":
         limits = limits[:1]
-    if layout.network.equilibrium.kind == "neo-hookean":
-        firsts = firsts[-1:]
     weight = 1.0 / problem.sigma
     found: list[tuple[float, np.ndarray]] = []
     for n, first in enumerate(firsts):
