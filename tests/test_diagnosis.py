@@ -1035,6 +1035,14 @@ def test_a_slack_strip_is_found():
     assert [s.modulus for s in springs] == pytest.approx([40e3, 30e3], rel=0.03)
 
 
+def test_beside_slack_all_is_explained_of_springs_that_do_not_stiffen():
+    soft = replace(STRIP, network=Network.gent((40e3, 30e3), (1e4, 1e4), (2.0,)))
+    hidden = replace(soft, effects=effect("slack", looseness=1.0))
+    found = diagnose([film_record_of(hidden)], soft, workers=1)
+    assert [step.effect for step in found.steps] == ["slack"]
+    assert found.final.cost < 0.01 * found.baseline.cost
+
+
 # --- how records were made
 
 

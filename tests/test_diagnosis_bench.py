@@ -331,6 +331,14 @@ def test_what_a_model_of_a_film_may_be_off_is_not_averaged_away():
     assert bench.full[0].noise == pytest.approx(math.hypot(error, record.noise))
 
 
+@pytest.mark.parametrize(("limit", "held"), [(1e4, True), (3.0, False)])
+def test_limits_of_a_film_are_free_where_its_springs_are_seen_to_stiffen(limit, held):
+    strip = replace(STRIP, network=Network.gent((40e3, 30e3), (limit, 1e4), (2.0,)))
+    trial = bench_of(film_record_of(strip)).baseline(strip, lambda *_: None)
+    assert trial.fixed[trial.problem.layout.column("J")].all() == held
+    assert trial.cost < 0.01  # of what a model of a film may be off
+
+
 def test_films_have_no_voltage_to_account_for():
     bench = bench_of(film_record_of(STRIP))
     trial = fitted(bench, STRIP)

@@ -22,7 +22,7 @@ from model.fitting.search import Algorithm1, algorithm_1
 from model.fitting.threads import together
 from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Load, Network, Spring
 from model.records import ActuatorRecord, FilmRecord
-from tests.engine_tools import typical
+from tests.engine_tools import effect, typical
 
 # the package exports the function of the same name
 identify_module = importlib.import_module("model.fitting.identify")
@@ -132,7 +132,7 @@ def test_more_branches_never_fit_worse():
     assert fits[2].cost <= fits[1].cost * (1.0 + 1e-9)
 
 
-def film_record(seed=0, noise=20.0):
+def film_record(seed=0, noise=20.0, effects=()):
     network = Network(
         Spring(60e3, 30.0), (Branch(Spring(40e3, 500.0), 0.8), Branch(Spring(25e3, 500.0), 15.0))
     )
@@ -140,9 +140,21 @@ def film_record(seed=0, noise=20.0):
     # up and down at several speeds, and held in between
     corners = np.array([0.0, 2.0, 10.0, 12.0, 22.0, 30.0, 30.5, 45.0, 60.0])
     stretch = np.interp(time, corners, [1.0, 1.6, 1.6, 1.1, 2.2, 2.2, 1.4, 1.4, 1.0])
-    stress = Strip(network).simulate(time, stretch).stress
+    stress = Strip(network, effects=effects).simulate(time, stretch).stress
     stress = stress + noise * np.random.default_rng(seed).standard_normal(time.size)
     return network, FilmRecord("film", time, stretch, stress, noise)
+
+
+def test_what_a_film_lacks_does_not_decide_whether_its_springs_stiffen():
+    network, record = film_record(effects=effect("slack", looseness=1.0))
+    fits = []
+    for branches in (1, 2):
+        base = Strip(Network(network.equilibrium, network.branches[:branches]))
+        nested = fits[-1].model.network if fits else None
+        fits.append(identify([record], base, intervals=False, nested=nested))
+    assert fits[0].cost > 100.0
+    assert fits[1].cost <= fits[0].cost * (1.0 + 1e-9)
+    assert all(fit.held_limits == () for fit in fits)
 
 
 def test_a_film_of_two_branches_is_found_again():

@@ -239,11 +239,16 @@ class Bench:
         """``base`` fitted from a global search.
 
         The locking limits of an actuator stay where no spring stiffens: at a few per cent of strain
-        they could only imitate what is missing.
+        they could only imitate what is missing. Those of a film do unless they explain
+        significantly more.
         """
         problem = self.problem(replace(base, effects=()))
         if isinstance(base, Strip):
-            fit, fixed = fit_globally(problem, None, progress)
+            fit, fixed = fit_globally(problem, None, progress, stiffening=False)
+            if fixed.any():
+                freed, free = fit_globally(problem, None, progress)
+                if is_worth_freeing(problem, fit.cost, freed, int(fixed.sum())):
+                    fit, fixed = freed, free
         else:
             fixed = np.zeros(problem.layout.size, dtype=bool)
             fixed[problem.layout.column("J")] = True

@@ -217,34 +217,46 @@ def _coarse_about(problem: Problem, values: np.ndarray) -> Problem:
 
 
 def fit_globally(
-    problem: Problem, nested: Network | None, progress: Progress
+    problem: Problem, nested: Network | None, progress: Progress, stiffening: bool = True
 ) -> tuple[LocalFit, np.ndarray]:
     """Global search, descents from several starts, then the limits: the fit, and what is held.
 
-    The locking limits are held where springs do not stiffen, and stay free only if that explains
-    significantly more: at a few per cent of strain, or where something else is missing, they would
-    wander, and drag the relaxation times along.
+    The locking limits of an actuator are first held where springs do not stiffen: at a few per cent
+    of strain they would otherwise wander, and drag the relaxation times along. They are freed at
+    the end, and stay free only if that explains significantly more. Those of a film are free,
+    unless its springs are not to be ``stiffening``.
     """
     layout = problem.layout
-    held = np.zeros(layout.size, dtype=bool)
-    held[layout.column("J")] = True
-    free = np.zeros_like(held)
+    limits = np.zeros(layout.size, dtype=bool)
+    limits[layout.column("J")] = True
+    driven_by_voltage = isinstance(layout.base, Actuator)
+    first = limits if driven_by_voltage or not stiffening else np.zeros_like(limits)
     coarse = _coarse(problem)
-    if isinstance(layout.base, Actuator):
-        best = _best_of(coarse, voltage_starts(coarse, progress), nested, held, progress)
-        freed = descend(coarse, best.x, iterations=20) if held.any() else best
-    else:
-        starts = film_starts(coarse, progress, stiffening=False)
-        best = freed = _best_of(coarse, starts, nested, held, progress)
-        if held.any():
-            # strained by several times they are a matter of shape: sought, not set out for
-            freed = _best_of(coarse, film_starts(coarse, progress), nested, free, progress)
-    if is_worth_freeing(coarse, best.cost, freed, int(held.sum())):
-        best, held = freed, free
-    fit = descend(problem, best.x, held, damping=1e-4)
+    starts = (
+        voltage_starts(coarse, progress)
+        if driven_by_voltage
+        else film_starts(coarse, progress, stiffening)
+    )
+    if nested is not None:
+        starts = np.vstack([starts, layout.padded(nested)])
+    steps = len(starts) + 4
+    fits = []
+    for n, start in enumerate(starts):
+        fits.append(descend(coarse, start, first, iterations=_SCOUT_ITERATIONS))
+        progress("descents", (n + 1) / steps)
+    # two, because the one that leads after a few steps is not always the one that gets down
+    leaders = sorted(fits, key=lambda f: f.cost)[:2]
+    best = min((descend(coarse, f.x, first) for f in leaders), key=lambda f: f.cost)
+    progress("descents", (len(starts) + 2) / steps)
+    if driven_by_voltage and limits.any():
+        freed = descend(coarse, best.x, iterations=20)
+        if is_worth_freeing(coarse, best.cost, freed, int(limits.sum())):
+            best, first = freed, np.zeros_like(limits)
+    progress("descents", (len(starts) + 3) / steps)
+    fit = descend(problem, best.x, first, damping=1e-4)
     progress("descents", 1.0)
     problem.simulations += coarse.simulations
-    return fit, held
+    return fit, first
 
 
 def is_worth_freeing(problem: Problem, cost: float, freed: LocalFit, numbers: int) -> bool:
@@ -254,26 +266,6 @@ def is_worth_freeing(problem: Problem, cost: float, freed: LocalFit, numbers: in
     """
     inflation = max(1.0, freed.cost) * max(1.0, correlation_time(freed.residuals))
     return (cost - freed.cost) * problem.samples / inflation > CHI2_95 * numbers
-
-
-def _best_of(
-    problem: Problem,
-    starts: np.ndarray,
-    nested: Network | None,
-    fixed: np.ndarray,
-    progress: Progress,
-) -> LocalFit:
-    """The best descent from ``starts`` (K, d) and from a fit with fewer branches."""
-    if nested is not None:
-        fewer = problem.layout.padded(nested)
-        starts = np.vstack([starts, np.where(fixed, starts[0], fewer)])
-    fits = []
-    for n, start in enumerate(starts):
-        fits.append(descend(problem, start, fixed, iterations=_SCOUT_ITERATIONS))
-        progress("descents", (n + 1) / (len(starts) + 3))
-    # two, because the one that leads after a few steps is not always the one that gets down
-    leaders = sorted(fits, key=lambda f: f.cost)[:2]
-    return min((descend(problem, f.x, fixed) for f in leaders), key=lambda f: f.cost)
 
 
 def _intervals(
