@@ -159,7 +159,7 @@ def beyond(
                 f"goes to {far / 1e3:.3g} kV, those that were fitted to {farthest / 1e3:.3g} kV"
             )
         if long > _LONGER * longest:
-            said.append(f"lasts {long:.3g} s, those that were fitted {longest:.3g} s at most")
+            said.append(f"lasts {long:.0f} s, those that were fitted {longest:.0f} s at most")
         if said:
             found.append(f"{recording.name} {'; and '.join(said)}: its error is extrapolated")
     return tuple(found)
