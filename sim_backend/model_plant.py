@@ -40,6 +40,10 @@ class ModelPlant:
         """Present capacitance in F."""
         return float(self.actuator.film.capacitance(self.state[:1])[0])
 
+    def renewed(self, chance: np.random.Generator) -> ModelPlant:  # noqa: ARG002
+        """The same: nothing of a model is left to chance."""
+        return self
+
     def advance(
         self, time: np.ndarray, voltage: np.ndarray, hold: bool
     ) -> tuple[Motion, ModelPlant]:

@@ -40,6 +40,10 @@ class Plant(Protocol):
         """Present capacitance in F."""
         ...
 
+    def renewed(self, chance: np.random.Generator) -> Plant:
+        """The film at rest as another run finds it: what is of one run alone is drawn anew."""
+        ...
+
     def advance(self, time: np.ndarray, voltage: np.ndarray, hold: bool) -> tuple[Motion, Plant]:
         """Follow ``voltage`` (N,) V on ``time`` (N,) s; with ``hold`` each stands until the next.
 

@@ -77,7 +77,8 @@ class SignalPath:
         self._skews = {name: settings.skew(i) for i, name in enumerate(self._names[1:])}
 
     def start(self, plant: Plant) -> PathState:
-        """State before the first sample."""
+        """State before the first sample, with what this run of ``plant`` has of its own."""
+        plant = plant.renewed(self._streams.before_run("film", self._run))
         return PathState(plant, AmplifierState(), self._laser.start())
 
     def advance(

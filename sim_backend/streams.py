@@ -12,7 +12,7 @@ import numpy as np
 
 __all__ = ["Streams"]
 
-_INSTRUMENTS = ("card", "amplifier", "laser", "thermometer")
+_INSTRUMENTS = ("card", "amplifier", "laser", "thermometer", "film")
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,7 @@ def result(
     unnamed: dict[str, str] | None = None,
     seed: int = 0,
     mode: str = "thesis",
+    own: float = 0.0,
 ) -> dict[str, Any]:
     """A kept result in which ``hidden`` was diagnosed as ``steps``."""
     anything = bool(steps or unnamed)
@@ -41,6 +42,7 @@ def result(
         "mode": mode,
         "sources": "as they are",
         "floor_um": FLOOR,
+        "own_um": own,
         "truth": {
             "families": list(hidden),
             "description": " and ".join(hidden),
@@ -182,6 +184,16 @@ def test_the_totals_are_held_against_what_is_wanted() -> None:
     assert "| false alarms | 1 of 2 | <= 0 | **no** |" in page
     assert "| worse than before | 1 of 7 | <= 0 | **no** |" in page
     assert "| longer than 60 s | 1 of 7 | <= 0 | **no** |" in page
+
+
+def test_what_is_of_one_run_alone_is_nobodys_error() -> None:
+    walked = score(result(("drift",), step("drift"), after=11.0, own=10.0))
+    assert walked.is_noise
+    assert not score(result(("drift",), step("drift"), after=12.5, own=10.0)).is_noise
+    assert not score(result(("drift",), step("drift"), after=11.0)).is_noise
+    page = report([walked, score(result(("drag",), step("drag"), after=2.0))])
+    assert "| within 15 % of the noise | 1 of 2 (50%)" in page
+    assert "| ... of what hides no walk | 0 of 1 (0%) |" in page
 
 
 def test_one_false_alarm_in_fifty_is_allowed() -> None:

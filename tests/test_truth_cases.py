@@ -8,6 +8,7 @@ import pytest
 from app.sequencefile import load_sequence
 from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from sim_backend.truth import cases
+from sim_backend.truth.effects import drift
 
 #: The families that a diagnosis may name, as its JSON spells them.
 FAMILIES = {
@@ -142,6 +143,20 @@ def test_sizes_are_worth_finding_and_bearable(family, form):
         assert 1e-6 < case.size(time, voltage) < 400e-6
         # what resonates shows more on the chirp, but nothing fails
         assert 1e-6 < case.size(*rich) < 2e-3
+
+
+@pytest.mark.parametrize(("family", "form"), FORMS)
+def test_all_but_a_walk_is_the_same_in_every_run(family, form):
+    case = cases.TruthCase(
+        0, THESIS_FILM, THESIS_LOAD, (form(np.random.default_rng(0), THESIS_LOAD),)
+    )
+    time, voltage = np.arange(301) * 1e-3, np.full(301, 4000.0)
+    runs = [
+        plant.advance(time, voltage, True)[0].displacement
+        for plant in (case.plant(), case.plant().renewed(np.random.default_rng(5)))
+    ]
+    own = case.of_one_run(time, voltage, np.random.default_rng(5))
+    assert np.array_equal(*runs) == (not own.any()) == (form is not drift.wander)
 
 
 def test_drawn_cases_are_worth_finding_and_bearable():

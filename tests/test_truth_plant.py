@@ -8,6 +8,7 @@ from model.actuator import Actuator
 from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load, Network, Spring
 from sim_backend.factory import open_simulated_rig
 from sim_backend.model_plant import ModelPlant
+from sim_backend.streams import Streams
 from sim_backend.truth import cases
 from sim_backend.truth.effect import TruthEffect
 from sim_backend.truth.effects import drag, load_inertia
@@ -95,6 +96,57 @@ def test_the_rig_of_a_seed_has_that_film():
     plant = cases.draw(4, THESIS_FILM, THESIS_LOAD).plant()
     motion, _ = plant.advance(time, waveform.voltage, True)
     assert (reading - motion.displacement).std() < 5e-6
+
+
+def walking():
+    """The first rig whose reading wanders."""
+    return next(
+        seed
+        for seed in range(2000)
+        if "wanders" in cases.draw(seed, THESIS_FILM, THESIS_LOAD, "drift").description
+    )
+
+
+def test_a_bench_takes_another_way_in_each_run_and_the_same_in_that_run_again():
+    effect = cases.draw(walking(), THESIS_FILM, THESIS_LOAD, "drift").effects
+    case = cases.TruthCase(walking(), THESIS_FILM, THESIS_LOAD, effect)
+    time, voltage = np.arange(2001) * 1e-2, np.zeros(2001)
+
+    def seen(plant):
+        return plant.advance(time, voltage, True)[0].displacement
+
+    def chance(run):
+        return Streams((run, case.seed)).before_run("film", 0)
+
+    runs = [seen(case.plant().renewed(chance(run))) for run in (0, 0, 1)]
+    np.testing.assert_array_equal(runs[0], runs[1])
+    assert np.abs(runs[0] - runs[2]).max() > 1e-6
+    # the film stays where it is: what is seen is the walk
+    np.testing.assert_allclose(case.of_one_run(time, voltage, chance(1)), runs[2], atol=1e-12)
+    # and what it is drawn by does not come after it
+    again = case.plant().renewed(chance(0)).renewed(chance(1))
+    np.testing.assert_array_equal(seen(again), runs[2])
+
+
+def test_the_rig_draws_for_each_run_what_is_of_one_run():
+    address = next(
+        f"sim:{seed}"
+        for seed in range(2000)
+        if cases.draw(seed, THESIS_FILM, THESIS_LOAD).families == ("drift",)
+        and "wanders" in cases.draw(seed, THESIS_FILM, THESIS_LOAD).description
+    )
+    waveform = lobes(peaks=(), quiet=6.0)
+
+    def record(seed):
+        rig = open_simulated_rig(address, RigSettings(), THESIS_FILM, THESIS_LOAD, seed=seed)
+        return [play(rig, waveform).physical(rig, "displacement") for _ in range(2)]
+
+    first, second = record(0)
+    again, _ = record(0)
+    np.testing.assert_array_equal(first, again)
+    # slower than the laser's noise: means of a second
+    apart = (first - second).reshape(-1, 1000).mean(axis=1)
+    assert np.ptp(apart) > 2e-6
 
 
 def test_rest_stretch_is_the_models():

@@ -134,6 +134,20 @@ class TruthCase:
             return float("inf")
         return float(np.sqrt(np.mean((hiding.displacement - plain.displacement) ** 2)))
 
+    def of_one_run(
+        self, time: np.ndarray, voltage: np.ndarray, chance: np.random.Generator
+    ) -> np.ndarray:
+        """What the run that draws from ``chance`` has of its own in what the sensor sees, (N,) m.
+
+        That is what no other run can tell of it, under ``voltage`` (N,) V at ``time`` (N,) s.
+        """
+        repeated = [effect for effect in self.effects if effect.anew is None]
+        if len(repeated) == len(self.effects):
+            return np.zeros_like(time)
+        run, _ = self.plant().renewed(chance).advance(time, voltage, True)
+        rest, _ = TruthPlant.at_rest(self._numbers(), repeated).advance(time, voltage, True)
+        return run.displacement - rest.displacement
+
     def _numbers(self) -> FilmNumbers:
         return FilmNumbers.of(self.film, self.load, self.network)
 

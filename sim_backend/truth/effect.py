@@ -35,6 +35,8 @@ class TruthEffect:
     * ``on_course``: changes the load, the pull of the voltage or the stiffness as time goes by;
     * ``on_voltage``: a stage on the voltage (N,) V that reaches the film, held from node to node;
     * ``on_motion``: a stage on what the sensor sees, rows (2, N): displacement m, velocity m/s.
+
+    ``anew`` draws it as another run has it, where a part of it is of one run alone.
     """
 
     family: str
@@ -44,6 +46,7 @@ class TruthEffect:
     on_course: Course | None = None
     on_voltage: Stage | None = None
     on_motion: Stage | None = None
+    anew: Callable[[np.random.Generator], TruthEffect] | None = None
 
 
 #: Draws one effect in one form for a film under the load.

@@ -25,8 +25,13 @@ __all__ = ["TruthPlant"]
 
 @dataclass(frozen=True)
 class TruthPlant:
-    """The film of ``numbers`` with its present state, and what stands before and after it."""
+    """The film of ``numbers`` with its present state, and what stands before and after it.
 
+    ``plain`` are the numbers without what ``effects`` change in them.
+    """
+
+    plain: FilmNumbers
+    effects: tuple[TruthEffect, ...]
     numbers: FilmNumbers
     rest: float
     state: FilmState
@@ -37,11 +42,12 @@ class TruthPlant:
     failed: bool = False
 
     @classmethod
-    def at_rest(cls, numbers: FilmNumbers, effects: Sequence[TruthEffect] = ()) -> TruthPlant:
-        """The film relaxed under its load, with ``effects`` in it.
+    def at_rest(cls, plain: FilmNumbers, effects: Sequence[TruthEffect] = ()) -> TruthPlant:
+        """The film of ``plain`` numbers relaxed under its load, with ``effects`` in it.
 
         Raises ``ValueError`` where it has no rest state.
         """
+        numbers = plain
         for effect in effects:
             if effect.on_film is not None:
                 numbers = effect.on_film(numbers)
@@ -51,7 +57,14 @@ class TruthPlant:
         on_motion = tuple(e.on_motion for e in effects if e.on_motion is not None)
         carries = (None,) * (len(on_voltage) + len(on_motion))
         state = numbers.at_rest(rest)
-        return cls(numbers, rest, state, on_course, on_voltage, on_motion, carries)
+        return cls(
+            plain, tuple(effects), numbers, rest, state, on_course, on_voltage, on_motion, carries
+        )
+
+    def renewed(self, chance: np.random.Generator) -> TruthPlant:
+        """See ``sim_backend.plant.Plant.renewed``."""
+        effects = [e if e.anew is None else e.anew(chance) for e in self.effects]
+        return TruthPlant.at_rest(self.plain, effects)
 
     @property
     def capacitance(self) -> float:

@@ -25,6 +25,8 @@ from app.rigfile import load_rig_file
 from app.run import record
 from app.sequencefile import load_sequence
 from app.toml_input import read_text
+from model.records import counted
+from sim_backend.streams import Streams
 from tests.blind.seeds import drawn
 
 __all__ = ["MODES", "VALIDATION", "Bench", "Case", "sources_digest"]
@@ -87,6 +89,18 @@ class Bench:
             self._floor = float(np.std(still)) * 1e6
         return self._floor
 
+    def own_um(self, case: Case) -> float:
+        """RMS in um of what the validation recordings of ``case`` have each of their own."""
+        rate, truth = float(self._rig.card.sample_rate_Hz), drawn(case.seed)
+        parts = []
+        for i, name in enumerate(VALIDATION, start=len(MODES[case.mode])):
+            time, voltage = load_sequence(name).sample(rate)
+            # the film's own chance in the first run of the rig that ``record`` opens
+            chance = Streams((i, case.seed)).before_run("film", 0)
+            lead_in = int(np.argmax(voltage != 0.0))
+            parts.append(counted(truth.of_one_run(time, voltage, chance), lead_in))
+        return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) * 1e6
+
     def record(self, case: Case, folder: Path) -> tuple[list[Path], list[Path]]:
         """Training and validation recordings of ``case`` in ``folder``, each with its own noise."""
         names = [*MODES[case.mode], *VALIDATION]
@@ -118,6 +132,7 @@ class Bench:
             "mode": case.mode,
             "sources": sources,
             "floor_um": self.floor_um(),
+            "own_um": self.own_um(case),
             "truth": {
                 "families": list(truth.families),
                 "description": truth.description,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import permutations
@@ -26,7 +27,9 @@ class Score:
     could as well be. ``outcome`` is ``right`` (the first step names what is hidden; nothing is
     named where nothing is; what is in no family is not passed off as one), ``group`` (the first
     step says that it cannot tell it from what is hidden), ``wrong``, or ``failed``. ``both`` is
-    None but for two effects. ``needless`` are families named that are not hidden.
+    None but for two effects. ``needless`` are families named that are not hidden. ``floor`` is the
+    rig's noise, ``own`` what the validation recordings have each of their own: the way a bench has
+    wandered, which the hidden truth itself could not foretell.
     """
 
     seed: int
@@ -43,6 +46,7 @@ class Score:
     both: bool | None
     needless: tuple[str, ...]
     floor: float
+    own: float
     floor_read: float
     before: float
     after: float
@@ -50,14 +54,19 @@ class Score:
     error: str
 
     @property
-    def over_floor(self) -> float:
-        """Validation RMS after over the rig's noise."""
-        return self.after / self.floor
+    def least(self) -> float:
+        """RMS in um that the hidden truth itself would leave: noise, and what is of one run."""
+        return math.hypot(self.floor, self.own)
+
+    @property
+    def over_least(self) -> float:
+        """Validation RMS after over that."""
+        return self.after / self.least
 
     @property
     def is_noise(self) -> bool:
-        """Whether validation is down to the rig's noise."""
-        return self.over_floor <= WITHIN
+        """Whether validation is down to what the hidden truth itself would leave."""
+        return self.over_least <= WITHIN
 
     @property
     def worse(self) -> bool:
@@ -92,7 +101,7 @@ def score(result: Mapping[str, Any]) -> Score:
             clean = verdict == "nothing_missing" and not steps and not unnamed
             outcome = RIGHT if clean else WRONG
         elif kind == "unknown":
-            noise = after <= WITHIN * result["floor_um"]
+            noise = after <= WITHIN * math.hypot(result["floor_um"], result["own_um"])
             outcome = RIGHT if "unknown" in named or unnamed or noise else WRONG
         else:
             outcome = _first_step(families, named, groups)
@@ -113,6 +122,7 @@ def score(result: Mapping[str, Any]) -> Score:
         both=both,
         needless=_needless(families, named, groups),
         floor=result["floor_um"],
+        own=result["own_um"],
         floor_read=floor_read,
         before=before,
         after=after,

@@ -1,7 +1,8 @@
 """The reading wanders although the film does not.
 
 ``root``: A (sqrt(1 + t/t_0) - 1) over its value after 25 s, a sensor head that settles.
-``wander``: five slow cosines with phases of their own, as of a bench that follows the building.
+``wander``: five slow cosines with phases of their own, as of a bench that follows the building: it
+takes another way in each run, which nothing that was recorded before can tell.
 """
 
 from __future__ import annotations
@@ -45,10 +46,13 @@ def root(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: AR
 
 
 def wander(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A smooth random walk."""
-    size = log_uniform(generator, *_WANDER)
-    omegas = 2.0 * math.pi * np.geomspace(_SLOWEST, _FASTEST, 5) * generator.uniform(0.85, 1.15, 5)
-    phases = generator.uniform(0.0, 2.0 * math.pi, 5)
+    """A smooth random walk, another one in each run."""
+    return _walk(log_uniform(generator, *_WANDER), generator)
+
+
+def _walk(size: float, chance: np.random.Generator) -> TruthEffect:
+    omegas = 2.0 * math.pi * np.geomspace(_SLOWEST, _FASTEST, 5) * chance.uniform(0.85, 1.15, 5)
+    phases = chance.uniform(0.0, 2.0 * math.pi, 5)
     amplitudes = 1.0 / omegas
     amplitudes *= size * math.sqrt(2.0) / math.sqrt(float(np.sum(amplitudes**2)))
 
@@ -63,4 +67,5 @@ def wander(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: 
         acts_on="sensor",
         description=f"the reading wanders by {size * 1e6:.3g} um RMS between 10 and 60 mHz",
         on_motion=on_motion,
+        anew=lambda chance: _walk(size, chance),
     )
