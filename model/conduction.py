@@ -12,10 +12,10 @@ import numpy as np
 
 from model.jit import jit
 
-__all__ = ["HOPS", "REMEMBERED", "behind", "conductivity"]
+__all__ = ["CROWDED", "HOPS", "REMEMBERED", "behind", "conductivity"]
 
-#: As the exponent of the field: charges hop.
-HOPS = 0.0
+#: As the exponent of the field: charges hop, or crowd.
+HOPS, CROWDED = 0.0, -1.0
 #: Numbers that ``behind`` remembers.
 REMEMBERED = 4
 
@@ -28,8 +28,11 @@ _ITERATIONS = 30
 def conductivity(growth: float, exponent: float, field: float) -> tuple[float, float]:
     """Over that at ``field`` 1; and how it grows, d(ln g)/d(ln E).
 
-    Of traps which the field empties exp(b (E^n - 1)), of hops (``HOPS``) sinh(b E)/E over the same.
+    Of traps which the field empties exp(b (E^n - 1)), of hops (``HOPS``) sinh(b E)/E over the same,
+    of charges that crowd (``CROWDED``) E^b.
     """
+    if exponent == CROWDED:
+        return field**growth, growth
     steep = growth * field
     if exponent == HOPS:
         if steep < 1e-3:
@@ -73,14 +76,15 @@ def behind(
     end: float,
     h: float,
     lam: float,
+    eased: float,
 ) -> tuple[float, float]:
     """Voltage at the film before and after ``h`` s in which it goes from ``start`` to ``end`` V.
 
-    ``loss`` is the part that is lost at 8 kV over the unstretched film. ``REMEMBERED`` numbers are:
-    the ratio r, and of the step before the voltage that it ended at, that at the film then, and how
-    the one follows the other. A step begins where the one before has ended; from there the next
-    voltage at the film is foreseen so well that one of Newton's steps will do. With ``h`` = 0 none
-    is made.
+    ``loss`` is the part that is lost at 8 kV over the unstretched film; stretched by ``lam``, it
+    conducts ``eased`` times as well in the same field. ``REMEMBERED`` numbers are: the ratio r, and
+    of the step before the voltage that it ended at, that at the film then, and how the one follows
+    the other. A step begins where the one before has ended; from there the next voltage at the film
+    is foreseen so well that one of Newton's steps will do. With ``h`` = 0 none is made.
     """
     if m[j] == 0.0:
         left = 1.0 - loss
@@ -88,13 +92,13 @@ def behind(
     first, last = abs(start), abs(end)
     if first != m[j + 1]:
         guess = m[j + 2] if 0.0 < m[j + 2] <= first else first
-        m[j + 2], m[j + 3] = _reached(m[j], growth, exponent, first, lam, guess)
+        m[j + 2], m[j + 3] = _reached(m[j] * eased, growth, exponent, first, lam, guess)
         m[j + 1] = first
     before = m[j + 2]
     if h > 0.0:
         guess = last
         if first > 0.0:
             guess = min(max(before * (1.0 + m[j + 3] * (last / first - 1.0)), 0.0), last)
-        m[j + 2], m[j + 3] = _reached(m[j], growth, exponent, last, lam, guess)
+        m[j + 2], m[j + 3] = _reached(m[j] * eased, growth, exponent, last, lam, guess)
         m[j + 1] = last
     return math.copysign(before, start), math.copysign(m[j + 2], end)

@@ -167,9 +167,9 @@ def extra(name, p, film, drive):
             slopes=lambda t, lam, u, z, v: (bending(u, z[0]),),
         )
 
-    def leakage(conductivity):
+    def leakage(conductivity, widening=lambda lam: 1.0):
         def lost(v, lam):
-            return v * conductivity(v * lam / 8e3)
+            return v * conductivity(v * lam / 8e3) * widening(lam)
 
         # what is lost at 8 kV over the unstretched film is given
         whole = p["loss"] * 8e3 / lost((1.0 - p["loss"]) * 8e3, 1.0)
@@ -386,6 +386,9 @@ def extra(name, p, film, drive):
         "leakage": lambda: leakage(lambda e: math.exp(p["growth"] * e ** p["exponent"])),
         "hopping leakage": lambda: leakage(
             lambda e: math.sinh(p["growth"] * e) / e if e else p["growth"]
+        ),
+        "space-charge leakage": lambda: leakage(
+            lambda e: e ** p["growth"], lambda lam: lam ** (p["growth"] + 2.0)
         ),
         "linear drag": lambda: Extra(stress=lambda t, lam, u, z, v: p["drag"] * u),
         "mixed drag": lambda: Extra(

@@ -260,6 +260,7 @@ SPLITTING = {
     "ageing": 0.15,  # softens by the path at the beginning of the step
     "leakage": 0.15,  # loses by the stretch amid the step
     "hopping leakage": 0.15,  # the same
+    "space-charge leakage": 0.3,  # the same, by its third power and more
 }
 
 

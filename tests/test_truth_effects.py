@@ -172,7 +172,7 @@ def test_elastic_bristles_hold_what_lugre_lets_creep():
 
 
 def test_leakage_is_what_the_series_resistance_passes():
-    for form in ("poole_frenkel", "hopping", "space_charge"):
+    for form in ("poole_frenkel", "hopping", "space_charge", "tunnelling"):
         numbers = drawn(_form(form), 5).on_film(NUMBERS)
         hidden = numbers.hidden
         voltage, stretch = np.array([-3000.0, 0.0, 2000.0, 8000.0]), np.full(4, 1.2)

@@ -24,4 +24,4 @@ EFFECT = replace(
 
 @jit
 def supply(c, k, m, j, t, start, end, h, lam, rate):
-    return behind(m, j, c[k], c[k + 1], HOPS, start, end, h, lam)
+    return behind(m, j, c[k], c[k + 1], HOPS, start, end, h, lam, 1.0)

@@ -50,4 +50,4 @@ EFFECT = Effect(
 
 @jit
 def supply(c, k, m, j, t, start, end, h, lam, rate):
-    return behind(m, j, c[k], c[k + 1], c[k + 2], start, end, h, lam)
+    return behind(m, j, c[k], c[k + 1], c[k + 2], start, end, h, lam, 1.0)

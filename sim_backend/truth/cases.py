@@ -49,7 +49,12 @@ FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
             amplifier.second_order,
         ),
         "electrode_resistance": (electrode_resistance.ladder, electrode_resistance.percolating),
-        "leakage": (leakage.poole_frenkel, leakage.hopping, leakage.space_charge),
+        "leakage": (
+            leakage.poole_frenkel,
+            leakage.hopping,
+            leakage.space_charge,
+            leakage.tunnelling,
+        ),
         "dielectric_relaxation": (
             dielectric_relaxation.three_terms,
             dielectric_relaxation.cole_cole,

@@ -89,12 +89,14 @@ class Hidden(NamedTuple):
     ladder_2: float = 0.0
     ladder_gauge: float = 0.0
     # leakage behind a series resistance in ohm: conductance S; exponent of Poole and Frenkel
-    # in V^-1/2 or, when above 0, of hopping in 1/V, or the voltage of space charge
+    # in V^-1/2 or, when above 0, of hopping in 1/V, the voltage of space charge, or that of
+    # tunnelling
     leak_series: float = 0.0
     leak_conductance: float = 0.0
     leak_frenkel: float = 0.0
     leak_hopping: float = 0.0
     leak_space: float = 0.0
+    leak_tunnel: float = 0.0
     # permittivity: share gained at large strain, reach; inverse square of a voltage
     permittivity_strain: float = 0.0
     permittivity_reach: float = 1.0
@@ -254,6 +256,12 @@ def _leak(h: Hidden, v: float, lam: float) -> tuple[float, float]:
     if h.leak_space > 0.0:
         slope = h.leak_conductance * lam**4 / h.leak_space
         return slope * v * v, 2.0 * slope * v
+    if h.leak_tunnel > 0.0:
+        if v <= 0.0:
+            return 0.0, 0.0
+        barrier = h.leak_tunnel / (v * lam)
+        current = h.leak_conductance * v * v / h.leak_tunnel * math.exp(-barrier)
+        return current, current * (2.0 + barrier) / v
     root = h.leak_frenkel * math.sqrt(v * lam)
     conductance = h.leak_conductance * math.exp(root)
     return conductance * v, conductance * (1.0 + 0.5 * root)

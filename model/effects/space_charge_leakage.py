@@ -1,0 +1,40 @@
+"""Leakage limited by the charges that are in the film already: a power of the voltage.
+
+What is injected repels what would follow: without traps the current goes with the square of the
+voltage (Mott and Gurney 1940), and with traps of all depths with V^(l+1)/d^(2l+1) of a thickness d
+(Mark and Helfrich, J. Appl. Phys. 33, 205 (1962)). A film stretched by lam is that much thinner and
+wider.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from model.conduction import CROWDED, behind
+from model.effects.leakage import EFFECT as BY_TRAPS
+from model.jit import jit
+
+__all__ = ["EFFECT", "supply"]
+
+_LOSS, _GROWTH, _ = BY_TRAPS.parameters
+
+EFFECT = replace(
+    BY_TRAPS,
+    name="space-charge leakage",
+    words="the film takes a current that goes with a power of the voltage",
+    parameters=(
+        _LOSS,
+        replace(
+            _GROWTH,
+            meaning="power of the field by which the conductivity grows: 1 without traps",
+            typical=1.0,
+            starts=(1.0, 3.0),
+        ),
+    ),
+)
+
+
+@jit
+def supply(c, k, m, j, t, start, end, h, lam, rate):
+    # of the conductance V^l lam^(2 l + 2), the field has l powers of lam
+    return behind(m, j, c[k], c[k + 1], CROWDED, start, end, h, lam, lam ** (c[k + 1] + 2.0))
