@@ -83,6 +83,7 @@ class _Branch(_Spring):
 #: value, or which of its other numbers.
 _SINCE_THEN: dict[str, dict[str, float | str]] = {
     "dry friction": {"damping": 1e-6},
+    "elastoplastic friction": {"easing_exponent": 2.0},
     "broad dielectric relaxation": {"half_width": 4.0},
     "dielectric relaxation in stages": {"sooner_ratio": "ratio"},
 }

@@ -154,7 +154,8 @@ def extra(name, p, film, drive):
         size, reach, ahead = p["friction"], p["presliding"], p["damping"]
 
         def bending(u, z):
-            slips = reach * (1.0 + p["excess"] * math.exp(-((u / p["easing"]) ** 2)))
+            eased = math.exp(-(abs(u / p["easing"]) ** p["easing_exponent"]))
+            slips = reach * (1.0 + p["excess"] * eased)
             part = z / slips if u > 0.0 else -z / slips
             if part <= p["elastic"]:
                 return u

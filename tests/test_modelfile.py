@@ -91,6 +91,19 @@ def test_a_model_comes_back_to_the_last_bit(tmp_path: Path, name: str) -> None:
             },
             "sooner_ratio",
         ),
+        (
+            "elastoplastic friction",
+            {
+                "friction": 50.0,
+                "presliding": 1e-4,
+                "damping": 1e-3,
+                "excess": 0.2,
+                "easing": 1e-2,
+                "elastic": 0.5,
+                "easing_exponent": 2.0,
+            },
+            "easing_exponent",
+        ),
     ],
 )
 def test_an_older_file_lacks_numbers_of_newer_laws(

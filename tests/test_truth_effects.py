@@ -171,6 +171,20 @@ def test_elastic_bristles_hold_what_lugre_lets_creep():
     assert moved[0.8] < 0.02 * moved[0.0]
 
 
+@pytest.mark.parametrize(
+    ("form", "left"),
+    [("lugre", math.exp(-4.0)), ("tustin", math.exp(-2.0)), ("oiled", 1.0 / 5.0)],
+)
+def test_what_eases_with_speed_is_lost_as_the_law_says(form, left):
+    hidden = drawn(_form(form), 3).on_film(NUMBERS).hidden
+    level = hidden.friction + left * (hidden.friction_static - hidden.friction)
+    bent = level / hidden.friction * hidden.friction_reach
+    # at twice the rate of its law, bristles bent like that bend no further
+    stress, speed = film._bristles(hidden, bent, 2.0 * hidden.friction_stribeck)
+    assert stress == pytest.approx(level, rel=1e-12)
+    assert speed == pytest.approx(0.0, abs=1e-12 * hidden.friction_stribeck)
+
+
 def test_leakage_is_what_the_series_resistance_passes():
     for form in ("poole_frenkel", "hopping", "space_charge", "tunnelling"):
         numbers = drawn(_form(form), 5).on_film(NUMBERS)

@@ -2,7 +2,9 @@
 
 The law of Dupont, Hayward, Armstrong and Altpeter (IEEE Trans. Autom. Control 47, 2002): as
 ``easing friction``, but where bristles are bent by less than a part of the deflection at which they
-slip, or back, they follow the film; from there to that deflection they slip the more.
+slip, or back, they follow the film; from there to that deflection they slip the more. And what is
+lost with speed goes as exp(-|lam'/v|^d), of which Stribeck's d = 2 and Tustin's d = 1 are two (Bo
+and Pavelescu, Wear 82, 1982).
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from dataclasses import replace
 
 from model.effects.description import Parameter
 from model.effects.easing_friction import EFFECT as EASING
-from model.effects.easing_friction import reach, stiffness
+from model.effects.easing_friction import stiffness
 from model.filters import bent, bristles_slip
 from model.jit import jit
 
@@ -27,8 +29,22 @@ EFFECT = replace(
         Parameter(
             "elastic", "", (0.0, 0.9), "part of it up to which nothing slips", 0.1, starts=(0.6,)
         ),
+        Parameter(
+            "easing_exponent",
+            "",
+            (0.5, 3.0),
+            "of the rate: how suddenly it is lost",
+            0.3,
+            starts=(2.0,),
+        ),
     ),
 )
+
+
+@jit
+def reach(c, k, rate):
+    """Deflection, in stretch, at which all bristles slip while the film moves at ``rate``."""
+    return c[k + 1] * (1.0 + c[k + 3] * math.exp(-(abs(rate / c[k + 4]) ** c[k + 6])))
 
 
 @jit

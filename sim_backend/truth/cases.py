@@ -69,7 +69,12 @@ FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
         ),
         "load_inertia": (load_inertia.hung,),
         "drag": (drag.mixed, drag.air_film),
-        "friction": (friction.lugre, friction.elasto_plastic, friction.tustin),
+        "friction": (
+            friction.lugre,
+            friction.elasto_plastic,
+            friction.tustin,
+            friction.oiled,
+        ),
         "sensor_lag": (sensor_lag.moving_average, sensor_lag.low_pass),
         "sensor_nonlinearity": (
             sensor_nonlinearity.cubic,

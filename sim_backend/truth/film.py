@@ -70,8 +70,9 @@ class Hidden(NamedTuple):
     drag: float = 0.0
     drag_quadratic: float = 0.0
     drag_power: float = 0.0
-    # friction of bristles: Coulomb and static stress Pa, Stribeck rate 1/s and power, the bristles'
-    # reach, their damping Pa s, and the share of the reach within which they do not slip
+    # friction of bristles: Coulomb and static stress Pa, Stribeck rate 1/s and power (0: as a
+    # contact in oil eases), the bristles' reach, their damping Pa s, and the share of the reach
+    # within which they do not slip
     friction: float = 0.0
     friction_static: float = 0.0
     friction_stribeck: float = 1.0
@@ -299,7 +300,10 @@ def _slipped(start: float, reach: float, moved: float) -> float:
 def _bristles(h: Hidden, x: float, rate: float) -> tuple[float, float]:
     """Friction stress in Pa and the rate of the bristles' deflection ``x``."""
     ratio = abs(rate) / h.friction_stribeck
-    eased = math.exp(-(ratio**h.friction_easing))
+    if h.friction_easing > 0.0:
+        eased = math.exp(-(ratio**h.friction_easing))
+    else:
+        eased = 1.0 / (1.0 + ratio**2)
     level = h.friction + (h.friction_static - h.friction) * eased
     stiffness = h.friction / h.friction_reach
     steady = level / stiffness

@@ -5,7 +5,8 @@ x' = v - |v| x / x_s(v), force s0 x + s1 x', with x_s = (Fc + (Fs - Fc) exp(-(v/
 Stribeck. ``elasto_plastic``: Dupont, Hayward, Armstrong and Altpeter, same Trans. 47 (2002): up to
 a share of x_s the bristles only bend, so the load does not creep under a swinging force.
 ``tustin``: as the first, but easing as exp(-|v|/vs) does (Tustin, J. IEE 94 (1947)), with a corner
-at rest.
+at rest. ``oiled``: as the first, but easing as 1/(1 + (v/vs)^2) does, of a contact in oil (Hess and
+Soom, J. Tribology 112 (1990)): some of it is left at any speed.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from sim_backend.truth.chance import log_uniform
 from sim_backend.truth.effect import TruthEffect
 from sim_backend.truth.film import FilmNumbers
 
-__all__ = ["elasto_plastic", "lugre", "tustin"]
+__all__ = ["elasto_plastic", "lugre", "oiled", "tustin"]
 
 _LEAST, _MOST = 0.4e-3, 18e-3  # N
 _REACH = (4e-6, 30e-6)  # m
@@ -75,3 +76,8 @@ def elasto_plastic(generator: np.random.Generator, load: Load) -> TruthEffect:  
 def tustin(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
     """Bristles that slip a little at once, and slip easier at any speed."""
     return _friction(generator, 0.0, "friction (Tustin)", easing=1.0)
+
+
+def oiled(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
+    """Bristles that slip a little at once, and lose what eases late."""
+    return _friction(generator, 0.0, "friction (Hess and Soom)", easing=0.0)
