@@ -36,6 +36,7 @@ _SIMULATED = 2  # leading promises that are held against a simulation
 _DONE_WELL = (1e-2, 1e-3)  # of what a model's numbers do best: what is left to them
 _LET_GO = 0.05  # of how far a film was stretched: less is no way back
 _ON_THE_WAY_BACK = ("softening", "rate_independent_hysteresis", "slack")  # families that show there
+_SPREAD = (16, 6, 4)  # values of one shape, of each of two, of each of more
 _SIZES = (0.3, 1.0, 3.0, 10.0)  # times the typical one, tried of effects with a single size
 
 
@@ -96,6 +97,13 @@ class Screen:
             found.sort(key=lambda p: -p.share)
         tried = self._simulated(effect, found, several=not step and len(effect.sizes) == 1)
         return sorted(tried, key=lambda p: -p.share)
+
+    def scattered(self, effect: Effect) -> list[Promise]:
+        """Promises of ``effect``, best first, of shapes all over their bounds."""
+        several = len(effect.shapes)
+        spread = [_spread(p, several) or self._starts(p) for p in effect.shapes]
+        found = self._scored(effect, list(product(*spread)))
+        return sorted(found, key=lambda p: -p.share)
 
     def _closer(self, effect: Effect, shape: Parameter, near: Promise, step: float) -> Promise:
         """The best promise within half a ``step`` or so of one that is ``near``."""
@@ -327,6 +335,18 @@ class Screen:
         left = self._residual + across @ size
         share = 1.0 - float(left @ left) / max(total, 1e-300)
         return size, max(share, 0.0) if math.isfinite(share) else 0.0
+
+
+def _spread(shape: Parameter, several: int) -> list[float]:
+    """Values of a ``shape`` all over its bounds, fewer of ``several``; none where records say."""
+    if shape.part_of:
+        return []
+    low, high = shape.fitted
+    count = _SPREAD[min(several, len(_SPREAD)) - 1]
+    parts = (np.arange(count) + 0.5) / count
+    if shape.logarithmic:
+        return [float(low * (high / low) ** part) for part in parts]
+    return [float(low + (high - low) * part) for part in parts]
 
 
 def _place(promise: Promise) -> float:

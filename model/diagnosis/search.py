@@ -42,6 +42,7 @@ _TURNS = 3  # of searching on and pruning: what is pruned makes room
 _EXCHANGES = 3  # of one effect for another, when more than one is there
 _DECISIVE = 12.0  # of the information criterion: odds of e^6, over some forty candidates
 _ALIKE = 10.0  # of the same, for explaining alone: candidates nearer than that are not told apart
+_TRUE_TO = 1e-4  # of what is explained: no law is true to more of it
 _MATTERS = 0.01  # of the noise's mean square: less is not worth an effect
 _SECOND_SHARE = 0.25  # of what is left above the noise: less is not worth one more effect
 _OF_ITS_FORM = 0.02  # of what is explained: a law not quite the true one leaves so little
@@ -74,6 +75,9 @@ _AS_WELL = 1.1  # of what is left beside a leader that explains all: these may d
 _ANEW = 6  # of such effects that are fitted anew
 _RIVALS = 0.5  # of what a leader explains that leaves but noise: such are followed to their ends
 _OUT_OF_REACH = 30.0  # times the leader's cost: from there no branches elsewhere lead to it
+_PLAYED = 0.7  # of what a walk explains: a law that explains so much may be what it plays
+_LAWS = 3  # of such that are sought all over their shapes
+_AFAR = 4  # promises of such a law that are followed
 _CONTENDERS = 4  # of those that promised as much as a leader that explains all
 _ANEW_SIZES = (0.3, 1.0, 3.0, 10.0, 30.0)  # times the typical one, tried for that
 _ANEW_CLOSER = (0.56, 0.75, 1.0, 1.33, 1.78)  # times the best of these
@@ -355,6 +359,7 @@ class _Search:
             if promising and best.cost - leader.cost > least:
                 fitted, correlation = self._settled(best, self._anew(fitted), least)
                 fitted, correlation = self._rivals_ended(best, fitted)
+                fitted, correlation = self._laws_of_walk(best, fitted)
             leader = fitted[0].trial
             gain = self._gain(best, leader, correlation)
             matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
@@ -720,6 +725,49 @@ class _Search:
         correlation = self._correlation([best, *(t.trial for t in order)])
         return sorted(order, key=lambda t: self._demerit(t.trial, correlation)), correlation
 
+    def _laws_of_walk(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
+        """The candidates, best first, laws that a leading walk may play sought all over.
+
+        A walk plays all that is slow, from wherever it sets out. A law of two time constants does
+        so only near them, and where it sets out the branches may have taken one of them over.
+        """
+        lead = tried[0]
+        if not EFFECTS[lead.name].recurs and EFFECTS[lead.name].family != "unknown":
+            explained = lead.parent.cost - lead.trial.cost
+            names = [t.name for t in tried]
+            laws = [
+                t
+                for t in tried
+                if EFFECTS[t.name].recurs
+                and EFFECTS[t.name].family != "unknown"
+                and t.parent is lead.parent
+                and t.parent.cost - t.trial.cost > _PLAYED * explained
+                and _is_first_of_family(t.name, names)
+            ]
+            for law in laws[:_LAWS]:
+                self._sought_all_over(law, lead.trial)
+                if self.found[frozenset(law.trial.effects)].cost < lead.trial.cost:
+                    break
+        order = self._as_found(tried)
+        correlation = self._correlation([best, *(t.trial for t in order)])
+        return sorted(order, key=lambda t: self._demerit(t.trial, correlation)), correlation
+
+    def _sought_all_over(self, tried: _Tried, lead: Trial) -> None:
+        """Fit an effect again from the shapes, of all within its bounds, that promise most."""
+        screen = self.screened[frozenset(tried.parent.effects)][0]
+        promises = screen.scattered(EFFECTS[tried.name])[:_AFAR]
+        fixed = tried.trial.fixed
+        shapes = np.full((screen.jacobian.shape[0], len(EFFECTS[tried.name].shapes)), np.nan)
+
+        def fit(promise: Promise) -> Trial:
+            jacobian = np.column_stack([screen.jacobian, promise.columns, shapes])
+            trial = self.bench.fit(promise.model, [(promise.start, jacobian)], fixed, lead.cost)
+            # where it leads shows in its last steps only
+            return self.bench.ended(trial, lead.cost)
+
+        for trial in self.bench.together(fit, promises):
+            self._keep(trial)
+
     def _as_found(self, tried: list[_Tried]) -> list[_Tried]:
         """The candidates as the best fits of them are by now."""
         return [replace(t, trial=self.found[frozenset(t.trial.effects)]) for t in tried]
@@ -1009,9 +1057,15 @@ class _Search:
         return self._criterion(over, correlation) - self._criterion(trial, correlation)
 
     def _explains_as_well(self, trial: Trial, best: Trial, correlation: float) -> bool:
-        """Whether the data cannot tell ``trial`` from ``best``, which may be the simpler one."""
+        """Whether the data cannot tell ``trial`` from ``best``, which may be the simpler one.
+
+        However many they are, they tell no two laws apart that differ by less than a hundredth (in
+        RMS) of what they explain: by as much no law is true to a film.
+        """
         samples = self.bench.samples / correlation
-        return information(trial.cost, 0, samples) - information(best.cost, 0, samples) < _ALIKE
+        behind = information(trial.cost, 0, samples) - information(best.cost, 0, samples)
+        explained = self.found[frozenset()].cost - best.cost
+        return behind < _ALIKE or trial.cost - best.cost < min(_TRUE_TO * explained, _MATTERS)
 
     def _demerit(self, trial: Trial, correlation: float) -> float:
         """The criterion, and a margin for each effect that names no cause, or follows no law."""
