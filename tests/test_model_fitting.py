@@ -4,6 +4,7 @@ import functools
 import importlib
 import math
 import time
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -360,3 +361,14 @@ def test_nothing_is_left_running_when_one_of_several_raises():
     assert done == finished
     assert len(done) < 19
     assert together(lambda job: 2 * job, range(5), 2) == [0, 2, 4, 6, 8]
+
+
+def test_work_that_asks_for_the_same_threads_does_not_wait_for_itself():
+    def inner(job):
+        return together(lambda k: 10 * job + k, range(3), 2)
+
+    done = []
+    asked = Thread(target=lambda: done.append(together(inner, range(4), 2)), daemon=True)
+    asked.start()
+    asked.join(20.0)
+    assert done == [[[10 * job + k for k in range(3)] for job in range(4)]]

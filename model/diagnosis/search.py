@@ -731,7 +731,7 @@ class _Search:
         A walk plays all that is slow, from wherever it sets out. A law of two time constants does
         so only near them, and where it sets out the branches may have taken one of them over.
         """
-        lead = tried[0]
+        lead = min(tried, key=lambda t: t.trial.cost)
         if not EFFECTS[lead.name].recurs and EFFECTS[lead.name].family != "unknown":
             explained = lead.parent.cost - lead.trial.cost
             names = [t.name for t in tried]

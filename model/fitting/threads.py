@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from functools import cache
+from threading import current_thread
 from typing import TypeVar
 
 __all__ = ["Job", "Result", "together"]
@@ -28,9 +29,10 @@ def together(
     """``work(job)`` of each of ``jobs``, in their order, done by ``workers`` threads.
 
     When one raises, no other is left running when that is raised here. Work that itself asks for
-    this needs another ``name``, or all threads would wait for each other.
+    this under the same ``name`` does its own one by one: threads would wait for each other.
     """
-    if workers <= 1 or len(jobs) <= 1:
+    within = current_thread().name.startswith(f"{name}_")
+    if workers <= 1 or len(jobs) <= 1 or within:
         return [work(job) for job in jobs]
     pool = _pool(workers, name)
     futures = [pool.submit(work, job) for job in jobs]
