@@ -64,7 +64,9 @@ _SETTING = 6  # iterations of the branches alone
 _PLACED = 3  # of the starts, the branches in their places, that are followed on
 _RESTART = 10  # iterations of each
 _SCATTERED = 128  # places of numbers of which nothing is known
-_SCOUTED = 6  # of these, the best ones, that are followed
+_SHAKEN = (0.5, 0.8)  # of a number, or of its logarithm: a little, and a lot
+_UNSURE = 3.0  # standard deviations, by as much at least
+_SCOUTED = 8  # of these, the best ones, that are followed
 _SCATTERINGS = 2  # the second from the best of the first
 _AS_GOOD = 0.98  # of the cost: who has gained less is where it was
 _LEADERS = 2  # of several starts that are followed on: the best at first does not always get down
@@ -468,19 +470,61 @@ class Bench:
         and once more from a better fit, beside which they may belong elsewhere. Beside a ``leader``
         no further than it takes to see that it does not come near its cost.
         """
-        problem, layout, fixed = trial.problem, trial.problem.layout, trial.fixed
+        layout = trial.problem.layout
         where = Sobol(int(more.sum()), scramble=False).random(_SCATTERED)
+
+        def places(start: np.ndarray) -> list[np.ndarray]:
+            xs = np.tile(start, (_SCATTERED, 1))
+            xs[:, more] = layout.lower[more] + where * (layout.upper - layout.lower)[more]
+            return [xs]
+
+        return self._from_places(trial, start, places, leader)
+
+    def shaken(self, trial: Trial, some: np.ndarray, leader: float) -> Trial:
+        """The model of ``trial`` fitted from places around it, or ``trial``.
+
+        There ``some`` (d,) of its numbers are other than they are: a little and a lot, and by as
+        much as they are not determined; and once more around a better fit. Beside a ``leader`` as
+        ``scattered``.
+        """
+        layout = trial.problem.layout
+        where = 2.0 * Sobol(int(some.sum()), scramble=False).random(_SCATTERED // 2) - 1.0
+        by_ratios = np.array([q.logarithmic for q in layout.quantities])
+        unsure = _UNSURE * self._spread(trial, trial.jacobian(quick=True))
+
+        def places(start: np.ndarray) -> list[np.ndarray]:
+            around = []
+            for part in _SHAKEN:
+                width = np.maximum(part * np.where(by_ratios, 1.0, np.abs(start)), unsure)
+                low = np.maximum(start - width, layout.lower)[some]
+                high = np.minimum(start + width, layout.upper)[some]
+                xs = np.tile(start, (where.shape[0], 1))
+                xs[:, some] = 0.5 * (low + high + where * (high - low))
+                around.append(xs)
+            return around
+
+        return self._from_places(trial, trial.x, places, leader)
+
+    def _from_places(
+        self,
+        trial: Trial,
+        start: np.ndarray,
+        places: Callable[[np.ndarray], list[np.ndarray]],
+        leader: float,
+    ) -> Trial:
+        """``trial``, or the best fit from groups of ``places`` that belong to a ``start``."""
+        problem, fixed = trial.problem, trial.fixed
 
         def down(trial: Trial) -> Trial:
             return self._down(trial, _ENDING, _worth_going(trial, leader, _NO_RIVAL))
 
         for _ in range(_SCATTERINGS):
-            xs = np.tile(start, (_SCATTERED, 1))
-            xs[:, more] = layout.lower[more] + where * (layout.upper - layout.lower)[more]
-            best = xs[np.argsort(problem.costs(xs))[:_SCOUTED]]
+            groups = places(start)
+            many = _SCOUTED // len(groups)
+            best = [x for xs in groups for x in xs[np.argsort(problem.costs(xs))[:many]]]
             scouts = self.together(
                 lambda x: descend_by_secants(problem, x, fixed, iterations=_RESTART, sure=False),
-                list(best),
+                best,
             )
             leaders = [_trial(problem, f, fixed) for f in _leaders(scouts)]
             found = min(self.together(down, leaders), key=lambda t: t.cost)
@@ -665,16 +709,21 @@ class Bench:
         )
         return float(np.sum(sizes * lost) / np.sum(sizes))
 
+    @staticmethod
+    def _spread(trial: Trial, jac: np.ndarray) -> np.ndarray:
+        """Standard deviations (d,) in coordinates, infinite of what is held."""
+        inflation = max(1.0, trial.cost) * max(1.0, trial.correlation)
+        spread = np.full(trial.x.size, math.inf)
+        spread[~trial.fixed] = np.sqrt(np.diag(covariance(jac.T @ jac, inflation)))
+        return spread
+
     def estimates(self, trial: Trial, jac: np.ndarray) -> tuple[Estimate, ...]:
         """All numbers of the model with 95 % intervals from the curvature at the optimum.
 
         Widened by what the residual is above the noise, and by its correlation.
         """
         layout = trial.problem.layout
-        inflation = max(1.0, trial.cost) * max(1.0, trial.correlation)
-        cov = covariance(jac.T @ jac, inflation)
-        spread = np.full(layout.size, math.inf)
-        spread[~trial.fixed] = 1.96 * np.sqrt(np.diag(cov))
+        spread = 1.96 * self._spread(trial, jac)
         values = layout.values(trial.x)
         found = []
         at_end = np.minimum(trial.x - layout.lower, layout.upper - trial.x) < 1e-9

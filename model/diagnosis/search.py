@@ -75,6 +75,7 @@ _AS_WELL = 1.1  # of what is left beside a leader that explains all: these may d
 _ANEW = 6  # of such effects that are fitted anew
 _RIVALS = 0.5  # of what a leader explains that leaves but noise: such are followed to their ends
 _OUT_OF_REACH = 30.0  # times the leader's cost: from there no branches elsewhere lead to it
+_SHAKEN_FROM = 0.8  # of what is above the noise: who explains so much is in a valley near the best
 _PLAYED = 0.7  # of what a walk explains: a law that explains so much may be what it plays
 _LAWS = 3  # of such that are sought all over their shapes
 _AFAR = 4  # promises of such a law that are followed
@@ -360,6 +361,7 @@ class _Search:
                 fitted, correlation = self._settled(best, self._anew(fitted), least)
                 fitted, correlation = self._rivals_ended(best, fitted)
                 fitted, correlation = self._laws_of_walk(best, fitted)
+                fitted, correlation = self._shaken(best, fitted)
             leader = fitted[0].trial
             gain = self._gain(best, leader, correlation)
             matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
@@ -722,6 +724,30 @@ class _Search:
                 if rivals and named and (quick or _is_first_of_family(one.name, names)):
                     self._ended(one.trial)
         order = self._as_found(order)
+        correlation = self._correlation([best, *(t.trial for t in order)])
+        return sorted(order, key=lambda t: self._demerit(t.trial, correlation)), correlation
+
+    def _shaken(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
+        """The candidates, best first, that one shaken which leads and still leaves more than noise.
+
+        A film that sticks and slips has a valley for every phase in which it does, and which one a
+        descent ends in is a matter of chance. So a law that follows the path, and explains most of
+        what is there, or the law of most numbers that extends it, is fitted again from all around.
+        """
+        lead = tried[0]
+        some = _explained(lead.parent, lead.trial) > _SHAKEN_FROM
+        if EFFECTS[lead.name].turns and some and not lead.trial.is_noise:
+            wider = [t for t in tried if _extends(t, lead)]
+            law = max([lead, *wider], key=lambda t: _intricacy(t.name))
+            key = frozenset(law.trial.effects)
+            if law is not lead and key not in self.extended:
+                self.extended.add(key)
+                self._keep(self._extended(law, lead))
+            if not self.found[key].is_noise:
+                trial = self.found[key]
+                own = [n.startswith(f"{law.name}: ") for n in trial.problem.layout.names]
+                self._keep(self.bench.shaken(trial, np.array(own), lead.trial.cost))
+        order = self._as_found(tried)
         correlation = self._correlation([best, *(t.trial for t in order)])
         return sorted(order, key=lambda t: self._demerit(t.trial, correlation)), correlation
 
