@@ -7,7 +7,7 @@ a few samples first, as many as cost nothing; what is chosen is fitted once more
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from threading import Lock
@@ -66,7 +66,8 @@ _RESTART = 10  # iterations of each
 _SCATTERED = 128  # places of numbers of which nothing is known
 _SHAKEN = (0.5, 0.8)  # of a number, or of its logarithm: a little, and a lot
 _UNSURE = 3.0  # standard deviations, by as much at least
-_SCOUTED = 8  # of these, the best ones, that are followed
+_SHAKES = 2  # times that all is tried around what is best by then
+_SCOUTED = 6  # of these, the best ones, that are followed
 _SCATTERINGS = 2  # the second from the best of the first
 _AS_GOOD = 0.98  # of the cost: who has gained less is where it was
 _LEADERS = 2  # of several starts that are followed on: the best at first does not always get down
@@ -470,63 +471,18 @@ class Bench:
         and once more from a better fit, beside which they may belong elsewhere. Beside a ``leader``
         no further than it takes to see that it does not come near its cost.
         """
-        layout = trial.problem.layout
+        problem, layout, fixed = trial.problem, trial.problem.layout, trial.fixed
         where = Sobol(int(more.sum()), scramble=False).random(_SCATTERED)
-
-        def places(start: np.ndarray) -> list[np.ndarray]:
-            xs = np.tile(start, (_SCATTERED, 1))
-            xs[:, more] = layout.lower[more] + where * (layout.upper - layout.lower)[more]
-            return [xs]
-
-        return self._from_places(trial, start, places, leader)
-
-    def shaken(self, trial: Trial, some: np.ndarray, leader: float) -> Trial:
-        """The model of ``trial`` fitted from places around it, or ``trial``.
-
-        There ``some`` (d,) of its numbers are other than they are: a little and a lot, and by as
-        much as they are not determined; and once more around a better fit. Beside a ``leader`` as
-        ``scattered``.
-        """
-        layout = trial.problem.layout
-        where = 2.0 * Sobol(int(some.sum()), scramble=False).random(_SCATTERED // 2) - 1.0
-        by_ratios = np.array([q.logarithmic for q in layout.quantities])
-        unsure = _UNSURE * self._spread(trial, trial.jacobian(quick=True))
-
-        def places(start: np.ndarray) -> list[np.ndarray]:
-            around = []
-            for part in _SHAKEN:
-                width = np.maximum(part * np.where(by_ratios, 1.0, np.abs(start)), unsure)
-                low = np.maximum(start - width, layout.lower)[some]
-                high = np.minimum(start + width, layout.upper)[some]
-                xs = np.tile(start, (where.shape[0], 1))
-                xs[:, some] = 0.5 * (low + high + where * (high - low))
-                around.append(xs)
-            return around
-
-        return self._from_places(trial, trial.x, places, leader)
-
-    def _from_places(
-        self,
-        trial: Trial,
-        start: np.ndarray,
-        places: Callable[[np.ndarray], list[np.ndarray]],
-        leader: float,
-    ) -> Trial:
-        """``trial``, or the best fit from groups of ``places`` that belong to a ``start``."""
-        problem, fixed = trial.problem, trial.fixed
 
         def down(trial: Trial) -> Trial:
             return self._down(trial, _ENDING, _worth_going(trial, leader, _NO_RIVAL))
 
         for _ in range(_SCATTERINGS):
-            groups = places(start)
-            many = _SCOUTED // len(groups)
-            best = [x for xs in groups for x in xs[np.argsort(problem.costs(xs))[:many]]]
-            scouts = self.together(
-                lambda x: descend_by_secants(problem, x, fixed, iterations=_RESTART, sure=False),
-                best,
-            )
-            leaders = [_trial(problem, f, fixed) for f in _leaders(scouts)]
+            xs = np.tile(start, (_SCATTERED, 1))
+            xs[:, more] = layout.lower[more] + where * (layout.upper - layout.lower)[more]
+            leaders = [
+                _trial(problem, f, fixed) for f in _leaders(self._scouted(trial, xs, _SCOUTED))
+            ]
             found = min(self.together(down, leaders), key=lambda t: t.cost)
             gained = found.cost < _AS_GOOD * trial.cost
             trial = min(trial, found, key=lambda t: t.cost)
@@ -534,6 +490,48 @@ class Bench:
                 break
             start = trial.x
         return self._as_near(trial, down)
+
+    def shaken(self, trial: Trial, some: np.ndarray, leader: float) -> Iterator[Trial]:
+        """Better and better fits of the model of ``trial`` from places around it, if there are any.
+
+        There ``some`` (d,) of its numbers are other than they are: a little and a lot, and by as
+        much as they are not determined; and again around a better one. Beside a ``leader`` as
+        ``scattered``.
+        """
+        problem, layout, fixed = trial.problem, trial.problem.layout, trial.fixed
+        where = 2.0 * Sobol(int(some.sum()), scramble=False).random(_SCATTERED // 2) - 1.0
+        by_ratios = np.array([q.logarithmic for q in layout.quantities])
+        unsure = _UNSURE * self._spread(trial, trial.jacobian(quick=True))
+
+        def down(trial: Trial) -> Trial:
+            return self._down(trial, _ENDING, _worth_going(trial, leader, _NO_RIVAL))
+
+        best = trial
+        for _ in range(_SHAKES):
+            scouts: list[LocalFit] = []
+            for part in _SHAKEN:
+                width = np.maximum(part * np.where(by_ratios, 1.0, np.abs(best.x)), unsure)
+                low = np.maximum(best.x - width, layout.lower)[some]
+                high = np.minimum(best.x + width, layout.upper)[some]
+                xs = np.tile(best.x, (where.shape[0], 1))
+                xs[:, some] = 0.5 * (low + high + where * (high - low))
+                scouts += self._scouted(trial, xs, _SCOUTED // len(_SHAKEN))
+            found = _trial(problem, min(scouts, key=lambda f: f.cost), fixed)
+            if found.cost > _AS_GOOD * best.cost:
+                break
+            yield found  # should the search be ended on the way down
+            best = self._as_near(found, down)
+            yield best
+            if best.is_white:
+                break
+
+    def _scouted(self, trial: Trial, xs: np.ndarray, many: int) -> list[LocalFit]:
+        """First steps down from the best places ``xs`` (K, d) for the model of ``trial``."""
+        problem, fixed = trial.problem, trial.fixed
+        return self.together(
+            lambda x: descend_by_secants(problem, x, fixed, iterations=_RESTART, sure=False),
+            list(xs[np.argsort(problem.costs(xs))[:many]]),
+        )
 
     def unaccounted(self, problem: Problem, xs: np.ndarray) -> np.ndarray:
         """Parts (K,) of the Maxwell stress that no branches account for, beside effects at ``xs``.

@@ -740,13 +740,15 @@ class _Search:
             wider = [t for t in tried if _extends(t, lead)]
             law = max([lead, *wider], key=lambda t: _intricacy(t.name))
             key = frozenset(law.trial.effects)
-            if law is not lead and key not in self.extended:
+            far = law.trial.cost > _MAY_LEAD * lead.trial.cost
+            if far and key not in self.extended:
                 self.extended.add(key)
                 self._keep(self._extended(law, lead))
             if not self.found[key].is_noise:
                 trial = self.found[key]
                 own = [n.startswith(f"{law.name}: ") for n in trial.problem.layout.names]
-                self._keep(self.bench.shaken(trial, np.array(own), lead.trial.cost))
+                for better in self.bench.shaken(trial, np.array(own), lead.trial.cost):
+                    self._keep(better)
         order = self._as_found(tried)
         correlation = self._correlation([best, *(t.trial for t in order)])
         return sorted(order, key=lambda t: self._demerit(t.trial, correlation)), correlation
