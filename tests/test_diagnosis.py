@@ -26,6 +26,7 @@ from model.diagnosis.search import _Search, _Tried
 from model.effects import EFFECTS
 from model.errors import ModelError
 from model.excitation import Sequence
+from model.fitting.parameters import Layout
 from model.material import TABLE_3, Network
 from model.records import ActuatorRecord
 from tests.engine_tools import (
@@ -567,6 +568,7 @@ def test_what_leaves_but_noise_is_not_fitted_anew():
     search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
     noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
     best = made_trial([record], PLAIN, 2.0 * noise)
+    search.found = {frozenset(): best}
     fitted = []
     # the last but one is white as well, but behind by what is no noise of a leader
     for name, left, promised in (
@@ -673,6 +675,116 @@ def test_a_law_gets_out_of_a_wrong_valley_from_where_a_simpler_one_has_ended():
     numbers = dict(zip(layout.names, layout.values(found.x), strict=True))
     for name in ("friction", "presliding", "excess", "easing"):
         assert numbers[f"easing friction: {name}"] == pytest.approx(hidden[name], rel=0.15)
+
+
+def test_a_law_is_shaken_out_of_a_valley_into_better_ones():
+    name = "elastoplastic friction"
+    hidden = {
+        "friction": 60.0,
+        "presliding": 1.5e-4,
+        "damping": 1e-3,
+        "excess": 0.4,
+        "easing": 8e-3,
+        "elastic": 0.55,
+        "easing_exponent": 2.0,
+    }
+    record = record_of(replace(PLAIN, effects=effect(name, **hidden)))
+    search = _Search([record], PLAIN, 2, lambda *_: None, lambda: False)
+    parent = made_trial([record], PLAIN, 20.0 * NOISE * np.ones(record.measured.size))
+    # bristles without damping, which ease too late: a descent from there does not get out
+    set_out = hidden | {"damping": 1e-6, "excess": 0.2, "easing": 3e-2}
+    layout = search.bench.problem(replace(PLAIN, effects=effect(name, **set_out))).layout
+    held = np.zeros(layout.size, dtype=bool)
+    held[layout.column("J")] = True
+    start = layout.coordinates(layout.initial())
+    wrong = search.bench.ended(search.bench.fit(layout.base, [], held, anew=[start]))
+    assert wrong.cost > 4.0
+    search.found = {frozenset({name}): wrong}
+    (shaken,), _ = search._shaken(parent, [_Tried(name, parent, wrong, 0.0)])
+    assert shaken.trial.cost < 0.6 * wrong.cost
+    assert shaken.trial is search.found[frozenset({name})]
+
+
+@pytest.mark.parametrize(
+    ("name", "left", "shaken"),
+    [
+        ("dry friction", 2.0, True),
+        ("dry friction", 1.0, False),  # leaves but noise
+        ("dry friction", 5.0, False),  # explains too little to be near
+        ("linear drag", 2.0, False),  # has no such valleys
+    ],
+)
+def test_only_a_law_with_many_valleys_is_shaken(name, left, shaken):
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    parent = made_trial([record], PLAIN, 6.0 * noise)
+    trial = made_trial([record], replace(PLAIN, effects=(typical(name),)), left * noise)
+    search.found = {frozenset(t.effects): t for t in (parent, trial)}
+    asked: list[list[str]] = []
+
+    def shake(trial: Trial, some: np.ndarray, leader: float) -> list[Trial]:
+        asked.append([n for n, s in zip(trial.problem.layout.names, some, strict=True) if s])
+        return []
+
+    search.bench.shaken = shake  # type: ignore[method-assign,assignment]
+    search._shaken(parent, [_Tried(name, parent, trial, 0.0)])
+    assert asked == ([[f"{name}: {p.name}" for p in EFFECTS[name].parameters]] if shaken else [])
+
+
+def test_a_law_that_a_walk_plays_is_sought_all_over():
+    slow = {
+        "stiffening": -6e-4,
+        "later": -4e-3,
+        "time_constant": 3.0,
+        "later_time_constant": 60.0,
+    }
+    name = "self-heating in stages"
+    record = record_of(replace(PLAIN, effects=effect(name, **slow)))
+    search = _Search([record], PLAIN, 2, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    held = np.zeros(Layout(PLAIN).size, dtype=bool)
+    held[Layout(PLAIN).column("J")] = True
+    layout = search.bench.problem(PLAIN).layout
+    start = layout.coordinates(layout.initial())
+    parent = search.bench.ended(search.bench.fit(PLAIN, [], held, anew=[start]))
+    assert parent.cost > 1.5
+    search.found = {frozenset(): parent}
+    search._screened(parent, (0.0, 1.0))
+    walk = made_trial([record], replace(PLAIN, effects=(typical("wandering drift"),)), noise)
+
+    def beside(cost: float) -> list[_Tried]:
+        law = made_trial(
+            [record], replace(PLAIN, effects=(typical(name),)), math.sqrt(cost) * noise
+        )
+        law = replace(law, fixed=np.append(held, np.zeros(len(slow), dtype=bool)))
+        search.found |= {frozenset(t.effects): t for t in (walk, law)}
+        names = (name, "wandering drift")
+        tried = [_Tried(n, parent, t, 0.0) for n, t in zip(names, (law, walk), strict=True)]
+        return search._laws_of_walk(parent, tried)[0]
+
+    # who explains little of what the walk does is not what it plays
+    little = 1.0 + 0.5 * (parent.cost - 1.0)
+    assert {t.name: t.trial.cost for t in beside(little)}[name] == pytest.approx(little, rel=0.1)
+    most = 1.0 + 0.1 * (parent.cost - 1.0)
+    found = beside(most)
+    assert found[0].name == name
+    assert found[0].trial.cost < 1.05
+
+
+def test_laws_that_differ_by_less_than_any_is_true_to_are_not_told_apart():
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+
+    def left(cost: float) -> Trial:
+        return made_trial([record], PLAIN, math.sqrt(cost) * noise)
+
+    best = left(1.0)
+    for before, behind, alike in ((60.0, 0.005, True), (60.0, 0.02, False), (8.0, 0.005, False)):
+        search.found = {frozenset(): left(before)}
+        # of a thousand times as many readings, each difference is significant
+        assert search._explains_as_well(left(1.0 + behind), best, 1e-3) == alike
 
 
 def test_what_is_exchanged_sets_out_beside_the_rest_as_it_was():
@@ -906,6 +1018,7 @@ def test_another_law_of_a_family_is_asked_for_beside_what_was_found_since():
         tuple(n for n in trial.effects if n != name), 20.0
     )
     search._round = a_round  # type: ignore[assignment, method-assign]
+    left((), 20.0)
     best = left(("ageing", "leakage"), 4.0)
     found = search._in_other_laws(best, (0.0, 1.0))
     assert set(found.effects) == {"leakage", "logarithmic ageing"}
@@ -999,6 +1112,7 @@ def test_a_rival_is_no_worse_for_having_more_numbers():
     search = _Search([record_of(PLAIN)], PLAIN, 1, lambda *_: None, lambda: False)
     free = made_trial([record_of(PLAIN)], PLAIN, np.full(1, NOISE))
     held = replace(free, fixed=~free.fixed)
+    search.found = {frozenset(): free}
     assert search._gain(free, held, 1.0) > 10.0
     assert search._explains_as_well(free, held, 1.0)
     worse = made_trial([record_of(PLAIN)], PLAIN, np.full(1, 1.05 * NOISE))
