@@ -703,8 +703,7 @@ class _Search:
         if to_other_laws and to_the_end:
             self._set_out_from_simpler(best, order)
             order = self._as_found(order)
-        correlation = self._correlation([best, *(t.trial for t in order)])
-        return sorted(order, key=rank), correlation
+        return self._ranked(best, order)
 
     def _rivals_ended(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
         """The candidates, best first, those that rival the leader at their ends.
@@ -723,9 +722,7 @@ class _Search:
                 quick = not follows_path(one.trial.model.effects)
                 if rivals and named and (quick or _is_first_of_family(one.name, names)):
                     self._ended(one.trial)
-        order = self._as_found(order)
-        correlation = self._correlation([best, *(t.trial for t in order)])
-        return sorted(order, key=lambda t: self._demerit(t.trial, correlation)), correlation
+        return self._ranked(best, order)
 
     def _shaken(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
         """The candidates, best first, that one shaken which leads and still leaves more than noise.
@@ -749,9 +746,7 @@ class _Search:
                 own = [n.startswith(f"{law.name}: ") for n in trial.problem.layout.names]
                 for better in self.bench.shaken(trial, np.array(own), lead.trial.cost):
                     self._keep(better)
-        order = self._as_found(tried)
-        correlation = self._correlation([best, *(t.trial for t in order)])
-        return sorted(order, key=lambda t: self._demerit(t.trial, correlation)), correlation
+        return self._ranked(best, tried)
 
     def _laws_of_walk(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
         """The candidates, best first, laws that a leading walk may play sought all over.
@@ -776,9 +771,7 @@ class _Search:
                 self._sought_all_over(law, lead.trial)
                 if self.found[frozenset(law.trial.effects)].cost < lead.trial.cost:
                     break
-        order = self._as_found(tried)
-        correlation = self._correlation([best, *(t.trial for t in order)])
-        return sorted(order, key=lambda t: self._demerit(t.trial, correlation)), correlation
+        return self._ranked(best, tried)
 
     def _sought_all_over(self, tried: _Tried, lead: Trial) -> None:
         """Fit an effect again from the shapes, of all within its bounds, that promise most."""
@@ -795,6 +788,12 @@ class _Search:
 
         for trial in self.bench.together(fit, promises):
             self._keep(trial)
+
+    def _ranked(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
+        """The candidates as they are by now, best first, by one count of independent samples."""
+        order = self._as_found(tried)
+        correlation = self._correlation([best, *(t.trial for t in order)])
+        return sorted(order, key=lambda t: self._demerit(t.trial, correlation)), correlation
 
     def _as_found(self, tried: list[_Tried]) -> list[_Tried]:
         """The candidates as the best fits of them are by now."""
