@@ -26,7 +26,6 @@ from model.diagnosis.search import _Search, _Tried
 from model.effects import EFFECTS
 from model.errors import ModelError
 from model.excitation import Sequence
-from model.fitting.parameters import Layout
 from model.material import TABLE_3, Network
 from model.records import ActuatorRecord
 from tests.engine_tools import (
@@ -640,6 +639,15 @@ def test_who_sets_out_from_a_simpler_law(before, simple, law, again):
     assert len(set_out) == again
 
 
+def ended_from(search: _Search, model: Actuator, *held: str) -> Trial:
+    """A fit of ``model`` from its own numbers to its valley's end; limits stay, and ``held``."""
+    layout = search.bench.problem(model).layout
+    fixed = np.array([n in held for n in layout.names])
+    fixed[layout.column("J")] = True
+    start = layout.coordinates(layout.initial())
+    return search.bench.ended(search.bench.fit(model, [], fixed, anew=[start]))
+
+
 def test_a_law_gets_out_of_a_wrong_valley_from_where_a_simpler_one_has_ended():
     hidden = {
         "friction": 60.0,
@@ -657,12 +665,8 @@ def test_a_law_gets_out_of_a_wrong_valley_from_where_a_simpler_one_has_ended():
         nothing = effect("linear drag", drag=0.0)
         own = effect(name, damping=1e-3, **numbers)
         effects = (*own, *nothing) if name == "dry friction" else (*nothing, *own)
-        layout = search.bench.problem(replace(PLAIN, effects=effects)).layout
-        held = np.zeros(layout.size, dtype=bool)
-        held[layout.column("J")] = held[layout.names.index("linear drag: drag")] = True
-        start = layout.coordinates(layout.initial())
-        trial = search.bench.fit(layout.base, [], held, anew=[start])
-        return _Tried(name, parent, search.bench.ended(trial), 0.0)
+        trial = ended_from(search, replace(PLAIN, effects=effects), "linear drag: drag")
+        return _Tried(name, parent, trial, 0.0)
 
     wrong = ended("easing friction", friction=30.0, presliding=1e-4, excess=0.9, easing=0.15)
     simpler = ended("dry friction", friction=55.0, presliding=2e-4)
@@ -693,11 +697,7 @@ def test_a_law_is_shaken_out_of_a_valley_into_better_ones():
     parent = made_trial([record], PLAIN, 20.0 * NOISE * np.ones(record.measured.size))
     # bristles without damping, which ease too late: a descent from there does not get out
     set_out = hidden | {"damping": 1e-6, "excess": 0.2, "easing": 3e-2}
-    layout = search.bench.problem(replace(PLAIN, effects=effect(name, **set_out))).layout
-    held = np.zeros(layout.size, dtype=bool)
-    held[layout.column("J")] = True
-    start = layout.coordinates(layout.initial())
-    wrong = search.bench.ended(search.bench.fit(layout.base, [], held, anew=[start]))
+    wrong = ended_from(search, replace(PLAIN, effects=effect(name, **set_out)))
     assert wrong.cost > 4.0
     search.found = {frozenset({name}): wrong}
     (shaken,), _ = search._shaken(parent, [_Tried(name, parent, wrong, 0.0)])
@@ -743,11 +743,7 @@ def test_a_law_that_a_walk_plays_is_sought_all_over():
     record = record_of(replace(PLAIN, effects=effect(name, **slow)))
     search = _Search([record], PLAIN, 2, lambda *_: None, lambda: False)
     noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
-    held = np.zeros(Layout(PLAIN).size, dtype=bool)
-    held[Layout(PLAIN).column("J")] = True
-    layout = search.bench.problem(PLAIN).layout
-    start = layout.coordinates(layout.initial())
-    parent = search.bench.ended(search.bench.fit(PLAIN, [], held, anew=[start]))
+    parent = ended_from(search, PLAIN)
     assert parent.cost > 1.5
     search.found = {frozenset(): parent}
     search._screened(parent, (0.0, 1.0))
@@ -757,7 +753,7 @@ def test_a_law_that_a_walk_plays_is_sought_all_over():
         law = made_trial(
             [record], replace(PLAIN, effects=(typical(name),)), math.sqrt(cost) * noise
         )
-        law = replace(law, fixed=np.append(held, np.zeros(len(slow), dtype=bool)))
+        law = replace(law, fixed=np.append(parent.fixed, np.zeros(len(slow), dtype=bool)))
         search.found |= {frozenset(t.effects): t for t in (walk, law)}
         names = (name, "wandering drift")
         tried = [_Tried(n, parent, t, 0.0) for n, t in zip(names, (law, walk), strict=True)]
