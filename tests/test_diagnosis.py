@@ -312,6 +312,9 @@ def test_what_happened_in_every_recording_alike_predicts_others():
     in_one = made_trial(records, PLAIN, noise + np.concatenate([step, 0.0 * step]))
     assert search._recurred(explained, in_both)
     assert not search._recurred(explained, in_one)
+    # what two have in common leaves much of each: they are not alike
+    partly = made_trial(records, PLAIN, noise + 0.6 * np.concatenate([step, step]))
+    assert not search._recurred(partly, in_both)
     alone = [made_trial(records[:1], PLAIN, r) for r in (noise[:size], noise[:size] + step)]
     assert not search._recurred(*alone)
 

@@ -1067,12 +1067,17 @@ class _Search:
         return kept
 
     def _recurred(self, trial: Trial, without: Trial) -> bool:
-        """Whether each of several recordings is decisively better explained than ``without``."""
-        sizes = [r.measured.size for r in trial.problem.records]
-        gained = without.residuals**2 - trial.residuals**2
-        parts = np.split(gained, np.cumsum(sizes)[:-1])
-        correlation = self._correlation([trial])
-        return len(parts) > 1 and all(float(p.sum()) / correlation > _DECISIVE for p in parts)
+        """Whether each of several recordings is decisively and mostly explained by it.
+
+        Two walks that differ have something in common, too, but that leaves much of each.
+        """
+        edges = np.cumsum([r.measured.size for r in trial.problem.records])[:-1]
+        used = np.isfinite(trial.problem.sigma).astype(float)
+        rows = (without.residuals**2 - trial.residuals**2, without.residuals**2 - used)
+        gained, missing = ([float(p.sum()) for p in np.split(row, edges)] for row in rows)
+        least = _DECISIVE * self._correlation([trial])
+        shown = [g > max(least, _TRUSTED * m) for g, m in zip(gained, missing, strict=True)]
+        return len(shown) > 1 and all(shown)
 
     # -- judgement
 
