@@ -4,6 +4,7 @@ import functools
 import importlib
 import math
 import time
+from dataclasses import replace
 from threading import Thread
 
 import numpy as np
@@ -372,3 +373,25 @@ def test_work_that_asks_for_the_same_threads_does_not_wait_for_itself():
     asked.start()
     asked.join(20.0)
     assert done == [[[10 * job + k for k in range(3)] for job in range(4)]]
+
+
+def test_work_is_counted_in_steps_and_in_simulations():
+    record, plain = made(ONE), Actuator(THESIS_FILM, THESIS_LOAD, ONE)
+    told = []
+
+    def work(model, haste, members=1):
+        problem = Problem([record], Layout(model), 1, haste, lambda *work: told.append(work))
+        problem.predict(np.tile(Layout(model).initial(), (members, 1)))
+        return told[-1]
+
+    simulated, quick = work(plain, kernel.QUICK)
+    assert simulated == 1
+    assert work(plain, kernel.QUICK, members=3) == (3, pytest.approx(3.0 * quick))
+    # a careful step takes as long as three; one that follows the path, as fifteen
+    steps = record.drive.time.size
+    assert work(plain, kernel.CAREFUL)[1] - quick == pytest.approx(2.0 * steps)
+    dry = (("friction", 50.0), ("presliding", 1e-4), ("damping", 1e-3))
+    rubbing = replace(plain, effects=(("dry friction", dry),))
+    assert work(rubbing, kernel.QUICK)[1] - quick == pytest.approx(14.0 * steps)
+    # and each takes something beside its steps
+    assert quick > steps

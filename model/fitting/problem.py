@@ -25,6 +25,7 @@ _ALIKE = 0.15  # of what a number does: as near must a sketch tell it
 _OF_MOTION = (3.0, 1.0, 1.0)
 _OF_PATH = (15.0, 15.0, 7.0)  # where a force follows the path
 _OF_FILM = 6.0  # a sample of a film
+_OF_ANY = 1e4  # a simulation of an actuator beside its steps: to hand it over, read it, compare it
 
 
 def is_told(whole: np.ndarray, sketch: np.ndarray) -> bool:
@@ -129,8 +130,8 @@ class Problem:
                 continue
             sketch = record.sketch
             drive = record.drive if sketch is None else sketch
-            whole += worth[min(self.haste, kernel.ROUGH)] * record.drive.time.size
-            sketches += worth[kernel.ROUGH] * drive.time.size
+            whole += worth[min(self.haste, kernel.ROUGH)] * record.drive.time.size + _OF_ANY
+            sketches += worth[kernel.ROUGH] * drive.time.size + _OF_ANY
         few = int(np.count_nonzero(by_sketch))
         return few * sketches + (by_sketch.size - few) * whole
 
