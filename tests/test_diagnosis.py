@@ -1227,7 +1227,7 @@ def test_it_ends_when_it_is_asked_to():
 def test_a_search_ends_when_it_has_taken_the_work_that_it_may(monkeypatch):
     record = record_of(plant("load inertia"))
     whole = of_hidden("load inertia")
-    monkeypatch.setattr(search, "_EFFORT", 2e6)
+    monkeypatch.setattr(search, "_EFFORT", 1.6e7)
     found = diagnose([record], PLAIN, workers=1)
     require_consistent(found)
     assert not found.interrupted

@@ -676,7 +676,7 @@ def refitted(truth, start):
 
     The misfit is that of the prediction without the noise, over the noise (RMS).
     """
-    problem = Problem(records(truth), Layout(start), workers=1)
+    problem = Problem(records(truth), Layout(start), workers=1, haste=kernel.QUICK)
     layout = problem.layout
     held = np.zeros(layout.size, dtype=bool)
     held[layout.column("J")] = True
