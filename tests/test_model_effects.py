@@ -630,6 +630,8 @@ NEARER |= dict.fromkeys(
     1.2,
 )
 NEARER |= dict.fromkeys(("easing friction", "elastoplastic friction"), 1.1)
+# of these, what quick steps get wrong is as large as what a number does
+CLOSELY = {"distributed hysteresis", "self-heating in stages"}
 # who squeals in another phase is far off: a search sets out from the same friction without easing
 SIZED = dict.fromkeys(("easing friction", "elastoplastic friction"), 0.8)
 NEARER |= dict.fromkeys(
@@ -676,7 +678,9 @@ def refitted(truth, start):
 
     The misfit is that of the prediction without the noise, over the noise (RMS).
     """
-    problem = Problem(records(truth), Layout(start), workers=1, haste=kernel.QUICK)
+    closely = any(name in CLOSELY for name, _ in truth.effects)
+    haste = kernel.CAREFUL if closely else kernel.QUICK
+    problem = Problem(records(truth), Layout(start), workers=1, haste=haste)
     layout = problem.layout
     held = np.zeros(layout.size, dtype=bool)
     held[layout.column("J")] = True
