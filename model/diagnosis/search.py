@@ -577,8 +577,6 @@ class _Search:
         effect = EFFECTS[name]
         model = promises[0].model
         first = parent.x.size
-        # of shapes, and far from the base model, the sensitivities are not known yet
-        shapes = np.full((jacobian.shape[0], len(effect.shapes)), np.nan)
         starts: list[tuple[np.ndarray, np.ndarray | None]] = []
         # from nothing: the first step, which all numbers take together, is the linear guess
         nothing = promises[0].start.copy()
@@ -586,7 +584,7 @@ class _Search:
         nothing[first : first + len(effect.sizes)] = [p.neutral for p in effect.sizes]
         worth = [p for p in promises if p.share > _NEARLY * promises[0].share]
         for start, promise in ((nothing, promises[0]), *((p.start, p) for p in worth)):
-            starts.append((start, np.column_stack([jacobian, promise.columns, shapes])))
+            starts.append((start, _near(jacobian, promise, effect)))
         simpler = self._simpler(parent, effect, promises[0].start)
         if simpler is not None:
             starts.append((simpler, starts[0][1]))
@@ -778,10 +776,9 @@ class _Search:
         screen = self.screened[frozenset(tried.parent.effects)][0]
         promises = screen.scattered(EFFECTS[tried.name])[:_AFAR]
         fixed = tried.trial.fixed
-        shapes = np.full((screen.jacobian.shape[0], len(EFFECTS[tried.name].shapes)), np.nan)
 
         def fit(promise: Promise) -> Trial:
-            jacobian = np.column_stack([screen.jacobian, promise.columns, shapes])
+            jacobian = _near(screen.jacobian, promise, EFFECTS[tried.name])
             trial = self.bench.fit(promise.model, [(promise.start, jacobian)], fixed, lead.cost)
             # where it leads shows in its last steps only
             return self.bench.ended(trial, lead.cost)
@@ -1332,6 +1329,15 @@ class _Search:
             if better > self._asked(other) and behind < found.get(of, (np.inf,))[0]:
                 found[of] = (behind, other, trial)
         return [(n, t) for _, n, t in sorted(found.values(), key=lambda f: f[0])]
+
+
+def _near(jacobian: np.ndarray, promise: Promise, effect: Effect) -> np.ndarray:
+    """The Jacobian (N, d) near a promise: that of the base model (N, f), and of the effect's sizes.
+
+    Of shapes, and far from the base model, the sensitivities are not known yet: NaN.
+    """
+    shapes = np.full((jacobian.shape[0], len(effect.shapes)), np.nan)
+    return np.column_stack([jacobian, promise.columns, shapes])
 
 
 def _numbers(trial: Trial) -> dict[str, float]:
