@@ -25,6 +25,7 @@ __all__ = [
     "effect_values",
     "initial_state",
     "reading_of",
+    "readings_of",
 ]
 
 STATUS_WORDS = MappingProxyType(
@@ -264,9 +265,26 @@ def reading_of(
     At ``times`` (N,) s, those of the drive where none are given. ``lag`` s is the known age of a
     reading, ``haste`` as the kernel has it. What the model did not reach reads 0.
     """
+    readings, status = readings_of(c[None], length, drive, lag, haste, times)
+    return readings[0], status
+
+
+def readings_of(
+    cs: np.ndarray,
+    length: float,
+    drive: Drive,
+    lag: float = 0.0,
+    haste: int = kernel.CAREFUL,
+    times: np.ndarray | None = None,
+) -> tuple[np.ndarray, int]:
+    """``(readings, status)`` of coefficient vectors ``cs`` (P, C) of one film: (P, N) m.
+
+    They differ in ``model.effects.SENSED`` alone: in what the sensor makes of how the film moves.
+    The rest is as in ``reading_of``.
+    """
     times = drive.time if times is None else times
-    c = c.copy()
-    reading, speed = np.zeros(times.size), np.zeros(times.size)
+    c = cs[0].copy()
+    readings = np.zeros((len(cs), times.size))
     status, rest = at_rest(c)
     if status == kernel.OK:
         x, u = np.zeros(drive.time.size), np.zeros(drive.time.size)
@@ -277,6 +295,9 @@ def reading_of(
         x -= rest
         x *= length
         u *= length
-        at_sensor(drive.time, x, u, times - lag, reading, speed)
-        kernel.read_sensor(c, times, reading, speed, np.zeros(SENSOR_MEMORY))
-    return reading, status
+        speed = np.zeros(times.size)
+        at_sensor(drive.time, x, u, times - lag, readings[0], speed)
+        readings[1:] = readings[0]
+        for one, reading in zip(cs, readings, strict=True):
+            kernel.read_sensor(one, times, reading, speed, np.zeros(SENSOR_MEMORY))
+    return readings, status

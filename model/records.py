@@ -70,7 +70,7 @@ class ActuatorRecord:
         return self.displacement
 
     def seen(self, displacement: np.ndarray) -> np.ndarray:
-        """What these readings are of a ``displacement`` (N,) at their times: means, and counted."""
+        """What these readings are of a ``displacement`` (..., N) at their times: means, counted."""
         return counted(_mean_about(displacement, self.means_of), self.lead_in)
 
     def coarse(self, rate: float) -> ActuatorRecord:
@@ -111,7 +111,7 @@ class ActuatorRecord:
 
 
 def _mean_about(values: np.ndarray, many: int) -> np.ndarray:
-    """Means over each of the intervals in the middle of which ``values`` (N,) are, of ``many``.
+    """Means over each of the intervals amid which ``values`` (..., N) are, of ``many``.
 
     Of as many samples of each interval, evenly spaced. From neighbours, to the fourth order in the
     interval's length; the ends are copied.
@@ -123,8 +123,8 @@ def _mean_about(values: np.ndarray, many: int) -> np.ndarray:
     curl = 1.0 / 1920.0 - many**-2.0 / 576.0 + 7.0 * many**-4.0 / 5760.0 - bend / 12.0
     means = values.copy()
     second = np.diff(values, 2)
-    means[1:-1] += bend * second
-    means[2:-2] += curl * np.diff(second, 2)
+    means[..., 1:-1] += bend * second
+    means[..., 2:-2] += curl * np.diff(second, 2)
     return means
 
 

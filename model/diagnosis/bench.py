@@ -32,8 +32,21 @@ from model.fitting.thinning import thinned
 from model.fitting.threads import Job, Result, together
 from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
-__all__ = ["FILM_MODEL_ERROR", "Bench", "Trial", "information", "merged", "relieved"]
+__all__ = [
+    "FILM_MODEL_ERROR",
+    "MAY_LEAD",
+    "MUCH_LEFT",
+    "Bench",
+    "Trial",
+    "information",
+    "merged",
+    "relieved",
+]
 
+#: of the noise's mean square: there it matters which effect leads, not yet how far it gets
+MUCH_LEFT = 25.0
+#: of the leader's cost: what has come so near may lead by its last steps
+MAY_LEAD = 6.0
 _RATE = 200.0  # Hz, to which records may be thinned: mains and a load's ringing still show
 _QUIET_MIN = 100  # samples of a lead-in from which a thinned record's noise is read again
 _FILM_SAMPLES = 1500
@@ -290,6 +303,7 @@ class Bench:
             else r
             for r in self.records
         )
+        self._told_by_sketches(self.problem(model, kernel.ROUGH), trial.fixed)
         return replace(trial, problem=self.problem(trial.problem.layout.base))
 
     def fit(
@@ -312,10 +326,7 @@ class Bench:
         promises is believed.
         """
         scouted = self.problem(model, kernel.ROUGH)
-        layout = scouted.layout
-        if layout.names not in self._sketched:  # asked once of each combination of effects
-            x = layout.coordinates(layout.initial())
-            scouted.sketched = self._sketched[layout.names] = scouted.told_by_sketches(x, ~fixed)
+        scouted.sketched = self._told_by_sketches(scouted, fixed)
         problem = self.problem(model)
         scouts = [
             descend_by_secants(scouted, start, fixed, jacobian, _SCOUTING, sure=False)
@@ -328,6 +339,8 @@ class Bench:
         best = min(scouts, key=lambda f: f.cost)
         if best.cost > _ROUGHLY and follows_path(model.effects):
             problem = scouted
+            if leader > MUCH_LEFT and best.cost > MAY_LEAD * leader:
+                return _trial(scouted, best, fixed)  # it takes long, and is for others to lead
 
         def down(trial: Trial) -> Trial:
             behind = max(trial.cost - leader, 0.0) * problem.samples
@@ -346,6 +359,22 @@ class Bench:
             return _trial(trial.problem, fit, fixed)
 
         return self._as_near(_trial(problem, best, fixed), down)
+
+    def _told_by_sketches(self, problem: Problem, fixed: np.ndarray) -> np.ndarray:
+        """Which numbers (d,) bool sketches tell; asked once of each combination of effects.
+
+        Where springs are told without effects, they are beside all that leave a film its turns.
+        """
+        layout, effects = problem.layout, problem.layout.base.effects
+        if layout.names not in self._sketched:
+            springs: np.ndarray | None = None
+            if effects and not follows_path(effects):
+                plain = self.problem(replace(layout.base, effects=()), problem.haste)
+                springs = self._told_by_sketches(plain, fixed[: plain.layout.size])
+                springs = springs if springs.any() else None
+            x = layout.coordinates(layout.initial())
+            self._sketched[layout.names] = problem.told_by_sketches(x, ~fixed, springs)
+        return self._sketched[layout.names]
 
     def settled(self, trial: Trial, leader: float = math.inf) -> Trial:
         """``trial`` followed towards the end of its valley, on the thinned records.
@@ -549,10 +578,14 @@ class Bench:
                 taken = (searched.measured - problem.measured) / problem.sigma
                 if np.linalg.norm(taken) > _MOST_OF_IT * moved:
                     continue
-                records = [r for r in searched.records if isinstance(r, ActuatorRecord)]
-                slow = [r.coarse(_SLOW_RATE) for r in records]
-                left[i] = voltage_misfit(Problem(slow, searched.layout), at_rest(cs[i])[1])
+                left[i] = voltage_misfit(self._slow(searched), at_rest(cs[i])[1])
         return left
+
+    @staticmethod
+    def _slow(problem: Problem) -> Problem:
+        """The ``problem`` in samples that are enough to see which branches there may be."""
+        records = [r for r in problem.records if isinstance(r, ActuatorRecord)]
+        return Problem([r.coarse(_SLOW_RATE) for r in records], problem.layout)
 
     def sought(self, trial: Trial, starts: np.ndarray) -> Trial:
         """``trial``, or a better fit from one of ``starts`` (K, d), with the branches sought anew.
@@ -570,7 +603,7 @@ class Bench:
                 starts, self._without_effects(trial.problem, starts), strict=True
             )
             if searched is not None
-            for springs in voltage_starts(searched, lambda *_: None, _RESTARTS)
+            for springs in voltage_starts(self._slow(searched), lambda *_: None, _RESTARTS)
         ]
         if not anew:
             return trial

@@ -10,7 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from model.actuator import Actuator
-from model.diagnosis.bench import Bench, Trial, Work, information, merged, relieved
+from model.diagnosis.bench import (
+    MAY_LEAD,
+    MUCH_LEFT,
+    Bench,
+    Trial,
+    Work,
+    information,
+    merged,
+    relieved,
+)
 from model.diagnosis.findings import (
     EXPLAINED,
     NOTHING_MISSING,
@@ -35,7 +44,7 @@ __all__ = ["diagnose"]
 Progress = Callable[[str, float], None]
 
 # quick steps of simulations that a search may take: some forty seconds of two cores
-_EFFORT = 3.8e8
+_EFFORT = 2.2e8
 _TO_PRUNE = 0.1  # of that: what a search that is ended may take to leave out what is needless
 _EFFECTS_MAX = 3  # more at once no record of this kind tells apart
 _TURNS = 3  # of searching on and pruning: what is pruned makes room
@@ -55,17 +64,16 @@ _BEAM = 2  # how many explanations are followed on
 _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed on
 _SETTLED = 5  # leading candidates that are fitted to the end of their valleys
 _SETTLED_QUICKLY = 12  # that are followed a little, while the leader leaves more than noise
-_MUCH_LEFT = 25.0  # of the noise's mean square: there only one law of a family is followed
 _NEARLY_ALL = 0.95  # of what was above the noise: who explains it may be in a wrong valley of it
 _AS_GOOD = 0.98  # of its cost: who did not come near the one will not come near the other
 _CLOSE = 1.15  # of the leader's cost: so near, and better than nothing, any other is one too
 _NEAR_LEAD = 2.0  # of the leader's cost before that: no branch of these is left without work
 _NEAR_NOISE = 1.5  # of the same, beside a leader that leaves but noise
-_MAY_LEAD = 6.0  # of the leader's cost: what has come so near may lead by its last steps
 _UNNAMED_MARGIN = (
     20.0  # of the criterion, by which an unnamed effect must be better than named ones
 )
 _SCREENED = 8  # effects at a time
+_ABREAST = 4  # effects that are fitted at a time
 _PROMISES = 2  # of one effect, in different shapes, from which a fit sets out
 _NEARLY = 0.8  # of the best promise of an effect: another shape that is worth a start
 _BETTER = 1e-4  # of the cost: less is the same place
@@ -488,15 +496,15 @@ class _Search:
         tried: list[_Tried] = []
 
         def refit(names: list[str]) -> None:
-            for pair in _abreast([n for n in names if n not in {t.name for t in tried}]):
-                unknown = [n for n in pair if self._owes(parent, n, shares[n])]
+            for some in _abreast([n for n in names if n not in {t.name for t in tried}]):
+                unknown = [n for n in some if self._owes(parent, n, shares[n])]
                 trials = self.bench.together(
                     lambda n: self._refit(parent, n, promises[n], jacobian, other), unknown
                 )
                 for name, trial in zip(unknown, trials, strict=True):
                     self.refitted.add((frozenset(parent.effects), name))
                     self._keep(trial)
-                for name in pair:
+                for name in some:
                     trial = self.found[frozenset((*parent.effects, name))]
                     tried.append(_Tried(name, parent, trial, shares[name]))
                 part = 0.25 + 0.75 * len(tried) / many
@@ -508,7 +516,7 @@ class _Search:
                 # who promises next to nothing beside what explains all is no rival of it
                 least = _HINT * shares[order[0]]
                 order = [n for n in order if shares[n] > least]
-            if order and parent.cost > _MUCH_LEFT:
+            if order and parent.cost > MUCH_LEFT:
                 # so far from the noise it matters which family it is, not yet which law of it
                 refit([n for n in order if _is_first_of_family(n, order)])
                 near = _NEAR_LEAD * min(t.trial.cost for t in tried)
@@ -594,7 +602,7 @@ class _Search:
         anew: list[np.ndarray] = []
         if effect.relaxes and isinstance(model, Actuator):
             anew = self._relieved(parent, promises[0])
-        elif effect.acts_on == "inertia" and parent.cost > _MUCH_LEFT:
+        elif effect.acts_on == "inertia" and parent.cost > MUCH_LEFT:
             anew = self._moving(parent, promises[0])
         fixed = np.concatenate([parent.fixed, np.zeros(len(effect.parameters), dtype=bool)])
         leader = min(t.cost for t in self.found.values())
@@ -677,7 +685,7 @@ class _Search:
             of_parent[beside] += 1
             if place >= follow and not (near and rank(tried) < mark) and not may_lead:
                 continue
-            if lead > _MUCH_LEFT and not _is_first_of_family(tried.name, names):
+            if lead > MUCH_LEFT and not _is_first_of_family(tried.name, names):
                 continue
             worse = rank(tried) - self._criterion(tried.parent, correlation)
             if place and not owing and worse > (_DECISIVE if subtle else 0.0):
@@ -690,7 +698,7 @@ class _Search:
                 self._ended(tried.trial)
             elif may_lead and to_the_end and not leads.is_white:
                 self._ended(tried.trial, lead)
-            elif key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
+            elif key not in self.settled and tried.trial.cost < MAY_LEAD * lead:
                 self.settled.add(key)
                 self.found[key] = self.bench.settled(tried.trial, lead)
             lead = min(lead, self.found[key].cost)
@@ -714,12 +722,14 @@ class _Search:
         order = sorted(tried, key=lambda t: t.trial.cost)
         names = [t.name for t in order]
         if leader.is_noise:
+            rivals: list[Trial] = []
             for one in order:
-                rivals = best.cost - one.trial.cost > _RIVALS * (best.cost - leader.cost)
+                rivalling = best.cost - one.trial.cost > _RIVALS * (best.cost - leader.cost)
                 named = EFFECTS[one.name].family != "unknown"
                 quick = not follows_path(one.trial.model.effects)
-                if rivals and named and (quick or _is_first_of_family(one.name, names)):
-                    self._ended(one.trial)
+                if rivalling and named and (quick or _is_first_of_family(one.name, names)):
+                    rivals.append(one.trial)
+            self.bench.together(self._ended, rivals)
         return self._ranked(best, order)
 
     def _shaken(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
@@ -735,7 +745,7 @@ class _Search:
             wider = [t for t in tried if _extends(t, lead)]
             law = max([lead, *wider], key=lambda t: _intricacy(t.name))
             key = frozenset(law.trial.effects)
-            far = law.trial.cost > _MAY_LEAD * lead.trial.cost
+            far = law.trial.cost > MAY_LEAD * lead.trial.cost
             if far and key not in self.extended:
                 self.extended.add(key)
                 self._keep(self._extended(law, lead))
@@ -868,7 +878,9 @@ class _Search:
         def looked(place: int) -> tuple[float, int, float] | None:
             one = tried[place]
             sizes = EFFECTS[one.name].sizes
-            if len(sizes) != 1 or one.trial.cost > _OUT_OF_REACH * leader.cost:
+            # beside a leader that leaves much, others are looked for beside it next
+            reach = MAY_LEAD if leader.cost > MUCH_LEFT else _OUT_OF_REACH
+            if len(sizes) != 1 or one.trial.cost > reach * leader.cost:
                 return None
             left, size = self._unaccounted(one, sizes_of(sizes[0], _ANEW_SIZES))
             if not left < _IN_THE_WAY * before[frozenset(one.parent.effects)]:
@@ -885,7 +897,7 @@ class _Search:
             most = min(most, _AS_WELL * there)
         again = list(tried)
         names = [tried[place].name for _, place, _ in looks]
-        if leader.cost > _MUCH_LEFT:
+        if leader.cost > MUCH_LEFT:
             looks = [k for k in looks if _is_first_of_family(tried[k[1]].name, names)]
         starts = {
             place: self._sized(tried[place], [f * size for f in _ANEW_FROM])
@@ -1397,18 +1409,23 @@ def _promised_as_much(tried: _Tried, lead: float) -> bool:
 
 
 def _abreast(names: list[str]) -> list[list[str]]:
-    """``names`` of effects in twos that may be fitted at a time, whatever the number of threads.
+    """``names`` of effects in groups that may be fitted at a time, whatever the number of threads.
 
-    The simpler of a family first: the others start from it too.
+    The simpler of a family first: the others start from it too. What takes long comes last, when it
+    is known how far others get.
     """
-    pairs: list[list[str]] = []
-    for name in sorted(names, key=_intricacy):
-        last = pairs[-1] if pairs else []
-        if len(last) == 1 and _intricacy(last[0]) == _intricacy(name):
+
+    def late(name: str) -> tuple[bool, int]:
+        return EFFECTS[name].turns, _intricacy(name)
+
+    groups: list[list[str]] = []
+    for name in sorted(names, key=late):
+        last = groups[-1] if groups else []
+        if 0 < len(last) < _ABREAST and late(last[0]) == late(name):
             last.append(name)
         else:
-            pairs.append([name])
-    return pairs
+            groups.append([name])
+    return groups
 
 
 def _is_first_of_family(name: str, order: Sequence[str]) -> bool:

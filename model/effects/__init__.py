@@ -25,6 +25,7 @@ __all__ = [
     "MEMORY",
     "NEUTRAL",
     "PLACES",
+    "SENSED",
     "SENSOR_MEMORY",
     "SLOTS",
     "Effect",
@@ -81,6 +82,15 @@ PLACES: Mapping[str, Place] = MappingProxyType(_places)
 #: those of the sensor remember.
 SLOTS = sum(len(e.parameters) for e in EFFECTS.values())
 MEMORY, SENSOR_MEMORY = _motion, _sensor
+#: Indices of the coefficients of effects that act on the reading alone: no film moves by them.
+SENSED = np.array(
+    [
+        PLACES[e.name].at + i
+        for e in EFFECTS.values()
+        if hasattr(PLACES[e.name].module, "sense")
+        for i in range(len(e.parameters))
+    ]
+)
 #: The coefficients (SLOTS,) of a model without effects; shapes are at a typical value.
 NEUTRAL = np.array(
     [

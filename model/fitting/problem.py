@@ -8,8 +8,8 @@ from copy import copy
 import numpy as np
 
 from model import kernel
-from model.actuator import Actuator, reading_of
-from model.effects import follows_path
+from model.actuator import Actuator, readings_of
+from model.effects import EFFECTS, SENSED, follows_path
 from model.errors import ModelError
 from model.film import stress_of
 from model.fitting.parameters import Layout
@@ -23,9 +23,9 @@ _MOST = 0.6  # of the numbers
 _ALIKE = 0.15  # of what a number does: as near must a sketch tell it
 # quick steps that a step takes as long as, by haste: careful, quick, rough
 _OF_MOTION = (3.0, 1.0, 1.0)
-_OF_PATH = (15.0, 15.0, 7.0)  # where a force follows the path
+_OF_PATH = (7.0, 7.0, 3.5)  # where a force follows the path
 _OF_FILM = 6.0  # a sample of a film
-_OF_ANY = 1e4  # a simulation of an actuator beside its steps: to hand it over, read it, compare it
+_OF_ANY = 1.5e4  # a population beside its steps: to hand it over, and what a fit makes of it
 
 
 def is_told(whole: np.ndarray, sketch: np.ndarray) -> bool:
@@ -95,28 +95,64 @@ class Problem:
         out = np.zeros((c.shape[0], self.measured.size))
         status = np.zeros((c.shape[0], len(self.records)), dtype=np.int64)
 
-        jobs = list(np.ndindex(status.shape))
+        films = self._films(c, by_sketch)
+        which = by_sketch[[members[0] for members in films]]
 
-        def run(first: int) -> None:
+        def run(jobs: list[tuple[int, int]]) -> None:
             # some in one go: to hand them over one by one would take a part of the time
-            for member, i in jobs[first :: self.workers]:
+            for film, i in jobs:
+                members = films[film]
                 part = slice(self._edges[i], self._edges[i + 1])
-                out[member, part], status[member, i] = self._reading(
-                    c[member], self.records[i], bool(by_sketch[member])
+                out[members, part], status[members, i] = self._readings(
+                    c[members], self.records[i], bool(which[film])
                 )
 
-        together(run, range(min(self.workers, len(jobs))), self.workers)
-        self.simulations += status.size
+        together(run, self._shared_out(which), self.workers)
+        self.simulations += which.size * len(self.records)
         if self.told is not None:
-            self.told(status.size, self._effort(by_sketch))
+            self.told(which.size * len(self.records), self._effort(which))
         if self._missed is not None:
             out += self._missed
         # of several records the first that fails speaks
         failed = np.argmax(status != kernel.OK, axis=1)
         return out, np.take_along_axis(status, failed[:, None], axis=1)[:, 0]
 
+    def _films(self, c: np.ndarray, by_sketch: np.ndarray) -> list[list[int]]:
+        """Members of a population ``c`` (P, C) whose films move alike: one simulation does."""
+        sensors = any(EFFECTS[name].acts_on == "sensor" for name, _ in self.layout.base.effects)
+        if len(c) < 2 or not sensors:
+            return [[member] for member in range(len(c))]
+        films: dict[tuple[bytes, bool], list[int]] = {}
+        moving = np.delete(c, SENSED, axis=1)
+        for member, (row, sketched) in enumerate(zip(moving, by_sketch, strict=True)):
+            films.setdefault((row.tobytes(), bool(sketched)), []).append(member)
+        return list(films.values())
+
+    def _shared_out(self, by_sketch: np.ndarray) -> list[list[tuple[int, int]]]:
+        """Films, of which some are ``by_sketch`` (P,), and records for each of the workers.
+
+        The long ones first, each to who has least to do yet: records may differ much.
+        """
+        steps = np.array([self._steps(r) for r in self.records])
+        jobs = list(np.ndindex(by_sketch.size, len(self.records)))
+        jobs.sort(key=lambda job: -steps[job[1], int(by_sketch[job[0]])])
+        shares: list[list[tuple[int, int]]] = [[] for _ in range(min(self.workers, len(jobs)))]
+        loads = [0.0] * len(shares)
+        for film, i in jobs:
+            least = loads.index(min(loads))
+            shares[least].append((film, i))
+            loads[least] += steps[i, int(by_sketch[film])]
+        return shares
+
+    @staticmethod
+    def _steps(record: Record) -> tuple[float, float]:
+        """Samples that a simulation steps through: of the whole record, and of its sketch."""
+        if isinstance(record, FilmRecord) or record.sketch is None:
+            return float(record.time.size), float(record.time.size)
+        return float(record.time.size), float(record.sketch.time.size)
+
     def _effort(self, by_sketch: np.ndarray) -> float:
-        """What it takes to simulate members of which some are ``by_sketch`` (P,), in quick steps.
+        """What it takes to simulate films of which some are ``by_sketch`` (P,), in quick steps.
 
         As steps go, not seconds: the same on any machine, however busy.
         """
@@ -124,27 +160,27 @@ class Problem:
         worth = _OF_PATH if turning else _OF_MOTION
         whole, sketches = 0.0, 0.0
         for record in self.records:
+            steps, fewer = self._steps(record)
             if isinstance(record, FilmRecord):
-                whole += _OF_FILM * record.time.size
-                sketches += _OF_FILM * record.time.size
+                whole += _OF_FILM * steps
+                sketches += _OF_FILM * fewer
                 continue
-            sketch = record.sketch
-            drive = record.drive if sketch is None else sketch
-            whole += worth[min(self.haste, kernel.ROUGH)] * record.drive.time.size + _OF_ANY
-            sketches += worth[kernel.ROUGH] * drive.time.size + _OF_ANY
+            whole += worth[min(self.haste, kernel.ROUGH)] * steps
+            sketches += worth[kernel.ROUGH] * fewer
         few = int(np.count_nonzero(by_sketch))
-        return few * sketches + (by_sketch.size - few) * whole
+        return _OF_ANY + few * sketches + (by_sketch.size - few) * whole
 
-    def _reading(self, c: np.ndarray, record: Record, sketched: bool) -> tuple[np.ndarray, int]:
+    def _readings(self, c: np.ndarray, record: Record, sketched: bool) -> tuple[np.ndarray, int]:
+        """Readings (M, N) of members ``c`` (M, C) whose films move alike."""
         if isinstance(record, FilmRecord):
-            stress, status, _ = stress_of(c, record.time, record.stretch)
-            return stress, status
+            stress, status, _ = stress_of(c[0], record.time, record.stretch)
+            return stress[None], status
         base = self.layout.base
         length = base.film.length if isinstance(base, Actuator) else 1.0
         drive, haste = record.drive, self.haste
         if sketched and record.sketch is not None:
             drive, haste = record.sketch, kernel.SKETCHED
-        moved, status = reading_of(c, length, drive, record.lag, haste, record.time)
+        moved, status = readings_of(c, length, drive, record.lag, haste, record.time)
         return record.seen(moved), status
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
@@ -192,17 +228,26 @@ class Problem:
         half = width.size
         return ((predicted[:half] - predicted[half:]) / self.sigma).T / width
 
-    def told_by_sketches(self, x: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """Which numbers (d,) bool sketches tell at ``x`` (d,) what they do, of those ``free``."""
+    def told_by_sketches(
+        self, x: np.ndarray, free: np.ndarray, known: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Which numbers (d,) bool sketches tell at ``x`` (d,) what they do, of those ``free``.
+
+        The first of them may be ``known``, and are not asked again.
+        """
         told = np.zeros(x.size, dtype=bool)
         if not self._has_sketches:
             return told
         residuals = self.residuals(x)
         if self.sketch(x, residuals) is None:
             return told  # much of what they miss would show in differences too
-        wholly = self._one_sided(x, free, residuals, None)
-        there = self._one_sided(x, free, residuals, np.ones(wholly.shape[1], dtype=bool))
-        told[free] = [is_told(w, t) for w, t in zip(wholly.T, there.T, strict=True)]
+        asked = free.copy()
+        if known is not None:
+            told[: known.size] = known
+            asked[: known.size] = False
+        wholly = self._one_sided(x, asked, residuals, None)
+        there = self._one_sided(x, asked, residuals, np.ones(wholly.shape[1], dtype=bool))
+        told[asked] = [is_told(w, t) for w, t in zip(wholly.T, there.T, strict=True)]
         # where few are told, these are hardly to be trusted either
         return told if np.mean(told[free]) > _MOST else np.zeros_like(told)
 
