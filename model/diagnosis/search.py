@@ -418,13 +418,23 @@ class _Search:
 
         Beside a ``leader`` of such a cost, as far as it takes to see that it will not lead.
         """
-        key = frozenset(trial.effects)
-        if self.ended.get(key, 0.0) < _AS_GOOD * leader:
+        return self._all_ended([trial], leader)[0]
+
+    def _all_ended(self, trials: Sequence[Trial], leader: float = math.inf) -> list[Trial]:
+        """Each of ``trials``, of different effects, as ``_ended`` has it: all, or none of them."""
+        keys = [frozenset(t.effects) for t in trials]
+        due = [k for k in zip(keys, trials, strict=True) if self._is_due(k[0], leader)]
+        found = self.bench.together(lambda k: self.bench.ended(k[1], leader), due)
+        for (key, _), trial in zip(due, found, strict=True):
             self.settled.add(key)
-            self.found[key] = self.bench.ended(trial, leader)
+            self.found[key] = trial
             # who has come down to the leader was held back by none
-            self.ended[key] = leader if self.found[key].cost > leader else math.inf
-        return self.found[key]
+            self.ended[key] = leader if trial.cost > leader else math.inf
+        return [self.found[key] for key in keys]
+
+    def _is_due(self, key: frozenset[str], leader: float) -> bool:
+        """Whether a trial was followed down less far than beside a ``leader`` of such a cost."""
+        return self.ended.get(key, 0.0) < _AS_GOOD * leader
 
     def _restarted(self, trial: Trial) -> Trial:
         """``trial`` from a new global search, with what its effects do taken off the records."""
@@ -729,7 +739,8 @@ class _Search:
                 quick = not follows_path(one.trial.model.effects)
                 if rivalling and named and (quick or _is_first_of_family(one.name, names)):
                     rivals.append(one.trial)
-            self.bench.together(self._ended, rivals)
+            for n in range(0, len(rivals), _ABREAST):
+                self._all_ended(rivals[n : n + _ABREAST])
         return self._ranked(best, order)
 
     def _shaken(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
