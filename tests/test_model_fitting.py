@@ -5,7 +5,7 @@ import importlib
 import math
 import time
 from dataclasses import replace
-from threading import Thread
+from threading import Barrier, Event, Thread, current_thread
 
 import numpy as np
 import pytest
@@ -375,7 +375,91 @@ def test_work_that_asks_for_the_same_threads_does_not_wait_for_itself():
     assert done == [[[10 * job + k for k in range(3)] for job in range(4)]]
 
 
-def test_work_is_counted_in_steps_and_in_simulations():
+def test_who_is_one_of_several_at_work_does_its_own():
+    """To hand work over takes as long as some of it: only who is alone asks the others for help."""
+    meet, left = Barrier(2, timeout=20.0), Event()
+
+    def inner(_):
+        return current_thread().name
+
+    def abreast(_):
+        meet.wait()  # both are at work
+        names = together(inner, range(4), 2)
+        meet.wait()
+        return {current_thread().name}, set(names)
+
+    for mine, names in together(abreast, range(2), 2, "fit"):
+        assert names == mine
+
+    def alone(job):
+        if job == 0:
+            return left.set()
+        left.wait(20.0)
+        names: set[str] = set()
+        for _ in range(200):  # the other has said that it leaves, and does so at once
+            names |= set(together(inner, range(4), 2))
+            if not any(n.startswith("fit") for n in names):
+                break
+            names.clear()
+            time.sleep(0.01)
+        return names
+
+    _, helped = together(alone, range(2), 2, "fit")
+    assert helped
+    assert all(n.startswith("simulation") for n in helped)
+
+
+def test_records_of_any_length_are_shared_out_evenly():
+    plain = Actuator(THESIS_FILM, THESIS_LOAD, ONE)
+    short = made(ONE)
+    drive = short.drive
+    long = replace(
+        short,
+        drive=Drive(np.arange(3 * drive.time.size) * 0.01, np.tile(drive.voltage, 3)),
+        displacement=np.tile(short.displacement, 3),
+    )
+    problem = Problem([short, long], Layout(plain), 2, kernel.QUICK)
+    lengths = [r.drive.time.size for r in problem.records]
+    for members in (1, 2, 3, 8):
+        shares = problem._shared_out(np.zeros(members, dtype=bool))
+        jobs = [job for share in shares for job in share]
+        assert sorted(jobs) == [(m, i) for m in range(members) for i in range(2)]
+        loads = [sum(lengths[i] for _, i in share) for share in shares]
+        assert max(loads) - min(loads) <= max(lengths)
+    assert loads[0] == loads[1]
+    # and whoever simulates them, they say the same
+    several = np.tile(problem.layout.initial(), (3, 1)) * np.array([[1.0], [1.1], [0.9]])
+    one_by_one = Problem([short, long], Layout(plain), 1, kernel.QUICK).predict(several)[0]
+    np.testing.assert_array_equal(problem.predict(several)[0], one_by_one)
+
+
+def test_a_film_is_simulated_once_however_it_is_read():
+    record = replace(made(ONE), lag=2e-3, lead_in=50, means_of=2)
+    sensed = (*effect("sensor curvature", quadratic=3.0), *effect("sensor lag", time_constant=0.02))
+    model = Actuator(THESIS_FILM, THESIS_LOAD, ONE, effects=sensed)
+    problem = Problem([record], Layout(model), 1, kernel.QUICK)
+    layout = problem.layout
+    values = np.tile(layout.initial(), (6, 1))
+    values[1, layout.names.index("sensor curvature: quadratic")] = -4.0
+    values[2, layout.names.index("sensor lag: time_constant")] = 0.05
+    values[3, layout.column("mu")[1]] *= 1.02
+    values[4] = values[3]
+    values[4, layout.names.index("sensor lag: time_constant")] = 0.0
+    told = []
+    problem.told = lambda *work: told.append(work)
+    several, status = problem.predict(values)
+    assert (status == kernel.OK).all()
+    assert problem.simulations == told[0][0] == 2
+    for row, reading in zip(values, several, strict=True):
+        np.testing.assert_array_equal(problem.predict(row[None])[0][0], reading)
+    assert len({reading.tobytes() for reading in several}) == 5
+    # what moves the film is simulated for each
+    problem.simulations = 0
+    problem.predict(values[:3] * np.linspace(1.0, 1.1, 3)[:, None])
+    assert problem.simulations == 3
+
+
+def test_work_is_counted_in_steps_and_in_populations():
     record, plain = made(ONE), Actuator(THESIS_FILM, THESIS_LOAD, ONE)
     told = []
 
@@ -386,12 +470,12 @@ def test_work_is_counted_in_steps_and_in_simulations():
 
     simulated, quick = work(plain, kernel.QUICK)
     assert simulated == 1
-    assert work(plain, kernel.QUICK, members=3) == (3, pytest.approx(3.0 * quick))
-    # a careful step takes as long as three; one that follows the path, as fifteen
     steps = record.drive.time.size
+    assert work(plain, kernel.QUICK, members=3) == (3, pytest.approx(quick + 2.0 * steps))
+    # a careful step takes as long as three; one that follows the path, as seven
     assert work(plain, kernel.CAREFUL)[1] - quick == pytest.approx(2.0 * steps)
     dry = (("friction", 50.0), ("presliding", 1e-4), ("damping", 1e-3))
     rubbing = replace(plain, effects=(("dry friction", dry),))
-    assert work(rubbing, kernel.QUICK)[1] - quick == pytest.approx(14.0 * steps)
-    # and each takes something beside its steps
+    assert work(rubbing, kernel.QUICK)[1] - quick == pytest.approx(6.0 * steps)
+    # and a population takes something beside its steps
     assert quick > steps

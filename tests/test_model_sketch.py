@@ -128,6 +128,47 @@ def test_which_numbers_are_told():
     assert not problem.told_by_sketches(x, free).any()
 
 
+def test_what_is_known_is_not_asked_again():
+    slow = with_sketch(record(*SLOW))
+    plain, x, free = posed(PLAIN, slow)
+    springs = plain.told_by_sketches(x, free)
+    problem, x, free = posed(replace(PLAIN, effects=effect("linear drag", drag=300.0)), slow)
+    told = problem.told_by_sketches(x, free)
+    asked = problem.simulations
+    problem.simulations = 0
+    np.testing.assert_array_equal(problem.told_by_sketches(x, free, springs), told)
+    # the place itself three times, and the one number twice
+    assert problem.simulations == 5 < asked
+    # who was not told is not
+    doubted = springs.copy()
+    doubted[0] = False
+    assert not problem.told_by_sketches(x, free, doubted)[0]
+
+
+def test_springs_are_asked_once_for_all_effects_that_leave_a_film_its_turns():
+    two = replace(PLAIN, network=Network.gent((45e3, 60e3, 20e3), (1e4, 1e4, 1e4), (0.4, 3.0)))
+    bench = Bench([record(*SLOW, model=two)], two, workers=1)
+    base = bench.baseline(two, lambda *_: None)
+    asked = []
+
+    def told(effects):
+        model = replace(base.model, effects=effects)
+        layout = bench.problem(model).layout
+        start = layout.coordinates(layout.initial())
+        fixed = np.append(base.fixed, np.zeros(layout.size - base.fixed.size, dtype=bool))
+        before = bench.simulations
+        bench.fit(model, [(start, None)], fixed)
+        asked.append(bench.simulations - before)
+        return bench.problem(model).sketched
+
+    springs = bench.problem(base.model).sketched
+    np.testing.assert_array_equal(springs, ~base.fixed)
+    np.testing.assert_array_equal(told(effect("linear drift", drift=1e-6))[:-1], springs)
+    # one that sticks and slips is asked anew, and no sketch tells it
+    assert not told((typical("easing friction"),)).any()
+    assert asked[0] < asked[1]
+
+
 def test_differences_by_sketches_are_those_of_the_whole():
     model = replace(PLAIN, effects=effect("linear drag", drag=300.0))
     problem, x, free = posed(model, with_sketch(record(*SLOW, model=model)))

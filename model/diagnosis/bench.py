@@ -34,8 +34,6 @@ from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
 __all__ = [
     "FILM_MODEL_ERROR",
-    "MAY_LEAD",
-    "MUCH_LEFT",
     "Bench",
     "Trial",
     "information",
@@ -43,10 +41,6 @@ __all__ = [
     "relieved",
 ]
 
-#: of the noise's mean square: there it matters which effect leads, not yet how far it gets
-MUCH_LEFT = 25.0
-#: of the leader's cost: what has come so near may lead by its last steps
-MAY_LEAD = 6.0
 _RATE = 200.0  # Hz, to which records may be thinned: mains and a load's ringing still show
 _QUIET_MIN = 100  # samples of a lead-in from which a thinned record's noise is read again
 _FILM_SAMPLES = 1500
@@ -339,8 +333,6 @@ class Bench:
         best = min(scouts, key=lambda f: f.cost)
         if best.cost > _ROUGHLY and follows_path(model.effects):
             problem = scouted
-            if leader > MUCH_LEFT and best.cost > MAY_LEAD * leader:
-                return _trial(scouted, best, fixed)  # it takes long, and is for others to lead
 
         def down(trial: Trial) -> Trial:
             behind = max(trial.cost - leader, 0.0) * problem.samples

@@ -11,8 +11,6 @@ import numpy as np
 
 from model.actuator import Actuator
 from model.diagnosis.bench import (
-    MAY_LEAD,
-    MUCH_LEFT,
     Bench,
     Trial,
     Work,
@@ -64,11 +62,13 @@ _BEAM = 2  # how many explanations are followed on
 _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed on
 _SETTLED = 5  # leading candidates that are fitted to the end of their valleys
 _SETTLED_QUICKLY = 12  # that are followed a little, while the leader leaves more than noise
+_MUCH_LEFT = 25.0  # of the noise's mean square: there only one law of a family is followed
 _NEARLY_ALL = 0.95  # of what was above the noise: who explains it may be in a wrong valley of it
 _AS_GOOD = 0.98  # of its cost: who did not come near the one will not come near the other
 _CLOSE = 1.15  # of the leader's cost: so near, and better than nothing, any other is one too
 _NEAR_LEAD = 2.0  # of the leader's cost before that: no branch of these is left without work
 _NEAR_NOISE = 1.5  # of the same, beside a leader that leaves but noise
+_MAY_LEAD = 6.0  # of the leader's cost: what has come so near may lead by its last steps
 _UNNAMED_MARGIN = (
     20.0  # of the criterion, by which an unnamed effect must be better than named ones
 )
@@ -526,7 +526,7 @@ class _Search:
                 # who promises next to nothing beside what explains all is no rival of it
                 least = _HINT * shares[order[0]]
                 order = [n for n in order if shares[n] > least]
-            if order and parent.cost > MUCH_LEFT:
+            if order and parent.cost > _MUCH_LEFT:
                 # so far from the noise it matters which family it is, not yet which law of it
                 refit([n for n in order if _is_first_of_family(n, order)])
                 near = _NEAR_LEAD * min(t.trial.cost for t in tried)
@@ -612,7 +612,7 @@ class _Search:
         anew: list[np.ndarray] = []
         if effect.relaxes and isinstance(model, Actuator):
             anew = self._relieved(parent, promises[0])
-        elif effect.acts_on == "inertia" and parent.cost > MUCH_LEFT:
+        elif effect.acts_on == "inertia" and parent.cost > _MUCH_LEFT:
             anew = self._moving(parent, promises[0])
         fixed = np.concatenate([parent.fixed, np.zeros(len(effect.parameters), dtype=bool)])
         leader = min(t.cost for t in self.found.values())
@@ -695,7 +695,7 @@ class _Search:
             of_parent[beside] += 1
             if place >= follow and not (near and rank(tried) < mark) and not may_lead:
                 continue
-            if lead > MUCH_LEFT and not _is_first_of_family(tried.name, names):
+            if lead > _MUCH_LEFT and not _is_first_of_family(tried.name, names):
                 continue
             worse = rank(tried) - self._criterion(tried.parent, correlation)
             if place and not owing and worse > (_DECISIVE if subtle else 0.0):
@@ -708,7 +708,7 @@ class _Search:
                 self._ended(tried.trial)
             elif may_lead and to_the_end and not leads.is_white:
                 self._ended(tried.trial, lead)
-            elif key not in self.settled and tried.trial.cost < MAY_LEAD * lead:
+            elif key not in self.settled and tried.trial.cost < _MAY_LEAD * lead:
                 self.settled.add(key)
                 self.found[key] = self.bench.settled(tried.trial, lead)
             lead = min(lead, self.found[key].cost)
@@ -756,7 +756,7 @@ class _Search:
             wider = [t for t in tried if _extends(t, lead)]
             law = max([lead, *wider], key=lambda t: _intricacy(t.name))
             key = frozenset(law.trial.effects)
-            far = law.trial.cost > MAY_LEAD * lead.trial.cost
+            far = law.trial.cost > _MAY_LEAD * lead.trial.cost
             if far and key not in self.extended:
                 self.extended.add(key)
                 self._keep(self._extended(law, lead))
@@ -890,7 +890,7 @@ class _Search:
             one = tried[place]
             sizes = EFFECTS[one.name].sizes
             # beside a leader that leaves much, others are looked for beside it next
-            reach = MAY_LEAD if leader.cost > MUCH_LEFT else _OUT_OF_REACH
+            reach = _MAY_LEAD if leader.cost > _MUCH_LEFT else _OUT_OF_REACH
             if len(sizes) != 1 or one.trial.cost > reach * leader.cost:
                 return None
             left, size = self._unaccounted(one, sizes_of(sizes[0], _ANEW_SIZES))
@@ -908,7 +908,7 @@ class _Search:
             most = min(most, _AS_WELL * there)
         again = list(tried)
         names = [tried[place].name for _, place, _ in looks]
-        if leader.cost > MUCH_LEFT:
+        if leader.cost > _MUCH_LEFT:
             looks = [k for k in looks if _is_first_of_family(tried[k[1]].name, names)]
         starts = {
             place: self._sized(tried[place], [f * size for f in _ANEW_FROM])
