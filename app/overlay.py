@@ -95,7 +95,7 @@ class Overlay:
             now = self._warmth.after(scaling.physical(block.counts[self._thermometer]))
             warmth = np.full(time.size, now)
         stretch, speed = np.empty(time.size), np.empty(time.size)
-        status, reached = kernel.drive_by_voltage(
+        status, reached, _ = kernel.drive_by_voltage(
             self._coefficients, time, voltage, voltage, warmth, self._state, stretch, speed
         )
         moved = (stretch - self._rest) * self._length

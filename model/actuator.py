@@ -163,7 +163,7 @@ class Actuator:
         reached = 0
         y = initial_state(c, rest)
         if status == kernel.OK:
-            status, reached = kernel.drive_by_voltage(
+            status, reached, _ = kernel.drive_by_voltage(
                 c, drive.time, drive.voltage, drive.ends, drive.temperature, y, stretch, rate
             )
         displacement, velocity = np.empty_like(stretch), np.empty_like(rate)
@@ -265,7 +265,7 @@ def reading_of(
     At ``times`` (N,) s, those of the drive where none are given. ``lag`` s is the known age of a
     reading, ``haste`` as the kernel has it. What the model did not reach reads 0.
     """
-    readings, status = readings_of(c[None], length, drive, lag, haste, times)
+    readings, status, _ = readings_of(c[None], length, drive, lag, haste, times)
     return readings[0], status
 
 
@@ -276,19 +276,19 @@ def readings_of(
     lag: float = 0.0,
     haste: int = kernel.CAREFUL,
     times: np.ndarray | None = None,
-) -> tuple[np.ndarray, int]:
-    """``(readings, status)`` of coefficient vectors ``cs`` (P, C) of one film: (P, N) m.
+) -> tuple[np.ndarray, int, int]:
+    """``(readings, status, steps)`` of coefficient vectors ``cs`` (P, C) of one film: (P, N) m.
 
-    They differ in ``model.effects.SENSED`` alone: in what the sensor makes of how the film moves.
-    The rest is as in ``reading_of``.
+    They differ in ``model.effects.SENSED`` alone: in what the sensor makes of how the film moves,
+    which took so many ``steps``. The rest is as in ``reading_of``.
     """
     times = drive.time if times is None else times
     c = cs[0].copy()
-    readings = np.zeros((len(cs), times.size))
+    readings, steps = np.zeros((len(cs), times.size)), 0
     status, rest = at_rest(c)
     if status == kernel.OK:
         x, u = np.zeros(drive.time.size), np.zeros(drive.time.size)
-        status, _ = kernel.drive_by_voltage(
+        status, _, steps = kernel.drive_by_voltage(
             c, drive.time, drive.voltage, drive.ends, drive.temperature,
             initial_state(c, rest), x, u, haste,
         )  # fmt: skip
@@ -300,4 +300,4 @@ def readings_of(
         readings[1:] = readings[0]
         for one, reading in zip(cs, readings, strict=True):
             kernel.read_sensor(one, times, reading, speed, np.zeros(SENSOR_MEMORY))
-    return readings, status
+    return readings, status, steps

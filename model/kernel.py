@@ -109,6 +109,7 @@ _K, _D, _W, _H, _KIND, _FADING = 30, 31, 32, 33, 34, 35  # where those that it f
 _RODAS_TOLERANCE = 5e-9  # in stretch, a step: 0.4 nm on 75 mm
 _RODAS_STEP_MAX = 2e-2  # s; the error estimate rules below that
 _RODAS_HALVINGS = 2.0**-17
+_RODAS_WORTH = 10  # explicit steps that a sample by it takes as long as, at least
 
 _inertia, _supply, _polarise = assembly.inertia, assembly.supply, assembly.polarise
 _permittivity, _soften, _stress = assembly.permittivity, assembly.soften, assembly.stress
@@ -1055,7 +1056,7 @@ def drive_by_voltage(
     stretch: np.ndarray,
     rate: np.ndarray,
     haste: int = CAREFUL,
-) -> tuple[int, int]:
+) -> tuple[int, int, int]:
     """Carry state ``y`` (2 + n + MEMORY,) along a record; fill ``stretch`` and ``rate`` (N,).
 
     ``time`` s and ``voltage`` V are (N,), increasing and not necessarily even. From each sample to
@@ -1066,8 +1067,9 @@ def drive_by_voltage(
     given, so a record can be cut and continued. ``c`` must know the stretch at rest
     (``model.actuator.at_rest``).
 
-    Returns ``(status, reached)``: on any status but ``OK`` the samples from ``reached`` on are
-    filled with the last stretch that was reached, never with NaN.
+    Returns ``(status, reached, steps)``: on any status but ``OK`` the samples from ``reached`` on
+    are filled with the last stretch that was reached, never with NaN; ``steps`` were taken, one
+    sample by the stiff method counted for as many as take as long.
     """
     samples = time.shape[0]
     held, uniform = int(c[HELD]), int(c[UNIFORM])
@@ -1100,7 +1102,7 @@ def drive_by_voltage(
     room, swings = np.empty((7, 3, 3)), np.zeros((_COURSES, _SWING))
     course, stiffness_step = swings[0], 0.0
     status = OK
-    reached = samples
+    reached, taken = samples, 0
     h = _RODAS_STEP_MAX
     springy, swing, bound, steps, step_before, gentle = 0.0, 0.0, 0.0, 1, 0.0, True
     kick_gain, ring_gain, fading, per_phase2 = 0.0, 0.0, 1.0, 1.0
@@ -1201,6 +1203,7 @@ def drive_by_voltage(
                 acting if moves else 0, c, table, branches, course, y, v0, v1, time[k], theta,
                 h_fine, fine, max(fine // looks, 1), trace,
             )  # fmt: skip
+            taken += fine
             ring = max(ring * fading, trace[2] * per_phase2 - forced)
         elif explicit:
             refine, forced = _refined(
@@ -1208,6 +1211,7 @@ def drive_by_voltage(
             )
             fine = steps * refine
             h_fine = dt / fine
+            taken += fine
             if moves:
                 _effect_steps(
                     acting, c, springs, y, v0, v1, time[k], theta, h_fine, fine, refine, work, trace
@@ -1232,6 +1236,7 @@ def drive_by_voltage(
         last, last_begin, dt_before = v1, v0, dt
         if not explicit:
             fresh = True
+            taken += _RODAS_WORTH
             if moves:
                 status = NOT_CONVERGED
             else:
@@ -1243,7 +1248,7 @@ def drive_by_voltage(
         for k in range(reached, samples):
             stretch[k] = stretch[reached - 1]
             rate[k] = 0.0
-    return status, reached
+    return status, reached, taken
 
 
 @jit

@@ -53,7 +53,7 @@ class ModelPlant:
         after = self
         if not self.failed:
             state = self.state.copy()
-            status, reached = kernel.drive_by_voltage(
+            status, reached, _ = kernel.drive_by_voltage(
                 self.coefficients, time, voltage, ends_of(voltage, hold), np.zeros(0),
                 state, stretch, rate,
             )  # fmt: skip

@@ -548,7 +548,7 @@ def test_a_run_in_two_pieces_is_the_run(name):
         for part in (slice(0, cut + 1), slice(cut, drive.time.size)):
             time = drive.time[part]
             stretch, rate = np.zeros(time.size), np.zeros(time.size)
-            status, _ = kernel.drive_by_voltage(
+            status, _, _ = kernel.drive_by_voltage(
                 c, time, drive.voltage[part], drive.ends[part], drive.temperature[part],
                 y, stretch, rate,
             )  # fmt: skip

@@ -247,7 +247,7 @@ def test_a_record_cut_into_blocks_is_the_record(drive, hold):
     for start in range(0, time.size - 1, 37):
         part = slice(start, min(start + 38, time.size))
         stretch, rate = np.zeros(time[part].size), np.zeros(time[part].size)
-        status, _ = kernel.drive_by_voltage(
+        status, _, _ = kernel.drive_by_voltage(
             c,
             time[part],
             voltage[part],

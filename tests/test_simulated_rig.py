@@ -71,7 +71,7 @@ def expected_displacement(voltage, rate, shift):
     c = actuator.coefficients()
     _, rest = at_rest(c)
     stretch, speed = np.empty(time.size), np.empty(time.size)
-    status, _ = kernel.drive_by_voltage(
+    status, _, _ = kernel.drive_by_voltage(
         c, time, at_time, at_time, np.zeros(0), initial_state(c, rest), stretch, speed
     )
     assert status == kernel.OK

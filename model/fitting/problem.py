@@ -9,9 +9,9 @@ import numpy as np
 
 from model import kernel
 from model.actuator import Actuator, readings_of
-from model.effects import EFFECTS, SENSED, follows_path
+from model.effects import EFFECTS, SENSED
 from model.errors import ModelError
-from model.film import stress_of
+from model.film import Strip, stress_of
 from model.fitting.parameters import Layout
 from model.fitting.threads import together
 from model.records import ActuatorRecord, FilmRecord, Record
@@ -21,10 +21,8 @@ __all__ = ["Problem", "is_told"]
 _SAME = 1.0  # of the noise: a sketch that is further from the whole is none
 _MOST = 0.6  # of the numbers
 _ALIKE = 0.15  # of what a number does: as near must a sketch tell it
-# quick steps that a step takes as long as, by haste: careful, quick, rough
-_OF_MOTION = (3.0, 1.0, 1.0)
-_OF_PATH = (7.0, 7.0, 3.5)  # where a force follows the path
-_OF_FILM = 6.0  # a sample of a film
+_OF_STRIP = 6.0  # steps of an actuator that a sample of a strip takes as long as
+_OF_EFFECT = 0.8  # of a step, that each effect takes which moves the film
 _OF_ANY = 1.5e4  # a population beside its steps: to hand it over, and what a fit makes of it
 
 
@@ -97,20 +95,21 @@ class Problem:
 
         films = self._films(c, by_sketch)
         which = by_sketch[[members[0] for members in films]]
+        steps = np.zeros((which.size, len(self.records)))
 
         def run(jobs: list[tuple[int, int]]) -> None:
             # some in one go: to hand them over one by one would take a part of the time
             for film, i in jobs:
                 members = films[film]
                 part = slice(self._edges[i], self._edges[i + 1])
-                out[members, part], status[members, i] = self._readings(
+                out[members, part], status[members, i], steps[film, i] = self._readings(
                     c[members], self.records[i], bool(which[film])
                 )
 
         together(run, self._shared_out(which), self.workers)
         self.simulations += which.size * len(self.records)
         if self.told is not None:
-            self.told(which.size * len(self.records), self._effort(which))
+            self.told(which.size * len(self.records), self._effort(float(steps.sum())))
         if self._missed is not None:
             out += self._missed
         # of several records the first that fails speaks
@@ -151,37 +150,31 @@ class Problem:
             return float(record.time.size), float(record.time.size)
         return float(record.time.size), float(record.sketch.time.size)
 
-    def _effort(self, by_sketch: np.ndarray) -> float:
-        """What it takes to simulate films of which some are ``by_sketch`` (P,), in quick steps.
+    def _effort(self, steps: float) -> float:
+        """What it takes to simulate a population in so many ``steps``, in those of a bare film.
 
         As steps go, not seconds: the same on any machine, however busy.
         """
-        turning = follows_path(self.layout.base.effects)
-        worth = _OF_PATH if turning else _OF_MOTION
-        whole, sketches = 0.0, 0.0
-        for record in self.records:
-            steps, fewer = self._steps(record)
-            if isinstance(record, FilmRecord):
-                whole += _OF_FILM * steps
-                sketches += _OF_FILM * fewer
-                continue
-            whole += worth[min(self.haste, kernel.ROUGH)] * steps
-            sketches += worth[kernel.ROUGH] * fewer
-        few = int(np.count_nonzero(by_sketch))
-        return _OF_ANY + few * sketches + (by_sketch.size - few) * whole
+        base = self.layout.base
+        if isinstance(base, Strip):
+            return _OF_ANY + _OF_STRIP * steps
+        moving = sum(EFFECTS[name].acts_on != "sensor" for name, _ in base.effects)
+        return _OF_ANY + (1.0 + _OF_EFFECT * moving) * steps
 
-    def _readings(self, c: np.ndarray, record: Record, sketched: bool) -> tuple[np.ndarray, int]:
-        """Readings (M, N) of members ``c`` (M, C) whose films move alike."""
+    def _readings(
+        self, c: np.ndarray, record: Record, sketched: bool
+    ) -> tuple[np.ndarray, int, int]:
+        """Readings (M, N) of members ``c`` (M, C) whose films move alike; status and steps."""
         if isinstance(record, FilmRecord):
             stress, status, _ = stress_of(c[0], record.time, record.stretch)
-            return stress[None], status
+            return stress[None], status, record.time.size
         base = self.layout.base
         length = base.film.length if isinstance(base, Actuator) else 1.0
         drive, haste = record.drive, self.haste
         if sketched and record.sketch is not None:
             drive, haste = record.sketch, kernel.SKETCHED
-        moved, status = readings_of(c, length, drive, record.lag, haste, record.time)
-        return record.seen(moved), status
+        moved, status, steps = readings_of(c, length, drive, record.lag, haste, record.time)
+        return record.seen(moved), status, steps
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """(model - measured)/noise, (N,), at coordinates ``x`` (d,)."""
