@@ -12,13 +12,7 @@ import pytest
 
 from model import kernel
 from model.actuator import Drive
-from model.diagnosis.bench import (
-    FILM_MODEL_ERROR,
-    Bench,
-    information,
-    merged,
-    relieved,
-)
+from model.diagnosis.bench import FILM_MODEL_ERROR, Bench, information, merged, relieved
 from model.diagnosis.screening import Screen
 from model.effects import EFFECTS
 from model.excitation import Chirp, Ramp, Sequence

@@ -32,14 +32,7 @@ from model.fitting.thinning import thinned
 from model.fitting.threads import Job, Result, together
 from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
-__all__ = [
-    "FILM_MODEL_ERROR",
-    "Bench",
-    "Trial",
-    "information",
-    "merged",
-    "relieved",
-]
+__all__ = ["FILM_MODEL_ERROR", "Bench", "Trial", "information", "merged", "relieved"]
 
 _RATE = 200.0  # Hz, to which records may be thinned: mains and a load's ringing still show
 _QUIET_MIN = 100  # samples of a lead-in from which a thinned record's noise is read again

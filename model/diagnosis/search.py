@@ -10,14 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from model.actuator import Actuator
-from model.diagnosis.bench import (
-    Bench,
-    Trial,
-    Work,
-    information,
-    merged,
-    relieved,
-)
+from model.diagnosis.bench import Bench, Trial, Work, information, merged, relieved
 from model.diagnosis.findings import (
     EXPLAINED,
     NOTHING_MISSING,
@@ -41,7 +34,7 @@ __all__ = ["diagnose"]
 
 Progress = Callable[[str, float], None]
 
-# steps of simulations that a search may take: some forty seconds of two cores
+# steps of simulations that a search may take: some forty-five seconds of two cores
 _EFFORT = 3.2e8
 _TO_PRUNE = 0.1  # of that: what a search that is ended may take to leave out what is needless
 _EFFECTS_MAX = 3  # more at once no record of this kind tells apart

@@ -107,9 +107,9 @@ class Problem:
                 )
 
         together(run, self._shared_out(which), self.workers)
-        self.simulations += which.size * len(self.records)
+        self.simulations += steps.size
         if self.told is not None:
-            self.told(which.size * len(self.records), self._effort(float(steps.sum())))
+            self.told(steps.size, self._effort(float(steps.sum())))
         if self._missed is not None:
             out += self._missed
         # of several records the first that fails speaks
