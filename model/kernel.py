@@ -94,14 +94,21 @@ _LEAN_SUBSTEPS_MAX = 4  # the same for the quicker form
 # in the longest step; with effects there is no other method, and what is stiffer than that, such as
 # friction that builds up within a nanometre, is given up: no record could tell it apart
 _EFFECT_SUBSTEPS_MAX = 25
-# change of a drag over a step, as a phase: that part is not in closed form
-_GROWN, _GROWN_QUICK = 1.0, 6.0
+# Change of a drag over a step, as a phase: that part is not in closed form. The fourth root less
+# where the film moves further than this stretch until the drag takes it up, or in a sample.
+_GROWN = 20.0
+_NEAR, _NEAR_QUICK = 1e-8, 5e-7
+_GROWN_LEAST = 1.0
+_TAKEN_UP = 3.0  # times that in which a drag alone would slow the film to 1/e
+_FORESEEN = 1.5  # of that change, if more was met on the way, is still let pass
 _RINGING = 1e-4  # in stretch, from which on steps must see it: 7.5 um on 75 mm
 _CALM = 2e-5  # in stretch, up to which what softens on the way need not see it
 _STEEP = 0.05  # of the stiffness: what softens by so much where the film is must be seen anyway
 # numbers in closed form need not be quite the film's own: what they lack is integrated
 _STIFFNESS_NEAR = 0.005
 _DRAG_NEAR = 0.2
+# between the least drag of a sample and the most, where closed forms of it are the most accurate
+_DRAG_HIGH = 0.7
 _DRAG_MIN = 1e-2  # 1/s; less is none
 _COURSES = 256  # of these forms that are kept
 _SWING = 40  # numbers that say how the film goes on
@@ -260,6 +267,13 @@ def _drag(acting: int, c: np.ndarray, y: np.ndarray, rate: float) -> float:
     """Drag of the effects over the inertia, 1/s, at a rate of stretch."""
     _, drag = _stiffness(acting, c, y[2 + branch_count(c) :], y[0], rate)
     return drag / c[INERTIA]
+
+
+@inlined
+def _growth_allowed(moved: float, hasty: bool) -> float:
+    """How much a drag may change in a step, as a phase, where the film is so far ``moved``."""
+    near = _NEAR_QUICK if hasty else _NEAR
+    return max(_GROWN * math.sqrt(math.sqrt(near / max(moved, near))), _GROWN_LEAST)
 
 
 @jit
@@ -719,7 +733,8 @@ def _lean_steps(
     one does that fades as they do in the mean; by what each differs it goes as in classical
     Runge-Kutta, which is the same method for what has no linear part. Nothing leaves the registers
     on the way. ``table`` is ``_lean_table``'s, ``branches`` is ``_speeds``'s, ``swing`` is
-    ``_swings``'s. Where effects are ``acting`` it does what ``_effect_steps`` does.
+    ``_swings``'s. Where effects are ``acting`` it does what ``_effect_steps`` does. ``trace`` is
+    ``_rk4_steps``'s, and then the least and the greatest speed that were met.
     """
     n = y.shape[0] - 2 - MEMORY
     memory = y[2 + n :]
@@ -749,6 +764,7 @@ def _lean_steps(
     half, sixth = 0.5 * h, h / 6.0
     dv = (v1 - v0) / steps
     last, last_but_one, bend = trace[0], trace[1], 0.0
+    slow = fast = abs(speed)
     for m in range(steps):
         va = v0 + dv * m
         vm, vb = va + 0.5 * dv, va + dv
@@ -872,6 +888,7 @@ def _lean_steps(
         went = z - fades * seen
         lam += sum_z + c1 * push
         speed = sum_v + c2 * push
+        slow, fast = min(slow, abs(speed)), max(fast, abs(speed))
         gave = sum_seen + c3 * push - before
         if acting & _COMMIT:
             _commit(acting, c, memory, lam, speed, lam0, h, t)
@@ -879,6 +896,7 @@ def _lean_steps(
         x2 += sixth * (sum_2 + r2 * t2 - s2 * went - f2 * left) + s2 * gave + f2 * gone
         x3 += sixth * (sum_3 + r3 * t3 - s3 * went - f3 * left) + s3 * gave + f3 * gone
     trace[0], trace[1], trace[2] = last, last_but_one, bend
+    trace[3], trace[4] = slow, fast
     y[0], y[1] = lam, speed
     if n > 0:
         y[2] = x1
@@ -1097,7 +1115,7 @@ def drive_by_voltage(
         longest = _SKETCH_STEP_MAX if haste == SKETCHED else _QUICK_STEP_MAX
     work = np.zeros((15, y.shape[0]))
     before = np.empty(y.shape[0])
-    trace = np.zeros(3)
+    trace = np.zeros(5)
     branches = np.zeros((2, max(springs.shape[1] - 1, 3)))
     room, swings = np.empty((7, 3, 3)), np.zeros((_COURSES, _SWING))
     course, stiffness_step = swings[0], 0.0
@@ -1178,32 +1196,53 @@ def drive_by_voltage(
             elif haste != SKETCHED and max(ring * fading, abs(kick)) > _RINGING * springy:
                 finer = swing * dt / phase_max
                 fine = max(fine, math.ceil(min(finer - 1e-6, _EFFECT_SUBSTEPS_MAX)))
+            slow = fast = abs(y[1])
             if drags:
-                # a drag may change with the rate: where it does within the sample, in finer steps
-                change = abs(y[1] - rate_before) + abs(kick) * dt
-                most_drag = _drag(acting, c, y, abs(y[1]) + change)
-                least_drag = _drag(acting, c, y, max(abs(y[1]) - change, 0.0))
-                drag = 0.5 * (most_drag + least_drag)
-                growth = (most_drag - least_drag) * dt
-                growth /= _GROWN_QUICK if hasty else _GROWN
-                fine = max(fine, math.ceil(min(growth, 4 * _EFFECT_SUBSTEPS_MAX)))
+                # a kick cannot carry the film on faster than springs let it swing
+                change = abs(y[1] - rate_before) + abs(kick) * min(dt, 1.0 / swing)
+                slow, fast = max(slow - change, 0.0), fast + change
                 rate_before = y[1]
-            h_fine = dt / fine
+                seen, seen_before = trace[0], trace[1]
             # a film that the field pulls on is softer by that
             pulling2 = 0.5 * (v0 * v0 + v1 * v1)
-            stiff = springy - c[ELECTRIC] * pulling2 / c[INERTIA]
-            kind = _kind_of_drag(drag)
-            if not _fits(course, stiff, 0.5 * stiffness_step, kind, h_fine):
-                level = max(math.floor(stiff / stiffness_step), 1.0)
-                stiff = (level + 0.5) * stiffness_step
-                course = swings[(int(level) + 37 * fine + 101 * kind) % _COURSES]
-                if not _fits(course, stiff, 0.0, kind, h_fine):
-                    _swings(stiff, drag, branches, h_fine, room, course)
-            _lean_steps(
-                acting if moves else 0, c, table, branches, course, y, v0, v1, time[k], theta,
-                h_fine, fine, max(fine // looks, 1), trace,
-            )  # fmt: skip
-            taken += fine
+            softer = springy - c[ELECTRIC] * pulling2 / c[INERTIA]
+            while True:
+                if drags:
+                    # a drag may change with the rate: then in finer steps
+                    most_drag = _drag(acting, c, before, fast)
+                    least_drag = _drag(acting, c, before, slow)
+                    drag = _DRAG_HIGH * most_drag + (1.0 - _DRAG_HIGH) * least_drag
+                    growth = (most_drag - least_drag) * dt
+                    growth /= _growth_allowed(fast * min(dt, _TAKEN_UP / most_drag), hasty)
+                    fine = max(fine, math.ceil(min(growth, 4 * _EFFECT_SUBSTEPS_MAX)))
+                h_fine, stiff = dt / fine, softer
+                kind = _kind_of_drag(drag)
+                if not _fits(course, stiff, 0.5 * stiffness_step, kind, h_fine):
+                    level = max(math.floor(stiff / stiffness_step), 1.0)
+                    stiff = (level + 0.5) * stiffness_step
+                    course = swings[(int(level) + 37 * fine + 101 * kind) % _COURSES]
+                    if not _fits(course, stiff, 0.0, kind, h_fine):
+                        _swings(stiff, drag, branches, h_fine, room, course)
+                _lean_steps(
+                    acting if moves else 0, c, table, branches, course, y, v0, v1, time[k], theta,
+                    h_fine, fine, max(fine // looks, 1), trace,
+                )  # fmt: skip
+                taken += fine
+                if not drags or fine >= 4 * _EFFECT_SUBSTEPS_MAX:
+                    break
+                # it was faster on the way, or slower, than was foreseen
+                slow, fast = trace[3], trace[4]
+                most_drag = _drag(acting, c, before, fast)
+                growth = (most_drag - _drag(acting, c, before, slow)) * h_fine
+                growth /= _growth_allowed(fast * min(dt, _TAKEN_UP / most_drag), hasty)
+                if growth <= _FORESEEN:
+                    break
+                fine += 1
+                if not math.isfinite(growth):
+                    slow, fast, fine = 0.0, 0.0, 4 * _EFFECT_SUBSTEPS_MAX
+                trace[0], trace[1] = seen, seen_before
+                for j in range(y.shape[0]):
+                    y[j] = before[j]
             ring = max(ring * fading, trace[2] * per_phase2 - forced)
         elif explicit:
             refine, forced = _refined(

@@ -290,11 +290,14 @@ def test_a_short_read_says_how_short_it_is_and_loses_nothing():
 
 def test_a_late_reply_comes_in_the_end():
     link = HandClock()
-    with running("late-reply@0.3+2.0", link=link) as (_, __, ai):
+    with running("late-reply@0.3+2.0", link=link) as (card, _, ai):
         read(ai, 299)
         pending = in_thread(lambda: read(ai, 10))
         link.until_somebody_waits()
-        link.advance(2.0)
+        link.advance(1.5)
+        card.server.clients.check()
+        assert high(card.device)  # who waits for a reply is not silent
+        link.advance(0.5)
         assert pending().shape == (3, 10)
         assert read(ai, 10).shape == (3, 10)
 

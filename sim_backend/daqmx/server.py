@@ -164,11 +164,11 @@ class _Way(grpc.ServerInterceptor):
             try:
                 with watched:
                     response = call(request, context)
+                    self._delay()  # of a late reply the client knows that it waits for it
             except DaqmxError as error:
                 self._freeze()
                 refuse(context, error)
             self._freeze()
-            self._delay()
             return response
 
         return answer
