@@ -94,6 +94,7 @@ _LEAN_SUBSTEPS_MAX = 4  # the same for the quicker form
 # in the longest step; with effects there is no other method, and what is stiffer than that, such as
 # friction that builds up within a nanometre, is given up: no record could tell it apart
 _EFFECT_SUBSTEPS_MAX = 25
+_DRAG_SUBSTEPS_MAX = 4 * _EFFECT_SUBSTEPS_MAX
 # Change of a drag over a step, as a phase: that part is not in closed form. The fourth root less
 # where the film moves further than this stretch until the drag takes it up, or in a sample.
 _GROWN = 20.0
@@ -270,10 +271,18 @@ def _drag(acting: int, c: np.ndarray, y: np.ndarray, rate: float) -> float:
 
 
 @inlined
-def _growth_allowed(moved: float, hasty: bool) -> float:
-    """How much a drag may change in a step, as a phase, where the film is so far ``moved``."""
+def _drag_between(
+    acting: int, c: np.ndarray, y: np.ndarray, slow: float, fast: float, dt: float, hasty: bool
+) -> tuple[float, float]:
+    """Drag for the closed form, 1/s, at rates from ``slow`` to ``fast``, and what else it takes.
+
+    That is how many steps a sample of ``dt`` s asks for, of what a drag changes between them.
+    """
+    most, least = _drag(acting, c, y, fast), _drag(acting, c, y, slow)
     near = _NEAR_QUICK if hasty else _NEAR
-    return max(_GROWN * math.sqrt(math.sqrt(near / max(moved, near))), _GROWN_LEAST)
+    moved = max(fast * min(dt, _TAKEN_UP / most), near)
+    allowed = max(_GROWN * math.sqrt(math.sqrt(near / moved)), _GROWN_LEAST)
+    return _DRAG_HIGH * most + (1.0 - _DRAG_HIGH) * least, (most - least) * dt / allowed
 
 
 @jit
@@ -1196,25 +1205,20 @@ def drive_by_voltage(
             elif haste != SKETCHED and max(ring * fading, abs(kick)) > _RINGING * springy:
                 finer = swing * dt / phase_max
                 fine = max(fine, math.ceil(min(finer - 1e-6, _EFFECT_SUBSTEPS_MAX)))
-            slow = fast = abs(y[1])
+            asked = 0.0
             if drags:
                 # a kick cannot carry the film on faster than springs let it swing
                 change = abs(y[1] - rate_before) + abs(kick) * min(dt, 1.0 / swing)
-                slow, fast = max(slow - change, 0.0), fast + change
+                slow, fast = max(abs(y[1]) - change, 0.0), abs(y[1]) + change
+                drag, asked = _drag_between(acting, c, before, slow, fast, dt, hasty)
                 rate_before = y[1]
                 seen, seen_before = trace[0], trace[1]
             # a film that the field pulls on is softer by that
             pulling2 = 0.5 * (v0 * v0 + v1 * v1)
             softer = springy - c[ELECTRIC] * pulling2 / c[INERTIA]
             while True:
-                if drags:
-                    # a drag may change with the rate: then in finer steps
-                    most_drag = _drag(acting, c, before, fast)
-                    least_drag = _drag(acting, c, before, slow)
-                    drag = _DRAG_HIGH * most_drag + (1.0 - _DRAG_HIGH) * least_drag
-                    growth = (most_drag - least_drag) * dt
-                    growth /= _growth_allowed(fast * min(dt, _TAKEN_UP / most_drag), hasty)
-                    fine = max(fine, math.ceil(min(growth, 4 * _EFFECT_SUBSTEPS_MAX)))
+                # a drag may change with the rate: then in finer steps
+                fine = max(fine, math.ceil(min(asked, _DRAG_SUBSTEPS_MAX)))
                 h_fine, stiff = dt / fine, softer
                 kind = _kind_of_drag(drag)
                 if not _fits(course, stiff, 0.5 * stiffness_step, kind, h_fine):
@@ -1228,18 +1232,15 @@ def drive_by_voltage(
                     h_fine, fine, max(fine // looks, 1), trace,
                 )  # fmt: skip
                 taken += fine
-                if not drags or fine >= 4 * _EFFECT_SUBSTEPS_MAX:
+                if not drags or fine >= _DRAG_SUBSTEPS_MAX:
                     break
                 # it was faster on the way, or slower, than was foreseen
-                slow, fast = trace[3], trace[4]
-                most_drag = _drag(acting, c, before, fast)
-                growth = (most_drag - _drag(acting, c, before, slow)) * h_fine
-                growth /= _growth_allowed(fast * min(dt, _TAKEN_UP / most_drag), hasty)
-                if growth <= _FORESEEN:
+                met, asked = _drag_between(acting, c, before, trace[3], trace[4], dt, hasty)
+                if asked <= _FORESEEN * fine:
                     break
-                fine += 1
-                if not math.isfinite(growth):
-                    slow, fast, fine = 0.0, 0.0, 4 * _EFFECT_SUBSTEPS_MAX
+                drag, fine = met, fine + 1
+                if not math.isfinite(asked):
+                    drag, asked, fine = _drag(acting, c, before, 0.0), 0.0, _DRAG_SUBSTEPS_MAX
                 trace[0], trace[1] = seen, seen_before
                 for j in range(y.shape[0]):
                     y[j] = before[j]
