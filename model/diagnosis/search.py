@@ -35,7 +35,7 @@ __all__ = ["diagnose"]
 Progress = Callable[[str, float], None]
 
 # steps of simulations that a search may take: some forty-five seconds of two cores
-_EFFORT = 3.2e8
+_EFFORT = 3.0e8
 _TO_PRUNE = 0.1  # of that: what a search that is ended may take to leave out what is needless
 _EFFECTS_MAX = 3  # more at once no record of this kind tells apart
 _TURNS = 3  # of searching on and pruning: what is pruned makes room
