@@ -24,6 +24,7 @@ from drivers.settings import CardSettings
 from model.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY
 from tests.command import (
     LOBE,
+    SHORT_PRESETS,
     SLOW_RIG,
     Answer,
     dearig,
@@ -475,9 +476,10 @@ def test_measured_film_data(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_demo_does_the_main_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # a slow clock leaves everything else as it is, and the test short
+    # a slow clock and one period of each lobe leave everything else as it is, and the test short
     slow = RigFile(card=CardSettings(sample_rate_Hz=100.0))
     monkeypatch.setattr("app.demo.RigFile", lambda: slow)
+    monkeypatch.setattr("app.sequencefile.PRESETS", SHORT_PRESETS)
     folder = tmp_path / "demo"
     found = done("demo", "--out", folder, "--json", "-").json
     assert found["format"] == "dearig-demo/1"

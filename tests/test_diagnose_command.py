@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from model.diagnosis.findings import Diagnosis
 from model.film import Strip
 from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Network, Spring
 from tests.command import (
+    SHORT_PRESETS,
     dearig,
     done,
     film_csv,
@@ -36,6 +37,13 @@ from tests.test_report_page import check
 RIG = "[card]\nsample_rate_Hz = 100.0\n"
 #: What the simulated rig of these tests hides.
 HIDDEN = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, (("amplifier offset", (("offset", 60.0),)),))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _short_thesis() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("app.sequencefile.PRESETS", SHORT_PRESETS)
+        yield
 
 
 @pytest.fixture(scope="module")

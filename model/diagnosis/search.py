@@ -36,7 +36,7 @@ Progress = Callable[[str, float], None]
 
 # steps of simulations that a search may take: some forty-five seconds of two cores
 _EFFORT = 3.0e8
-_TO_PRUNE = 0.1  # of that: what a search that is ended may take to leave out what is needless
+_AT_LAST = 0.1  # of that: what one that is ended may take to prune, and to tell laws apart
 _EFFECTS_MAX = 3  # more at once no record of this kind tells apart
 _TURNS = 3  # of searching on and pruning: what is pruned makes room
 _EXCHANGES = 3  # of one effect for another, when more than one is there
@@ -62,6 +62,8 @@ _CLOSE = 1.15  # of the leader's cost: so near, and better than nothing, any oth
 _NEAR_LEAD = 2.0  # of the leader's cost before that: no branch of these is left without work
 _NEAR_NOISE = 1.5  # of the same, beside a leader that leaves but noise
 _MAY_LEAD = 6.0  # of the leader's cost: what has come so near may lead by its last steps
+_NEAR_LAW = 100.0  # of chi-square: what lies so near may come to lead by its very last steps
+_NEAR_RIVAL = 30.0  # of the same, of another family
 _UNNAMED_MARGIN = (
     20.0  # of the criterion, by which an unnamed effect must be better than named ones
 )
@@ -166,6 +168,7 @@ class _Search:
         self.found: dict[frozenset[str], Trial] = {}
         self.settled: set[frozenset[str]] = set()
         self.ended: dict[frozenset[str], float] = {}  # beside a leader of which cost
+        self.last: dict[frozenset[str], Trial] = {}  # those that were fitted to the last
         self.screened: dict[frozenset[str], tuple[Screen, dict[str, list[Promise]]]] = {}
         self.refitted: set[tuple[frozenset[str], str]] = set()  # on top of what, and which
         self.left_out: set[tuple[frozenset[str], str]] = set()
@@ -202,20 +205,24 @@ class _Search:
     def _within_effort(self, baseline: Trial) -> Trial:
         """What ``baseline`` lacks, as far as the search gets with the work that it may take.
 
-        Where it is ended, what is needless in what it has found may still be sought.
+        Where it is ended, what is needless in what it has found may still be sought, and by which
+        law of its family each effect follows.
         """
         try:
-            return self._retimed(self._explained(baseline))
+            best = self._in_own_laws(self._explained(baseline))
+            return self._retimed(self._among_rivals(best))
         except _Enough:
             self.ran_out = True
             # fits side by side may have gone a little further: as much is left, however far
             self.work.effort = self.most
-            self.most *= 1.0 + _TO_PRUNE
+            self.most *= 1.0 + _AT_LAST
         best = self._leading()
-        try:
-            return self._pruned(best)
-        except _Enough:
-            return best
+        for step in (self._pruned, self._in_own_laws, self._among_rivals):
+            try:
+                best = step(best)
+            except _Enough:
+                break
+        return best
 
     def _explained(self, best: Trial) -> Trial:
         """``best`` with what it lacks, and without what it does not need.
@@ -265,6 +272,54 @@ class _Search:
             if frozenset(best.effects) == frozenset(before.effects):
                 break
         return best
+
+    def _in_own_laws(self, best: Trial) -> Trial:
+        """``best``, each effect by that law of its family which explains most at the very end.
+
+        Where several leave but noise, some ten of chi-square tell which it is, and with it what
+        other recordings will show: no quick descent is so sure of its end. Of a film no model is
+        asked to be so good.
+        """
+        for name in best.effects if best.is_noise and best.is_of_actuator else ():
+            best = self._told_from(best, name, _NEAR_LAW, EFFECTS[name].family)
+        return best
+
+    def _among_rivals(self, best: Trial) -> Trial:
+        """The same of what else has come near, of any family."""
+        for name in best.effects if best.is_noise and best.is_of_actuator else ():
+            best = self._told_from(best, name, _NEAR_RIVAL)
+        return best
+
+    def _told_from(self, best: Trial, name: str, near: float, family: str = "") -> Trial:
+        """``best``, or with another effect in the place of one, of those that lie so ``near``.
+
+        In chi-square; with a ``family``, only effects of that one.
+        """
+        rest = [n for n in best.effects if n != name]
+        names = [e.name for e in self.effects if family in ("", e.family)]
+        keys = {n: frozenset((*rest, n)) for n in names if n not in rest}
+        most = best.cost + near * best.correlation / self.bench.samples
+        laws = [n for n, k in keys.items() if k in self.found and self.found[k].cost < most]
+        due = [n for n in laws if self.last.get(keys[n]) is not self.found[keys[n]]]
+        if len(laws) < 2 or not due:
+            return best
+        for some in _abreast(due):
+            trials = self.bench.together(
+                lambda n: self.bench.to_the_last(self.found[keys[n]]), some
+            )
+            for n, trial in zip(some, trials, strict=True):
+                self._keep(trial)
+                self.last[keys[n]] = self.found[keys[n]]
+        parent = self._without(best, name)
+        _, promises = self.screened.get(frozenset(rest), (None, {}))
+        tried = []
+        for n in laws:
+            shares = [p.share for p in promises.get(n, [])]
+            tried.append(_Tried(n, parent, self.found[keys[n]], max(shares, default=0.0)))
+        fitted, correlation = self._ranked(best, tried)
+        if fitted[0].name != name:
+            self._record(fitted, correlation, fitted[0], "fitted to the last explains more")
+        return fitted[0].trial
 
     def _replaced(self, best: Trial, span: tuple[float, float], laws: bool = False) -> Trial:
         """``best``, or what does better with any other effect in the place of one.
