@@ -784,6 +784,57 @@ def test_laws_that_differ_by_less_than_any_is_true_to_are_not_told_apart():
         assert search._explains_as_well(left(1.0 + behind), best, 1e-3) == alike
 
 
+def told_apart(left: dict[str, float], found_last: dict[str, float]) -> tuple[list[list[str]], str]:
+    """Which effects of such costs are fitted to the last, in two turns, and which is told then.
+
+    Of ``left`` the first is the best until then; ``found_last`` are costs that the last fits leave.
+    """
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    noise /= np.sqrt(np.mean((noise / NOISE) ** 2))
+
+    def trial(name: str, cost: float) -> Trial:
+        effects = (typical(name),) if name else ()
+        return made_trial([record], replace(PLAIN, effects=effects), math.sqrt(cost) * noise)
+
+    search.found = {frozenset({n} - {""}): trial(n, c) for n, c in {"": 20.0, **left}.items()}
+    search.left_out = {(frozenset({n}), n) for n in left}
+    looked: list[str] = []
+
+    def to_the_last(given: Trial) -> Trial:
+        (name,) = given.effects
+        looked.append(name)
+        return trial(name, found_last.get(name, given.cost))
+
+    search.bench.to_the_last = to_the_last  # type: ignore[method-assign]
+    best, turns = search.found[frozenset({next(iter(left))})], []
+    for turn in (search._in_own_laws, search._among_rivals, search._in_own_laws):
+        best = turn(best)
+        turns.append(sorted(looked))
+        looked.clear()
+    assert turns.pop() == []  # nobody is fitted to the last twice
+    assert [r.chosen for r in search.rounds] == [n for n in best.effects if n != next(iter(left))]
+    return turns, best.effects[0]
+
+
+def test_laws_that_leave_but_noise_are_told_apart_by_their_very_ends():
+    # of chi-square 1.4 a thousandth
+    left = {"ageing": 1.02, "logarithmic ageing": 1.05, "Mullins softening": 1.2, "leakage": 1.03}
+    turns = [["ageing", "logarithmic ageing"], ["leakage"]]
+    assert told_apart(left, {}) == (turns, "ageing")
+    assert told_apart(left, {"logarithmic ageing": 1.021}) == (turns, "ageing")
+    assert told_apart(left, {"logarithmic ageing": 1.015}) == (turns, "logarithmic ageing")
+    assert told_apart(left, {"leakage": 0.98}) == (turns, "leakage")
+
+
+def test_what_leaves_more_than_noise_is_not_followed_to_its_last_steps():
+    left = {"ageing": 1.5, "logarithmic ageing": 1.51, "leakage": 1.51}
+    assert told_apart(left, {"logarithmic ageing": 1.0}) == ([[], []], "ageing")
+    # nor who has no rival
+    assert told_apart({"ageing": 1.02, "leakage": 1.2}, {}) == ([[], []], "ageing")
+
+
 def test_what_is_exchanged_sets_out_beside_the_rest_as_it_was():
     record = record_of(PLAIN)
     search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)

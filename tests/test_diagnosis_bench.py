@@ -18,7 +18,7 @@ from model.effects import EFFECTS
 from model.excitation import Chirp, Ramp, Sequence
 from model.fitting import identify
 from model.fitting.parameters import Layout
-from model.material import Network
+from model.material import TABLE_3, Branch, Network, Spring
 from model.records import ActuatorRecord
 from tests.engine_tools import (
     NOISE,
@@ -215,6 +215,23 @@ def test_a_branch_that_stands_in_for_creep_is_relieved():
     assert (found.cost - made.cost) * found.problem.samples < 9.0
     # one branch alone has nothing to be relieved of
     assert relieved(fitted(bench, PLAIN)) == []
+
+
+def test_the_last_steps_lead_on_where_quick_ones_have_ended():
+    # branches stand where they had imitated the creep, and nothing of it shows in what is left
+    imitating = zip((60e3, 15e3, 550.0), (0.33, 0.69, 61.0), strict=True)
+    branches = tuple(Branch(Spring(mu, 9e3), t) for mu, t in imitating)
+    thesis = replace(PLAIN, network=TABLE_3)
+    creep = effect("broad creep", modulus=4000.0, relaxation_time=1.3, exponent=0.1)
+    bench = Bench([record_of(replace(thesis, effects=creep))], thesis, workers=1)
+    start = replace(thesis, network=replace(TABLE_3, branches=branches), effects=creep)
+    ended = bench.ended(fitted(bench, start))
+    assert ended.is_white
+    last = bench.to_the_last(ended)
+    # of chi-square: as much as tells two laws apart
+    assert (ended.cost - last.cost) * bench.samples > 2.0
+    again = bench.to_the_last(last)
+    assert (last.cost - again.cost) * bench.samples < 0.5
 
 
 def test_one_branch_more_is_made_one_with_its_neighbour():
