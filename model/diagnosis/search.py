@@ -303,6 +303,7 @@ class _Search:
         due = [n for n in laws if self.last.get(keys[n]) is not self.found[keys[n]]]
         if len(laws) < 2 or not due:
             return best
+        self.report("telling laws apart", 0.92)
         for some in _abreast(due):
             trials = self.bench.together(
                 lambda n: self.bench.to_the_last(self.found[keys[n]]), some
