@@ -277,24 +277,26 @@ class _Search:
         """``best``, each effect by that law of its family which explains most at the very end.
 
         Where several leave but noise, some ten of chi-square tell which it is, and with it what
-        other recordings will show: no quick descent is so sure of its end. Of a film no model is
-        asked to be so good.
+        other recordings will show: no quick descent is so sure of its end.
         """
-        for name in best.effects if best.is_noise and best.is_of_actuator else ():
+        for name in best.effects:
             best = self._told_from(best, name, _NEAR_LAW, EFFECTS[name].family)
         return best
 
     def _among_rivals(self, best: Trial) -> Trial:
         """The same of what else has come near, of any family."""
-        for name in best.effects if best.is_noise and best.is_of_actuator else ():
+        for name in best.effects:
             best = self._told_from(best, name, _NEAR_RIVAL)
         return best
 
     def _told_from(self, best: Trial, name: str, near: float, family: str = "") -> Trial:
         """``best``, or with another effect in the place of one, of those that lie so ``near``.
 
-        In chi-square; with a ``family``, only effects of that one.
+        In chi-square; with a ``family``, only effects of that one. Where more than noise is left,
+        such steps tell nothing; of a film no model is asked to be so good.
         """
+        if not (best.is_noise and best.is_of_actuator):
+            return best
         rest = [n for n in best.effects if n != name]
         names = [e.name for e in self.effects if family in ("", e.family)]
         keys = {n: frozenset((*rest, n)) for n in names if n not in rest}
