@@ -26,6 +26,7 @@ from model.diagnosis.search import _Search, _Tried
 from model.effects import EFFECTS
 from model.errors import ModelError
 from model.excitation import Sequence
+from model.fitting.problem import Problem
 from model.material import TABLE_3, Network
 from model.records import ActuatorRecord
 from tests.engine_tools import (
@@ -593,6 +594,38 @@ def test_what_leaves_but_noise_is_not_fitted_anew():
     assert anew == ["ageing", "sensor averaging"]
 
 
+@pytest.mark.parametrize(("slow", "anew"), [(0.0, []), (0.7, ["sensor averaging"])])
+def test_beside_what_leaves_more_than_noise_others_are_fitted_anew(slow, anew):
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    lasting = slow * NOISE * np.sin(record.time)
+    best = made_trial([record], PLAIN, 10.0 * noise)
+    search.found = {frozenset(): best}
+    fitted = []
+    # the leader explains nearly all, but a delay, far behind, may be what the branches hide
+    for name, left in (("load inertia", noise + lasting), ("sensor averaging", 7.0 * noise)):
+        with_it = replace(PLAIN, effects=(typical(name),))
+        fitted.append(_Tried(name, best, made_trial([record], with_it, left), 0.2))
+    leader = fitted[0].trial
+    assert leader.is_noise == (slow == 0.0)
+    unaccounted = {"load inertia": 0.006, "sensor averaging": 0.008}
+    found: list[str] = []
+
+    def sought(trial: Trial, _: np.ndarray) -> Trial:
+        found.append(trial.effects[0])
+        return trial
+
+    def by_stretch(problem: Problem, xs: np.ndarray) -> np.ndarray:
+        effects = problem.layout.base.effects
+        return np.full(len(xs), unaccounted[effects[0][0]] if effects else 0.03)
+
+    search.bench.sought = sought  # type: ignore[method-assign]
+    search.bench.unaccounted = by_stretch  # type: ignore[method-assign]
+    search._anew([replace(t, promised=0.9 - t.promised * i) for i, t in enumerate(fitted)])
+    assert [n for n in found if n != "load inertia"] == anew
+
+
 @pytest.mark.parametrize(
     ("before", "simple", "law", "again"),
     [
@@ -1015,6 +1048,37 @@ def test_a_walk_needs_a_margin_over_what_follows_a_law():
     assert demerit("wandering drift") == pytest.approx(demerit("sudden change of force"))
     assert demerit("wandering drift") > 10.0
     assert demerit("linear drift") == demerit("warm-up in stages") == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "before", "lasting", "gives_way"),
+    [
+        ("slow branch", 4.0, 0.0, True),
+        ("slow branch", 1.9, 0.0, False),  # does not do nearly all that the walk does
+        ("slow branch", 20.0, 0.7, False),  # leaves something that lasts
+        ("attached mode", 4.0, 0.0, False),  # names no cause
+        ("sudden change of force", 4.0, 0.0, False),  # follows no law either
+    ],
+)
+def test_a_walk_gives_way_to_a_law_that_leaves_but_noise(name, before, lasting, gives_way):
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    noise /= np.sqrt(np.mean((noise / NOISE) ** 2))
+    slow = lasting * NOISE * np.sin(record.time)
+    parent = made_trial([record], PLAIN, math.sqrt(before) * noise)
+
+    def tried(name: str, residuals: np.ndarray) -> _Tried:
+        model = replace(PLAIN, effects=(typical(name),))
+        return _Tried(name, parent, made_trial([record], model, residuals), 0.0)
+
+    # by the criterion alone the walk leads
+    fits = [tried("wandering drift", noise), tried(name, math.sqrt(1.1) * noise + slow)]
+    search.found = {frozenset(t.trial.effects): t.trial for t in fits}
+    order, correlation = search._ranked(parent, fits)
+    walk, other = (search._demerit(t.trial, correlation) for t in fits)
+    assert walk < other
+    assert order[0].name == (name if gives_way else "wandering drift")
 
 
 def test_what_explains_too_little_to_be_named_is_not_exchanged():

@@ -77,7 +77,7 @@ _CLEARLY = 2.0  # of the least that is left: more, and it is not the one that th
 _AS_WELL = 1.1  # of what is left beside a leader that explains all: these may do so too
 _ANEW = 6  # of such effects that are fitted anew
 _RIVALS = 0.5  # of what a leader explains that leaves but noise: such are followed to their ends
-_OUT_OF_REACH = 30.0  # times the leader's cost: from there no branches elsewhere lead to it
+_OUT_OF_REACH = 100.0  # times the leader's cost: from there no branches elsewhere lead to it
 _SHAKEN_FROM = 0.8  # of what is above the noise: who explains so much is in a valley near the best
 _PLAYED = 0.7  # of what a walk explains: a law that explains so much may be what it plays
 _LAWS = 3  # of such that are sought all over their shapes
@@ -518,8 +518,7 @@ class _Search:
 
         However much that is of the cost, in which the noise may be read a little wrong.
         """
-        effect = EFFECTS[tried.name]
-        return tried.trial.is_white and effect.recurs and effect.family != "unknown"
+        return tried.trial.is_white and _is_law(tried.name)
 
     def _least(self, best: Trial) -> float:
         """The cost that one more effect must explain to be followed on; -inf: none is asked for."""
@@ -825,14 +824,13 @@ class _Search:
         so only near them, and where it sets out the branches may have taken one of them over.
         """
         lead = min(tried, key=lambda t: t.trial.cost)
-        if not EFFECTS[lead.name].recurs and EFFECTS[lead.name].family != "unknown":
+        if _is_walk(lead.name):
             explained = lead.parent.cost - lead.trial.cost
             names = [t.name for t in tried]
             laws = [
                 t
                 for t in tried
-                if EFFECTS[t.name].recurs
-                and EFFECTS[t.name].family != "unknown"
+                if _is_law(t.name)
                 and t.parent is lead.parent
                 and t.parent.cost - t.trial.cost > _PLAYED * explained
                 and _is_first_of_family(t.name, names)
@@ -859,10 +857,26 @@ class _Search:
             self._keep(trial)
 
     def _ranked(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
-        """The candidates as they are by now, best first, by one count of independent samples."""
+        """The candidates as they are by now, best first, by one count of independent samples.
+
+        A walk gives way to a law that does nearly all that it does, and leaves nothing but noise: it
+        plays all that is slow, the last of it the law's own form, and foretells nothing.
+        """
         order = self._as_found(tried)
         correlation = self._correlation([best, *(t.trial for t in order)])
-        return sorted(order, key=lambda t: self._demerit(t.trial, correlation)), correlation
+        order.sort(key=lambda t: self._demerit(t.trial, correlation))
+        lead = order[0]
+        if _is_walk(lead.name):
+            explained = lead.parent.cost - lead.trial.cost
+            order.sort(
+                key=lambda t: (
+                    not _is_law(t.name)
+                    or t.parent is not lead.parent
+                    or t.parent.cost - t.trial.cost < _NEARLY_ALL * explained
+                    or not t.trial.is_white
+                )
+            )
+        return order, correlation
 
     def _as_found(self, tried: list[_Tried]) -> list[_Tried]:
         """The candidates as the best fits of them are by now."""
@@ -953,7 +967,7 @@ class _Search:
         looks = [k for k in self.bench.together(looked, range(len(tried))) if k is not None]
         looks.sort(key=lambda look: look[0])
         most = _CLEARLY * looks[0][0] if looks else 0.0
-        if leader.cost < _EXPLAINED_RMS**2:
+        if leader.is_noise:
             there = float(self.bench.unaccounted(leader.problem, leader.x[None])[0])
             there = min([there, *(left for left, place, _ in looks if place == 0)])
             most = min(most, _AS_WELL * there)
@@ -1412,6 +1426,16 @@ def _near(jacobian: np.ndarray, promise: Promise, effect: Effect) -> np.ndarray:
     """
     shapes = np.full((jacobian.shape[0], len(effect.shapes)), np.nan)
     return np.column_stack([jacobian, promise.columns, shapes])
+
+
+def _is_law(name: str) -> bool:
+    """Whether an effect names a cause, which acts in the same way whenever the rig runs."""
+    return EFFECTS[name].recurs and EFFECTS[name].family != "unknown"
+
+
+def _is_walk(name: str) -> bool:
+    """Whether an effect is of one recording, and of no moment in it."""
+    return not EFFECTS[name].recurs and EFFECTS[name].family != "unknown"
 
 
 def _numbers(trial: Trial) -> dict[str, float]:
