@@ -868,6 +868,37 @@ def test_what_leaves_more_than_noise_is_not_followed_to_its_last_steps():
     assert told_apart({"ageing": 1.02, "leakage": 1.2}, {}) == ([[], []], "ageing")
 
 
+@pytest.mark.parametrize(
+    ("left", "told", "foretelling"),
+    [
+        # of chi-square 4 a number: too little to name it, and more than it costs predictions
+        ({"warm-up": 1.02, "warm-up in stages": 1.0172}, "warm-up", "warm-up in stages"),
+        ({"warm-up": 1.02, "warm-up in stages": 1.0192}, "warm-up", "warm-up"),
+        # what a walk shows of one recording foretells no other
+        ({"linear drift": 1.02, "wandering drift": 1.0}, "linear drift", "linear drift"),
+        # nor is it asked which cause it is
+        ({"leakage": 1.02, "Mullins softening": 1.018}, "leakage", "leakage"),
+    ],
+)
+def test_by_which_law_others_are_foretold_is_asked_in_its_own_way(left, told, foretelling):
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    noise /= np.sqrt(np.mean((noise / NOISE) ** 2))
+    for name, cost in {"": 20.0, **left}.items():
+        effects = (typical(name),) if name else ()
+        model = replace(PLAIN, effects=effects)
+        search._keep(made_trial([record], model, math.sqrt(cost) * noise))
+    search.left_out = {(frozenset({n}), n) for n in left}
+    search.bench.to_the_last = lambda trial: trial  # type: ignore[method-assign]
+    search.screened[frozenset()] = (None, {})  # type: ignore[assignment]
+    best = search._in_own_laws(search.found[frozenset({told})])
+    assert best.effects == (told,)
+    best = search._as_it_foretells(best)
+    assert best.effects == (foretelling,)
+    assert [r.chosen for r in search.rounds] == ([foretelling] if foretelling != told else [])
+
+
 def test_what_is_exchanged_sets_out_beside_the_rest_as_it_was():
     record = record_of(PLAIN)
     search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)

@@ -32,7 +32,15 @@ from model.fitting.thinning import thinned
 from model.fitting.threads import Job, Result, together
 from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
-__all__ = ["FILM_MODEL_ERROR", "Bench", "Trial", "information", "merged", "relieved"]
+__all__ = [
+    "FILM_MODEL_ERROR",
+    "Bench",
+    "Trial",
+    "akaike",
+    "information",
+    "merged",
+    "relieved",
+]
 
 _RATE = 200.0  # Hz, to which records may be thinned: mains and a load's ringing still show
 _QUIET_MIN = 100  # samples of a lead-in from which a thinned record's noise is read again
@@ -91,6 +99,11 @@ def information(cost: float, free: int, samples: float) -> float:
     an effect explains, so that it also compares models that all leave more than noise.
     """
     return samples * math.log(max(cost, 1e-12)) + free * math.log(max(samples, 2.0))
+
+
+def akaike(cost: float, free: int, samples: float) -> float:
+    """Akaike's information criterion of the same: by it models are chosen that predict best."""
+    return samples * math.log(max(cost, 1e-12)) + 2.0 * free
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from model.actuator import Actuator
-from model.diagnosis.bench import Bench, Trial, Work, information, merged, relieved
+from model.diagnosis.bench import Bench, Trial, Work, akaike, information, merged, relieved
 from model.diagnosis.findings import (
     EXPLAINED,
     NOTHING_MISSING,
@@ -209,15 +209,16 @@ class _Search:
         law of its family each effect follows.
         """
         try:
-            best = self._in_own_laws(self._explained(baseline))
-            return self._retimed(self._among_rivals(best))
+            best = self._among_rivals(self._in_own_laws(self._explained(baseline)))
+            return self._retimed(self._as_it_foretells(best))
         except _Enough:
             self.ran_out = True
             # fits side by side may have gone a little further: as much is left, however far
             self.work.effort = self.most
             self.most *= 1.0 + _AT_LAST
         best = self._leading()
-        for step in (self._pruned, self._in_own_laws, self._among_rivals):
+        told = (self._in_own_laws, self._among_rivals, self._as_it_foretells)
+        for step in (self._pruned, *told):
             try:
                 best = step(best)
             except _Enough:
@@ -289,6 +290,43 @@ class _Search:
             best = self._told_from(best, name, _NEAR_RIVAL)
         return best
 
+    def _as_it_foretells(self, best: Trial) -> Trial:
+        """``best``, each effect by that law of its family by which other recordings should follow.
+
+        Which cause it is the Bayesian criterion has told. On which law it follows only predictions
+        hang, and there Akaike's is the one to ask: the simplest law that a record of slow lobes
+        allows need not be true, and a number too many costs predictions little. Only laws that were
+        fitted to the last are asked.
+        """
+        if not (best.is_noise and best.is_of_actuator):
+            return best
+        for name in filter(_is_law, best.effects):
+            family = [e.name for e in self.effects if e.family == EFFECTS[name].family]
+            tried = [
+                t
+                for t in self._in_its_place(best, name, filter(_is_law, family))
+                if t.name == name or frozenset(t.trial.effects) in self.last
+            ]
+            if len(tried) < 2:
+                continue
+            correlation = self._correlation([t.trial for t in tried])
+            samples = self.bench.samples / correlation
+            law = min(tried, key=lambda t: akaike(t.trial.cost, t.trial.free, samples))
+            if law.name != name:
+                self._record(tried, correlation, law, "should foretell other recordings better")
+                best = law.trial
+        return best
+
+    def _in_its_place(self, best: Trial, name: str, others: Iterable[str]) -> list[_Tried]:
+        """What was found of ``others`` in the place of the effect ``name`` of ``best``."""
+        parent = self._without(best, name)
+        _, promises = self.screened.get(frozenset(parent.effects), (None, {}))
+        keys = {n: frozenset((*parent.effects, n)) for n in others if n not in parent.effects}
+        shares = {n: max((p.share for p in promises.get(n, [])), default=0.0) for n in keys}
+        return [
+            _Tried(n, parent, self.found[k], shares[n]) for n, k in keys.items() if k in self.found
+        ]
+
     def _told_from(self, best: Trial, name: str, near: float, family: str = "") -> Trial:
         """``best``, or with another effect in the place of one, of those that lie so ``near``.
 
@@ -297,29 +335,21 @@ class _Search:
         """
         if not (best.is_noise and best.is_of_actuator):
             return best
-        rest = [n for n in best.effects if n != name]
         names = [e.name for e in self.effects if family in ("", e.family)]
-        keys = {n: frozenset((*rest, n)) for n in names if n not in rest}
         most = best.cost + near * best.correlation / self.bench.samples
-        laws = [n for n, k in keys.items() if k in self.found and self.found[k].cost < most]
-        due = [n for n in laws if self.last.get(keys[n]) is not self.found[keys[n]]]
+        laws = [t for t in self._in_its_place(best, name, names) if t.trial.cost < most]
+        due = [t for t in laws if self.last.get(frozenset(t.trial.effects)) is not t.trial]
         if len(laws) < 2 or not due:
             return best
         self.report("telling laws apart", 0.92)
-        for some in _abreast(due):
-            trials = self.bench.together(
-                lambda n: self.bench.to_the_last(self.found[keys[n]]), some
-            )
-            for n, trial in zip(some, trials, strict=True):
+        fresh = {t.name: t.trial for t in due}
+        for some in _abreast(list(fresh)):
+            trials = self.bench.together(lambda n: self.bench.to_the_last(fresh[n]), some)
+            for trial in trials:
                 self._keep(trial)
-                self.last[keys[n]] = self.found[keys[n]]
-        parent = self._without(best, name)
-        _, promises = self.screened.get(frozenset(rest), (None, {}))
-        tried = []
-        for n in laws:
-            shares = [p.share for p in promises.get(n, [])]
-            tried.append(_Tried(n, parent, self.found[keys[n]], max(shares, default=0.0)))
-        fitted, correlation = self._ranked(best, tried)
+                key = frozenset(trial.effects)
+                self.last[key] = self.found[key]
+        fitted, correlation = self._ranked(best, laws)
         if fitted[0].name != name:
             self._record(fitted, correlation, fitted[0], "fitted to the last explains more")
         return fitted[0].trial
@@ -859,8 +889,8 @@ class _Search:
     def _ranked(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
         """The candidates as they are by now, best first, by one count of independent samples.
 
-        A walk gives way to a law that does nearly all that it does, and leaves nothing but noise: it
-        plays all that is slow, the last of it the law's own form, and foretells nothing.
+        A walk gives way to a law that does nearly all that it does, and leaves but noise: it plays
+        all that is slow, the last of it the law's own form, and foretells nothing.
         """
         order = self._as_found(tried)
         correlation = self._correlation([best, *(t.trial for t in order)])
