@@ -78,6 +78,7 @@ _AS_WELL = 1.1  # of what is left beside a leader that explains all: these may d
 _ANEW = 6  # of such effects that are fitted anew
 _RIVALS = 0.5  # of what a leader explains that leaves but noise: such are followed to their ends
 _OUT_OF_REACH = 100.0  # times the leader's cost: from there no branches elsewhere lead to it
+_IDLE = 0.01  # of the cost: a law that is so near that of a simpler one does what that one does
 _SHAKEN_FROM = 0.8  # of what is above the noise: who explains so much is in a valley near the best
 _PLAYED = 0.7  # of what a walk explains: a law that explains so much may be what it plays
 _LAWS = 3  # of such that are sought all over their shapes
@@ -173,7 +174,7 @@ class _Search:
         self.refitted: set[tuple[frozenset[str], str]] = set()  # on top of what, and which
         self.left_out: set[tuple[frozenset[str], str]] = set()
         self.extended: set[frozenset[str]] = set()  # from where a simpler law has ended
-        self.reduced: set[tuple[frozenset[str], str]] = set()  # from a leader, and which
+        self.reset: set[tuple[frozenset[str], str]] = set()  # from a leader, and which
         self.interrupted = False
         self.held = False
 
@@ -450,6 +451,7 @@ class _Search:
                 fitted, correlation = self._settled(best, self._anew(fitted), least)
                 fitted, correlation = self._rivals_ended(best, fitted)
                 fitted, correlation = self._laws_of_walk(best, fitted)
+                fitted, correlation = self._out_of_simpler(best, fitted)
                 fitted, correlation = self._shaken(best, fitted)
             leader = fitted[0].trial
             gain = self._gain(best, leader, correlation)
@@ -823,6 +825,54 @@ class _Search:
                 self._all_ended(rivals[n : n + _ABREAST])
         return self._ranked(best, order)
 
+    def _out_of_simpler(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
+        """The candidates, best first, laws of the leading family from where simpler ones end.
+
+        While more than noise is left, a law of many numbers may be in a wrong valley, even where it
+        leads. From the bottom of the valley of the one that it extends, what it has more idle, the
+        way down is its own. Each sets out once from the most intricate that it extends.
+        """
+        order, correlation = self._ranked(best, tried)
+        family = EFFECTS[order[0].name].family
+        laws = [t for t in order if EFFECTS[t.name].family == family]
+        for one in sorted(laws, key=lambda t: _intricacy(t.name)):
+            lead = order[0]
+            if lead.trial.is_white or _explained(lead.parent, lead.trial) < _SHAKEN_FROM:
+                break
+            simpler = [t for t in order if _extends(one, t)]
+            nearest = max(simpler, key=lambda t: _intricacy(t.name), default=one)
+            both = (frozenset(one.trial.effects), nearest.name)
+            if nearest is one or both in self.reset:
+                continue
+            self.reset.add(both)
+            start = self._idle(one, nearest)
+            if start is not None:
+                # a few steps by which it is on its way; what it is idle in shows no way on
+                fit = self.bench.fit(one.trial.model, [(start, None)], one.trial.fixed)
+                # where it leads shows in its last steps only
+                self._keep(self.bench.ended(fit))
+                order, correlation = self._ranked(best, order)
+        return order, correlation
+
+    @staticmethod
+    def _idle(tried: _Tried, simpler: _Tried) -> np.ndarray | None:
+        """Coordinates (d,) where a law does what the ``simpler`` one does; None if none is seen.
+
+        One of the numbers that it has more is at an end of its range there, the others are typical.
+        """
+        law, problem = EFFECTS[tried.name], tried.trial.problem
+        layout, shared = problem.layout, _taken_over(tried.name, simpler)
+        more = [p for p in law.parameters if f"{law.name}: {p.name}" not in shared]
+        known = {f"{law.name}: {p.name}": p.typical for p in more} | shared
+        places = [known | {f"{law.name}: {p.name}": end} for p in more for end in p.fitted]
+        xs = np.array(
+            [layout.coordinates(np.array([place[n] for n in layout.names])) for place in places]
+        )
+        xs = np.clip(xs, layout.lower, layout.upper)
+        away = np.abs(problem.costs(xs) / simpler.trial.cost - 1.0)
+        found = int(np.argmin(away))
+        return xs[found] if away[found] < _IDLE else None
+
     def _shaken(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
         """The candidates, best first, that one shaken which leads and still leaves more than noise.
 
@@ -950,9 +1000,9 @@ class _Search:
             return
         for one in tried:
             both = (frozenset(one.trial.effects), lead.name)
-            if both in self.reduced or not _extends(lead, one):
+            if both in self.reset or not _extends(lead, one):
                 continue
-            self.reduced.add(both)
+            self.reset.add(both)
             known = _taken_over(one.name, lead)
             layout = one.trial.problem.layout
             start = layout.coordinates(np.array([known[n] for n in layout.names]))
