@@ -715,6 +715,62 @@ def test_a_law_gets_out_of_a_wrong_valley_from_where_a_simpler_one_has_ended():
         assert numbers[f"easing friction: {name}"] == pytest.approx(hidden[name], rel=0.15)
 
 
+def test_a_law_gets_out_of_a_wrong_valley_from_where_it_does_what_a_simpler_one_does():
+    hidden = {
+        "friction": 60.0,
+        "presliding": 2e-4,
+        "damping": 1e-3,
+        "excess": 0.1,
+        "easing": 5e-3,
+    }
+    record = record_of(replace(PLAIN, effects=effect("easing friction", **hidden)))
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    parent = made_trial([record], PLAIN, np.full(record.measured.size, 100.0 * NOISE))
+
+    def ended(name: str, **numbers: float) -> _Tried:
+        own = effect(name, damping=1e-3, **numbers)
+        return _Tried(name, parent, ended_from(search, replace(PLAIN, effects=own)), 0.0)
+
+    wrong = ended("easing friction", friction=30.0, presliding=1e-4, excess=0.9, easing=0.15)
+    simpler = ended("dry friction", friction=54.0, presliding=2e-4)
+    assert min(wrong.trial.cost, simpler.trial.cost) > 1.25
+    there = search._idle(wrong, simpler)
+    assert there is not None
+    numbers = dict(
+        zip(
+            wrong.trial.problem.layout.names,
+            wrong.trial.problem.layout.values(there),
+            strict=True,
+        )
+    )
+    assert numbers["easing friction: excess"] == 0.0
+    assert numbers["easing friction: friction"] == pytest.approx(60.0, rel=0.3)
+    assert wrong.trial.problem.costs(there[None])[0] == pytest.approx(simpler.trial.cost, rel=1e-3)
+
+    search.found = {frozenset(t.trial.effects): t.trial for t in (wrong, simpler)}
+    order, _ = search._out_of_simpler(parent, [wrong, simpler])
+    assert order[0].name == "easing friction"
+    assert order[0].trial.cost < 1.05
+    before = search.work.simulations
+    search._out_of_simpler(parent, order)  # once from each
+    assert search.work.simulations == before
+
+
+def test_what_leaves_nothing_sets_out_from_no_simpler_law():
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    parent = made_trial([record], PLAIN, 10.0 * noise)
+    tried = []
+    for name, left in (("dry friction", noise), ("easing friction", 2.0 * noise)):
+        model = replace(PLAIN, effects=(typical(name),))
+        tried.append(_Tried(name, parent, made_trial([record], model, left), 0.0))
+    search.found = {frozenset(t.trial.effects): t.trial for t in tried}
+    order, _ = search._out_of_simpler(parent, tried)
+    assert [t.name for t in order] == ["dry friction", "easing friction"]
+    assert search.work.simulations == 0
+
+
 def test_a_law_is_shaken_out_of_a_valley_into_better_ones():
     name = "elastoplastic friction"
     hidden = {

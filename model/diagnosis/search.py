@@ -35,7 +35,7 @@ __all__ = ["diagnose"]
 Progress = Callable[[str, float], None]
 
 # steps of simulations that a search may take: some forty-five seconds of two cores
-_EFFORT = 3.0e8
+_EFFORT = 2.8e8
 _AT_LAST = 0.1  # of that: what one that is ended may take to prune, and to tell laws apart
 _EFFECTS_MAX = 3  # more at once no record of this kind tells apart
 _TURNS = 3  # of searching on and pruning: what is pruned makes room
@@ -858,12 +858,13 @@ class _Search:
     def _idle(tried: _Tried, simpler: _Tried) -> np.ndarray | None:
         """Coordinates (d,) where a law does what the ``simpler`` one does; None if none is seen.
 
-        One of the numbers that it has more is at an end of its range there, the others are typical.
+        One of the numbers that it has more is at an end of its range there, the others are where
+        fits set out.
         """
         law, problem = EFFECTS[tried.name], tried.trial.problem
         layout, shared = problem.layout, _taken_over(tried.name, simpler)
         more = [p for p in law.parameters if f"{law.name}: {p.name}" not in shared]
-        known = {f"{law.name}: {p.name}": p.typical for p in more} | shared
+        known = {f"{law.name}: {p.name}": p.starts[0] for p in more if p.starts} | shared
         places = [known | {f"{law.name}: {p.name}": end} for p in more for end in p.fitted]
         xs = np.array(
             [layout.coordinates(np.array([place[n] for n in layout.names])) for place in places]
