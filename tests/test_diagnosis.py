@@ -22,7 +22,7 @@ from model.diagnosis.findings import (
     UNEXPLAINED,
 )
 from model.diagnosis.screening import Promise
-from model.diagnosis.search import _Search, _Tried
+from model.diagnosis.search import _numbers, _Search, _Tried
 from model.effects import EFFECTS
 from model.errors import ModelError
 from model.excitation import Sequence
@@ -736,13 +736,7 @@ def test_a_law_gets_out_of_a_wrong_valley_from_where_it_does_what_a_simpler_one_
     assert min(wrong.trial.cost, simpler.trial.cost) > 1.25
     there = search._idle(wrong, simpler)
     assert there is not None
-    numbers = dict(
-        zip(
-            wrong.trial.problem.layout.names,
-            wrong.trial.problem.layout.values(there),
-            strict=True,
-        )
-    )
+    numbers = _numbers(replace(wrong.trial, x=there))
     assert numbers["easing friction: excess"] == 0.0
     assert numbers["easing friction: friction"] == pytest.approx(60.0, rel=0.3)
     assert wrong.trial.problem.costs(there[None])[0] == pytest.approx(simpler.trial.cost, rel=1e-3)

@@ -103,7 +103,7 @@ def information(cost: float, free: int, samples: float) -> float:
 
 def akaike(cost: float, free: int, samples: float) -> float:
     """Akaike's information criterion of the same: by it models are chosen that predict best."""
-    return samples * math.log(max(cost, 1e-12)) + 2.0 * free
+    return information(cost, 0, samples) + 2.0 * free
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +28,7 @@ from model.diagnosis.unnamed import describe_unnamed
 from model.effects import EFFECTS, Effect, follows_path
 from model.film import Strip
 from model.fitting import Estimate
+from model.fitting.parameters import Layout
 from model.records import ActuatorRecord, Record
 
 __all__ = ["diagnose"]
@@ -174,7 +175,7 @@ class _Search:
         self.refitted: set[tuple[frozenset[str], str]] = set()  # on top of what, and which
         self.left_out: set[tuple[frozenset[str], str]] = set()
         self.extended: set[frozenset[str]] = set()  # from where a simpler law has ended
-        self.reset: set[tuple[frozenset[str], str]] = set()  # from a leader, and which
+        self.reset: set[tuple[frozenset[str], str]] = set()  # which, from which other law
         self.interrupted = False
         self.held = False
 
@@ -703,10 +704,7 @@ class _Search:
 
     def _in_place(self, model: Actuator | Strip, other: Trial, alone: Trial) -> np.ndarray:
         """Coordinates of ``model`` as ``other`` is, but its new effect as it was ``alone``."""
-        known = _numbers(alone) | _numbers(other)
-        layout = self.bench.problem(model).layout
-        x = layout.coordinates(np.array([known[n] for n in layout.names]))
-        return np.clip(x, layout.lower, layout.upper)
+        return _placed(self.bench.problem(model).layout, _numbers(alone) | _numbers(other))
 
     def _relieved(self, parent: Trial, promise: Promise) -> list[np.ndarray]:
         """Coordinates where an effect has taken over from a branch; the rest is as promised."""
@@ -862,14 +860,11 @@ class _Search:
         fits set out.
         """
         law, problem = EFFECTS[tried.name], tried.trial.problem
-        layout, shared = problem.layout, _taken_over(tried.name, simpler)
+        shared = _taken_over(tried.name, simpler)
         more = [p for p in law.parameters if f"{law.name}: {p.name}" not in shared]
         known = {f"{law.name}: {p.name}": p.starts[0] for p in more if p.starts} | shared
         places = [known | {f"{law.name}: {p.name}": end} for p in more for end in p.fitted]
-        xs = np.array(
-            [layout.coordinates(np.array([place[n] for n in layout.names])) for place in places]
-        )
-        xs = np.clip(xs, layout.lower, layout.upper)
+        xs = np.array([_placed(problem.layout, place) for place in places])
         away = np.abs(problem.costs(xs) / simpler.trial.cost - 1.0)
         found = int(np.argmin(away))
         return xs[found] if away[found] < _IDLE else None
@@ -1004,10 +999,7 @@ class _Search:
             if both in self.reset or not _extends(lead, one):
                 continue
             self.reset.add(both)
-            known = _taken_over(one.name, lead)
-            layout = one.trial.problem.layout
-            start = layout.coordinates(np.array([known[n] for n in layout.names]))
-            start = np.clip(start, layout.lower, layout.upper)
+            start = _placed(one.trial.problem.layout, _taken_over(one.name, lead))
             trial = self.bench.fit(
                 one.trial.model, [(start, None)], one.trial.fixed, lead.trial.cost
             )
@@ -1523,6 +1515,12 @@ def _numbers(trial: Trial) -> dict[str, float]:
     """The numbers of a model as they were fitted, by name."""
     layout = trial.problem.layout
     return dict(zip(layout.names, layout.values(trial.x), strict=True))
+
+
+def _placed(layout: Layout, known: Mapping[str, float]) -> np.ndarray:
+    """Coordinates (d,) of numbers by name, within the bounds of ``layout``."""
+    x = layout.coordinates(np.array([known[n] for n in layout.names]))
+    return np.clip(x, layout.lower, layout.upper)
 
 
 def _taken_over(name: str, other: _Tried) -> dict[str, float]:
