@@ -17,11 +17,11 @@ from scipy.stats.qmc import Sobol
 
 from model import kernel
 from model.actuator import Actuator, at_rest
-from model.diagnosis.findings import NOISE_RMS, Stage
+from model.diagnosis.findings import NOISE_RMS, NOT_BY_CHANCE, Stage
 from model.effects import follows_path
 from model.film import Strip
 from model.fitting.identify import fit_globally, is_determined, is_worth_freeing
-from model.fitting.intervals import correlation_time, covariance, is_flat
+from model.fitting.intervals import correlation_time, covariance, is_flat, unevenness
 from model.fitting.levenberg import LocalFit, descend
 from model.fitting.parameters import Estimate, Layout
 from model.fitting.problem import Problem
@@ -159,6 +159,15 @@ class Trial:
             return self.is_noise
         flat = (is_flat(part) for part in _by_record(self.problem, self.residuals))
         return self.correlation <= _WHITE_CORRELATION and all(flat)
+
+    @property
+    def uneven(self) -> float:
+        """The part of ``cost`` that beyond doubt is no white noise, by its spectrum; 0 of a film."""
+        if not self.is_of_actuator:
+            return 0.0
+        parts = _by_record(self.problem, self.residuals)
+        shares = [unevenness(p, NOT_BY_CHANCE) for p in parts]
+        return float(np.dot(shares, [p @ p for p in parts])) / self.problem.samples
 
     @property
     def record_costs(self) -> list[float]:

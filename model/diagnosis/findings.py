@@ -16,6 +16,7 @@ from model.fitting import Estimate
 __all__ = [
     "EXPLAINED",
     "NOISE_RMS",
+    "NOT_BY_CHANCE",
     "NOTHING_MISSING",
     "PARTLY_EXPLAINED",
     "UNEXPLAINED",
@@ -32,6 +33,8 @@ __all__ = [
 
 #: Residual over noise that still is noise: the noise itself is known to some per cent.
 NOISE_RMS = 1.08
+#: Probability below which a spectrum that noise might have by chance is called that of no noise.
+NOT_BY_CHANCE = 1e-3
 
 NOTHING_MISSING = "nothing_missing"
 EXPLAINED = "explained"

@@ -10,8 +10,8 @@ from scipy.signal import welch
 from scipy.stats import chi2, norm
 
 from model.diagnosis.bench import Trial
-from model.diagnosis.findings import NOISE_RMS, Dependence, Signature
-from model.fitting.intervals import correlation_time
+from model.diagnosis.findings import NOISE_RMS, NOT_BY_CHANCE, Dependence, Signature
+from model.fitting.intervals import correlation_time, unevenness
 from model.records import ActuatorRecord, Record
 
 __all__ = ["signatures"]
@@ -76,7 +76,11 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
     difference = along.loading - along.unloading
     loops = float(np.nanmean(difference)) if np.isfinite(difference).any() else 0.0
     repeats = _first_less_repeats(record, residual, good)
+    # of a film, what a model may be off is no noise
+    sensed = isinstance(record, ActuatorRecord)
+    uneven = unevenness(used, NOT_BY_CHANCE) if sensed else 0.0
     is_noise = rms < NOISE_RMS * noise and all(d.explained < _SHARE for d in dependences)
+    is_noise &= uneven == 0.0
     return Signature(
         record=record.name,
         time=time,
@@ -93,7 +97,9 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
         loading_less_unloading=loops,
         first_less_repeats=repeats,
         is_noise=is_noise,
-        words=_words(record, rms, is_noise, dependences, loops, repeats, frequency, density, step),
+        words=_words(
+            record, rms, is_noise, dependences, loops, repeats, frequency, density, step, uneven
+        ),
     )
 
 
@@ -195,6 +201,7 @@ def _words(
     frequency: np.ndarray,
     density: np.ndarray,
     step: float,
+    uneven: float,
 ) -> tuple[str, ...]:
     unit, scale = ("um", 1e6) if isinstance(record, ActuatorRecord) else ("kPa", 1e-3)
     words = [
@@ -222,4 +229,9 @@ def _words(
     floor = 2.0 * record.noise**2 * step
     if frequency[peak] > 2.0 and density[peak] > 20.0 * floor:
         words.append(f"a line stands in its spectrum at {frequency[peak]:.3g} Hz")
+    elif uneven:
+        words.append(
+            f"{100 * uneven:.0f} % of it or more stands out of a spectrum of noise; it is highest near "
+            f"{frequency[peak]:.3g} Hz"
+        )
     return tuple(words)

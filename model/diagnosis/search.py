@@ -156,6 +156,7 @@ class _Search:
         stop: Callable[[], bool],
         thorough: bool = False,
     ) -> None:
+        self.thorough = thorough
         self.most = math.inf if thorough else _EFFORT
         self.ran_out = False
         self.work = Work()
@@ -174,6 +175,7 @@ class _Search:
         self.screened: dict[frozenset[str], tuple[Screen, dict[str, list[Promise]]]] = {}
         self.refitted: set[tuple[frozenset[str], str]] = set()  # on top of what, and which
         self.left_out: set[tuple[frozenset[str], str]] = set()
+        self.again: set[frozenset[str]] = set()  # in the place of what alone was hardly better
         self.extended: set[frozenset[str]] = set()  # from where a simpler law has ended
         self.reset: set[tuple[frozenset[str], str]] = set()  # which, from which other law
         self.interrupted = False
@@ -218,7 +220,10 @@ class _Search:
             # fits side by side may have gone a little further: as much is left, however far
             self.work.effort = self.most
             self.most *= 1.0 + _AT_LAST
-        best = self._leading()
+        try:
+            best = self._asked_again(self._leading())
+        except _Enough:
+            best = self._leading()  # of what it has found until then
         told = (self._in_own_laws, self._among_rivals, self._as_it_foretells)
         for step in (self._pruned, *told):
             try:
@@ -262,6 +267,35 @@ class _Search:
                 break
             best = self._pruned(best)
         return best
+
+    def _asked_again(self, best: Trial) -> Trial:
+        """``best``, or with another effect in the place of one that alone was hardly better.
+
+        What else was missing stood in the way of both: beside it, it may be the other.
+        """
+        if best.is_noise or len(best.effects) < 2:
+            return best
+        alone = {t.effects[0]: t for t in self.found.values() if len(t.effects) == 1}
+        trials = [best]
+        for name in [n for n in best.effects if n in alone]:
+            rivals = [t for t in alone.values() if t.cost < _BEAM_COST * alone[name].cost]
+            for rival in sorted(rivals, key=lambda t: t.cost):
+                key = frozenset((*best.effects, *rival.effects)) - {name}
+                if len(key) == len(best.effects) and key not in self.again:
+                    self.again.add(key)
+                    self._keep(self._instead(best, name, rival))
+                    trials.append(self.found[key])
+        correlation = self._correlation(trials)
+        return self._ended(min(trials, key=lambda t: self._demerit(t, correlation)))
+
+    def _instead(self, best: Trial, name: str, rival: Trial) -> Trial:
+        """``best`` with the effect of ``rival``, as it is there, in the place of effect ``name``."""
+        rest = tuple(e for e in best.model.effects if e[0] != name)
+        model = replace(best.model, effects=(*rest, *rival.model.effects))
+        start = self._in_place(model, best, rival)
+        fixed = self.found[frozenset()].fixed
+        fixed = np.concatenate([fixed, np.zeros(start.size - fixed.size, dtype=bool)])
+        return self.bench.fit(model, [(start, None)], fixed, best.cost)
 
     def _in_other_laws(self, best: Trial, span: tuple[float, float]) -> Trial:
         """``best`` with other laws of the families in it, where these explain more.
@@ -487,6 +521,7 @@ class _Search:
             if taken:
                 best, looking_on = self._restarted(self._ended(leader)), False
                 if len(best.effects) > 1:
+                    best = self._asked_again(best)
                     best = self._in_other_laws(best, (0.1 + 0.28 * (depth + 1), 0.0))
                 if best.is_white:
                     break
@@ -609,12 +644,12 @@ class _Search:
                 # who promises next to nothing beside what explains all is no rival of it
                 least = _HINT * shares[order[0]]
                 order = [n for n in order if shares[n] > least]
-            if order and parent.cost > _MUCH_LEFT:
-                # so far from the noise it matters which family it is, not yet which law of it
-                refit([n for n in order if _is_first_of_family(n, order)])
-                near = _NEAR_LEAD * min(t.trial.cost for t in tried)
-                may_lead = {EFFECTS[t.name].family for t in tried if t.trial.cost < near}
-                order = [n for n in order if EFFECTS[n].family in may_lead]
+        if order and parent.cost > _MUCH_LEFT and (depth > 0 or not self.thorough):
+            # so far from the noise it matters which family it is, not yet which law of it
+            refit([n for n in order if _is_first_of_family(n, order)])
+            near = (_NEAR_LEAD if depth > 0 else _MAY_LEAD) * min(t.trial.cost for t in tried)
+            may_lead = {EFFECTS[t.name].family for t in tried if t.trial.cost < near}
+            order = [n for n in order if EFFECTS[n].family in may_lead]
         refit(order)
         return tried
 
@@ -986,26 +1021,55 @@ class _Search:
                 lead = min(lead, trial, key=lambda t: t.cost)
 
     def _set_out_from_leader(self, tried: list[_Tried]) -> None:
-        """Fit the laws again that the leading one extends, from its numbers, each once.
+        """Fit others again from where the leading one has ended, each once.
 
-        One that leaves more than noise is not the right law: a simpler one may be, in whose valley
-        it is already.
+        One that leaves more than noise is not the right law. A simpler one may be, in whose valley
+        it is already; or one whose own way down has led elsewhere.
         """
         lead = min(tried, key=lambda t: t.trial.cost)
         if lead.trial.is_white:
             return
         for one in tried:
             both = (frozenset(one.trial.effects), lead.name)
-            if both in self.reset or not _extends(lead, one):
+            if one is lead or one.parent is not lead.parent or both in self.reset:
+                continue
+            start = self._beside_leader(one, lead)
+            if start is None:
                 continue
             self.reset.add(both)
-            start = _placed(one.trial.problem.layout, _taken_over(one.name, lead))
             trial = self.bench.fit(
                 one.trial.model, [(start, None)], one.trial.fixed, lead.trial.cost
             )
             self._keep(trial)
-            if trial.cost < _NEAR_LEAD * lead.trial.cost:
+            near = 1.0 if lead.trial.cost > _MUCH_LEFT else _NEAR_LEAD
+            if trial.cost < near * lead.trial.cost:
                 self._ended(self.found[both[0]], lead.trial.cost)
+
+    @staticmethod
+    def _beside_leader(tried: _Tried, lead: _Tried) -> np.ndarray | None:
+        """Coordinates (d,) of an effect with the rest as the leading one has it; None if no good.
+
+        What a law that extends it has found is taken over. Of another, that size is taken which
+        suits the rest best.
+        """
+        law, trial = EFFECTS[tried.name], tried.trial
+        layout, known = trial.problem.layout, _taken_over(tried.name, lead)
+        if _extends(lead, tried):
+            return _placed(layout, known)
+        if len(law.sizes) != 1 or law.turns or trial.cost > _MAY_LEAD * lead.trial.cost:
+            return None
+        (size,) = law.sizes
+        start, left = trial.x, math.inf
+        sizes = sizes_of(size, _ANEW_SIZES)
+        for parts in (None, _ANEW_CLOSER):
+            if parts is not None:
+                sizes = [f * best for f in parts]
+            places = [_numbers(trial) | known | {f"{law.name}: {size.name}": s} for s in sizes]
+            xs = np.array([_placed(layout, place) for place in places])
+            costs = trial.problem.costs(xs)
+            found = int(np.argmin(costs))
+            best, start, left = sizes[found], xs[found], float(costs[found])
+        return start if left < _NEAR_LEAD * trial.cost else None
 
     def _anew(self, tried: list[_Tried]) -> list[_Tried]:
         """The candidates, those fitted anew in whose way the branches stand.
@@ -1355,7 +1419,7 @@ class _Search:
         is_noise = all(s.is_noise for s in after)
         if not best.effects:
             verdict = NOTHING_MISSING if small else UNEXPLAINED
-        elif small:
+        elif small and last.uneven <= _OF_ITS_FORM * (first.cost - last.cost):
             verdict = EXPLAINED
         else:
             verdict = PARTLY_EXPLAINED if explained > _UNNAMED_SHARE else UNEXPLAINED
