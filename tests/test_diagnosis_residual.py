@@ -81,6 +81,18 @@ def test_noise_is_called_noise():
         assert s.noise == NOISE
 
 
+def test_a_line_of_the_size_of_noise_is_not_called_noise():
+    line = 0.4 * math.sqrt(2.0) * NOISE * np.sin(2.0 * math.pi * 9.0 * record().time)
+    found = look(math.sqrt(1.0 - 0.4**2) * noise(3) + line)
+    assert found.rms == pytest.approx(NOISE, rel=0.05)
+    assert not found.is_noise
+    words = ", ".join(found.words)
+    assert "noise is all that is left" not in words
+    share, _, rest = words.partition(" % of it or more stands out of a spectrum of noise")
+    assert 8 <= int(share.rpartition(" ")[2]) <= 18
+    assert float(rest.rpartition("near ")[2].removesuffix(" Hz")) == pytest.approx(9.0, abs=0.5)
+
+
 def test_its_spectrum_is_flat_at_the_floor():
     density = np.mean([s.density for s in of_noise()], axis=0)
     floor = of_noise()[0].floor_density

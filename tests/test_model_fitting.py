@@ -16,7 +16,7 @@ from model.errors import ModelError
 from model.excitation import Sequence
 from model.film import Strip
 from model.fitting import identify
-from model.fitting.intervals import correlation_time, covariance, is_flat
+from model.fitting.intervals import correlation_time, covariance, is_flat, unevenness
 from model.fitting.levenberg import descend
 from model.fitting.parameters import Layout
 from model.fitting.problem import Problem
@@ -333,6 +333,22 @@ def test_what_is_flat_has_as_much_power_at_any_frequency(size):
         assert sum(is_flat(n + math.sqrt(0.003) * part) for n in noise[:50]) > 45
     assert is_flat(np.zeros(100))
     assert is_flat(np.ones(3))
+
+
+def test_how_much_of_the_power_stands_out_is_told():
+    rng = np.random.default_rng(7)
+    t = np.linspace(0.0, 25.0, 5000)
+    line = math.sqrt(2.0) * np.sin(2.0 * math.pi * 9.0 * t)
+    for share in (0.05, 0.2, 0.5):
+        noise = rng.standard_normal((50, 5000))
+        told = [
+            unevenness(math.sqrt(1.0 - share) * n + math.sqrt(share) * line, 1e-3) for n in noise
+        ]
+        # a tenth of the noise lies below the line: so much of its share is not seen to stand out
+        assert np.mean(told) == pytest.approx(0.92 * share, abs=0.012)
+    noise = rng.standard_normal((1000, 5000))
+    assert sum(unevenness(n, 0.1) > 0.0 for n in noise) == pytest.approx(100, abs=30)
+    assert unevenness(np.zeros(100)) == unevenness(np.ones(3)) == 0.0
 
 
 def test_covariance_is_the_inverse_where_there_is_one():

@@ -162,7 +162,7 @@ class Trial:
 
     @property
     def uneven(self) -> float:
-        """The part of ``cost`` that beyond doubt is no white noise, by its spectrum; 0 of a film."""
+        """The part of ``cost`` that by its spectrum is no white noise beyond doubt; 0 of a film."""
         if not self.is_of_actuator:
             return 0.0
         parts = _by_record(self.problem, self.residuals)

@@ -16,8 +16,8 @@ from model.fitting import Estimate
 __all__ = [
     "EXPLAINED",
     "NOISE_RMS",
-    "NOT_BY_CHANCE",
     "NOTHING_MISSING",
+    "NOT_BY_CHANCE",
     "PARTLY_EXPLAINED",
     "UNEXPLAINED",
     "Candidate",

@@ -231,7 +231,7 @@ def _words(
         words.append(f"a line stands in its spectrum at {frequency[peak]:.3g} Hz")
     elif uneven:
         words.append(
-            f"{100 * uneven:.0f} % of it or more stands out of a spectrum of noise; it is highest near "
-            f"{frequency[peak]:.3g} Hz"
+            f"{100 * uneven:.0f} % of it or more stands out of a spectrum of noise, which is "
+            f"highest near {frequency[peak]:.3g} Hz"
         )
     return tuple(words)

@@ -175,7 +175,6 @@ class _Search:
         self.screened: dict[frozenset[str], tuple[Screen, dict[str, list[Promise]]]] = {}
         self.refitted: set[tuple[frozenset[str], str]] = set()  # on top of what, and which
         self.left_out: set[tuple[frozenset[str], str]] = set()
-        self.again: set[frozenset[str]] = set()  # in the place of what alone was hardly better
         self.extended: set[frozenset[str]] = set()  # from where a simpler law has ended
         self.reset: set[tuple[frozenset[str], str]] = set()  # which, from which other law
         self.interrupted = False
@@ -220,10 +219,7 @@ class _Search:
             # fits side by side may have gone a little further: as much is left, however far
             self.work.effort = self.most
             self.most *= 1.0 + _AT_LAST
-        try:
-            best = self._asked_again(self._leading())
-        except _Enough:
-            best = self._leading()  # of what it has found until then
+        best = self._leading()
         told = (self._in_own_laws, self._among_rivals, self._as_it_foretells)
         for step in (self._pruned, *told):
             try:
@@ -267,35 +263,6 @@ class _Search:
                 break
             best = self._pruned(best)
         return best
-
-    def _asked_again(self, best: Trial) -> Trial:
-        """``best``, or with another effect in the place of one that alone was hardly better.
-
-        What else was missing stood in the way of both: beside it, it may be the other.
-        """
-        if best.is_noise or len(best.effects) < 2:
-            return best
-        alone = {t.effects[0]: t for t in self.found.values() if len(t.effects) == 1}
-        trials = [best]
-        for name in [n for n in best.effects if n in alone]:
-            rivals = [t for t in alone.values() if t.cost < _BEAM_COST * alone[name].cost]
-            for rival in sorted(rivals, key=lambda t: t.cost):
-                key = frozenset((*best.effects, *rival.effects)) - {name}
-                if len(key) == len(best.effects) and key not in self.again:
-                    self.again.add(key)
-                    self._keep(self._instead(best, name, rival))
-                    trials.append(self.found[key])
-        correlation = self._correlation(trials)
-        return self._ended(min(trials, key=lambda t: self._demerit(t, correlation)))
-
-    def _instead(self, best: Trial, name: str, rival: Trial) -> Trial:
-        """``best`` with the effect of ``rival``, as it is there, in the place of effect ``name``."""
-        rest = tuple(e for e in best.model.effects if e[0] != name)
-        model = replace(best.model, effects=(*rest, *rival.model.effects))
-        start = self._in_place(model, best, rival)
-        fixed = self.found[frozenset()].fixed
-        fixed = np.concatenate([fixed, np.zeros(start.size - fixed.size, dtype=bool)])
-        return self.bench.fit(model, [(start, None)], fixed, best.cost)
 
     def _in_other_laws(self, best: Trial, span: tuple[float, float]) -> Trial:
         """``best`` with other laws of the families in it, where these explain more.
@@ -521,7 +488,6 @@ class _Search:
             if taken:
                 best, looking_on = self._restarted(self._ended(leader)), False
                 if len(best.effects) > 1:
-                    best = self._asked_again(best)
                     best = self._in_other_laws(best, (0.1 + 0.28 * (depth + 1), 0.0))
                 if best.is_white:
                     break
@@ -1059,16 +1025,16 @@ class _Search:
         if len(law.sizes) != 1 or law.turns or trial.cost > _MAY_LEAD * lead.trial.cost:
             return None
         (size,) = law.sizes
-        start, left = trial.x, math.inf
-        sizes = sizes_of(size, _ANEW_SIZES)
-        for parts in (None, _ANEW_CLOSER):
-            if parts is not None:
-                sizes = [f * best for f in parts]
+
+        def suited(sizes: Sequence[float]) -> tuple[float, float, np.ndarray]:
             places = [_numbers(trial) | known | {f"{law.name}: {size.name}": s} for s in sizes]
             xs = np.array([_placed(layout, place) for place in places])
             costs = trial.problem.costs(xs)
-            found = int(np.argmin(costs))
-            best, start, left = sizes[found], xs[found], float(costs[found])
+            best = int(np.argmin(costs))
+            return float(costs[best]), sizes[best], xs[best]
+
+        _, near, _ = suited(sizes_of(size, _ANEW_SIZES))
+        left, _, start = suited([f * near for f in _ANEW_CLOSER])
         return start if left < _NEAR_LEAD * trial.cost else None
 
     def _anew(self, tried: list[_Tried]) -> list[_Tried]:
