@@ -58,6 +58,7 @@ _SETTLED = 5  # leading candidates that are fitted to the end of their valleys
 _SETTLED_QUICKLY = 12  # that are followed a little, while the leader leaves more than noise
 _MUCH_LEFT = 25.0  # of the noise's mean square: there only one law of a family is followed
 _NEARLY_ALL = 0.95  # of what was above the noise: who explains it may be in a wrong valley of it
+_MOSTLY = 0.8  # of the same: who explains it does most of what an effect without a cause does
 _AS_GOOD = 0.98  # of its cost: who did not come near the one will not come near the other
 _CLOSE = 1.15  # of the leader's cost: so near, and better than nothing, any other is one too
 _NEAR_LEAD = 2.0  # of the leader's cost before that: no branch of these is left without work
@@ -76,7 +77,7 @@ _BETTER = 1e-4  # of the cost: less is the same place
 _IN_THE_WAY = 0.9  # of what no branches account for: with an effect that leaves less, they hid it
 _CLEARLY = 2.0  # of the least that is left: more, and it is not the one that they hid
 _AS_WELL = 1.1  # of what is left beside a leader that explains all: these may do so too
-_ANEW = 6  # of such effects that are fitted anew
+_ANEW = 3  # of such effects that are fitted anew
 _RIVALS = 0.5  # of what a leader explains that leaves but noise: such are followed to their ends
 _OUT_OF_REACH = 100.0  # times the leader's cost: from there no branches elsewhere lead to it
 _IDLE = 0.01  # of the cost: a law that is so near that of a simpler one does what that one does
@@ -937,22 +938,29 @@ class _Search:
         """The candidates as they are by now, best first, by one count of independent samples.
 
         A walk gives way to a law that does nearly all that it does, and leaves but noise: it plays
-        all that is slow, the last of it the law's own form, and foretells nothing.
+        all that is slow, the last of it the law's own form, and foretells nothing. An effect that
+        names no cause, and leaves more than noise, gives way to a law that does most of what it
+        does: it plays a part of two things at once, and stands in the way of either.
         """
         order = self._as_found(tried)
         correlation = self._correlation([best, *(t.trial for t in order)])
         order.sort(key=lambda t: self._demerit(t.trial, correlation))
         lead = order[0]
+        explained = lead.parent.cost - lead.trial.cost
         if _is_walk(lead.name):
-            explained = lead.parent.cost - lead.trial.cost
-            order.sort(
-                key=lambda t: (
-                    not _is_law(t.name)
-                    or t.parent is not lead.parent
-                    or t.parent.cost - t.trial.cost < _NEARLY_ALL * explained
-                    or not t.trial.is_white
-                )
+            part, white = _NEARLY_ALL, True
+        elif EFFECTS[lead.name].family == "unknown" and lead.trial.cost > _EXPLAINED_RMS**2:
+            part, white = _MOSTLY, False
+        else:
+            return order, correlation
+        order.sort(
+            key=lambda t: (
+                not _is_law(t.name)
+                or t.parent is not lead.parent
+                or t.parent.cost - t.trial.cost < part * explained
+                or (white and not t.trial.is_white)
             )
+        )
         return order, correlation
 
     def _as_found(self, tried: list[_Tried]) -> list[_Tried]:
