@@ -1200,6 +1200,34 @@ def test_a_walk_gives_way_to_a_law_that_leaves_but_noise(name, before, lasting, 
     assert order[0].name == (name if gives_way else "wandering drift")
 
 
+@pytest.mark.parametrize(
+    ("name", "left", "law", "gives_way"),
+    [
+        ("stress beyond a displacement", 12.0, 25.0, True),
+        ("stress beyond a displacement", 12.0, 35.0, False),  # the law does far less than it does
+        ("stress beyond a displacement", 1.1, 6.0, False),  # it leaves but noise: so it may be it
+        ("linear drag", 12.0, 25.0, False),  # it is a cause itself
+    ],
+)
+def test_what_names_no_cause_gives_way_while_more_than_noise_is_left(name, left, law, gives_way):
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    noise /= np.sqrt(np.mean((noise / NOISE) ** 2))
+    base = made_trial([record], PLAIN, math.sqrt(100.0) * noise)
+
+    def tried(name: str, cost: float) -> _Tried:
+        model = replace(PLAIN, effects=(typical(name),))
+        return _Tried(name, base, made_trial([record], model, math.sqrt(cost) * noise), 0.0)
+
+    fits = [tried(name, left), tried("strain-dependent permittivity", law), tried("ageing", 80.0)]
+    search.found = {frozenset(): base} | {frozenset(t.trial.effects): t.trial for t in fits}
+    first = "strain-dependent permittivity" if gives_way else name
+    assert search._ranked(base, fits)[0][0].name == first
+    # and where the search is ended there
+    assert search._leading().effects == (first,)
+
+
 def test_what_explains_too_little_to_be_named_is_not_exchanged():
     record = record_of(PLAIN)
     search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)

@@ -1315,6 +1315,9 @@ class _Search:
             key=lambda t: self._demerit(t, correlation) + _DECISIVE * len(t.effects),
         )
         base = self.found[frozenset()]
+        if len(best.effects) == 1:
+            alone = [_Tried(t.effects[0], base, t, 0.0) for t in trials if len(t.effects) == 1]
+            best = self._ranked(base, alone)[0][0].trial
         gain = self._gain(base, best, correlation)
         return best if gain > _DECISIVE else base
 
