@@ -79,8 +79,8 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
     # of a film, what a model may be off is no noise
     sensed = isinstance(record, ActuatorRecord)
     uneven = unevenness(used, NOT_BY_CHANCE) if sensed else 0.0
-    is_noise = rms < NOISE_RMS * noise and all(d.explained < _SHARE for d in dependences)
-    is_noise &= uneven == 0.0
+    goes_with_nothing = all(d.explained < _SHARE for d in dependences)
+    is_noise = rms < NOISE_RMS * noise and goes_with_nothing and uneven == 0.0
     return Signature(
         record=record.name,
         time=time,

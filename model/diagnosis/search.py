@@ -1033,10 +1033,10 @@ class _Search:
         if len(law.sizes) != 1 or law.turns or trial.cost > _MAY_LEAD * lead.trial.cost:
             return None
         (size,) = law.sizes
+        rest, name = _numbers(trial) | known, f"{law.name}: {size.name}"
 
         def suited(sizes: Sequence[float]) -> tuple[float, float, np.ndarray]:
-            places = [_numbers(trial) | known | {f"{law.name}: {size.name}": s} for s in sizes]
-            xs = np.array([_placed(layout, place) for place in places])
+            xs = np.array([_placed(layout, rest | {name: s}) for s in sizes])
             costs = trial.problem.costs(xs)
             best = int(np.argmin(costs))
             return float(costs[best]), sizes[best], xs[best]
