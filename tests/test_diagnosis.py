@@ -263,6 +263,78 @@ def test_beside_a_walk_no_drift_predicts_others():
     assert search._for_others(fits[drifts]).effects == ("settling drift",)
 
 
+@functools.cache
+def of_walking() -> Diagnosis:
+    """A laser's stand that warms and cools more than twice in half a minute."""
+    record = record_of(PLAIN)
+    way = 2e-5 * np.sin(0.55 * record.drive.time) + 1e-5 * np.sin(0.23 * record.drive.time)
+    walking = replace(record, displacement=record.displacement + way)
+    return diagnose([walking], PLAIN, workers=1)
+
+
+def test_a_walk_that_leaves_more_than_noise_is_refined():
+    found = of_walking()
+    assert [s.effect for s in found.steps] == ["restless drift"]
+    assert found.verdict == EXPLAINED
+    assert any("restless drift" in {c.effect for c in r.candidates} for r in found.rounds)
+
+
+def test_a_walk_that_leaves_but_noise_is_not_refined():
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
+    walk = made_trial([record], replace(PLAIN, effects=(typical("wandering drift"),)), noise)
+    assert walk.is_white
+    assert search._refining(walk) == []
+    assert search._in_refined(walk) is walk
+
+
+def test_springs_beside_a_walk_beyond_doubt_predict_others():
+    found = of_walking()
+    assert found.final.predicting.effects == ()
+    assert any("predicted without it" in note for note in found.notes)
+    # an excitation that it has not seen
+    drive = Drive(*Sequence.thesis(frequencies=(0.6,) * 5, periods=1).sample(100.0))
+    truth = PLAIN.simulate(drive).displacement
+
+    def off(model: Actuator) -> float:
+        return float(np.sqrt(np.mean((model.simulate(drive).displacement - truth) ** 2)))
+
+    assert off(found.baseline.model) > 3e-6
+    assert off(found.final.predicting) < 0.3 * off(found.baseline.model)
+
+
+@pytest.mark.parametrize(
+    ("law_leaves", "walk_leaves", "interrupted", "beyond_doubt"),
+    [
+        (1.5, 1.0, False, True),
+        (1.2, 1.0, False, False),  # a law explains it, too
+        (9.0, 1.5, False, False),  # something else is missing
+        (1.5, 1.0, True, False),  # laws were not all tried
+    ],
+)
+def test_a_walk_is_beyond_doubt_where_nothing_else_explains_it(
+    law_leaves, walk_leaves, interrupted, beyond_doubt
+):
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    search.interrupted = interrupted
+    names = ("linear drag", "settling drift", "wandering drift")
+    left = {(): 100.0, names[:1]: 9.0, names[:2]: law_leaves, names: walk_leaves}
+    for some, cost in left.items():
+        model = replace(PLAIN, effects=tuple(typical(n) for n in some))
+        over = np.full(1, math.sqrt(cost) * NOISE)
+        search.found[frozenset(some)] = made_trial([record], model, over)
+        search.left_out |= {(frozenset(some), n) for n in some}
+    last = search.found[frozenset(names)]
+    beside = search._beside_walks(last, last)
+    if beyond_doubt:
+        # what else drifts may be of the walk
+        assert beside == replace(last.model, effects=last.model.effects[:1])
+    else:
+        assert beside is None
+
+
 def test_who_plays_a_walk_once_it_is_left_out_predicts_nothing():
     record = record_of(PLAIN)
 

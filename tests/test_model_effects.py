@@ -338,6 +338,12 @@ def mains(p, t):
     return moved(t)[0] + (first + third).real
 
 
+def shown_by_walk(p, t):
+    way = [0.0, *p.values()]
+    walked = np.polynomial.chebyshev.chebval(t / 15.0 - 1.0, way)
+    return moved(t)[0] + walked - np.polynomial.chebyshev.chebval(-1.0, way)
+
+
 SHOWN = {
     "linear drift": lambda p, t: moved(t)[0] + p["drift"] * t,
     "mains interference": mains,
@@ -371,11 +377,8 @@ SHOWN = {
         / (np.power(1.0 + 30.0 / p["onset"], p["exponent"]) - 1.0)
     ),
     "sensor double lag": shown_by_two_lags,
-    "wandering drift": lambda p, t: (
-        moved(t)[0]
-        + np.polynomial.chebyshev.chebval(t / 15.0 - 1.0, [0.0, *p.values()])
-        - np.polynomial.chebyshev.chebval(-1.0, [0.0, *p.values()])
-    ),
+    "wandering drift": shown_by_walk,
+    "restless drift": shown_by_walk,
     "sudden change of reading": lambda p, t: (
         moved(t)[0] + p["jump"] * np.clip((t - p["moment"]) / 0.02 + 0.5, 0.0, 1.0)
     ),
@@ -595,6 +598,7 @@ LARGER = {
     "settling drift": 3.0,
     "slowing drift": 30.0,
     "wandering drift": 3.0,
+    "restless drift": 3.0,
     "mains interference": 2.0,
     "sensor curvature": 3.0,
     "sensor bend": 3.0,

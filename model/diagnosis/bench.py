@@ -725,11 +725,11 @@ class Bench:
         trial: Trial,
         correlation: float,
         estimates: bool = False,
-        for_others: Trial | None = None,
+        for_others: Actuator | Strip | None = None,
     ) -> Stage:
         """What the trial comes to, with the correlation time by which samples count.
 
-        ``for_others`` is the trial by which other recordings are predicted, where it is another.
+        ``for_others`` is the model by which other recordings are predicted, where it is another.
         """
         jac = trial.jacobian(quick=not estimates)
         predicted = _left_out(trial, jac)
@@ -748,7 +748,7 @@ class Bench:
             selection_max=float(np.max(np.abs(left_out))),
             criterion=information(trial.cost, trial.free, samples),
             estimates=self.estimates(trial, jac) if estimates else (),
-            for_others=(for_others or trial).model,
+            for_others=for_others or trial.model,
         )
 
     def _noise_lost(self) -> float:

@@ -22,7 +22,7 @@ from model.diagnosis.findings import (
     Step,
 )
 from model.diagnosis.residual import signatures
-from model.diagnosis.screening import Promise, Screen, is_of, sizes_of
+from model.diagnosis.screening import Promise, Screen, is_of, sizes_of, with_effect
 from model.diagnosis.stress import missing_stress
 from model.diagnosis.unnamed import describe_unnamed
 from model.effects import EFFECTS, Effect, follows_path
@@ -222,7 +222,7 @@ class _Search:
             self.most *= 1.0 + _AT_LAST
         best = self._leading()
         told = (self._in_own_laws, self._among_rivals, self._as_it_foretells)
-        for step in (self._pruned, *told):
+        for step in (self._pruned, self._in_refined, *told):
             try:
                 best = step(best)
             except _Enough:
@@ -454,6 +454,7 @@ class _Search:
                 fitted, correlation = self._settled(best, self._anew(fitted), least)
                 fitted, correlation = self._rivals_ended(best, fitted)
                 fitted, correlation = self._laws_of_walk(best, fitted)
+                fitted, correlation = self._refined(best, fitted)
                 fitted, correlation = self._out_of_simpler(best, fitted)
                 fitted, correlation = self._shaken(best, fitted)
             leader = fitted[0].trial
@@ -655,7 +656,8 @@ class _Search:
         if key not in self.screened or self.screened[key][0].trial is not parent:
             self.screened[key] = (Screen(self.bench, parent), {})
         screen, known = self.screened[key]
-        wanted = [e for e in self.effects if family in ("", e.family) and e.name not in key]
+        of_family = [e for e in self.effects if family in ("", e.family) and not e.refines]
+        wanted = [e for e in of_family if e.name not in key]
         asked = [e for e in wanted if e.name not in known]
         for n in range(0, len(asked), _SCREENED):
             some = asked[n : n + _SCREENED]
@@ -918,6 +920,43 @@ class _Search:
                 if self.found[frozenset(law.trial.effects)].cost < lead.trial.cost:
                     break
         return self._ranked(best, tried)
+
+    def _refined(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
+        """The candidates, best first, and what refines an effect of the one that explains most."""
+        lead = min(tried, key=lambda t: t.trial.cost)
+        return self._ranked(best, [*tried, *self._refining(lead.trial)])
+
+    def _in_refined(self, best: Trial) -> Trial:
+        """``best``, or what refines an effect of it, where that explains more."""
+        tried = self._refining(best)
+        correlation = self._correlation([best, *(t.trial for t in tried)])
+        found = min([best, *(t.trial for t in tried)], key=lambda t: self._demerit(t, correlation))
+        for one in tried:
+            if one.trial is found:
+                self._record([one], correlation, one, "explains more than what it refines")
+        return found
+
+    def _refining(self, trial: Trial) -> list[_Tried]:
+        """What refines effects of ``trial``, in their place, where it leaves more than noise.
+
+        From where that has ended, what there is more doing nothing.
+        """
+        refining = [e for e in self.effects if e.refines in trial.effects]
+        tried = []
+        for effect in refining if not trial.is_white else ():
+            parent = self._without(trial, effect.refines)
+            key = frozenset((*parent.effects, effect.name))
+            if key not in self.found:
+                nothing = tuple(p.neutral or 0.0 for p in effect.sizes)
+                model = with_effect(parent.model, effect.name, nothing)
+                layout = self.bench.problem(model).layout
+                known = dict(zip(layout.names, layout.initial(), strict=True))
+                coarse = _Tried(effect.refines, parent, trial, 0.0)
+                start = _placed(layout, known | _taken_over(effect.name, coarse))
+                fixed = np.concatenate([parent.fixed, np.zeros(len(nothing), dtype=bool)])
+                self._keep(self.bench.ended(self.bench.fit(model, [(start, None)], fixed)))
+            tried.append(_Tried(effect.name, parent, self.found[key], 0.0))
+        return tried
 
     def _sought_all_over(self, tried: _Tried, lead: Trial) -> None:
         """Fit an effect again from the shapes, of all within its bounds, that promise most."""
@@ -1262,6 +1301,32 @@ class _Search:
             return base
         return kept
 
+    def _predicting(self, trial: Trial) -> Actuator | Strip:
+        """The model by which ``trial`` predicts other recordings."""
+        return self._beside_walks(trial, trial) or self._for_others(trial).model
+
+    def _beside_walks(self, trial: Trial, fitted: Trial) -> Actuator | Strip | None:
+        """The model of ``fitted`` without what drifts in it, where a walk is beyond doubt.
+
+        ``fitted`` are the effects of ``trial`` as they fit best. Where they leave but noise, and
+        nothing that was found without a walk does, no law of the rig plays it: then springs that
+        know of it foretell other recordings as if it had not been, and those of a fit without it
+        are bent by it. None of what may be a law's disguise.
+        """
+        walks = [n for n in trial.effects if _is_walk(n)]
+        lawful = (t for key, t in self.found.items() if not any(map(_is_walk, key)))
+        small = _EXPLAINED_RMS**2
+        if self.interrupted or not walks or trial.cost > small:
+            return None
+        if any(t.cost < small for t in lawful):
+            return None
+        if any(self._recurred(trial, self._without(trial, n)) for n in walks):
+            return None
+        families = {EFFECTS[n].family for n in walks}
+        model = fitted.model
+        kept = [e for e in model.effects if EFFECTS[e[0]].family not in families]
+        return replace(model, effects=tuple(e for e in kept if EFFECTS[e[0]].recurs))
+
     def _recurred(self, trial: Trial, without: Trial) -> bool:
         """Whether each of several recordings is decisively and mostly explained by it.
 
@@ -1381,12 +1446,15 @@ class _Search:
         stage0 = self.bench.stage(first, correlation, estimates=True)
         explained = _explained(first, last)
         small = last.cost < _EXPLAINED_RMS**2
-        others = self._for_others(best)
         doubtful = not small and (explained < _TRUSTED or _is_worse_in_one(first, last))
-        if doubtful or not others.effects:
-            others = first
-        else:
-            others = last if others is best else self.bench.polished(others, self.interrupted)
+        others = first.model if doubtful else self._beside_walks(best, last)
+        if others is None:
+            kept = self._for_others(best)
+            if not kept.effects:
+                kept = first
+            else:
+                kept = last if kept is best else self.bench.polished(kept, self.interrupted)
+            others = kept.model
         final = self.bench.stage(last, correlation, estimates=True, for_others=others)
         steps, rivals = self._steps(best, last, final.estimates, correlation)
         before = signatures(self.bench.full, first)
@@ -1412,7 +1480,7 @@ class _Search:
             )
         if self.interrupted and not (self.rounds or best.effects):
             notes.append("interrupted before any round was over: what is missing was not found out")
-        gone = [n for n in best.effects if n not in {name for name, _ in others.model.effects}]
+        gone = [n for n in best.effects if n not in {name for name, _ in others.effects}]
         if gone and doubtful:
             notes.append(
                 "what was found explains too little, or does worse in one of these recordings than "
@@ -1493,7 +1561,7 @@ class _Search:
                     family=effect.family,
                     acts_on=effect.acts_on,
                     stage=self.bench.stage(
-                        with_it, correlation, for_others=self._for_others(on_bench)
+                        with_it, correlation, for_others=self._predicting(on_bench)
                     ),
                     estimates=own,
                     indistinguishable_from=families,

@@ -89,7 +89,8 @@ class Effect:
     ``recurs`` is False for what happens in one recording and is no property of the rig: nothing
     says that another recording has it too, or when. ``relaxes`` is True of what relaxes as the
     network's branches do, its first two numbers being a modulus and a relaxation time: while it is
-    missing, branches stand in for it.
+    missing, branches stand in for it. ``refines`` names an effect that this one does more closely:
+    it is sought only where that one leads and leaves more than noise.
     ``words`` is one sentence for a person: what the effect is and what betrays it.
     """
 
@@ -103,6 +104,7 @@ class Effect:
     turns: bool = False
     recurs: bool = True
     relaxes: bool = False
+    refines: str = ""
 
     @property
     def sizes(self) -> tuple[Parameter, ...]:

@@ -12,7 +12,7 @@ from model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
 
-_WALK = (-1e-2, 1e-2)  # m
+WALK = (-1e-2, 1e-2)  # m
 
 EFFECT = Effect(
     name="wandering drift",
@@ -20,11 +20,11 @@ EFFECT = Effect(
     acts_on="sensor",
     words="the reading wanders with time, whatever the film does",
     parameters=(
-        Parameter("linear", "m", _WALK, "half of its part in 30 s", 3e-6, 0.0),
-        Parameter("quadratic", "m", _WALK, "half of its part there and back", 3e-6, 0.0),
-        Parameter("cubic", "m", _WALK, "half of its part with two turns", 3e-6, 0.0),
-        Parameter("quartic", "m", _WALK, "half of its part with three turns", 3e-6, 0.0),
-        Parameter("quintic", "m", _WALK, "half of its part with four turns", 3e-6, 0.0),
+        Parameter("linear", "m", WALK, "half of its part in 30 s", 3e-6, 0.0),
+        Parameter("quadratic", "m", WALK, "half of its part there and back", 3e-6, 0.0),
+        Parameter("cubic", "m", WALK, "half of its part with two turns", 3e-6, 0.0),
+        Parameter("quartic", "m", WALK, "half of its part with three turns", 3e-6, 0.0),
+        Parameter("quintic", "m", WALK, "half of its part with four turns", 3e-6, 0.0),
     ),
     recurs=False,
 )
@@ -33,10 +33,15 @@ _SPAN = 30.0  # s
 
 
 @jit
-def sense(c, k, m, j, t, dt, x, u):
+def walked(c, k, terms, t):
     s = 2.0 * t / _SPAN - 1.0
-    now, before, start = s, 1.0, -1.0
-    for i in range(5):
-        x += c[k + i] * (now - start)
+    now, before, start, way = s, 1.0, -1.0, 0.0
+    for i in range(terms):
+        way += c[k + i] * (now - start)
         now, before, start = 2.0 * s * now - before, now, -start
-    return x
+    return way
+
+
+@jit
+def sense(c, k, m, j, t, dt, x, u):
+    return x + walked(c, k, 5, t)
