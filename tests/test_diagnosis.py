@@ -276,7 +276,12 @@ def test_a_walk_that_leaves_more_than_noise_is_refined():
     found = of_walking()
     assert [s.effect for s in found.steps] == ["restless drift"]
     assert found.verdict == EXPLAINED
-    assert any("restless drift" in {c.effect for c in r.candidates} for r in found.rounds)
+    closer, coarse = (
+        next(c for r in found.rounds for c in r.candidates if c.effect == name)
+        for name in ("restless drift", "wandering drift")
+    )
+    assert closer.promised == coarse.promised > 0.5
+    assert closer.note == ""
 
 
 def test_a_walk_that_leaves_but_noise_is_not_refined():
@@ -327,12 +332,11 @@ def test_a_walk_is_beyond_doubt_where_nothing_else_explains_it(
         search.found[frozenset(some)] = made_trial([record], model, over)
         search.left_out |= {(frozenset(some), n) for n in some}
     last = search.found[frozenset(names)]
-    beside = search._beside_walks(last, last)
+    assert search._walks_beyond_doubt(last) == beyond_doubt
     if beyond_doubt:
         # what else drifts may be of the walk
-        assert beside == replace(last.model, effects=last.model.effects[:1])
-    else:
-        assert beside is None
+        beside = replace(last.model, effects=last.model.effects[:1])
+        assert search._predicting(last, lambda t: t) == beside
 
 
 def test_who_plays_a_walk_once_it_is_left_out_predicts_nothing():

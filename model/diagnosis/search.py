@@ -326,7 +326,9 @@ class _Search:
         parent = self._without(best, name)
         _, promises = self.screened.get(frozenset(parent.effects), (None, {}))
         keys = {n: frozenset((*parent.effects, n)) for n in others if n not in parent.effects}
-        shares = {n: max((p.share for p in promises.get(n, [])), default=0.0) for n in keys}
+        # what refines another promises at least what that does
+        asked = {n: promises.get(EFFECTS[n].refines or n, []) for n in keys}
+        shares = {n: max((p.share for p in asked[n]), default=0.0) for n in keys}
         return [
             _Tried(n, parent, self.found[k], shares[n]) for n, k in keys.items() if k in self.found
         ]
@@ -942,7 +944,7 @@ class _Search:
         From where that has ended, what there is more doing nothing.
         """
         refining = [e for e in self.effects if e.refines in trial.effects]
-        tried = []
+        tried: list[_Tried] = []
         for effect in refining if not trial.is_white else ():
             parent = self._without(trial, effect.refines)
             key = frozenset((*parent.effects, effect.name))
@@ -955,7 +957,7 @@ class _Search:
                 start = _placed(layout, known | _taken_over(effect.name, coarse))
                 fixed = np.concatenate([parent.fixed, np.zeros(len(nothing), dtype=bool)])
                 self._keep(self.bench.ended(self.bench.fit(model, [(start, None)], fixed)))
-            tried.append(_Tried(effect.name, parent, self.found[key], 0.0))
+            tried += self._in_its_place(trial, effect.refines, [effect.name])
         return tried
 
     def _sought_all_over(self, tried: _Tried, lead: Trial) -> None:
@@ -1278,19 +1280,11 @@ class _Search:
     def _for_others(self, trial: Trial) -> Trial:
         """``trial`` as it predicts other recordings: without what may not happen again.
 
-        A moment or a walk is of one recording, unless several of these show it alike: all are
-        fitted with one set of numbers, and each must be the better for it. What else is of its
-        family goes with it: where a reading walks, what else drifts may be of the walk. The rest is
-        fitted without: then whoever has found nothing else predicts as before, and no worse. Where
-        the rest then plays what happened once, it predicts nothing, and the baseline does: it
-        explains far less than all did, or far more without it than beside it.
+        The rest is fitted without: then whoever has found nothing else predicts as before, and no
+        worse. Where the rest then plays what happened once, it predicts nothing, and the baseline
+        does: it explains far less than all did, or far more without it than beside it.
         """
-        lawless = {
-            EFFECTS[n].family
-            for n in trial.effects
-            if not EFFECTS[n].recurs and not self._recurred(trial, self._without(trial, n))
-        }
-        once = [n for n in trial.effects if EFFECTS[n].family in lawless]
+        once = self._once(trial)
         kept = self._with_only(trial, [n for n in trial.effects if n not in once])
         base = self.found[frozenset()]
         if kept is trial or kept is base:
@@ -1301,31 +1295,41 @@ class _Search:
             return base
         return kept
 
-    def _predicting(self, trial: Trial) -> Actuator | Strip:
-        """The model by which ``trial`` predicts other recordings."""
-        return self._beside_walks(trial, trial) or self._for_others(trial).model
+    def _once(self, trial: Trial) -> list[str]:
+        """Effects of ``trial`` that may not happen again, and what else is of their families.
 
-    def _beside_walks(self, trial: Trial, fitted: Trial) -> Actuator | Strip | None:
-        """The model of ``fitted`` without what drifts in it, where a walk is beyond doubt.
-
-        ``fitted`` are the effects of ``trial`` as they fit best. Where they leave but noise, and
-        nothing that was found without a walk does, no law of the rig plays it: then springs that
-        know of it foretell other recordings as if it had not been, and those of a fit without it
-        are bent by it. None of what may be a law's disguise.
+        A moment or a walk is of one recording, unless several of these show it alike: all are
+        fitted with one set of numbers, and each must be the better for it. What else is of its
+        family goes with it: where a reading walks, what else drifts may be of the walk.
         """
-        walks = [n for n in trial.effects if _is_walk(n)]
-        lawful = (t for key, t in self.found.items() if not any(map(_is_walk, key)))
+        lawless = {
+            EFFECTS[n].family
+            for n in trial.effects
+            if not EFFECTS[n].recurs and not self._recurred(trial, self._without(trial, n))
+        }
+        return [n for n in trial.effects if EFFECTS[n].family in lawless]
+
+    def _predicting(self, trial: Trial, fitted: Callable[[Trial], Trial]) -> Actuator | Strip:
+        """The model by which ``trial`` predicts other recordings, ``fitted`` as well as is asked.
+
+        Where a walk is beyond doubt, the rest is as it is beside it.
+        """
+        if not self._walks_beyond_doubt(trial):
+            return fitted(self._for_others(trial)).model
+        model, once = fitted(trial).model, self._once(trial)
+        return replace(model, effects=tuple(e for e in model.effects if e[0] not in once))
+
+    def _walks_beyond_doubt(self, trial: Trial) -> bool:
+        """Whether ``trial`` leaves but noise, and nothing that was found without a walk does.
+
+        Then no law of the rig plays it: springs that know of it foretell other recordings as if it
+        had not been, and those of a fit without it are bent by it.
+        """
         small = _EXPLAINED_RMS**2
-        if self.interrupted or not walks or trial.cost > small:
-            return None
-        if any(t.cost < small for t in lawful):
-            return None
-        if any(self._recurred(trial, self._without(trial, n)) for n in walks):
-            return None
-        families = {EFFECTS[n].family for n in walks}
-        model = fitted.model
-        kept = [e for e in model.effects if EFFECTS[e[0]].family not in families]
-        return replace(model, effects=tuple(e for e in kept if EFFECTS[e[0]].recurs))
+        lawful = (t for key, t in self.found.items() if not any(map(_is_walk, key)))
+        if self.interrupted or trial.cost > small or any(t.cost < small for t in lawful):
+            return False
+        return any(map(_is_walk, self._once(trial)))
 
     def _recurred(self, trial: Trial, without: Trial) -> bool:
         """Whether each of several recordings is decisively and mostly explained by it.
@@ -1447,14 +1451,13 @@ class _Search:
         explained = _explained(first, last)
         small = last.cost < _EXPLAINED_RMS**2
         doubtful = not small and (explained < _TRUSTED or _is_worse_in_one(first, last))
-        others = first.model if doubtful else self._beside_walks(best, last)
-        if others is None:
-            kept = self._for_others(best)
-            if not kept.effects:
-                kept = first
-            else:
-                kept = last if kept is best else self.bench.polished(kept, self.interrupted)
-            others = kept.model
+        done = {frozenset(): first, frozenset(best.effects): last}
+
+        def fitted(trial: Trial) -> Trial:
+            key = frozenset(trial.effects)
+            return done[key] if key in done else self.bench.polished(trial, self.interrupted)
+
+        others = first.model if doubtful else self._predicting(best, fitted)
         final = self.bench.stage(last, correlation, estimates=True, for_others=others)
         steps, rivals = self._steps(best, last, final.estimates, correlation)
         before = signatures(self.bench.full, first)
@@ -1561,7 +1564,7 @@ class _Search:
                     family=effect.family,
                     acts_on=effect.acts_on,
                     stage=self.bench.stage(
-                        with_it, correlation, for_others=self._predicting(on_bench)
+                        with_it, correlation, for_others=self._predicting(on_bench, lambda t: t)
                     ),
                     estimates=own,
                     indistinguishable_from=families,
