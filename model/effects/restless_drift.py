@@ -1,8 +1,7 @@
 """Drift of the sensor's zero that wanders up and down in a record: air that moves about a mount.
 
 As ``wandering_drift``, by a polynomial of the ninth degree, which follows two turns there and back
-in half a minute to some thousandths. So many numbers play much that is slow: they are sought only
-where fewer have led.
+in half a minute. So many numbers play much that is slow: they are sought only where fewer have led.
 """
 
 from __future__ import annotations
