@@ -262,8 +262,8 @@ def _outcome(
     stands = tuple(
         Stand(
             tuple(name for name, _ in stage.model.effects),
-            _compared(recordings, stage.model, "train", drive, failed),
-            _compared(others, stage.predicting, "validation", drive, failed),
+            _compared(recordings, stage.of_each(len(recordings)), "train", drive, failed),
+            _compared(others, [stage.predicting] * len(others), "validation", drive, failed),
         )
         for stage in models
     )
@@ -294,10 +294,10 @@ def _title(recordings: Sequence[Recording]) -> str:
 
 
 def _compared(
-    recordings: Sequence[Recording], model: Any, role: str, drive: str, failed: list[str]
+    recordings: Sequence[Recording], models: Sequence[Any], role: str, drive: str, failed: list[str]
 ) -> tuple[Comparison, ...]:
     found = []
-    for recording in recordings:
+    for recording, model in zip(recordings, models, strict=True):
         try:
             found.append(compare(recording, model, role, drive))
         except InputError as error:

@@ -387,7 +387,7 @@ def effect_table(outcome: DiagnoseOutcome) -> Table:
     for step in outcome.finding.steps:
         meanings = {p.name: p.meaning for p in EFFECTS[step.effect].parameters}
         for e in step.estimates:
-            about = meanings.get(e.name, "")
+            about = meanings.get(e.name.split(" in ")[0], "")  # of one recording, if so
             detail = "; ".join(w for w in (about, e.note) if w)
             rows.append(_estimate(e, f"{step.effect}: {e.name.replace('_', ' ')}", detail))
     return Table("Numbers of what was found", _ESTIMATES, tuple(rows))

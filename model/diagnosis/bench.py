@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from functools import cached_property
+from itertools import pairwise, product
 from threading import Lock
 
 import numpy as np
@@ -30,6 +31,7 @@ from model.fitting.secant import descend_by_secants
 from model.fitting.sketch import sketched
 from model.fitting.thinning import thinned
 from model.fitting.threads import Job, Result, together
+from model.fitting.walks import Walking
 from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
 __all__ = [
@@ -128,14 +130,43 @@ class Trial:
         return layout.model(layout.values(self.x))
 
     @property
+    def models(self) -> tuple[Actuator | Strip, ...]:
+        """The fitted model of each record, with the walk that each has of its own."""
+        if self.walking is None:
+            return (self.model,) * len(self.problem.records)
+        return tuple(self._walked(sizes) for sizes in self.walking.sizes)
+
+    @property
+    def in_common(self) -> Actuator | Strip:
+        """The fitted model with one walk for all records, which they may not show alike."""
+        return self.model if self.walking is None else self._walked(self.walking.in_common)
+
+    @property
+    def residuals_in_common(self) -> np.ndarray:
+        """What the model ``in_common`` leaves, (N,) over the noise."""
+        return self.residuals if self.walking is None else self.walking.residuals_in_common
+
+    @cached_property
+    def walking(self) -> Walking | None:
+        """The walks that each record has of its own; None where none has."""
+        return self.problem.walking(self.x)
+
+    def _walked(self, sizes: np.ndarray) -> Actuator | Strip:
+        layout = self.problem.layout
+        values = layout.values(self.x)
+        values[self.problem.own] = sizes
+        return layout.model(values)
+
+    @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects in it."""
         return tuple(name for name, _ in self.problem.layout.base.effects)
 
     @property
     def free(self) -> int:
-        """How many numbers were fitted."""
-        return int(np.count_nonzero(~self.fixed))
+        """How many numbers were fitted, those of each record's own among them."""
+        more = 0 if self.problem.walks is None else self.problem.walks.more
+        return int(np.count_nonzero(~self.fixed)) + more
 
     @property
     def is_of_actuator(self) -> bool:
@@ -748,7 +779,8 @@ class Bench:
             selection_max=float(np.max(np.abs(left_out))),
             criterion=information(trial.cost, trial.free, samples),
             estimates=self.estimates(trial, jac) if estimates else (),
-            for_others=for_others or trial.model,
+            for_others=for_others or trial.in_common,
+            models=trial.models,
         )
 
     def _noise_lost(self) -> float:
@@ -780,6 +812,8 @@ class Bench:
         for q, x, value, s, end in zip(
             layout.quantities, trial.x, values, spread, at_end, strict=True
         ):
+            if trial.problem.walks is not None and q.name in trial.problem.walks.names:
+                continue
             if not math.isfinite(s):
                 found.append(Estimate(q.name, q.unit, float(value), 0.0, math.inf, False, "held"))
                 continue
@@ -794,7 +828,26 @@ class Bench:
                 # a law that would go further there is not quite the one that acts
                 note = "at the end of the range that it may have"
             found.append(Estimate(q.name, q.unit, float(value), low, high, sure, note))
-        return tuple(found)
+        return (*found, *self._own_estimates(trial))
+
+    @staticmethod
+    def _own_estimates(trial: Trial) -> Iterator[Estimate]:
+        """The same of the walks that each record has of its own."""
+        problem, walking = trial.problem, trial.walking
+        if problem.walks is None or walking is None:
+            return
+        shared = ~trial.fixed & ~problem.own
+        jac = problem.without_walks().jacobian(trial.x, shared)
+        jac = np.hstack([jac, problem.walks.ways / problem.sigma[:, None]])
+        inflation = max(1.0, trial.cost) * max(1.0, trial.correlation)
+        sizes = walking.sizes.ravel()
+        spread = 1.96 * np.sqrt(np.diag(covariance(jac.T @ jac, inflation)))[-sizes.size :]
+        whose = product(problem.records, problem.walks.names)
+        for (record, name), value, s in zip(whose, sizes, spread, strict=True):
+            low, high = float(value - s), float(value + s)
+            sure = is_determined(low, high)
+            note = "" if sure else "these data hardly determine it"
+            yield Estimate(f"{name} in {record.name}", "m", float(value), low, high, sure, note)
 
 
 def _leaders(fits: Sequence[LocalFit], many: int = _LEADERS) -> list[LocalFit]:
@@ -961,8 +1014,13 @@ def _left_out(trial: Trial, jac: np.ndarray) -> np.ndarray:
     n = trial.residuals.size
     edges = np.linspace(0, n, _SEGMENTS + 1).astype(int)
     out = trial.residuals.copy()
-    normal = jac.T @ jac
     reach = trial.problem.layout.reach(trial.x)[~trial.fixed]
+    if trial.problem.walks is not None:
+        # a walk in a segment is foretold by that in the rest of its record
+        own = trial.problem.walks.ways / trial.problem.sigma[:, None]
+        jac = np.hstack([jac, own])
+        reach = np.append(reach, np.full(own.shape[1], np.inf))
+    normal = jac.T @ jac
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     for low, high in pairwise(edges):
         part, r = jac[low:high], trial.residuals[low:high]

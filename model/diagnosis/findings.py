@@ -117,7 +117,8 @@ class Stage:
     the Bayesian information criterion, counting correlated residuals as what they are worth; only
     differences mean something. ``estimates`` are the model's numbers with their intervals.
     ``for_others`` is the model by which other recordings are predicted: the same without what
-    happened in these recordings only, fitted again.
+    happened in these recordings only, fitted again. ``models`` are those of the training records,
+    each with the walk that it has of its own.
     """
 
     model: Actuator | Strip
@@ -128,6 +129,11 @@ class Stage:
     criterion: float
     estimates: tuple[Estimate, ...] = ()
     for_others: Actuator | Strip | None = None
+    models: tuple[Actuator | Strip, ...] = ()
+
+    def of_each(self, records: int) -> tuple[Actuator | Strip, ...]:
+        """The models of so many training ``records``."""
+        return self.models or (self.model,) * records
 
     @property
     def predicting(self) -> Actuator | Strip:

@@ -87,6 +87,9 @@ class Screen:
 
     def promises(self, effect: Effect) -> list[Promise]:
         """Promises of ``effect``, best first: one for each shape on its grid."""
+        own = self._of_each_record(effect)
+        if own is not None:
+            return [own]
         shapes = list(product(*(self._starts(p) for p in effect.shapes)))
         found = self._scored(effect, shapes)
         only = effect.shapes[0] if len(effect.shapes) == 1 else None
@@ -289,6 +292,24 @@ class Screen:
             start = np.clip(layout.coordinates(there_too), layout.lower, layout.upper)
             found.append(Promise(models[n * per], start, columns, share))
         return found
+
+    def _of_each_record(self, effect: Effect) -> Promise | None:
+        """The promise of a walk that each record has of its own; None of any other effect."""
+        if effect.ways is None:
+            return None
+        nothing = tuple(p.neutral or 0.0 for p in effect.sizes)
+        model = with_effect(self.trial.model, effect.name, nothing)
+        problem = self.bench.problem(model, self._haste)
+        if problem.walks is None:
+            return None
+        columns = problem.walks.ways / problem.sigma[:, None]
+        columns /= np.linalg.norm(columns, axis=0)
+        across = columns - self._q @ (self._q.T @ columns)
+        _, share = self._solve(across, columns, float(self._residual @ self._residual))
+        base_values = self.trial.problem.layout.values(self.trial.x)
+        start = problem.layout.coordinates(np.concatenate([base_values, nothing]))
+        # its sizes are found on the way: as numbers of the model they do nothing
+        return Promise(model, start, np.zeros((problem.measured.size, len(nothing))), share)
 
     def _moved(
         self, problem: Problem, population: np.ndarray, asked: Sequence[int]

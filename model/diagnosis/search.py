@@ -327,7 +327,7 @@ class _Search:
         _, promises = self.screened.get(frozenset(parent.effects), (None, {}))
         keys = {n: frozenset((*parent.effects, n)) for n in others if n not in parent.effects}
         # what refines another promises at least what that does
-        asked = {n: promises.get(EFFECTS[n].refines or n, []) for n in keys}
+        asked = {n: promises.get(_coarsest(n), []) for n in keys}
         shares = {n: max((p.share for p in asked[n]), default=0.0) for n in keys}
         return [
             _Tried(n, parent, self.found[k], shares[n]) for n, k in keys.items() if k in self.found
@@ -691,7 +691,8 @@ class _Search:
         nothing[first : first + len(effect.sizes)] = [p.neutral for p in effect.sizes]
         worth = [p for p in promises if p.share > _NEARLY * promises[0].share]
         for start, promise in ((nothing, promises[0]), *((p.start, p) for p in worth)):
-            starts.append((start, _near(jacobian, promise, effect)))
+            near = _near(jacobian, promise, effect)
+            starts.append((start, self.bench.problem(model).off_walks(near)))
         simpler = self._simpler(parent, effect, promises[0].start)
         if simpler is not None:
             starts.append((simpler, starts[0][1]))
@@ -941,7 +942,7 @@ class _Search:
     def _refining(self, trial: Trial) -> list[_Tried]:
         """What refines effects of ``trial``, in their place, where it leaves more than noise.
 
-        From where that has ended, what there is more doing nothing.
+        From where that has ended, what there is more doing nothing; and what refines that.
         """
         refining = [e for e in self.effects if e.refines in trial.effects]
         tried: list[_Tried] = []
@@ -957,7 +958,10 @@ class _Search:
                 start = _placed(layout, known | _taken_over(effect.name, coarse))
                 fixed = np.concatenate([parent.fixed, np.zeros(len(nothing), dtype=bool)])
                 self._keep(self.bench.ended(self.bench.fit(model, [(start, None)], fixed)))
-            tried += self._in_its_place(trial, effect.refines, [effect.name])
+            fine = self._in_its_place(trial, effect.refines, [effect.name])
+            tried += fine
+            for one in fine:
+                tried += self._refining(one.trial)
         return tried
 
     def _sought_all_over(self, tried: _Tried, lead: Trial) -> None:
@@ -1315,8 +1319,8 @@ class _Search:
         Where a walk is beyond doubt, the rest is as it is beside it.
         """
         if not self._walks_beyond_doubt(trial):
-            return fitted(self._for_others(trial)).model
-        model, once = fitted(trial).model, self._once(trial)
+            return fitted(self._for_others(trial)).in_common
+        model, once = fitted(trial).in_common, self._once(trial)
         return replace(model, effects=tuple(e for e in model.effects if e[0] not in once))
 
     def _walks_beyond_doubt(self, trial: Trial) -> bool:
@@ -1334,11 +1338,13 @@ class _Search:
     def _recurred(self, trial: Trial, without: Trial) -> bool:
         """Whether each of several recordings is decisively and mostly explained by it.
 
-        Two walks that differ have something in common, too, but that leaves much of each.
+        One for all: two walks that differ have something in common, too, but that leaves much of
+        each.
         """
         edges = np.cumsum([r.measured.size for r in trial.problem.records])[:-1]
         used = np.isfinite(trial.problem.sigma).astype(float)
-        rows = (without.residuals**2 - trial.residuals**2, without.residuals**2 - used)
+        left = trial.residuals_in_common
+        rows = (without.residuals**2 - left**2, without.residuals**2 - used)
         gained, missing = ([float(p.sum()) for p in np.split(row, edges)] for row in rows)
         least = _DECISIVE * self._correlation([trial])
         shown = [g > max(least, _TRUSTED * m) for g, m in zip(gained, missing, strict=True)]
@@ -1463,7 +1469,11 @@ class _Search:
         before = signatures(self.bench.full, first)
         after = signatures(self.bench.full, last)
         missing_before = missing_stress(self.bench.full, first.model)
-        missing_after = missing_stress(self.bench.full, last.model)
+        missing_after = [
+            m
+            for record, model in zip(self.bench.full, last.models, strict=True)
+            for m in missing_stress([record], model)
+        ]
         is_noise = all(s.is_noise for s in after)
         if not best.effects:
             verdict = NOTHING_MISSING if small else UNEXPLAINED
@@ -1511,7 +1521,7 @@ class _Search:
             before=before,
             after=after,
             missing_before=missing_before,
-            missing_after=missing_after,
+            missing_after=tuple(missing_after),
             unnamed=unnamed,
             rivals=tuple(rivals),
             simulations=self.work.simulations,
@@ -1714,6 +1724,13 @@ def _leads_to(name: str, other: str) -> bool:
     """Whether ``name`` is ``other``, or a simpler law of its family that it may start from."""
     same = EFFECTS[name].family == EFFECTS[other].family
     return name == other or (same and _intricacy(name) < _intricacy(other))
+
+
+def _coarsest(name: str) -> str:
+    """The effect that ``name`` refines, or what that one refines, ..., or ``name``."""
+    while EFFECTS[name].refines:
+        name = EFFECTS[name].refines
+    return name
 
 
 def _intricacy(name: str) -> int:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+
+import numpy as np
 
 __all__ = ["ACTS_ON", "FAMILIES", "Effect", "EffectValues", "Parameter"]
 
@@ -90,7 +93,10 @@ class Effect:
     says that another recording has it too, or when. ``relaxes`` is True of what relaxes as the
     network's branches do, its first two numbers being a modulus and a relaxation time: while it is
     missing, branches stand in for it. ``refines`` names an effect that this one does more closely:
-    it is sought only where that one leads and leaves more than noise.
+    it is sought only where that one leads and leaves more than noise. ``ways`` is of an effect that
+    goes another way in each recording, and adds to the reading what is linear in its sizes: at
+    times (N,) s what each of them adds by itself, (N, sizes). Of several recordings each has sizes
+    of its own then (``model.fitting.walks``).
     ``words`` is one sentence for a person: what the effect is and what betrays it.
     """
 
@@ -105,6 +111,7 @@ class Effect:
     recurs: bool = True
     relaxes: bool = False
     refines: str = ""
+    ways: Callable[[np.ndarray], np.ndarray] | None = None
 
     @property
     def sizes(self) -> tuple[Parameter, ...]:

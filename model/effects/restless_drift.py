@@ -6,9 +6,11 @@ in half a minute. So many numbers play much that is slow: they are sought only w
 
 from __future__ import annotations
 
+from functools import partial
+
 from model.effects.description import Effect, Parameter
 from model.effects.wandering_drift import EFFECT as WANDERING
-from model.effects.wandering_drift import WALK, walked
+from model.effects.wandering_drift import WALK, walked, ways
 from model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
@@ -29,6 +31,7 @@ EFFECT = Effect(
     ),
     recurs=False,
     refines=WANDERING.name,
+    ways=partial(ways, terms=9),
 )
 
 

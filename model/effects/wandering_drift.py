@@ -7,12 +7,41 @@ so that the numbers do not do each other's work. How it goes on is not known.
 
 from __future__ import annotations
 
+from functools import partial
+
+import numpy as np
+
 from model.effects.description import Effect, Parameter
-from model.jit import jit
+from model.jit import allocating, jit
 
 __all__ = ["EFFECT", "sense"]
 
+_SPAN = 30.0  # s
+
 WALK = (-1e-2, 1e-2)  # m
+
+
+@jit
+def walked(c, k, terms, t):
+    s = 2.0 * t / _SPAN - 1.0
+    now, before, start, way = s, 1.0, -1.0, 0.0
+    for i in range(terms):
+        way += c[k + i] * (now - start)
+        now, before, start = 2.0 * s * now - before, now, -start
+    return way
+
+
+@allocating
+def ways(time, terms):
+    """What each of ``terms`` numbers adds at ``time`` (N,) s: (N, terms)."""
+    alone, found = np.zeros(terms), np.zeros((time.size, terms))
+    for i in range(terms):
+        alone[:] = 0.0
+        alone[i] = 1.0
+        for n in range(time.size):
+            found[n, i] = walked(alone, 0, terms, time[n])
+    return found
+
 
 EFFECT = Effect(
     name="wandering drift",
@@ -27,19 +56,8 @@ EFFECT = Effect(
         Parameter("quintic", "m", WALK, "half of its part with four turns", 3e-6, 0.0),
     ),
     recurs=False,
+    ways=partial(ways, terms=5),
 )
-
-_SPAN = 30.0  # s
-
-
-@jit
-def walked(c, k, terms, t):
-    s = 2.0 * t / _SPAN - 1.0
-    now, before, start, way = s, 1.0, -1.0, 0.0
-    for i in range(terms):
-        way += c[k + i] * (now - start)
-        now, before, start = 2.0 * s * now - before, now, -start
-    return way
 
 
 @jit

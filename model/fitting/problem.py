@@ -14,6 +14,7 @@ from model.errors import ModelError
 from model.film import Strip, stress_of
 from model.fitting.parameters import Layout
 from model.fitting.threads import together
+from model.fitting.walks import Walking, walks_of
 from model.records import ActuatorRecord, FilmRecord, Record
 
 __all__ = ["Problem", "is_told"]
@@ -39,6 +40,9 @@ class Problem:
     residual, which a search walks away from. ``haste`` is as the kernel has it. ``simulations``
     counts records simulated, and ``told`` is called with each such number. What the numbers
     ``sketched`` (d,) bool do is told by the records' sketches, None where nothing is.
+
+    Walks that each of several records has of its own are found on the way (``model.fitting.walks``)
+    and are part of every prediction; the layout's numbers of them then do nothing.
     """
 
     def __init__(
@@ -75,6 +79,9 @@ class Problem:
             ]
         )
         self._edges = np.cumsum([0, *(r.measured.size for r in records)])
+        self.walks = walks_of(self.records, layout.base.effects)
+        #: (d,) bool of the layout's numbers that each record has for itself
+        self.own = np.isin(layout.names, () if self.walks is None else self.walks.names)
 
     @property
     def samples(self) -> int:
@@ -112,6 +119,8 @@ class Problem:
             self.told(steps.size, self._effort(float(steps.sum())))
         if self._missed is not None:
             out += self._missed
+        if self.walks is not None:
+            out += self.walks.nearest(self.measured - out)
         # of several records the first that fails speaks
         failed = np.argmax(status != kernel.OK, axis=1)
         return out, np.take_along_axis(status, failed[:, None], axis=1)[:, 0]
@@ -180,6 +189,28 @@ class Problem:
         """(model - measured)/noise, (N,), at coordinates ``x`` (d,)."""
         predicted, _ = self.predict(self.layout.values(x))
         return (predicted[0] - self.measured) / self.sigma
+
+    def walking(self, x: np.ndarray) -> Walking | None:
+        """The walks of the records at ``x`` (d,); None where none has one of its own."""
+        if self.walks is None:
+            return None
+        still = self.layout.values(x)
+        still[self.own] = 0.0
+        missing = self.measured - self.without_walks().predict(still)[0][0]
+        return self.walks.walking(missing, self.sigma)
+
+    def without_walks(self) -> Problem:
+        """The same, but that what each record has of its own is not found on the way."""
+        other = copy(self)
+        other.walks = None
+        return other
+
+    def off_walks(self, jacobian: np.ndarray) -> np.ndarray:
+        """Columns of a ``jacobian`` (N, f) less what the walks of each record make up for."""
+        if self.walks is None:
+            return jacobian
+        sigma = np.where(np.isfinite(self.sigma), self.sigma, 0.0)
+        return jacobian - (self.walks.nearest(jacobian.T * sigma) / self.sigma).T
 
     def costs(self, x: np.ndarray) -> np.ndarray:
         """Mean square of the residuals (P,) of a population of coordinates (P, d).
