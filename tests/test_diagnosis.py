@@ -294,6 +294,102 @@ def test_a_walk_that_leaves_but_noise_is_not_refined():
     assert search._in_refined(walk) is walk
 
 
+def test_what_refines_is_refined_itself():
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    walks = ("wandering drift", "restless drift", "fitful drift")
+    for names, left in (((), 20.0), *(((name,), 10.0 / (i + 2)) for i, name in enumerate(walks))):
+        model = replace(PLAIN, effects=tuple(typical(name) for name in names))
+        search._keep(made_trial([record], model, np.full(record.measured.size, left * NOISE)))
+        search.left_out |= {(frozenset(names), name) for name in names}
+    coarse = search.found[frozenset(walks[:1])]
+    assert [t.name for t in search._refining(coarse)] == ["restless drift", "fitful drift"]
+    assert search._in_refined(coarse) is search.found[frozenset(walks[2:])]
+
+
+@functools.cache
+def of_two_walks() -> Diagnosis:
+    """Two recordings in which the reading wanders, in each in another way."""
+    drifts = (
+        {"linear": 2e-5, "quadratic": -8e-6, "cubic": 3e-6, "quartic": 1e-6, "quintic": -2e-6},
+        {"linear": -1e-5, "quadratic": 6e-6, "cubic": -5e-6, "quartic": 2e-6, "quintic": 1e-6},
+    )
+    walking = [
+        record_of(replace(PLAIN, effects=effect("wandering drift", **drift)), seed=seed)
+        for seed, drift in enumerate(drifts)
+    ]
+    return diagnose(
+        [replace(r, name=f"run {i}") for i, r in enumerate(walking)], PLAIN, workers=1
+    )
+
+
+def test_each_recording_has_a_walk_of_its_own():
+    found = of_two_walks()
+    assert [s.effect for s in found.steps] == ["wandering drift"]
+    assert found.verdict == EXPLAINED
+    assert found.baseline.cost > 5.0
+    # one set of numbers for the rig, and a walk of each of the two
+    assert len(found.final.models) == 2
+    one, other = (dict(m.effects)["wandering drift"] for m in found.final.models)
+    assert one != other
+    assert found.final.models[0].network == found.final.models[1].network
+    for model, drift in zip(found.final.models, (2e-5, -1e-5), strict=True):
+        assert np.sign(dict(dict(model.effects)["wandering drift"])["linear"]) == np.sign(drift)
+
+
+def test_what_each_recording_has_of_its_own_is_told_of_each():
+    (step,) = of_two_walks().steps
+    sizes = ("linear", "quadratic", "cubic", "quartic", "quintic")
+    assert [e.name for e in step.estimates] == [
+        f"{size} in {run}" for run in ("run 0", "run 1") for size in sizes
+    ]
+    hidden = (2e-5, -8e-6, 3e-6, 1e-6, -2e-6, -1e-5, 6e-6, -5e-6, 2e-6, 1e-6)
+    inside = [e.low <= h <= e.high for e, h in zip(step.estimates, hidden, strict=True)]
+    assert sum(inside) >= 8
+    for estimate, model in zip(step.estimates[::5], of_two_walks().final.models, strict=True):
+        assert estimate.value == dict(dict(model.effects)["wandering drift"])["linear"]
+        assert estimate.unit == "m"
+
+
+def test_what_a_walk_leaves_is_what_its_own_recording_lacks():
+    found = of_two_walks()
+    assert all(s.is_noise for s in found.after)
+    for before, after in zip(found.missing_before, found.missing_after, strict=True):
+        assert np.sqrt(np.mean(after.stress**2)) < 0.5 * np.sqrt(np.mean(before.stress**2))
+
+
+def test_walks_of_their_own_predict_no_other_recording():
+    found = of_two_walks()
+    assert found.final.predicting.effects == ()
+    assert any("predicted without it" in note for note in found.notes)
+
+
+def test_a_walk_that_each_recording_shows_alike_predicts_others():
+    drift = {"linear": 2e-5, "quadratic": -8e-6, "cubic": 3e-6, "quartic": 1e-6, "quintic": -2e-6}
+    walks = replace(PLAIN, effects=effect("wandering drift", **drift))
+    records = [record_of(walks, seed=seed) for seed in (0, 1)]
+    search = _Search(records, PLAIN, 1, lambda *_: None, lambda: False)
+    trials = {}
+    for model in (PLAIN, walks):
+        layout = search.bench.problem(model).layout
+        held = np.zeros(layout.size, dtype=bool)
+        held[layout.column("J")] = True
+        start = layout.coordinates(layout.initial())
+        trial = search.bench.ended(search.bench.fit(model, [(start, None)], held))
+        search.found[frozenset(trial.effects)] = trials[trial.effects] = trial
+    bare, walking = trials[()], trials[("wandering drift",)]
+    search.left_out.add((frozenset(walking.effects), "wandering drift"))
+    assert walking.free == bare.free + 10
+    assert search._recurred(walking, bare)
+    predicting = search._predicting(walking, lambda t: t)
+    # one walk for all, which is that of each
+    shown = [m.simulate(thesis_drive()).displacement for m in (predicting, *walking.models)]
+    assert np.max(np.abs(shown[0] - shown[1])) < 1e-6
+    assert np.max(np.abs(shown[0] - walks.simulate(thesis_drive()).displacement)) < 1e-6
+    # it is taken from each of the two by turns, and foretold by the rest
+    assert search.bench.left_out_cost(walking) == pytest.approx(1.0, abs=0.1)
+
+
 def test_springs_beside_a_walk_beyond_doubt_predict_others():
     found = of_walking()
     assert found.final.predicting.effects == ()

@@ -379,6 +379,7 @@ SHOWN = {
     "sensor double lag": shown_by_two_lags,
     "wandering drift": shown_by_walk,
     "restless drift": shown_by_walk,
+    "fitful drift": shown_by_walk,
     "sudden change of reading": lambda p, t: (
         moved(t)[0] + p["jump"] * np.clip((t - p["moment"]) / 0.02 + 0.5, 0.0, 1.0)
     ),
@@ -599,6 +600,7 @@ LARGER = {
     "slowing drift": 30.0,
     "wandering drift": 3.0,
     "restless drift": 3.0,
+    "fitful drift": 3.0,
     "mains interference": 2.0,
     "sensor curvature": 3.0,
     "sensor bend": 3.0,

@@ -67,6 +67,7 @@ _ROUGHLY = 100.0  # of the noise's mean square: what leaves more need not be sim
 _WHITE_CORRELATION = 1.3
 _LASTING = 2.0  # samples of correlation: so much is no noise of a sensor
 _POLISHING = 8  # iterations on every sample
+_TRIED = 9  # places that each of these tries, beside two for each number
 _PATIENCE = 3  # iterations down a valley that together must gain something
 _NEARLY = 1.02  # of the cost: a descent from elsewhere that comes so near is followed on
 _FAR_ABOVE = 1.1  # of the cost of a descent from elsewhere: such a valley is left
@@ -743,11 +744,20 @@ class Bench:
         predicted = _left_out(trial, trial.jacobian(quick=True))
         return float(predicted @ predicted) / trial.problem.samples
 
-    def polished(self, trial: Trial, in_haste: bool = False) -> Trial:
-        """``trial`` fitted to every sample, to the end; ``in_haste`` as it is, on every sample."""
+    def polished(self, trial: Trial, most: float = math.inf) -> Trial:
+        """``trial`` fitted to every sample, to the end, or as far as ``most`` work leads.
+
+        With none, it is what it was, on every sample; else it takes one step at least.
+        """
         problem = self.problem(trial.model, kernel.CAREFUL)
         gain = max(0.5, _WORTH * trial.cost * problem.samples)
-        iterations = 0 if in_haste else _POLISHING
+        iterations = _POLISHING if most > 0.0 else 0
+        if 0.0 < most < math.inf:
+            before = self.work.effort
+            problem.residuals(trial.x)
+            one = self.work.effort - before
+            one *= 2 * trial.free + _TRIED
+            iterations = min(iterations, max(1, int(most / one)))
         fit = descend(problem, trial.x, trial.fixed, iterations, gain, damping=1e-4)
         return _trial(problem, fit, trial.fixed)
 

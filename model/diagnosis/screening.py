@@ -37,6 +37,7 @@ _DONE_WELL = (1e-2, 1e-3)  # of what a model's numbers do best: what is left to 
 _LET_GO = 0.05  # of how far a film was stretched: less is no way back
 _ON_THE_WAY_BACK = ("softening", "rate_independent_hysteresis", "slack")  # families that show there
 _SPREAD = (16, 6, 4)  # values of one shape, of each of two, of each of more
+_FAR = 25.0  # of the noise's mean square: what is sought there shows in rough simulations, too
 _SIZES = (0.3, 1.0, 3.0, 10.0)  # times the typical one, tried of effects with a single size
 
 
@@ -81,8 +82,14 @@ class Screen:
         self.jacobian = trial.jacobian()
         self._q, self._r = np.linalg.qr(self.jacobian)
         self._residual = trial.residuals - self._q @ (self._q.T @ trial.residuals)
-        # what the base model does must be as it was
-        self._haste = trial.problem.haste if follows_path(trial.model.effects) else kernel.ROUGH
+        self._haste, self._as_it_was = kernel.ROUGH, trial.residuals
+        if follows_path(trial.model.effects):
+            # what the base model does must be as it was: films turn elsewhere in a rough simulation
+            if len(bench.records) == 1 or trial.cost < _FAR:
+                self._haste = trial.problem.haste
+            else:
+                rough = bench.problem(trial.problem.layout.base, self._haste)
+                self._as_it_was = rough.residuals(trial.x)
         self._sketch = trial.problem.sketch(trial.x, trial.residuals)
 
     def promises(self, effect: Effect) -> list[Promise]:
@@ -335,7 +342,7 @@ class Screen:
         predicted, status = problem.predict(population, by_sketch)
         moved = (predicted - problem.measured) / problem.sigma
         for row, sketched in zip(moved, by_sketch, strict=True):
-            row -= self._sketch if sketched else self.trial.residuals
+            row -= self._sketch if sketched else self._as_it_was
         return moved, status
 
     @staticmethod

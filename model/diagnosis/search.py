@@ -37,6 +37,9 @@ Progress = Callable[[str, float], None]
 
 # steps of simulations that a search may take: some forty-five seconds of two cores
 _EFFORT = 2.8e8
+_OF_SEVERAL = 0.9  # of that, of several records: there the last fits take longer
+_POLISHING = 2e7  # of these, that each of the final fits may take
+_FIRST_REFITS = 0.32  # of that: where refits of single effects take more, others must be quick
 _AT_LAST = 0.1  # of that: what one that is ended may take to prune, and to tell laws apart
 _EFFECTS_MAX = 3  # more at once no record of this kind tells apart
 _TURNS = 3  # of searching on and pruning: what is pruned makes room
@@ -158,7 +161,7 @@ class _Search:
         thorough: bool = False,
     ) -> None:
         self.thorough = thorough
-        self.most = math.inf if thorough else _EFFORT
+        self.most = math.inf if thorough else _EFFORT * (_OF_SEVERAL if len(records) > 1 else 1.0)
         self.ran_out = False
         self.work = Work()
         self.bench = Bench(records, base, workers, self._watch, self.work)
@@ -448,11 +451,14 @@ class _Search:
             if not tried:
                 break
             least = self._least(best)
-            fitted, correlation = self._settled(best, tried, least)
+            fitted, correlation = self._ranked(best, tried)
+            in_haste = self._leaves_no_time(fitted[0].trial)
+            if not in_haste:
+                fitted, correlation = self._settled(best, tried, least)
             leader = fitted[0].trial
             gain = self._gain(best, leader, correlation)
             promising = gain > self._asked(fitted[0].name) or not best.is_noise
-            if promising and best.cost - leader.cost > least:
+            if promising and best.cost - leader.cost > least and not in_haste:
                 fitted, correlation = self._settled(best, self._anew(fitted), least)
                 fitted, correlation = self._rivals_ended(best, fitted)
                 fitted, correlation = self._laws_of_walk(best, fitted)
@@ -558,6 +564,20 @@ class _Search:
         """
         return tried.trial.is_white and _is_law(tried.name)
 
+    def _leaves_no_time(self, leader: Trial) -> bool:
+        """Whether the work that is left is needed for what is missing beside a ``leader``.
+
+        Where much is left and refits take long, two effects are there at once, or one that follows
+        the path: to be sure of the first would leave nothing for the second.
+        """
+        late = self.work.effort > _FIRST_REFITS * self.most
+        return leader.cost > _MUCH_LEFT and late and self.is_dear
+
+    @property
+    def is_dear(self) -> bool:
+        """Whether a fit takes so long that they must be few: of several records."""
+        return len(self.bench.records) > 1
+
     def _least(self, best: Trial) -> float:
         """The cost that one more effect must explain to be followed on; -inf: none is asked for."""
         asked = self._share(best, math.inf) if best.effects else 0.0  # of any gain, however large
@@ -617,7 +637,8 @@ class _Search:
         if order and parent.cost > _MUCH_LEFT and (depth > 0 or not self.thorough):
             # so far from the noise it matters which family it is, not yet which law of it
             refit([n for n in order if _is_first_of_family(n, order)])
-            near = (_NEAR_LEAD if depth > 0 else _MAY_LEAD) * min(t.trial.cost for t in tried)
+            several = depth > 0 or self.is_dear
+            near = (_NEAR_LEAD if several else _MAY_LEAD) * min(t.trial.cost for t in tried)
             may_lead = {EFFECTS[t.name].family for t in tried if t.trial.cost < near}
             order = [n for n in order if EFFECTS[n].family in may_lead]
         refit(order)
@@ -1450,8 +1471,8 @@ class _Search:
 
     def _finding(self, baseline: Trial, best: Trial) -> Diagnosis:
         self.report("final fits", 0.94)
-        first = self.bench.polished(baseline, self.interrupted)
-        last = self.bench.polished(best, self.interrupted) if best.effects else first
+        first = self._polished(baseline)
+        last = self._polished(best) if best.effects else first
         correlation = max(1.0, last.correlation)
         stage0 = self.bench.stage(first, correlation, estimates=True)
         explained = _explained(first, last)
@@ -1461,7 +1482,7 @@ class _Search:
 
         def fitted(trial: Trial) -> Trial:
             key = frozenset(trial.effects)
-            return done[key] if key in done else self.bench.polished(trial, self.interrupted)
+            return done[key] if key in done else self._polished(trial)
 
         others = first.model if doubtful else self._predicting(best, fitted)
         final = self.bench.stage(last, correlation, estimates=True, for_others=others)
@@ -1529,6 +1550,11 @@ class _Search:
             held=self.held,
             notes=tuple(notes),
         )
+
+    def _polished(self, trial: Trial) -> Trial:
+        """``trial`` fitted to every reading, as far as there is time for it."""
+        most = math.inf if self.thorough else _POLISHING
+        return self.bench.polished(trial, 0.0 if self.interrupted else most)
 
     def _steps(
         self, best: Trial, last: Trial, numbers: Sequence[Estimate], correlation: float

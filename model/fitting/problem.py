@@ -241,6 +241,12 @@ class Problem:
         With the ``residuals`` at ``x`` given, one-sided ones, for half of the cost; if they may be
         ``sketched``, those that sketches tell for a quarter of that.
         """
+        moving = ~self.own[free]
+        if not moving.all():
+            # what each record has for itself does nothing, and not even by rounding
+            jac = np.zeros((self.measured.size, moving.size))
+            jac[:, moving] = self.jacobian(x, free & ~self.own, residuals, sketched)
+            return jac
         if residuals is not None:
             by_sketch = None if self.sketched is None or not sketched else self.sketched[free]
             return self._one_sided(x, free, residuals, by_sketch)
