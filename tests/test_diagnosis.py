@@ -318,9 +318,7 @@ def of_two_walks() -> Diagnosis:
         record_of(replace(PLAIN, effects=effect("wandering drift", **drift)), seed=seed)
         for seed, drift in enumerate(drifts)
     ]
-    return diagnose(
-        [replace(r, name=f"run {i}") for i, r in enumerate(walking)], PLAIN, workers=1
-    )
+    return diagnose([replace(r, name=f"run {i}") for i, r in enumerate(walking)], PLAIN, workers=1)
 
 
 def test_each_recording_has_a_walk_of_its_own():
@@ -533,17 +531,18 @@ def refitted(
     left: dict[str, float],
     alone: bool = False,
     thorough: bool = False,
+    records: int = 1,
 ) -> list[str]:
     """Which effects of such promised ``shares`` are refitted beside a drag that leaves ``parent``.
 
     Or ``alone``. ``left`` is what a refit of each leaves, in the noise's mean square.
     """
     record = record_of(PLAIN)
-    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False, thorough)
+    search = _Search([record] * records, PLAIN, 1, lambda *_: None, lambda: False, thorough)
 
     def trial(names: tuple[str, ...], cost: float) -> Trial:
         with_them = replace(PLAIN, effects=tuple(typical(name) for name in names))
-        return made_trial([record], with_them, np.full(1, math.sqrt(cost) * NOISE))
+        return made_trial([record] * records, with_them, np.full(1, math.sqrt(cost) * NOISE))
 
     beside = trial(() if alone else ("linear drag",), parent)
     promises = {
@@ -588,6 +587,67 @@ def test_far_from_the_noise_one_law_of_a_family_is_refitted():
     told = set(shares) - {"logarithmic ageing"}
     assert set(refitted(1e3, shares, left, alone=True)) == told
     assert set(refitted(1e3, shares, left, alone=True, thorough=True)) == set(shares)
+    # of several records as beside another
+    left["leakage"] = 400.0
+    assert set(refitted(1e3, shares, left, alone=True, records=2)) == told
+
+
+@pytest.mark.parametrize(
+    ("records", "left", "taken", "in_haste"),
+    [
+        (2, 30.0, 0.5, True),
+        (1, 30.0, 0.5, False),  # of one record there is time
+        (2, 20.0, 0.5, False),  # not much is missing
+        (2, 30.0, 0.1, False),  # refits were quick
+    ],
+)
+def test_a_first_effect_leaves_time_for_a_second(records, left, taken, in_haste):
+    record = record_of(PLAIN)
+    search = _Search([record] * records, PLAIN, 1, lambda *_: None, lambda: False)
+    search.work.effort = taken * search.most
+    leader = made_trial([record] * records, PLAIN, np.full(1, math.sqrt(left) * NOISE))
+    assert search._leaves_no_time(leader) == in_haste
+
+
+@pytest.mark.parametrize("records", [1, 2])
+def test_in_haste_the_leading_effect_is_taken_as_it_is(records):
+    """The course of a search, whose refits are made up: the first took half of all the work."""
+    record = record_of(PLAIN)
+    search = _Search([record] * records, PLAIN, 1, lambda *_: None, lambda: False)
+    noise = NOISE * np.random.default_rng(1).standard_normal(records * record.measured.size)
+
+    def made(left: float, *names: str) -> Trial:
+        model = replace(PLAIN, effects=tuple(typical(name) for name in names))
+        return made_trial([record] * records, model, left * noise)
+
+    bare, first, both = made(60.0), made(9.0, "leakage"), made(1.0, "leakage", "sensor lag")
+    search.found = {frozenset(t.effects): t for t in (bare, first, both)}
+    refits = {0: _Tried("leakage", bare, first, 0.9), 1: _Tried("sensor lag", first, both, 0.9)}
+    done: list[str] = []
+
+    def round_(parent: Trial, depth: int, *_: object) -> list[_Tried]:
+        done.append(f"refits {depth}")
+        search.work.effort = 0.5 * search.most
+        return [refits[depth]]
+
+    def settled(best: Trial, tried: list[_Tried], *_: object) -> tuple[list[_Tried], float]:
+        done.append("settled")
+        return search._ranked(best, tried)
+
+    def anew(tried: list[_Tried]) -> list[_Tried]:
+        done.append("anew")
+        return tried
+
+    search._round, search._settled, search._anew = round_, settled, anew  # type: ignore
+    search._ended = search._restarted = lambda trial, *_: trial  # type: ignore
+    search._rivals_ended = search._ranked  # type: ignore[method-assign]
+    search._in_other_laws = lambda best, _: best  # type: ignore
+    search._foretells = lambda *_: True  # type: ignore
+    assert search._search(bare) is both
+    sure = ["settled", "anew", "settled"]
+    # one that leaves but noise is made sure of, whatever the work
+    assert done == ["refits 0", *(sure if records == 1 else []), "refits 1", *sure]
+    assert [r.chosen for r in search.rounds] == ["leakage", "sensor lag"]
 
 
 def test_who_is_worse_than_nothing_after_a_refit_is_not_followed():

@@ -12,11 +12,13 @@ import pytest
 
 from model import kernel
 from model.actuator import Drive
+from model.diagnosis import bench as diagnosis_bench
 from model.diagnosis.bench import FILM_MODEL_ERROR, Bench, information, merged, relieved
 from model.diagnosis.screening import Screen
 from model.effects import EFFECTS
 from model.excitation import Chirp, Ramp, Sequence
 from model.fitting import identify
+from model.fitting.levenberg import descend
 from model.fitting.parameters import Layout
 from model.material import TABLE_3, Branch, Network, Spring
 from model.records import ActuatorRecord
@@ -151,6 +153,21 @@ def test_what_thinning_took_is_put_back_where_errors_are_told():
     assert rough.train_rms == pytest.approx(NOISE, rel=0.04)
     assert rough.train_rms == pytest.approx(full.train_rms, rel=0.04)
     assert rough.selection_rms == pytest.approx(full.selection_rms, rel=0.04)
+
+
+@pytest.mark.parametrize(("most", "iterations"), [(0.0, 0), (1.0, 1), (math.inf, 8), (1e12, 8)])
+def test_the_last_fit_goes_as_far_as_there_is_work_for_it(monkeypatch, most, iterations):
+    bench = bench_of(record_of(DRAGGED))
+    trial = fitted(bench, DRAGGED)
+    asked: list[int] = []
+
+    def counted(problem, start, fixed, iterations, *rest, **more):
+        asked.append(iterations)
+        return descend(problem, start, fixed, 0)
+
+    monkeypatch.setattr(diagnosis_bench, "descend", counted)
+    bench.polished(trial, most)
+    assert asked == [iterations]
 
 
 # --- branches that have nothing to do

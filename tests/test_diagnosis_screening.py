@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from model import kernel
 from model.diagnosis.bench import Bench
 from model.diagnosis.screening import Screen, is_of, with_effect
 from model.effects import EFFECTS
@@ -23,6 +24,8 @@ from tests.engine_tools import (
     record_of,
     thesis_drive,
 )
+
+STICKING = {"friction": 50.0, "presliding": 1e-4, "damping": 1e-3}
 
 
 @functools.cache
@@ -279,3 +282,26 @@ def test_no_film_grows_stiffer_by_use():
     for effect_of_use in (e for e in EFFECTS.values() if e.family == "softening"):
         # by a fit: a model may
         assert all(size.fitted[0] == 0.0 > size.bounds[0] for size in effect_of_use.sizes)
+
+
+def test_far_from_the_noise_a_film_that_sticks_is_screened_in_rough_simulations():
+    sticking = replace(PLAIN, effects=effect("dry friction", **STICKING))
+    truth = replace(sticking, effects=sticking.effects + effect("sensor curvature", quadratic=40.0))
+    records = [record_of(truth, seed=seed) for seed in (0, 1)]
+    found = []
+    for some in (records, records[:1]):
+        bench = Bench(some, PLAIN, workers=1)
+        trial = fitted(bench, sticking)
+        assert trial.cost > 25.0
+        screen = Screen(bench, trial)
+        # by what is there without it in the same simulation: the effect alone is left
+        found.append(screen.promises(EFFECTS["sensor curvature"])[0])
+        small = with_effect(trial.model, "sensor curvature", (1e-9,))
+        problem = bench.problem(small, screen._haste)
+        values = problem.layout.values(problem.layout.coordinates(problem.layout.initial()))
+        moved, _ = screen._moved_by(problem, values[None], np.zeros(1, dtype=bool))
+        assert np.max(np.abs(moved)) < 1e-3
+        rough = screen._haste == kernel.ROUGH
+        assert rough == (len(some) > 1)
+    assert found[0].share == pytest.approx(found[1].share, abs=0.05)
+    assert found[0].share > 0.5

@@ -1,4 +1,4 @@
-"""Walks that each of several recordings has of its own, found beside the numbers that they share."""
+"""Walks that each of several recordings has of its own, beside the numbers that they share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drift of the sensor's zero that goes up and down again and again: a longer record of a restless one.
+"""Drift of the sensor's zero that goes up and down again and again: of a longer record.
 
 As ``wandering_drift``, by a polynomial of the thirteenth degree: what wanders so fast that nine
 numbers follow it for half a minute asks for as many more as the record is longer. It plays nearly
