@@ -593,6 +593,29 @@ def test_far_from_the_noise_one_law_of_a_family_is_refitted():
 
 
 @pytest.mark.parametrize(
+    ("left", "without", "kept"),
+    [
+        (1.08, 1.107, ("distributed hysteresis",)),  # a quarter of the last of what a loop leaves
+        (1.01, 1.107, ("distributed hysteresis", "wandering drift")),
+        (1.3, 5.7, ("distributed hysteresis", "wandering drift")),
+    ],
+)
+def test_what_a_cut_round_has_found_must_be_worth_it_as_in_any_other(left, without, kept):
+    record = record_of(PLAIN)
+    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
+    both = ("distributed hysteresis", "wandering drift")
+    costs = {(): 22.0, both[:1]: without, both[1:]: 4.0, both: left}
+    rng = np.random.default_rng(1)
+    noise = NOISE * rng.standard_normal(record.measured.size)
+    noise /= np.sqrt(np.mean(noise**2)) / NOISE
+    for names, cost in costs.items():
+        model = replace(PLAIN, effects=tuple(typical(name) for name in names))
+        trial = made_trial([record], model, math.sqrt(cost) * noise)
+        search.found[frozenset(names)] = trial
+    assert search._without_needless(search.found[frozenset(both)]).effects == kept
+
+
+@pytest.mark.parametrize(
     ("records", "left", "taken", "in_haste"),
     [
         (2, 30.0, 0.5, True),

@@ -223,13 +223,28 @@ class _Search:
             # fits side by side may have gone a little further: as much is left, however far
             self.work.effort = self.most
             self.most *= 1.0 + _AT_LAST
-        best = self._leading()
+        best = self._without_needless(self._leading())
         told = (self._in_own_laws, self._among_rivals, self._as_it_foretells)
         for step in (self._pruned, self._in_refined, *told):
             try:
                 best = step(best)
             except _Enough:
                 break
+        return best
+
+    def _without_needless(self, best: Trial) -> Trial:
+        """``best`` without what a search that is not ended would not have taken beside the rest.
+
+        What was refitted first in a round that was cut short may be anything that plays the last
+        of what another leaves.
+        """
+        for name in best.effects:
+            rest = self.found.get(frozenset(best.effects) - {name})
+            if rest is None or not rest.effects:
+                continue
+            gain = self._gain(rest, best, self._correlation([rest, best]))
+            if not self._matters(rest, _Tried(name, rest, best, 0.0), gain):
+                return self._without_needless(rest)
         return best
 
     def _explained(self, best: Trial) -> Trial:
@@ -467,14 +482,7 @@ class _Search:
                 fitted, correlation = self._shaken(best, fitted)
             leader = fitted[0].trial
             gain = self._gain(best, leader, correlation)
-            matters = best.cost - leader.cost > _MATTERS * max(1.0, 0.2 * leader.cost)
-            # no more is asked of a model of a film than what it may be off
-            matters &= best.is_of_actuator or not best.is_noise
-            if best.effects:
-                # beside another, little of what no effect explains may go to any
-                took_all = gain > _BY_FAR and self._is_all(fitted[0])
-                share = 0.0 if took_all else self._share(best, gain)
-                matters &= best.cost - leader.cost > share * (best.cost - 1.0)
+            matters = self._matters(best, fitted[0], gain)
             significant = gain > self._asked(fitted[0].name) and matters
             taken = significant and self._foretells(best, fitted[0])
             if taken:
@@ -535,6 +543,19 @@ class _Search:
         """``trial`` from a new global search, with what its effects do taken off the records."""
         self._keep(self.bench.restarted(trial))
         return self._ended(self.found[frozenset(trial.effects)])
+
+    def _matters(self, best: Trial, tried: _Tried, gain: float) -> bool:
+        """Whether what one more effect explains of what ``best`` leaves is worth it."""
+        explained = best.cost - tried.trial.cost
+        if explained <= _MATTERS * max(1.0, 0.2 * tried.trial.cost):
+            return False
+        # no more is asked of a model of a film than what it may be off
+        if best.is_noise and not best.is_of_actuator:
+            return False
+        if not best.effects or (gain > _BY_FAR and self._is_all(tried)):
+            return True
+        # beside another, little of what no effect explains may go to any
+        return explained > self._share(best, gain) * (best.cost - 1.0)
 
     def _share(self, best: Trial, gain: float) -> float:
         """The part of what ``best`` leaves above the noise that one more effect must explain.
