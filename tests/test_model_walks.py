@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from model.actuator import Drive
 from model.effects import EFFECTS, PLACES
 from model.fitting.levenberg import descend
 from model.fitting.parameters import Layout
@@ -153,3 +154,14 @@ def test_one_walk_for_all_leaves_what_they_do_not_share():
     problem, x, held = problem_of(TWO)
     found = problem.walking(descend(problem, x, held).x)
     assert np.mean(found.residuals_in_common**2) > 10.0
+
+
+def test_a_record_too_short_for_its_walk_is_followed_without_more_ado():
+    short = ActuatorRecord(
+        "short", Drive(TWO[1].time[:4], TWO[1].drive.voltage[:4]), TWO[1].displacement[:4], NOISE
+    )
+    problem, x, held = problem_of([TWO[0], short])
+    fit = descend(problem, x, held)
+    assert np.all(np.isfinite(problem.walking(fit.x).sizes))
+    assert np.max(np.abs(fit.residuals[-3:])) < 1e-6  # all walks begin at 0
+    assert fit.cost == pytest.approx(1.0, abs=0.06)

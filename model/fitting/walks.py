@@ -12,12 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from model.effects import EFFECTS, EffectValues
 from model.records import ActuatorRecord, Record
 
 __all__ = ["Walking", "Walks", "walks_of"]
+
+_SEEN = 1e-12  # of what the best seen walk does: less, as in a short record, is not sought
 
 
 @dataclass(frozen=True)
@@ -49,8 +50,9 @@ class Walks:
         for record, ways in zip(records, self._ways, strict=True):
             # a reading that must not be used says nothing of the walk
             used = ways if record.valid is None else np.where(record.valid[:, None], ways, 0.0)
-            q, r = np.linalg.qr(used)
-            self._solved.append((q, r))
+            scale = np.maximum(np.linalg.norm(used, axis=0), 1e-300)
+            q, r = np.linalg.qr(used / scale)
+            self._solved.append((q, (np.linalg.pinv(r, rcond=_SEEN) / scale[:, None]).T))
 
     @property
     def more(self) -> int:
@@ -69,9 +71,9 @@ class Walks:
     def sizes(self, missing: np.ndarray) -> np.ndarray:
         """Sizes (..., K, n) that come nearest to what is ``missing`` (..., N) m of the readings."""
         found = []
-        for i, (q, r) in enumerate(self._solved):
+        for i, (q, inverse) in enumerate(self._solved):
             part = missing[..., self._edges[i] : self._edges[i + 1]]
-            found.append(_solve(r, part @ q))
+            found.append((part @ q) @ inverse)
         return np.stack(found, axis=-2)
 
     def moved(self, sizes: np.ndarray) -> np.ndarray:
@@ -110,10 +112,3 @@ def _ways_in(record: ActuatorRecord, effects: Sequence[str]) -> np.ndarray:
     ways = [EFFECTS[name].ways for name in effects]
     columns = np.concatenate([way(record.time) for way in ways if way is not None], axis=1)
     return record.seen(columns.T).T
-
-
-def _solve(r: np.ndarray, sides: np.ndarray) -> np.ndarray:
-    """``r`` (n, n), upper triangular, solved for ``sides`` (..., n)."""
-    flat = sides.reshape(-1, sides.shape[-1])
-    # of numbers that are not known yet a column is not finite, and stays so
-    return np.asarray(solve_triangular(r, flat.T, check_finite=False)).T.reshape(sides.shape)
