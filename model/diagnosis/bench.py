@@ -751,13 +751,12 @@ class Bench:
         """
         problem = self.problem(trial.model, kernel.CAREFUL)
         gain = max(0.5, _WORTH * trial.cost * problem.samples)
-        iterations = _POLISHING if most > 0.0 else 0
-        if 0.0 < most < math.inf:
+        iterations = 0
+        if most > 0.0:
             before = self.work.effort
             problem.residuals(trial.x)
-            one = self.work.effort - before
-            one *= 2 * trial.free + _TRIED
-            iterations = min(iterations, max(1, int(most / one)))
+            one = (self.work.effort - before) * (2 * trial.free + _TRIED)
+            iterations = int(min(_POLISHING, max(1.0, most / one)))
         fit = descend(problem, trial.x, trial.fixed, iterations, gain, damping=1e-4)
         return _trial(problem, fit, trial.fixed)
 

@@ -202,7 +202,7 @@ class Problem:
     def without_walks(self) -> Problem:
         """The same, but that what each record has of its own is not found on the way."""
         other = copy(self)
-        other.walks = None
+        other.walks, other.own = None, np.zeros_like(self.own)
         return other
 
     def off_walks(self, jacobian: np.ndarray) -> np.ndarray:
