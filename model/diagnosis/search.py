@@ -161,7 +161,9 @@ class _Search:
         thorough: bool = False,
     ) -> None:
         self.thorough = thorough
-        self.most = math.inf if thorough else _EFFORT * (_OF_SEVERAL if len(records) > 1 else 1.0)
+        # of several recordings of a rig a fit takes so long that they must be few; of films not
+        self.is_dear = len(records) > 1 and isinstance(base, Actuator)
+        self.most = math.inf if thorough else _EFFORT * (_OF_SEVERAL if self.is_dear else 1.0)
         self.ran_out = False
         self.work = Work()
         self.bench = Bench(records, base, workers, self._watch, self.work)
@@ -593,11 +595,6 @@ class _Search:
         """
         late = self.work.effort > _FIRST_REFITS * self.most
         return leader.cost > _MUCH_LEFT and late and self.is_dear
-
-    @property
-    def is_dear(self) -> bool:
-        """Whether a fit takes so long that they must be few: of several records."""
-        return len(self.bench.records) > 1
 
     def _least(self, best: Trial) -> float:
         """The cost that one more effect must explain to be followed on; -inf: none is asked for."""
