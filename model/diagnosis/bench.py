@@ -269,6 +269,11 @@ class Bench:
         return self.work.simulations
 
     @property
+    def is_dear(self) -> bool:
+        """Whether a fit takes so long that they must be few: of several recordings of a rig."""
+        return len(self.records) > 1 and isinstance(self.records[0], ActuatorRecord)
+
+    @property
     def samples(self) -> int:
         """How many readings count."""
         return sum(
@@ -818,10 +823,10 @@ class Bench:
         values = layout.values(trial.x)
         found = []
         at_end = np.minimum(trial.x - layout.lower, layout.upper - trial.x) < 1e-9
-        for q, x, value, s, end in zip(
-            layout.quantities, trial.x, values, spread, at_end, strict=True
+        for q, x, value, s, end, own in zip(
+            layout.quantities, trial.x, values, spread, at_end, trial.problem.own, strict=True
         ):
-            if trial.problem.walks is not None and q.name in trial.problem.walks.names:
+            if own:
                 continue
             if not math.isfinite(s):
                 found.append(Estimate(q.name, q.unit, float(value), 0.0, math.inf, False, "held"))
@@ -847,7 +852,7 @@ class Bench:
             return
         shared = ~trial.fixed & ~problem.own
         jac = problem.without_walks().jacobian(trial.x, shared)
-        jac = np.hstack([jac, problem.walks.ways / problem.sigma[:, None]])
+        jac = np.hstack([jac, problem.own_jacobian()])
         inflation = max(1.0, trial.cost) * max(1.0, trial.correlation)
         sizes = walking.sizes.ravel()
         spread = 1.96 * np.sqrt(np.diag(covariance(jac.T @ jac, inflation)))[-sizes.size :]
@@ -1024,11 +1029,9 @@ def _left_out(trial: Trial, jac: np.ndarray) -> np.ndarray:
     edges = np.linspace(0, n, _SEGMENTS + 1).astype(int)
     out = trial.residuals.copy()
     reach = trial.problem.layout.reach(trial.x)[~trial.fixed]
-    if trial.problem.walks is not None:
-        # a walk in a segment is foretold by that in the rest of its record
-        own = trial.problem.walks.ways / trial.problem.sigma[:, None]
-        jac = np.hstack([jac, own])
-        reach = np.append(reach, np.full(own.shape[1], np.inf))
+    # a walk in a segment is foretold by that in the rest of its record
+    own = trial.problem.own_jacobian()
+    jac, reach = np.hstack([jac, own]), np.append(reach, np.full(own.shape[1], np.inf))
     normal = jac.T @ jac
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     for low, high in pairwise(edges):

@@ -15,6 +15,7 @@ from model.fitting import Estimate
 
 __all__ = [
     "EXPLAINED",
+    "MUCH_LEFT",
     "NOISE_RMS",
     "NOTHING_MISSING",
     "NOT_BY_CHANCE",
@@ -33,6 +34,9 @@ __all__ = [
 
 #: Residual over noise that still is noise: the noise itself is known to some per cent.
 NOISE_RMS = 1.08
+#: Mean square of residual over noise from which it matters what is missing, not yet by which law,
+#: and what is sought shows in rough simulations, too.
+MUCH_LEFT = 25.0
 #: Probability below which a spectrum that noise might have by chance is called that of no noise.
 NOT_BY_CHANCE = 1e-3
 

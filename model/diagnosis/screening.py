@@ -22,6 +22,7 @@ import numpy as np
 from model import kernel
 from model.actuator import Actuator
 from model.diagnosis.bench import Bench, Trial
+from model.diagnosis.findings import MUCH_LEFT
 from model.effects import EFFECTS, Effect, EffectValues, Parameter, follows_path
 from model.film import Strip
 from model.fitting.problem import Problem, is_told
@@ -37,7 +38,6 @@ _DONE_WELL = (1e-2, 1e-3)  # of what a model's numbers do best: what is left to 
 _LET_GO = 0.05  # of how far a film was stretched: less is no way back
 _ON_THE_WAY_BACK = ("softening", "rate_independent_hysteresis", "slack")  # families that show there
 _SPREAD = (16, 6, 4)  # values of one shape, of each of two, of each of more
-_FAR = 25.0  # of the noise's mean square: what is sought there shows in rough simulations, too
 _SIZES = (0.3, 1.0, 3.0, 10.0)  # times the typical one, tried of effects with a single size
 
 
@@ -85,11 +85,11 @@ class Screen:
         self._haste, self._as_it_was = kernel.ROUGH, trial.residuals
         if follows_path(trial.model.effects):
             # what the base model does must be as it was: films turn elsewhere in a rough simulation
-            if len(bench.records) == 1 or trial.cost < _FAR:
-                self._haste = trial.problem.haste
-            else:
+            if bench.is_dear and trial.cost >= MUCH_LEFT:
                 rough = bench.problem(trial.problem.layout.base, self._haste)
                 self._as_it_was = rough.residuals(trial.x)
+            else:
+                self._haste = trial.problem.haste
         self._sketch = trial.problem.sketch(trial.x, trial.residuals)
 
     def promises(self, effect: Effect) -> list[Promise]:
@@ -309,7 +309,7 @@ class Screen:
         problem = self.bench.problem(model, self._haste)
         if problem.walks is None:
             return None
-        columns = problem.walks.ways / problem.sigma[:, None]
+        columns = problem.own_jacobian()
         columns /= np.linalg.norm(columns, axis=0)
         across = columns - self._q @ (self._q.T @ columns)
         _, share = self._solve(across, columns, float(self._residual @ self._residual))

@@ -13,6 +13,7 @@ from model.actuator import Actuator
 from model.diagnosis.bench import Bench, Trial, Work, akaike, information, merged, relieved
 from model.diagnosis.findings import (
     EXPLAINED,
+    MUCH_LEFT,
     NOTHING_MISSING,
     PARTLY_EXPLAINED,
     UNEXPLAINED,
@@ -59,7 +60,6 @@ _BEAM = 2  # how many explanations are followed on
 _BEAM_COST = 1.5  # of the leader's: what explains so much less is not followed on
 _SETTLED = 5  # leading candidates that are fitted to the end of their valleys
 _SETTLED_QUICKLY = 12  # that are followed a little, while the leader leaves more than noise
-_MUCH_LEFT = 25.0  # of the noise's mean square: there only one law of a family is followed
 _NEARLY_ALL = 0.95  # of what was above the noise: who explains it may be in a wrong valley of it
 _MOSTLY = 0.8  # of the same: who explains it does most of what an effect without a cause does
 _AS_GOOD = 0.98  # of its cost: who did not come near the one will not come near the other
@@ -161,12 +161,11 @@ class _Search:
         thorough: bool = False,
     ) -> None:
         self.thorough = thorough
-        # of several recordings of a rig a fit takes so long that they must be few; of films not
-        self.is_dear = len(records) > 1 and isinstance(base, Actuator)
-        self.most = math.inf if thorough else _EFFORT * (_OF_SEVERAL if self.is_dear else 1.0)
         self.ran_out = False
         self.work = Work()
         self.bench = Bench(records, base, workers, self._watch, self.work)
+        few = _OF_SEVERAL if self.bench.is_dear else 1.0
+        self.most = math.inf if thorough else _EFFORT * few
         self.base = base
         self._progress = progress
         self._reached = 0.0
@@ -594,7 +593,7 @@ class _Search:
         the path: to be sure of the first would leave nothing for the second.
         """
         late = self.work.effort > _FIRST_REFITS * self.most
-        return leader.cost > _MUCH_LEFT and late and self.is_dear
+        return leader.cost > MUCH_LEFT and late and self.bench.is_dear
 
     def _least(self, best: Trial) -> float:
         """The cost that one more effect must explain to be followed on; -inf: none is asked for."""
@@ -652,10 +651,10 @@ class _Search:
                 # who promises next to nothing beside what explains all is no rival of it
                 least = _HINT * shares[order[0]]
                 order = [n for n in order if shares[n] > least]
-        if order and parent.cost > _MUCH_LEFT and (depth > 0 or not self.thorough):
+        if order and parent.cost > MUCH_LEFT and (depth > 0 or not self.thorough):
             # so far from the noise it matters which family it is, not yet which law of it
             refit([n for n in order if _is_first_of_family(n, order)])
-            several = depth > 0 or self.is_dear
+            several = depth > 0 or self.bench.is_dear
             near = (_NEAR_LEAD if several else _MAY_LEAD) * min(t.trial.cost for t in tried)
             may_lead = {EFFECTS[t.name].family for t in tried if t.trial.cost < near}
             order = [n for n in order if EFFECTS[n].family in may_lead]
@@ -741,7 +740,7 @@ class _Search:
         anew: list[np.ndarray] = []
         if effect.relaxes and isinstance(model, Actuator):
             anew = self._relieved(parent, promises[0])
-        elif effect.acts_on == "inertia" and parent.cost > _MUCH_LEFT:
+        elif effect.acts_on == "inertia" and parent.cost > MUCH_LEFT:
             anew = self._moving(parent, promises[0])
         fixed = np.concatenate([parent.fixed, np.zeros(len(effect.parameters), dtype=bool)])
         leader = min(t.cost for t in self.found.values())
@@ -821,7 +820,7 @@ class _Search:
             of_parent[beside] += 1
             if place >= follow and not (near and rank(tried) < mark) and not may_lead:
                 continue
-            if lead > _MUCH_LEFT and not _is_first_of_family(tried.name, names):
+            if lead > MUCH_LEFT and not _is_first_of_family(tried.name, names):
                 continue
             worse = rank(tried) - self._criterion(tried.parent, correlation)
             if place and not owing and worse > (_DECISIVE if subtle else 0.0):
@@ -1099,7 +1098,7 @@ class _Search:
                 one.trial.model, [(start, None)], one.trial.fixed, lead.trial.cost
             )
             self._keep(trial)
-            near = 1.0 if lead.trial.cost > _MUCH_LEFT else _NEAR_LEAD
+            near = 1.0 if lead.trial.cost > MUCH_LEFT else _NEAR_LEAD
             if trial.cost < near * lead.trial.cost:
                 self._ended(self.found[both[0]], lead.trial.cost)
 
@@ -1150,7 +1149,7 @@ class _Search:
             one = tried[place]
             sizes = EFFECTS[one.name].sizes
             # beside a leader that leaves much, others are looked for beside it next
-            reach = _MAY_LEAD if leader.cost > _MUCH_LEFT else _OUT_OF_REACH
+            reach = _MAY_LEAD if leader.cost > MUCH_LEFT else _OUT_OF_REACH
             if len(sizes) != 1 or one.trial.cost > reach * leader.cost:
                 return None
             left, size = self._unaccounted(one, sizes_of(sizes[0], _ANEW_SIZES))
@@ -1168,7 +1167,7 @@ class _Search:
             most = min(most, _AS_WELL * there)
         again = list(tried)
         names = [tried[place].name for _, place, _ in looks]
-        if leader.cost > _MUCH_LEFT:
+        if leader.cost > MUCH_LEFT:
             looks = [k for k in looks if _is_first_of_family(tried[k[1]].name, names)]
         starts = {
             place: self._sized(tried[place], [f * size for f in _ANEW_FROM])

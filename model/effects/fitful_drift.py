@@ -7,32 +7,17 @@ anything slow, and is sought only where nine have led and have left something.
 
 from __future__ import annotations
 
-from functools import partial
-
-from model.effects.description import Effect, Parameter
 from model.effects.restless_drift import EFFECT as RESTLESS
-from model.effects.wandering_drift import WALK, walked, ways
+from model.effects.wandering_drift import finer, walked
 from model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
 
-_MORE = ("decic", "undecic", "duodecic", "tredecic")
-
-EFFECT = Effect(
-    name="fitful drift",
-    family="drift",
-    acts_on="sensor",
-    words="the reading goes up and down again and again, whatever the film does",
-    parameters=(
-        *RESTLESS.parameters,
-        *(
-            Parameter(name, "m", WALK, f"half of its part with {turns} turns", 3e-6, 0.0)
-            for name, turns in zip(_MORE, ("nine", "ten", "eleven", "twelve"), strict=True)
-        ),
-    ),
-    recurs=False,
-    refines=RESTLESS.name,
-    ways=partial(ways, terms=13),
+EFFECT = finer(
+    RESTLESS,
+    "fitful drift",
+    "the reading goes up and down again and again, whatever the film does",
+    {"decic": "nine", "undecic": "ten", "duodecic": "eleven", "tredecic": "twelve"},
 )
 
 

@@ -6,32 +6,17 @@ in half a minute. So many numbers play much that is slow: they are sought only w
 
 from __future__ import annotations
 
-from functools import partial
-
-from model.effects.description import Effect, Parameter
 from model.effects.wandering_drift import EFFECT as WANDERING
-from model.effects.wandering_drift import WALK, walked, ways
+from model.effects.wandering_drift import finer, walked
 from model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
 
-_MORE = ("sextic", "septic", "octic", "nonic")
-
-EFFECT = Effect(
-    name="restless drift",
-    family="drift",
-    acts_on="sensor",
-    words="the reading wanders up and down within the record, whatever the film does",
-    parameters=(
-        *WANDERING.parameters,
-        *(
-            Parameter(name, "m", WALK, f"half of its part with {turns} turns", 3e-6, 0.0)
-            for name, turns in zip(_MORE, ("five", "six", "seven", "eight"), strict=True)
-        ),
-    ),
-    recurs=False,
-    refines=WANDERING.name,
-    ways=partial(ways, terms=9),
+EFFECT = finer(
+    WANDERING,
+    "restless drift",
+    "the reading wanders up and down within the record, whatever the film does",
+    {"sextic": "five", "septic": "six", "octic": "seven", "nonic": "eight"},
 )
 
 

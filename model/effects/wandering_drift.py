@@ -7,6 +7,8 @@ so that the numbers do not do each other's work. How it goes on is not known.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -58,6 +60,19 @@ EFFECT = Effect(
     recurs=False,
     ways=partial(ways, terms=5),
 )
+
+
+def finer(coarse: Effect, name: str, words: str, more: Mapping[str, str]) -> Effect:
+    """A walk that refines ``coarse``, with ``more`` numbers: their names, and the turns of each."""
+    added = (
+        Parameter(number, "m", WALK, f"half of its part with {turns} turns", 3e-6, 0.0)
+        for number, turns in more.items()
+    )
+    parameters = (*coarse.parameters, *added)
+    follows = partial(ways, terms=len(parameters))
+    return replace(
+        coarse, name=name, words=words, parameters=parameters, refines=coarse.name, ways=follows
+    )
 
 
 @jit

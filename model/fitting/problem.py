@@ -80,8 +80,9 @@ class Problem:
         )
         self._edges = np.cumsum([0, *(r.measured.size for r in records)])
         self.walks = walks_of(self.records, layout.base.effects)
+        own = () if self.walks is None else self.walks.names
         #: (d,) bool of the layout's numbers that each record has for itself
-        self.own = np.isin(layout.names, () if self.walks is None else self.walks.names)
+        self.own = np.array([name in own for name in layout.names], dtype=bool)
 
     @property
     def samples(self) -> int:
@@ -204,6 +205,12 @@ class Problem:
         other = copy(self)
         other.walks, other.own = None, np.zeros_like(self.own)
         return other
+
+    def own_jacobian(self) -> np.ndarray:
+        """d(residuals)/d(sizes of the records' own walks), (N, K n); (N, 0) where none has one."""
+        if self.walks is None:
+            return np.empty((self.measured.size, 0))
+        return self.walks.ways / self.sigma[:, None]
 
     def off_walks(self, jacobian: np.ndarray) -> np.ndarray:
         """Columns of a ``jacobian`` (N, f) less what the walks of each record make up for."""
