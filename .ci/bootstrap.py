@@ -24,8 +24,8 @@ SCREEN = [
 
 def prepare(extras: str = "") -> Path:
     """Install the project with ``extras`` into .venv if need be; returns that Python."""
-    if not (3, 11) <= sys.version_info[:2] <= (3, 13):
-        sys.exit(f"dearig needs Python 3.11 to 3.13; this is {sys.version.split()[0]}")
+    if not (3, 11) <= sys.version_info[:2] <= (3, 14):
+        sys.exit(f"dearig needs Python 3.11 to 3.14; this is {sys.version.split()[0]}")
     python = SCRIPTS / ("python.exe" if os.name == "nt" else "python")
     wanted = hashlib.sha256(
         CONSTRAINTS.read_bytes()

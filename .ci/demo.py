@@ -6,4 +6,4 @@ from bootstrap import prepare, run
 
 if __name__ == "__main__":
     python = prepare()
-    sys.exit(run([str(python), "-m", "app", "demo", *sys.argv[1:]]))
+    sys.exit(run([str(python), "-m", "dearig", "demo", *sys.argv[1:]]))

@@ -1,6 +1,6 @@
-"""``python -m app`` is the command ``dearig``."""
+"""``python -m dearig`` is the command ``dearig``."""
 
-from app.cli import main
+from dearig.cli.main import main
 
 if __name__ == "__main__":
     main()

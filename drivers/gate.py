@@ -12,7 +12,7 @@ from typing import NoReturn, final
 
 import numpy as np
 
-from drivers.errors import RefusedWaveform, RigError
+from dearig.drivers.errors import RefusedWaveform, RigError
 
 __all__ = ["GatedWaveform", "Limits", "Margin", "Prediction", "admit", "ramp_down"]
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from drivers.rig import Instrument
-from drivers.settings import RigSettings
+from dearig.drivers.rig import Instrument
+from dearig.drivers.settings import RigSettings
 
 __all__ = ["instruments"]
 

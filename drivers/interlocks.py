@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.channels import COUNT_MAX, COUNT_MIN, Channel, Scaling
-from drivers.rig import Block
-from drivers.settings import Action, RigSettings
+from dearig.drivers.channels import COUNT_MAX, COUNT_MIN, Channel, Scaling
+from dearig.drivers.rig import Block
+from dearig.drivers.settings import Action, RigSettings
 
 __all__ = ["Interlocks", "Trip", "would_trip"]
 

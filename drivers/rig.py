@@ -8,9 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
-from drivers.channels import Channel
-from drivers.errors import RigStateError
-from drivers.gate import GatedWaveform
+from dearig.drivers.channels import Channel
+from dearig.drivers.errors import RigStateError
+from dearig.drivers.gate import GatedWaveform
 
 __all__ = ["Block", "Event", "Instrument", "Rig", "RigIdentity", "RigState", "expect"]
 

@@ -12,8 +12,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from drivers.channels import CHANNEL_NAMES, Channel, Scaling
-from drivers.gate import Limits
+from dearig.drivers.channels import CHANNEL_NAMES, Channel, Scaling
+from dearig.drivers.gate import Limits
 
 __all__ = [
     "AmplifierSettings",

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from drivers.findings import Finding
-from drivers.settings import AmplifierSettings, RigSettings
+from dearig.drivers.findings import Finding
+from dearig.drivers.settings import AmplifierSettings, RigSettings
 
 __all__ = ["Monitors", "scaling_findings", "zero_findings"]
 

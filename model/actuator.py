@@ -7,14 +7,22 @@ from types import MappingProxyType
 
 import numpy as np
 
-from model import coefficients as at
-from model import kernel
-from model.effects import EFFECTS, MEMORY, NEUTRAL, PLACES, SENSOR_MEMORY, SLOTS, EffectValues
-from model.errors import ModelError
-from model.kinematics import thinning
-from model.material import VACUUM_PERMITTIVITY, Film, Load, Network
-from model.network import HEAD, nominal_pull
-from model.sensor import at_sensor
+from dearig.model import coefficients as at
+from dearig.model import kernel
+from dearig.model.effects import (
+    EFFECTS,
+    MEMORY,
+    NEUTRAL,
+    PLACES,
+    SENSOR_MEMORY,
+    SLOTS,
+    EffectValues,
+)
+from dearig.model.errors import ModelError
+from dearig.model.kinematics import thinning
+from dearig.model.material import VACUUM_PERMITTIVITY, Film, Load, Network
+from dearig.model.network import HEAD, nominal_pull
+from dearig.model.sensor import at_sensor
 
 __all__ = [
     "STATUS_WORDS",
@@ -84,8 +92,8 @@ class Response:
 
     ``stretch`` lam, ``rate`` dlam/dt in 1/s, ``displacement`` in m what the sensor reads, which is
     (lam - lam_rest) L1 unless an effect acts on it, ``field`` the true field phi/z in V/m.
-    ``status`` is one of ``model.kernel``'s; beyond sample ``reached`` the arrays repeat the last
-    stretch that was computed.
+    ``status`` is one of ``dearig.model.kernel``'s; beyond sample ``reached`` the arrays repeat the
+    last stretch that was computed.
     """
 
     time: np.ndarray
@@ -115,7 +123,7 @@ class Response:
 class Actuator:
     """A film with its network, its load and any effects, ready to be driven.
 
-    ``effects`` maps the names of ``model.effects.EFFECTS`` to their parameter values.
+    ``effects`` maps the names of ``dearig.model.effects.EFFECTS`` to their parameter values.
     """
 
     film: Film
@@ -127,7 +135,7 @@ class Actuator:
         effect_values(self.effects, "voltage")
 
     def coefficients(self) -> np.ndarray:
-        """The kernel's coefficient vector (see ``model.coefficients``)."""
+        """The kernel's coefficient vector (see ``dearig.model.coefficients``)."""
         film, load = self.film, self.load
         c = self.network.coefficients(film.held)
         permittivity = VACUUM_PERMITTIVITY * film.permittivity
@@ -260,7 +268,8 @@ def reading_of(
     haste: int = kernel.CAREFUL,
     times: np.ndarray | None = None,
 ) -> tuple[np.ndarray, int]:
-    """``(reading, status)`` of coefficient vector ``c`` (see ``model.coefficients``): (N,) m.
+    """``(reading, status)`` of coefficient vector ``c`` (see ``dearig.model.coefficients``): (N,)
+    m.
 
     At ``times`` (N,) s, those of the drive where none are given. ``lag`` s is the known age of a
     reading, ``haste`` as the kernel has it. What the model did not reach reads 0.
@@ -279,8 +288,8 @@ def readings_of(
 ) -> tuple[np.ndarray, int, int]:
     """``(readings, status, steps)`` of coefficient vectors ``cs`` (P, C) of one film: (P, N) m.
 
-    They differ in ``model.effects.SENSED`` alone: in what the sensor makes of how the film moves,
-    which took so many ``steps``. The rest is as in ``reading_of``.
+    They differ in ``dearig.model.effects.SENSED`` alone: in what the sensor makes of how the film
+    moves, which took so many ``steps``. The rest is as in ``reading_of``.
     """
     times = drive.time if times is None else times
     c = cs[0].copy()

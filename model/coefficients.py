@@ -2,7 +2,7 @@
 
 One row a parameter set, so that a population is a matrix: the numbers of the film and its load, the
 values of all effects (neutral unless a model says otherwise), then ``WIDTH`` numbers for each
-spring, the equilibrium spring first. ``model.network`` knows where the springs begin.
+spring, the equilibrium spring first. ``dearig.model.network`` knows where the springs begin.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from model.jit import jit
+from dearig.model.jit import jit
 
 __all__ = ["CROWDED", "HOPS", "REMEMBERED", "behind", "conductivity"]
 

@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from model.coefficients import REST
-from model.filters import lagged
-from model.jit import jit
+from dearig.model.coefficients import REST
+from dearig.model.filters import lagged
+from dearig.model.jit import jit
 
 __all__ = ["relaxed"]
 

@@ -15,7 +15,7 @@ from typing import Protocol, cast
 
 import numpy as np
 
-from model.errors import ModelError
+from dearig.model.errors import ModelError
 
 __all__ = [
     "THESIS_AMPLITUDES",

@@ -6,15 +6,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from model import kernel
-from model.actuator import STATUS_WORDS, effect_values
-from model.coefficients import EFFECTS_AT, MODULUS, REST, WIDTH
-from model.effects import MEMORY, NEUTRAL, SLOTS, EffectValues
-from model.errors import ModelError
-from model.film_kernel import add_effects, drive_by_stretch
-from model.kinematics import KINEMATICS
-from model.material import Network
-from model.network import HEAD
+from dearig.model import kernel
+from dearig.model.actuator import STATUS_WORDS, effect_values
+from dearig.model.coefficients import EFFECTS_AT, MODULUS, REST, WIDTH
+from dearig.model.effects import MEMORY, NEUTRAL, SLOTS, EffectValues
+from dearig.model.errors import ModelError
+from dearig.model.film_kernel import add_effects, drive_by_stretch
+from dearig.model.kinematics import KINEMATICS
+from dearig.model.material import Network
+from dearig.model.network import HEAD
 
 __all__ = ["StressResponse", "Strip", "stress_of", "unit_stresses"]
 
@@ -42,7 +42,7 @@ class StressResponse:
 class Strip:
     """A piece of film whose stretch is imposed: its network, how it is held, and any effects.
 
-    ``effects`` maps the names of ``model.effects.EFFECTS`` to their parameter values.
+    ``effects`` maps the names of ``dearig.model.effects.EFFECTS`` to their parameter values.
     """
 
     network: Network

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from model.jit import jit
+from dearig.model.jit import jit
 
 __all__ = [
     "along_cubic",

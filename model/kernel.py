@@ -14,10 +14,10 @@ steps as accuracy asks for. Three methods:
   an error estimate, where it is: moduli of MPa, relaxation times of microseconds, springs near
   locking. Its Jacobian is an arrow (each branch knows only lam and itself), so a step costs O(n).
 
-Where effects of ``model.effects`` change the motion, Runge-Kutta runs with their hooks in it; what
-they remember (a voltage behind a resistance, the strain of a yielding element) goes from step to
-step in closed form, so that no effect makes the film stiffer than its own stress does. Their
-numbers stand in the state behind the branches.
+Where effects of ``dearig.model.effects`` change the motion, Runge-Kutta runs with their hooks in
+it; what they remember (a voltage behind a resistance, the strain of a yielding element) goes from
+step to step in closed form, so that no effect makes the film stiffer than its own stress does.
+Their numbers stand in the state behind the branches.
 
 Which one runs follows from the film's own stiffness and the sample interval, never from measured
 data, so a fit sees a smooth function. Nothing here raises: every outcome is a status.
@@ -29,7 +29,7 @@ import math
 
 import numpy as np
 
-from model.coefficients import (
+from dearig.model.coefficients import (
     ELECTRIC,
     FORCE,
     HELD,
@@ -42,12 +42,12 @@ from model.coefficients import (
     UNIFORM,
     WIDTH,
 )
-from model.effects import MEMORY, assembly
-from model.jit import allocating, inlined, jit
-from model.kinematics import electric, electric_slope, strain_and_pull
-from model.network import HEAD, branch_count, nominal_pull, nominal_pull_slope, true_pull
-from model.rodas import ALPHA, GAMMA, A, C, D
-from model.springs import SPRINGS, gent, neo_hookean
+from dearig.model.effects import MEMORY, assembly
+from dearig.model.jit import allocating, inlined, jit
+from dearig.model.kinematics import electric, electric_slope, strain_and_pull
+from dearig.model.network import HEAD, branch_count, nominal_pull, nominal_pull_slope, true_pull
+from dearig.model.rodas import ALPHA, GAMMA, A, C, D
+from dearig.model.springs import SPRINGS, gent, neo_hookean
 
 __all__ = [
     "BAD_INPUT",
@@ -76,7 +76,9 @@ BAD_INPUT = 5  #: not finite, or time that does not increase
 CAREFUL = 0  #: good to some hundredths of a micrometre
 QUICK = 1  #: to a tenth (some tenths on a step of 8 kV); careful where a force follows the path
 ROUGH = 2  #: nor careful there: to a tenth of what such an effect does, or some while it rings
-SKETCHED = 3  #: as rough, in steps from sample to sample, however far: ``model.fitting.sketch``
+#: As rough, in steps from sample to sample, however far: ``model.fitting.coarse_drive``.
+SKETCHED = 3
+
 
 _STRETCH_MAX = 100.0  # beyond any elastomer: a runaway, whatever the springs say
 _RK4_STEP_MAX = 2.5e-3  # s; a thesis record is then good to 0.03 um
@@ -1092,7 +1094,7 @@ def drive_by_voltage(
     is the temperature above that of the start, or (0,) where none was recorded. ``haste`` says how
     long steps may be: ``CAREFUL``, ``QUICK``, ``ROUGH``, ``SKETCHED``. Element 0 is the state as
     given, so a record can be cut and continued. ``c`` must know the stretch at rest
-    (``model.actuator.at_rest``).
+    (``dearig.model.actuator.at_rest``).
 
     Returns ``(status, reached, steps)``: on any status but ``OK`` the samples from ``reached`` on
     are filled with the last stretch that was reached, never with NaN; ``steps`` were taken, one

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from model.jit import allocating, jit
+from dearig.model.jit import allocating, jit
 
 __all__ = [
     "KINEMATICS",

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from model import coefficients as at
-from model.effects import NEUTRAL, SLOTS
-from model.errors import ModelError
-from model.kinematics import KINEMATICS, thinning
-from model.network import HEAD
-from model.springs import SPRINGS, locking_strain
+from dearig.model import coefficients as at
+from dearig.model.effects import NEUTRAL, SLOTS
+from dearig.model.errors import ModelError
+from dearig.model.kinematics import KINEMATICS, thinning
+from dearig.model.network import HEAD
+from dearig.model.springs import SPRINGS, locking_strain
 
 __all__ = [
     "STANDARD_GRAVITY",

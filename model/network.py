@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.coefficients import EFFECTS_AT, HELD, KIND, LIMIT, LOCKING, MODULUS, WIDTH
-from model.effects import SLOTS
-from model.jit import jit
-from model.kinematics import directions, pull_slope, strain_and_pull
-from model.springs import curvature, slope
+from dearig.model.coefficients import EFFECTS_AT, HELD, KIND, LIMIT, LOCKING, MODULUS, WIDTH
+from dearig.model.effects import SLOTS
+from dearig.model.jit import jit
+from dearig.model.kinematics import directions, pull_slope, strain_and_pull
+from dearig.model.springs import curvature, slope
 
 __all__ = [
     "HEAD",

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.ndimage import median_filter
 from scipy.optimize import minimize_scalar
 
-from model.actuator import Drive
-from model.errors import ModelError
+from dearig.model.actuator import Drive
+from dearig.model.errors import ModelError
 
 __all__ = ["ActuatorRecord", "FilmRecord", "Record", "counted", "noise_at_rest", "noise_of"]
 
@@ -42,7 +42,7 @@ class ActuatorRecord:
     good. Over the first ``lead_in`` samples, at 0 V, the displacement is 0 on average, because it
     is counted from there. Each reading is the mean of ``means_of`` that were taken, evenly about
     its time. By ``sketch``, where there is one, it is told what a number of a model does: the drive
-    in fewer and longer steps (``model.fitting.sketch``).
+    in fewer and longer steps (``dearig.model.fitting.coarse_drive``).
     """
 
     name: str

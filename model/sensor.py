@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.jit import jit
+from dearig.model.jit import jit
 
 __all__ = ["at_sensor"]
 

@@ -12,11 +12,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from model.actuator import Actuator
-from model.coefficients import ELECTRIC, FORCE, HELD, KIND, LIMIT, LOCKING, MODULUS
-from model.errors import ModelError
-from model.kinematics import electric, electric_slope, strain_and_pull
-from model.network import HEAD, nominal_pull, nominal_pull_slope
+from dearig.model.actuator import Actuator
+from dearig.model.coefficients import ELECTRIC, FORCE, HELD, KIND, LIMIT, LOCKING, MODULUS
+from dearig.model.errors import ModelError
+from dearig.model.kinematics import electric, electric_slope, strain_and_pull
+from dearig.model.network import HEAD, nominal_pull, nominal_pull_slope
 
 __all__ = ["pull_in_voltage", "static_stretch"]
 

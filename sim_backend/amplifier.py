@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.settings import AmplifierSettings
-from model.jit import jit
+from dearig.drivers.settings import AmplifierSettings
+from dearig.model.jit import jit
 
 __all__ = ["Amplifier", "AmplifierRows", "AmplifierState"]
 

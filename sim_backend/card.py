@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivers.channels import COUNT_MAX, Channel, Scaling
-from drivers.errors import RigError
-from drivers.settings import RigSettings
-from sim_backend.streams import Streams
+from dearig.drivers.channels import COUNT_MAX, Channel, Scaling
+from dearig.drivers.errors import RigError
+from dearig.drivers.settings import RigSettings
+from dearig.sim_backend.streams import Streams
 
 __all__ = ["INPUT_OVERWRITTEN", "Card"]
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import re
 
-from drivers.errors import AddressError
-from drivers.settings import RigSettings
-from model.actuator import Actuator
-from model.material import TABLE_3, Film, Load
-from sim_backend.clock import Clock, ManualClock, PacedClock
-from sim_backend.faults import FaultPlan
-from sim_backend.model_plant import ModelPlant
-from sim_backend.plant import Plant
-from sim_backend.rig import SimulatedRig
-from sim_backend.truth import cases
+from dearig.drivers.errors import AddressError
+from dearig.drivers.settings import RigSettings
+from dearig.model.actuator import Actuator
+from dearig.model.material import TABLE_3, Film, Load
+from dearig.sim_backend.clock import Clock, ManualClock, PacedClock
+from dearig.sim_backend.faults import FaultPlan
+from dearig.sim_backend.model_plant import ModelPlant
+from dearig.sim_backend.plant import Plant
+from dearig.sim_backend.rig import SimulatedRig
+from dearig.sim_backend.truth import cases
 
 __all__ = ["is_simulated", "open_simulated_rig", "plant_of"]
 

@@ -1,7 +1,7 @@
 """The LK-G5000 laser controller on its serial line: bytes in, bytes out, time as an argument.
 
-It knows the commands that ``drivers.keyence`` sends and no others, and takes its letters from the
-same table: it shows that the driver copes, not that the table is right.
+It knows the commands that ``dearig.drivers.keyence`` sends and no others, and takes its letters
+from the same table: it shows that the driver copes, not that the table is right.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from collections.abc import Callable
 from enum import StrEnum
 from typing import Protocol
 
-from drivers.keyence.commands import AVERAGING, SAMPLING_US
-from drivers.keyence.controller import POLL
-from drivers.settings import LaserSettings
-from sim_backend.faults import FaultKind, FaultPlan
+from dearig.drivers.keyence.commands import AVERAGING, SAMPLING_US
+from dearig.drivers.keyence.controller import POLL
+from dearig.drivers.settings import LaserSettings
+from dearig.sim_backend.faults import FaultKind, FaultPlan
 
 __all__ = ["Answers", "Conduct", "SimulatedController", "SimulatedLine"]
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.settings import LaserSettings
-from model.jit import allocating, jit
-from sim_backend.streams import Streams
+from dearig.drivers.settings import LaserSettings
+from dearig.model.jit import allocating, jit
+from dearig.sim_backend.streams import Streams
 
 __all__ = ["Laser", "LaserRows", "LaserState"]
 

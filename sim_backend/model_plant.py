@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from model import kernel
-from model.actuator import STATUS_WORDS, Actuator, at_rest, ends_of, initial_state
-from model.effects import SENSOR_MEMORY
-from sim_backend.plant import Motion
+from dearig.model import kernel
+from dearig.model.actuator import STATUS_WORDS, Actuator, at_rest, ends_of, initial_state
+from dearig.model.effects import SENSOR_MEMORY
+from dearig.sim_backend.plant import Motion
 
 __all__ = ["ModelPlant"]
 

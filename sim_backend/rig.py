@@ -7,17 +7,17 @@ import threading
 
 import numpy as np
 
-from drivers.errors import RigError, RigStateError
-from drivers.gate import GatedWaveform, ramp_down
-from drivers.identity import instruments
-from drivers.rig import Block, Event, RigIdentity, RigState
-from drivers.settings import RigSettings
-from sim_backend.card import INPUT_OVERWRITTEN, Card
-from sim_backend.clock import Clock
-from sim_backend.faults import Fault, FaultKind, FaultPlan
-from sim_backend.plant import Plant
-from sim_backend.signal_path import CHUNK, PathState, SignalPath
-from sim_backend.streams import Streams
+from dearig.drivers.errors import RigError, RigStateError
+from dearig.drivers.gate import GatedWaveform, ramp_down
+from dearig.drivers.identity import instruments
+from dearig.drivers.rig import Block, Event, RigIdentity, RigState
+from dearig.drivers.settings import RigSettings
+from dearig.sim_backend.card import INPUT_OVERWRITTEN, Card
+from dearig.sim_backend.clock import Clock
+from dearig.sim_backend.faults import Fault, FaultKind, FaultPlan
+from dearig.sim_backend.plant import Plant
+from dearig.sim_backend.signal_path import CHUNK, PathState, SignalPath
+from dearig.sim_backend.streams import Streams
 
 __all__ = ["OUTPUT_STARVED", "SimulatedRig"]
 
@@ -103,7 +103,7 @@ class _Run:
 
 
 class SimulatedRig:
-    """A rig on a ``clock``, whose film is ``plant``; see ``drivers.rig.Rig`` for the calls.
+    """A rig on a ``clock``, whose film is ``plant``; see ``dearig.drivers.rig.Rig`` for the calls.
 
     ``plant`` is the film at rest: every run starts from it, as if the operator had waited for it to
     relax. Blocks hold ``block_samples`` samples, or a tenth of a second when that is None; their

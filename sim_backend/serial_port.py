@@ -10,8 +10,8 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-from sim_backend.clock import Clock, PacedClock
-from sim_backend.keyence import Answers
+from dearig.sim_backend.clock import Clock, PacedClock
+from dearig.sim_backend.keyence import Answers
 
 __all__ = ["serve_on_pty", "serve_on_socket"]
 

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivers.rig import Event
-from drivers.settings import RigSettings, ThermometerSettings
-from sim_backend.amplifier import Amplifier, AmplifierRows, AmplifierState
-from sim_backend.card import Card
-from sim_backend.faults import FaultKind, FaultPlan
-from sim_backend.laser import Laser, LaserRows, LaserState
-from sim_backend.plant import Motion, Plant
-from sim_backend.streams import Streams
+from dearig.drivers.rig import Event
+from dearig.drivers.settings import RigSettings, ThermometerSettings
+from dearig.sim_backend.amplifier import Amplifier, AmplifierRows, AmplifierState
+from dearig.sim_backend.card import Card
+from dearig.sim_backend.faults import FaultKind, FaultPlan
+from dearig.sim_backend.laser import Laser, LaserRows, LaserState
+from dearig.sim_backend.plant import Motion, Plant
+from dearig.sim_backend.streams import Streams
 
 __all__ = ["CHUNK", "PathState", "SignalPath"]
 

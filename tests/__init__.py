@@ -1,4 +1,4 @@
 import pytest
 
 # suites that test files derive from: their asserts shall say what they compared
-pytest.register_assert_rewrite("tests.rig_contract")
+pytest.register_assert_rewrite("tests.tools.rig_contract")

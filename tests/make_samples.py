@@ -11,8 +11,8 @@ import tempfile
 from pathlib import Path
 from unittest.mock import patch
 
-from app.recording.verify import verify
-from tests.command import done
+from dearig.recording.verify import verify
+from tests.tools.command import done
 
 FOLDER = Path(__file__).parents[1] / "recordings"
 RIG = "[card]\nsample_rate_Hz = 200.0\n"

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from app.recording.exporters import EXPORTS, export_recording
-from app.recording.follow import Follower
-from app.recording.importers import import_file
-from app.recording.reader import open_recording
-from app.recording.recording import RecordedEvent, Recording
-from app.recording.recover import recover
-from app.recording.room import check_room, estimate_bytes, free_bytes
-from app.recording.save import save_recording
-from app.recording.summary import describe, describe_rows
-from app.recording.verify import Verification, verify
-from app.recording.writer import RecordingWriter
+from dearig.recording.disk_space import check_room, estimate_bytes, free_bytes
+from dearig.recording.exporters import EXPORTS, export_recording
+from dearig.recording.follow import Follower
+from dearig.recording.importers import import_file
+from dearig.recording.reader import open_recording
+from dearig.recording.recording import RecordedEvent, Recording
+from dearig.recording.recover import recover
+from dearig.recording.save import save_recording
+from dearig.recording.summary import describe, describe_rows
+from dearig.recording.verify import Verification, verify
+from dearig.recording.writer import RecordingWriter
 
 __all__ = [
     "EXPORTS",

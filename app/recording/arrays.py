@@ -10,14 +10,14 @@ from typing import TypeVar
 import h5py
 import numpy as np
 
-from app.errors import InputError
-from app.recording.clockwork import not_forward
-from app.recording.layout import UNITS
-from app.recording.opening import read_from
-from app.recording.physical import Counts, Rest
-from app.recording.pyramid import reduced
-from app.recording.quiet import lead_in
-from app.recording.safe import dataset, group
+from dearig.errors import InputError
+from dearig.recording.layout import UNITS
+from dearig.recording.opening import read_from
+from dearig.recording.physical import Counts, Rest
+from dearig.recording.pyramid import reduced
+from dearig.recording.rest_noise import lead_in
+from dearig.recording.safe import dataset, group
+from dearig.recording.timestamps import not_forward
 
 __all__ = ["Arrays", "Overview"]
 

@@ -10,11 +10,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from app.errors import InputError
-from app.recording.files import check_output, replaced_when_done
-from app.recording.layout import FORMAT, LINEAR, UNITS, ZERO_ORDER
-from app.recording.reader import open_recording
-from app.recording.recording import Recording
+from dearig.errors import InputError
+from dearig.recording.files import check_output, replaced_when_done
+from dearig.recording.layout import FORMAT, LINEAR, UNITS, ZERO_ORDER
+from dearig.recording.reader import open_recording
+from dearig.recording.recording import Recording
 
 __all__ = ["EXPORTS", "export_recording"]
 

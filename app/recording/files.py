@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from app.errors import InputError
+from dearig.errors import InputError
 
 __all__ = [
     "check_output",

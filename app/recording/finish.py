@@ -8,12 +8,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from app.errors import InputError
-from app.recording.checksums import complete_checksums
-from app.recording.files import in_words
-from app.recording.flushes import flush_notes
-from app.recording.journal import Patched, changed_in_place
-from app.recording.layout import (
+from dearig.errors import InputError
+from dearig.recording.checksums import complete_checksums
+from dearig.recording.files import in_words
+from dearig.recording.flushes import flush_notes
+from dearig.recording.journal import Patched, changed_in_place
+from dearig.recording.layout import (
     LIBVER,
     MESSAGE_BYTES,
     SIGNALS,
@@ -22,9 +22,9 @@ from app.recording.layout import (
     create_field,
     iso_time,
 )
-from app.recording.physical import SLICE, Counts
-from app.recording.pyramid import complete_pyramid
-from app.recording.text import clip_text, fixed, put_text
+from dearig.recording.physical import SLICE, Counts
+from dearig.recording.pyramid import complete_pyramid
+from dearig.recording.text import clip_text, fixed, put_text
 
 __all__ = ["OVERVIEW", "PHYSICAL_MAX", "finish"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import h5py
 import numpy as np
 
-from app.recording.layout import WALL_CLOCK_TYPE
-from app.recording.safe import item
+from dearig.recording.layout import WALL_CLOCK_TYPE
+from dearig.recording.safe import item
 
 __all__ = ["flush_notes"]
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from app.errors import InputError
-from app.recording.opening import read_from
-from app.recording.physical import Counts, Rest
-from app.recording.reader import read_events
-from app.recording.recording import RecordedEvent
-from app.recording.safe import group
+from dearig.errors import InputError
+from dearig.recording.opening import read_from
+from dearig.recording.physical import Counts, Rest
+from dearig.recording.reader import read_events
+from dearig.recording.recording import RecordedEvent
+from dearig.recording.safe import group
 
 __all__ = ["Follower", "News"]
 

@@ -12,13 +12,13 @@ from pathlib import Path
 import h5py
 from platformdirs import user_cache_path
 
-from app.errors import InputError
-from app.recording.files import in_words, replaced_when_done
-from app.recording.layout import FORMAT
-from app.recording.opening import read_from
-from app.recording.physical import read_channels, sample_count
-from app.recording.safe import Refused, dataset, group
-from app.recording.text import text_of
+from dearig.errors import InputError
+from dearig.recording.files import in_words, replaced_when_done
+from dearig.recording.layout import FORMAT
+from dearig.recording.opening import read_from
+from dearig.recording.physical import read_channels, sample_count
+from dearig.recording.safe import Refused, dataset, group
+from dearig.recording.text import text_of
 
 __all__ = ["ENDINGS", "Entry", "glance", "index_folder", "lines"]
 

@@ -24,7 +24,7 @@ from types import MappingProxyType
 import h5py
 import numpy as np
 
-from app.recording.text import fixed, put_text
+from dearig.recording.text import fixed, put_text
 
 __all__ = [
     "EVENT_LEVELS",

@@ -9,11 +9,11 @@ from typing import TypeVar
 
 import h5py
 
-from app.errors import InputError
-from app.recording.files import in_words, one_line
-from app.recording.journal import Patched, whole_journal
-from app.recording.safe import Refused
-from app.recording.superblock import SIZE, flags_of, mend_superblock
+from dearig.errors import InputError
+from dearig.recording.files import in_words, one_line
+from dearig.recording.journal import Patched, whole_journal
+from dearig.recording.safe import Refused
+from dearig.recording.superblock import SIZE, flags_of, mend_superblock
 
 #: The flag of a file that is written so that it can be read at any time.
 WRITTEN_IN_ORDER = 4

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import h5py
 import numpy as np
 
-from app.recording.flushes import flush_notes
-from app.recording.layout import UNITS, counts_name
-from app.recording.pyramid import levels, reduced
-from app.recording.quiet import NEGLIGIBLE
-from app.recording.text import fixed, text_of
-from drivers.channels import CHANNEL_NAMES, Channel, Scaling
+from dearig.drivers.channels import CHANNEL_NAMES, Channel, Scaling
+from dearig.recording.flushes import flush_notes
+from dearig.recording.layout import UNITS, counts_name
+from dearig.recording.pyramid import levels, reduced
+from dearig.recording.rest_noise import NEGLIGIBLE
+from dearig.recording.text import fixed, text_of
 
 __all__ = [
     "SLICE",

@@ -13,8 +13,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from app.recording.layout import iso_time
-from app.recording.text import fixed, put_text, text_of
+from dearig.recording.layout import iso_time
+from dearig.recording.text import fixed, put_text, text_of
 
 __all__ = ["gather", "git_revision", "read_provenance", "write_provenance"]
 

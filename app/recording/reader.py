@@ -7,10 +7,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from app.errors import InputError
-from app.recording.arrays import Arrays
-from app.recording.files import old_of
-from app.recording.layout import (
+from dearig.drivers.rig import Instrument
+from dearig.errors import InputError
+from dearig.model.errors import ModelError
+from dearig.model.kinematics import KINEMATICS
+from dearig.recording.arrays import Arrays
+from dearig.recording.files import old_of
+from dearig.recording.layout import (
     FORMAT,
     FORMAT_NAME,
     KINDS,
@@ -19,16 +22,13 @@ from app.recording.layout import (
     ZERO_ORDER,
     counts_name,
 )
-from app.recording.opening import opened, read_from
-from app.recording.physical import Counts, Rest, read_channels, resolution
-from app.recording.provenance import read_provenance
-from app.recording.recording import RecordedEvent, Recording
-from app.recording.safe import dataset, group, item
-from app.recording.sample import read_film, read_load
-from app.recording.text import text_of
-from drivers.rig import Instrument
-from model.errors import ModelError
-from model.kinematics import KINEMATICS
+from dearig.recording.opening import opened, read_from
+from dearig.recording.physical import Counts, Rest, read_channels, resolution
+from dearig.recording.provenance import read_provenance
+from dearig.recording.recording import RecordedEvent, Recording
+from dearig.recording.safe import dataset, group, item
+from dearig.recording.sample import read_film, read_load
+from dearig.recording.text import text_of
 
 __all__ = ["is_finished", "open_recording", "opened", "read_events"]
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from app.recording.arrays import Arrays, Overview
-from app.recording.files import file_sha256
-from app.recording.layout import SIGNALS
-from app.recording.quiet import noise_floor
-from drivers.channels import Channel
-from drivers.rig import Instrument
-from model.material import Film, Load
+from dearig.drivers.channels import Channel
+from dearig.drivers.rig import Instrument
+from dearig.model.material import Film, Load
+from dearig.recording.arrays import Arrays, Overview
+from dearig.recording.files import file_sha256
+from dearig.recording.layout import SIGNALS
+from dearig.recording.rest_noise import noise_floor
 
 __all__ = ["RecordedEvent", "Recording"]
 

@@ -6,13 +6,13 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from app.errors import InputError
-from app.recording.files import in_words
-from app.recording.finish import finish
-from app.recording.journal import carry_out, whole_journal
-from app.recording.opening import UNREADABLE
-from app.recording.reader import is_finished, open_recording
-from app.recording.superblock import mend_superblock
+from dearig.errors import InputError
+from dearig.recording.files import in_words
+from dearig.recording.finish import finish
+from dearig.recording.journal import carry_out, whole_journal
+from dearig.recording.opening import UNREADABLE
+from dearig.recording.reader import is_finished, open_recording
+from dearig.recording.superblock import mend_superblock
 
 __all__ = ["recover"]
 

@@ -7,9 +7,9 @@ from types import MappingProxyType
 
 import h5py
 
-from app.recording.safe import dataset, group
-from app.recording.text import fixed, put_text, text_of
-from model.material import Film, Load
+from dearig.model.material import Film, Load
+from dearig.recording.safe import dataset, group
+from dearig.recording.text import fixed, put_text, text_of
 
 __all__ = ["read_film", "read_load", "write_sample"]
 

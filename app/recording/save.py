@@ -9,8 +9,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from app.recording.files import check_output, replaced_when_done
-from app.recording.layout import (
+from dearig.drivers.rig import Event
+from dearig.model.material import Film, Load
+from dearig.recording.files import check_output, replaced_when_done
+from dearig.recording.layout import (
     EVENT_TYPE,
     KINDS,
     LIBVER,
@@ -22,11 +24,9 @@ from app.recording.layout import (
     create_field,
     lay_out,
 )
-from app.recording.provenance import gather, write_provenance
-from app.recording.sample import write_sample
-from app.recording.text import clip_text, fixed, put_text
-from drivers.rig import Event
-from model.material import Film, Load
+from dearig.recording.provenance import gather, write_provenance
+from dearig.recording.sample import write_sample
+from dearig.recording.text import clip_text, fixed, put_text
 
 __all__ = ["save_recording"]
 

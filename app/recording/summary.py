@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from app.recording.layout import FORMAT, LINEAR, UNITS, ZERO_ORDER
-from app.recording.recording import Recording
+from dearig.recording.layout import FORMAT, LINEAR, UNITS, ZERO_ORDER
+from dearig.recording.recording import Recording
 
 __all__ = ["describe", "describe_rows"]
 

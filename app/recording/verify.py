@@ -12,20 +12,20 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from app.errors import InputError
-from app.recording.checksums import wrong_blocks
-from app.recording.finish import OVERVIEW
-from app.recording.flushes import flush_notes
-from app.recording.journal import whole_journal
-from app.recording.layout import SIGNALS, counts_name
-from app.recording.opening import UNREADABLE, damage, opened
-from app.recording.physical import SLICE, Counts
-from app.recording.pyramid import BINS
-from app.recording.reader import open_recording
-from app.recording.recording import Recording
-from app.recording.safe import Refused, dataset, group
-from app.recording.superblock import consistency_flags
-from app.recording.text import text_of
+from dearig.errors import InputError
+from dearig.recording.checksums import wrong_blocks
+from dearig.recording.finish import OVERVIEW
+from dearig.recording.flushes import flush_notes
+from dearig.recording.journal import whole_journal
+from dearig.recording.layout import SIGNALS, counts_name
+from dearig.recording.opening import UNREADABLE, damage, opened
+from dearig.recording.physical import SLICE, Counts
+from dearig.recording.pyramid import BINS
+from dearig.recording.reader import open_recording
+from dearig.recording.recording import Recording
+from dearig.recording.safe import Refused, dataset, group
+from dearig.recording.superblock import consistency_flags
+from dearig.recording.text import text_of
 
 __all__ = ["Verification", "verify"]
 

@@ -23,11 +23,15 @@ from types import TracebackType
 import h5py
 import numpy as np
 
-from app.errors import DearigError, DiskFault, InputError, InstrumentFault
-from app.recording.checksums import ChecksumWriter
-from app.recording.files import check_output, in_words, put_back, set_aside
-from app.recording.finish import finish
-from app.recording.layout import (
+from dearig.drivers.channels import CHANNEL_NAMES, Channel
+from dearig.drivers.rig import Block, Event, RigIdentity
+from dearig.errors import DearigError, DiskFault, InputError, InstrumentFault
+from dearig.model.material import Film, Load
+from dearig.recording.checksums import ChecksumWriter
+from dearig.recording.disk_space import advice
+from dearig.recording.files import check_output, in_words, put_back, set_aside
+from dearig.recording.finish import finish
+from dearig.recording.layout import (
     EVENT_LEVELS,
     EVENT_TYPE,
     LIBVER,
@@ -38,15 +42,11 @@ from app.recording.layout import (
     counts_name,
     lay_out,
 )
-from app.recording.physical import TEMPERATURE_UNITS, write_channel
-from app.recording.provenance import gather, write_provenance
-from app.recording.pyramid import PyramidWriter
-from app.recording.room import advice
-from app.recording.sample import write_sample
-from app.recording.text import clip_text, fixed, put_text
-from drivers.channels import CHANNEL_NAMES, Channel
-from drivers.rig import Block, Event, RigIdentity
-from model.material import Film, Load
+from dearig.recording.physical import TEMPERATURE_UNITS, write_channel
+from dearig.recording.provenance import gather, write_provenance
+from dearig.recording.pyramid import PyramidWriter
+from dearig.recording.sample import write_sample
+from dearig.recording.text import clip_text, fixed, put_text
 
 __all__ = ["FLUSH_INTERVAL", "RecordingWriter"]
 

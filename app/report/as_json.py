@@ -8,12 +8,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.errors import InputError
-from app.report.units import SHOWN
-from app.report.words import pooled_noise, warnings_of
+from dearig.analysis.outcomes import pooled_noise
+from dearig.errors import InputError
+from dearig.report.words import warnings_of
+from dearig.units import SHOWN
 
 if TYPE_CHECKING:
-    from app.outcomes import (
+    from dearig.analysis.outcomes import (
         BranchTrial,
         Comparison,
         DiagnoseOutcome,
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
         Stand,
         ValidateOutcome,
     )
-    from model.diagnosis.findings import Candidate, Signature, Stage, Step
-    from model.fitting import Estimate
+    from dearig.model.diagnosis.results import Candidate, Signature, Stage, Step
+    from dearig.model.fitting import Estimate
 
 __all__ = ["diagnosis_json", "outcome_json", "write_json"]
 
@@ -33,7 +34,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
 
     What is not known, not finite, or has no meaning (the thesis's e_rms for a stress) is None.
     """
-    from app.outcomes import IdentifyOutcome
+    from dearig.analysis.outcomes import IdentifyOutcome
 
     head: dict[str, Any] = {"format": "dearig-validation/1"}
     if not isinstance(outcome, IdentifyOutcome):
@@ -233,8 +234,8 @@ def _stand_json(stand: Stand) -> dict[str, Any]:
 
 
 def _measures_json(comparisons: tuple[Comparison, ...], kind: str) -> dict[str, Any] | None:
-    """Errors pooled over recordings (see ``app.report.diagnosis.pooled``); None without any."""
-    from app.report.diagnosis import pooled
+    """Errors pooled over recordings (see ``dearig.report.diagnosis.pooled``); None without any."""
+    from dearig.report.diagnosis import pooled
 
     errors = pooled(comparisons)
     if errors is None:
@@ -251,7 +252,7 @@ def _measures_json(comparisons: tuple[Comparison, ...], kind: str) -> dict[str, 
 
 def _selection_json(stage: Stage, train: tuple[Comparison, ...], kind: str) -> dict[str, Any]:
     """Of a cross-validation: its errors, relative to the ranges of the training recordings."""
-    from app.report.diagnosis import pooled
+    from dearig.report.diagnosis import pooled
 
     shown, errors = SHOWN[kind], pooled(train)
 
@@ -340,7 +341,7 @@ def write_json(obj: dict[str, Any], target: str | Path) -> None:
         except OSError as error:
             raise InputError(f"the JSON cannot be written to standard output: {error}") from error
         return
-    from app.recording.files import check_output, replaced_when_done
+    from dearig.recording.files import check_output, replaced_when_done
 
     path = check_output(target, overwrite=True)
     with replaced_when_done(path) as partial:

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.report.numbers import NOTHING, interval, quoted, seconds, significant, symbol
-from app.report.tables import Row, Table
-from app.report.units import SHOWN, parameter_unit
-from app.report.words import listed, pooled_rms
+from dearig.analysis.outcomes import pooled_rms
+from dearig.report.numbers import NOTHING, interval, quoted, seconds, significant, symbol
+from dearig.report.tables import Row, Table
+from dearig.report.words import listed
+from dearig.units import SHOWN, parameter_unit, readable
 
 if TYPE_CHECKING:
-    from app.outcomes import Comparison, DiagnoseOutcome
-    from model.diagnosis.findings import Diagnosis, Round, Step
-    from model.fitting import Estimate
-    from model.measures import Errors
+    from dearig.analysis.outcomes import Comparison, DiagnoseOutcome
+    from dearig.model.diagnosis.results import Diagnosis, Round, Step
+    from dearig.model.fitting import Estimate
+    from dearig.model.measures import Errors
 
 __all__ = [
     "HEADLINES",
@@ -32,7 +32,6 @@ __all__ = [
     "kin",
     "pooled",
     "ranking",
-    "readable",
     "road",
     "summary",
     "thesis_before_after",
@@ -54,7 +53,7 @@ def pooled(comparisons: Sequence[Comparison]) -> Errors | None:
     The RMS is over all samples, the largest error is that of any; what is relative is relative to
     the range (or peak) of all recordings together, so that a small run does not count for more.
     """
-    from model.measures import Errors
+    from dearig.model.measures import Errors
 
     if not comparisons:
         return None
@@ -130,11 +129,6 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     return tuple(readable(s) for s in said)
 
 
-def readable(text: str) -> str:
-    """``text`` with the sign of the micrometre, which the model does without."""
-    return re.sub(r"(?<=\d) um\b", " \N{MICRO SIGN}m", text)
-
-
 def _verdict(outcome: DiagnoseOutcome) -> str:
     finding = outcome.finding
     if finding.interrupted and not finding.rounds:
@@ -166,7 +160,7 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
 
 def _or_so_little(outcome: DiagnoseOutcome) -> str:
     """What may be left besides noise where everything is explained."""
-    from model.diagnosis.bench import FILM_MODEL_ERROR
+    from dearig.model.diagnosis.bench import FILM_MODEL_ERROR
 
     film = outcome.kind == "film"
     return f", or {100.0 * FILM_MODEL_ERROR:g} % of the largest stress," if film else ""
@@ -381,7 +375,7 @@ def dropped(outcome: DiagnoseOutcome) -> str:
 
 def effect_table(outcome: DiagnoseOutcome) -> Table:
     """The numbers of the effects that were found, with intervals and meaning."""
-    from model.effects import EFFECTS
+    from dearig.model.effects import EFFECTS
 
     rows = []
     for step in outcome.finding.steps:

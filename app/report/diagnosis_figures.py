@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.report import figures as base
-from app.report.decimate import decimate
-from app.report.numbers import significant
-from app.report.units import SHOWN, Shown
+from dearig.analysis.decimate import decimate
+from dearig.report import figures as base
+from dearig.report.numbers import significant
+from dearig.units import SHOWN, Shown
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from app.outcomes import Comparison
-    from model.diagnosis.findings import Dependence, MissingStress, Signature
+    from dearig.analysis.outcomes import Comparison
+    from dearig.model.diagnosis.results import Dependence, MissingStress, Signature
 
 __all__ = [
     "bars_figure",

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from app.report import diagnosis_figures as drawn
-from app.report import figures
-from app.report.diagnosis import (
+from dearig.report import diagnosis_figures as drawn
+from dearig.report import figures
+from dearig.report.diagnosis import (
     before_after,
     called,
     dropped,
@@ -22,21 +22,20 @@ from app.report.diagnosis import (
     headline,
     kin,
     ranking,
-    readable,
     road,
     summary,
     thesis_before_after,
     warnings,
 )
-from app.report.html import Picture, picture, prefixes, write_page
-from app.report.numbers import seconds, significant
-from app.report.tables import Table
-from app.report.units import SHOWN
-from app.report.words import describe_model
+from dearig.report.html import Picture, picture, prefixes, write_page
+from dearig.report.numbers import seconds, significant
+from dearig.report.tables import Table
+from dearig.report.words import describe_model
+from dearig.units import SHOWN, readable
 
 if TYPE_CHECKING:
-    from app.outcomes import Comparison, DiagnoseOutcome
-    from model.diagnosis.findings import MissingStress, Signature
+    from dearig.analysis.outcomes import Comparison, DiagnoseOutcome
+    from dearig.model.diagnosis.results import MissingStress, Signature
 
 __all__ = ["write_diagnosis_report"]
 
@@ -170,7 +169,7 @@ def _paired(
 
 
 def _steps(outcome: DiagnoseOutcome) -> tuple[FoundEffect, ...]:
-    from model.effects import EFFECTS
+    from dearig.model.effects import EFFECTS
 
     found = []
     for step in outcome.finding.steps:

@@ -14,10 +14,10 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from app.report.decimate import decimate, decimate_path
-from app.report.numbers import power_of_ten, significant, symbol
-from app.report.residual import autocorrelation, even, spectrum
-from app.report.units import SHOWN, Shown, parameter_unit
+from dearig.analysis.decimate import decimate, decimate_path
+from dearig.analysis.residual import autocorrelation, even, spectrum
+from dearig.report.numbers import power_of_ten, significant, symbol
+from dearig.units import SHOWN, Shown, parameter_unit
 
 if TYPE_CHECKING:  # matplotlib takes most of a second to load: only a command that draws waits
     from matplotlib.artist import Artist
@@ -25,8 +25,8 @@ if TYPE_CHECKING:  # matplotlib takes most of a second to load: only a command t
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure, SubFigure
 
-    from app.outcomes import BranchTrial, Comparison
-    from model.fitting import Estimate, Identification
+    from dearig.analysis.outcomes import BranchTrial, Comparison
+    from dearig.model.fitting import Estimate, Identification
 
 __all__ = [
     "COLUMNS",
@@ -130,7 +130,7 @@ def blank(width: float, height: float) -> Figure:
 
 def save_png(figure: Figure, path: str | Path, dpi: int = 200) -> Path:
     """Write ``figure`` as PNG; the file appears as a whole or not at all. Raises ``InputError``."""
-    from app.recording.files import check_output, replaced_when_done
+    from dearig.recording.files import check_output, replaced_when_done
 
     path = check_output(path, overwrite=True)
     picture = io.BytesIO()
@@ -487,7 +487,7 @@ _PARAMETER_LOOKS = (_FITTED, _BARE, _FOLLOWS, _UNDETERMINED, _TABLE_3)
 
 
 def _intervals(ax: Axes, label: str, estimates: Sequence[Estimate], fit: Identification) -> None:
-    from app.report.thesis import table_3
+    from dearig.report.thesis import table_3
 
     known = fit.covariance.size > 0
     published = table_3(fit.model)

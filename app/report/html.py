@@ -9,9 +9,9 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.report import figures
-from app.report.numbers import seconds, significant
-from app.report.tables import (
+from dearig.report import figures
+from dearig.report.numbers import seconds, significant
+from dearig.report.tables import (
     Table,
     branch_trials,
     by_thesis_table,
@@ -19,19 +19,19 @@ from app.report.tables import (
     parameter_table,
     thesis_error_table,
 )
-from app.report.units import SHOWN
-from app.report.words import (
+from dearig.report.words import (
     describe_model,
     identify_summary,
     validate_summary,
     warnings_of,
 )
+from dearig.units import SHOWN
 
 if TYPE_CHECKING:  # jinja2 and matplotlib are loaded by the command that writes a report
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-    from app.outcomes import Comparison, IdentifyOutcome, Published, ValidateOutcome
+    from dearig.analysis.outcomes import Comparison, IdentifyOutcome, Published, ValidateOutcome
 
 __all__ = [
     "Picture",
@@ -120,7 +120,7 @@ def _write(
 
 def write_page(path: str | Path, template: str, contents: Callable[[], dict[str, Any]]) -> Path:
     """Write ``template`` with ``contents`` to ``path``. Raises ``InputError``."""
-    from app.recording.files import check_output, replaced_when_done
+    from dearig.recording.files import check_output, replaced_when_done
 
     path = check_output(path, overwrite=True)  # before seconds go into the figures
     page = _render(template, contents())
@@ -134,7 +134,7 @@ def _render(template: str, contents: dict[str, Any]) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("app.report"),
+        loader=PackageLoader("dearig.report"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

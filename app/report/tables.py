@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from app.report.numbers import NOTHING, interval, quoted, significant, symbol
-from app.report.thesis import table_3
-from app.report.units import SHOWN, parameter_unit
+from dearig.report.numbers import NOTHING, interval, quoted, significant, symbol
+from dearig.report.thesis import table_3
+from dearig.units import SHOWN, parameter_unit
 
 if TYPE_CHECKING:
-    from app.outcomes import BranchTrial, Comparison, Published
-    from model.fitting import Identification
+    from dearig.analysis.outcomes import BranchTrial, Comparison, Published
+    from dearig.model.fitting import Identification
 
 __all__ = [
     "Row",

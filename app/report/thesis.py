@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from model.actuator import Actuator
-    from model.film import Strip
+    from dearig.model.actuator import Actuator
+    from dearig.model.film import Strip
 
 __all__ = ["table_3"]
 
@@ -17,8 +17,8 @@ def table_3(model: Actuator | Strip) -> dict[str, float]:
     Table 3's branches are put in order of relaxation time, as fitted ones are: its order is a
     convention, and like has to stand beside like.
     """
-    from model.actuator import Actuator
-    from model.material import TABLE_3
+    from dearig.model.actuator import Actuator
+    from dearig.model.material import TABLE_3
 
     if not isinstance(model, Actuator) or len(model.network.branches) != len(TABLE_3.branches):
         return {}

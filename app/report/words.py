@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from app.report.numbers import seconds, significant, symbol
-from app.report.units import SHOWN
+from dearig.analysis.outcomes import pooled_noise, pooled_rms
+from dearig.report.numbers import seconds, significant, symbol
+from dearig.units import SHOWN
 
 if TYPE_CHECKING:
-    from app.outcomes import Comparison, IdentifyOutcome, ValidateOutcome
-    from model.actuator import Actuator
-    from model.film import Strip
-    from model.fitting import Identification
+    from dearig.analysis.outcomes import Comparison, IdentifyOutcome, ValidateOutcome
+    from dearig.model.actuator import Actuator
+    from dearig.model.film import Strip
+    from dearig.model.fitting import Identification
 
 __all__ = [
     "describe_model",
     "doubts",
     "identify_summary",
     "listed",
-    "pooled_noise",
-    "pooled_rms",
     "validate_summary",
     "warnings_of",
 ]
@@ -51,18 +49,6 @@ def _recordings(comparisons: Sequence[Comparison]) -> str:
     names = [c.name for c in comparisons]
     head = _counted(len(names), "recording")
     return f"{head} ({listed(names)})" if len(names) <= _NAMES_MAX else head
-
-
-def pooled_rms(comparisons: Sequence[Comparison]) -> float:
-    """RMS over all samples of all recordings, in m or Pa."""
-    samples = sum(c.errors.samples for c in comparisons)
-    return math.sqrt(sum(c.errors.rms**2 * c.errors.samples for c in comparisons) / samples)
-
-
-def pooled_noise(comparisons: Sequence[Comparison]) -> float | None:
-    """RMS of the noise floors that are known, in m or Pa; None where none is."""
-    floors = [c.noise for c in comparisons if c.noise is not None]
-    return math.sqrt(sum(n * n for n in floors) / len(floors)) if floors else None
 
 
 def describe_model(model: Actuator | Strip) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, QThread, Signal, Slot
 
-from app.errors import DearigError
+from dearig.errors import DearigError
 
 __all__ = ["Background"]
 

@@ -6,13 +6,13 @@ from PySide6.QtCore import Slot
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from app.outcomes import Comparison
-from app.report.numbers import significant
-from app.report.units import SHOWN
-from app.window.plotting import add_curve, add_legend, add_noise, emptied, stacked
-from app.window.session import Session
-from app.window.theme import SPACE
-from app.window.widgets import label
+from dearig.analysis.outcomes import Comparison
+from dearig.report.numbers import significant
+from dearig.units import SHOWN
+from dearig.window.plotting import add_curve, add_legend, add_noise, emptied, stacked
+from dearig.window.session import Session
+from dearig.window.theme import SPACE
+from dearig.window.widgets import label
 
 __all__ = ["BeforeAfterPlot"]
 

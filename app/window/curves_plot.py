@@ -9,12 +9,12 @@ from PySide6.QtCore import Qt, Slot
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from app.browse import Curves
-from app.report.units import SHOWN
-from app.window.plotting import add_curve, emptied, key_of, stacked
-from app.window.session import Session
-from app.window.theme import pen
-from app.window.widgets import label
+from dearig.analysis.summary import Curves
+from dearig.units import SHOWN
+from dearig.window.plotting import add_curve, emptied, key_of, stacked
+from dearig.window.session import Session
+from dearig.window.theme import pen
+from dearig.window.widgets import label
 
 __all__ = ["CurvesPlot"]
 

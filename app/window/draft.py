@@ -10,9 +10,9 @@ from typing import Any
 
 import tomli_w
 
-from app.errors import InputError
-from app.sequencefile import SEGMENT_KINDS
-from app.toml_input import parse_toml
+from dearig.config.sequencefile import SEGMENT_KINDS
+from dearig.config.toml_input import parse_toml
+from dearig.errors import InputError
 
 __all__ = ["NEW_SEGMENTS", "Draft", "Place", "has_comments", "place_of", "relative_csv"]
 
@@ -165,7 +165,7 @@ class Place:
 
 
 def place_of(sentence: str) -> Place:
-    """Where the fault is that ``sentence`` (of ``app.sequencefile``) tells of."""
+    """Where the fault is that ``sentence`` (of ``dearig.config.sequencefile``) tells of."""
     kinds = "|".join(SEGMENT_KINDS)
     key = r"(?:: (\w+?)(?:\[\d+\])? (?:=|is))?"
     found = re.search(rf"segment (\d+)(?: \((?:{kinds})\))?{key}", sentence)

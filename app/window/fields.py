@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from app.toml_input import allowed
+from dearig.config.toml_input import allowed
 
 __all__ = ["FormField", "form_fields", "shown_value", "typed_value"]
 

@@ -21,10 +21,10 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
-from app.browse import Glance
-from app.report.numbers import NOTHING, significant
-from app.report.units import SHOWN
-from app.window.session import Session
+from dearig.analysis.summary import Glance
+from dearig.report.numbers import NOTHING, significant
+from dearig.units import SHOWN
+from dearig.window.session import Session
 
 __all__ = ["COLUMNS", "GLANCE", "PATH", "SORT", "FolderModel", "ThumbnailDelegate"]
 

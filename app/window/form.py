@@ -8,9 +8,9 @@ from typing import Any
 from PySide6.QtCore import Signal, Slot
 from PySide6.QtWidgets import QComboBox, QGridLayout, QLineEdit, QWidget
 
-from app.window.fields import FormField, shown_value, typed_value
-from app.window.theme import SPACE
-from app.window.widgets import Sentence, label
+from dearig.window.fields import FormField, shown_value, typed_value
+from dearig.window.theme import SPACE
+from dearig.window.widgets import Sentence, label
 
 __all__ = ["Form"]
 

@@ -24,18 +24,18 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.window.guide import Guide
-from app.window.hv import HighVoltage, HighVoltageBadge
-from app.window.planner import Planner
-from app.window.recordings_page import RecordingsPage
-from app.window.rig_page import RigPage
-from app.window.room import GROUP
-from app.window.run_page import RunPage
-from app.window.running import simulated
-from app.window.sequence_page import SequencePage
-from app.window.session import Session
-from app.window.study_page import StudyPage
-from app.window.theme import DARK, LIGHT, apply, of_system
+from dearig.window.guide import Guide
+from dearig.window.hv import HighVoltage, HighVoltageBadge
+from dearig.window.layout_state import GROUP
+from dearig.window.planner import Planner
+from dearig.window.recordings_page import RecordingsPage
+from dearig.window.rig_page import RigPage
+from dearig.window.run_page import RunPage
+from dearig.window.running import simulated
+from dearig.window.sequence_page import SequencePage
+from dearig.window.session import Session
+from dearig.window.study_page import StudyPage
+from dearig.window.theme import DARK, LIGHT, apply, of_system
 
 __all__ = ["MainWindow"]
 

@@ -8,10 +8,10 @@ from typing import Any
 
 from PySide6.QtCore import QFileSystemWatcher, QObject, QTimer, Signal, Slot
 
-from app.browse import Glance, glance, recordings_in
-from app.window.background import Background
-from app.window.session import Session
-from app.window.worker import Job, Worker
+from dearig.analysis.summary import Glance, glance, recordings_in
+from dearig.window.background import Background
+from dearig.window.session import Session
+from dearig.window.worker import Job, Worker
 
 __all__ = ["Library", "library_of"]
 

@@ -13,15 +13,15 @@ from queue import SimpleQueue
 
 import numpy as np
 
-from app.overlay import Overlay
-from app.plan import Plan
-from app.recording.quiet import lead_in
-from app.run import Onlooker
-from app.window.session import OverlayModel
-from app.window.traces import ErrorsSoFar, Pyramid, RunningErrors
-from drivers.channels import Channel
-from drivers.rig import Block, Event, RigIdentity
-from model.errors import ModelError
+from dearig.acquisition.overlay import Overlay
+from dearig.acquisition.plan import Plan
+from dearig.acquisition.run import Onlooker
+from dearig.drivers.channels import Channel
+from dearig.drivers.rig import Block, Event, RigIdentity
+from dearig.model.errors import ModelError
+from dearig.recording.rest_noise import lead_in
+from dearig.window.session import OverlayModel
+from dearig.window.traces import ErrorsSoFar, Pyramid, RunningErrors
 
 __all__ = ["Live", "Now"]
 

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from app.errors import InputError
+from dearig.errors import InputError
 
 __all__ = ["run_window"]
 
@@ -37,12 +37,12 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     from PySide6.QtCore import QSettings, QTimer
     from PySide6.QtWidgets import QApplication
 
-    from app.rigfile import load_rig_file
-    from app.toml_input import read_text
-    from app.window.collector import Collector
-    from app.window.frame import MainWindow
-    from app.window.session import Session
-    from app.window.theme import of_system, prepare_plots
+    from dearig.config.rigfile import load_rig_file
+    from dearig.config.toml_input import read_text
+    from dearig.window.collector import Collector
+    from dearig.window.frame import MainWindow
+    from dearig.window.session import Session
+    from dearig.window.theme import of_system, prepare_plots
 
     # before anything is shown: what is wrong with a file belongs in the terminal it was given in
     settings = load_rig_file(rig_file)

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 from PySide6.QtCore import QObject, Slot
 
-from app.errors import InputError
-from app.plan import Plan, plan
-from app.rigfile import RigFile
-from app.sequencefile import LoadedSequence, parse_sequence
-from app.window.background import Background
-from app.window.session import Breach, Preview, Session
-from app.window.traces import Pyramid
-from drivers.gate import Limits
+from dearig.acquisition.plan import Plan, plan
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import LoadedSequence, parse_sequence
+from dearig.drivers.gate import Limits
+from dearig.errors import InputError
+from dearig.window.background import Background
+from dearig.window.session import Breach, Preview, Session
+from dearig.window.traces import Pyramid
 
 __all__ = ["Planner", "foresee"]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtGui import QColor
 
-from app.window.theme import Theme, pen, style_plot
+from dearig.window.theme import Theme, pen, style_plot
 
 __all__ = [
     "DecadeAxis",

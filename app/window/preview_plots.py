@@ -7,8 +7,8 @@ import pyqtgraph as pg
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QWidget
 
-from app.window.session import Preview, Session
-from app.window.theme import pen, style_plot
+from dearig.window.session import Preview, Session
+from dearig.window.theme import pen, style_plot
 
 __all__ = ["PreviewPlots"]
 

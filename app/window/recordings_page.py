@@ -32,20 +32,20 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.browse import Curves, Difference, curves, differences, hand_on, mend
-from app.recording.exporters import EXPORTS
-from app.report.numbers import significant
-from app.report.tables import Row, Table
-from app.report.units import SHOWN
-from app.window.curves_plot import CurvesPlot
-from app.window.folder_table import COLUMNS, PATH, SORT, FolderModel, ThumbnailDelegate
-from app.window.library import library_of
-from app.window.report_table import ReportTable, two_columns
-from app.window.room import remember
-from app.window.session import Session
-from app.window.theme import SPACE
-from app.window.widgets import Sentence, button, label
-from app.window.worker import Job
+from dearig.analysis.summary import Curves, Difference, curves, differences, hand_on, mend
+from dearig.recording.exporters import EXPORTS
+from dearig.report.numbers import significant
+from dearig.report.tables import Row, Table
+from dearig.units import SHOWN
+from dearig.window.curves_plot import CurvesPlot
+from dearig.window.folder_table import COLUMNS, PATH, SORT, FolderModel, ThumbnailDelegate
+from dearig.window.layout_state import remember
+from dearig.window.library import library_of
+from dearig.window.report_table import ReportTable, two_columns
+from dearig.window.session import Session
+from dearig.window.theme import SPACE
+from dearig.window.widgets import Sentence, button, label
+from dearig.window.worker import Job
 
 __all__ = ["RecordingsPage"]
 

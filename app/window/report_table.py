@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.report.tables import Row, Table
+from dearig.report.tables import Row, Table
 
 __all__ = ["ReportTable", "two_columns"]
 

@@ -10,14 +10,13 @@ from PySide6.QtCore import Slot
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from app.report.diagnosis import readable
-from app.report.units import SHOWN
-from app.study import Residual
-from app.window.plotting import DecadeAxis, add_curve, add_noise, emptied, set_key
-from app.window.session import Session
-from app.window.theme import SPACE, pen
-from app.window.widgets import label
-from model.diagnosis.findings import Dependence, MissingStress
+from dearig.analysis.study import Residual
+from dearig.model.diagnosis.results import Dependence, MissingStress
+from dearig.units import SHOWN, readable
+from dearig.window.plotting import DecadeAxis, add_curve, add_noise, emptied, set_key
+from dearig.window.session import Session
+from dearig.window.theme import SPACE, pen
+from dearig.window.widgets import label
 
 __all__ = ["ResidualPlots"]
 

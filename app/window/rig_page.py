@@ -26,18 +26,18 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.check import CheckOutcome, check_rig
-from app.errors import InputError
-from app.recording.files import check_output, replaced_when_done
-from app.rigform import SECTIONS, faults_of, parse_rig_file, section_values, with_value
-from app.toml_input import read_text
-from app.window.background import Background
-from app.window.fields import form_fields
-from app.window.form import Form
-from app.window.session import Session
-from app.window.theme import SPACE
-from app.window.widgets import Sentence, button, card, label
-from sim_backend.factory import is_simulated
+from dearig.acquisition.check import CheckOutcome, check_rig
+from dearig.config.rigform import SECTIONS, faults_of, parse_rig_file, section_values, with_value
+from dearig.config.toml_input import read_text
+from dearig.errors import InputError
+from dearig.recording.files import check_output, replaced_when_done
+from dearig.sim_backend.factory import is_simulated
+from dearig.window.background import Background
+from dearig.window.fields import form_fields
+from dearig.window.form import Form
+from dearig.window.session import Session
+from dearig.window.theme import SPACE
+from dearig.window.widgets import Sentence, button, card, label
 
 __all__ = ["RigPage"]
 

@@ -20,18 +20,18 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.modelfile import load_actuator, load_model
-from app.run import Beside
-from app.toml_input import read_text
-from app.window.background import Background
-from app.window.hv import HighVoltage, HighVoltageBadge
-from app.window.live import Live, Now
-from app.window.run_plots import RunPlots
-from app.window.running import RunEnd, Runner, RunOrder, simulated
-from app.window.session import OverlayModel, Session
-from app.window.theme import SPACE, digits
-from app.window.widgets import Readout, Sentence, button, card, label
-from sim_backend.faults import FaultPlan
+from dearig.acquisition.run import Beside
+from dearig.config.modelfile import load_actuator, load_model
+from dearig.config.toml_input import read_text
+from dearig.sim_backend.faults import FaultPlan
+from dearig.window.background import Background
+from dearig.window.hv import HighVoltage, HighVoltageBadge
+from dearig.window.live import Live, Now
+from dearig.window.run_plots import RunPlots
+from dearig.window.running import RunEnd, Runner, RunOrder, simulated
+from dearig.window.session import OverlayModel, Session
+from dearig.window.theme import SPACE, digits
+from dearig.window.widgets import Readout, Sentence, button, card, label
 
 __all__ = ["RunPage"]
 

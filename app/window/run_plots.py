@@ -10,9 +10,9 @@ from PySide6.QtCore import QRectF
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QWidget
 
-from app.window.live import Live
-from app.window.session import Preview, Session
-from app.window.theme import pen, style_plot
+from dearig.window.live import Live
+from dearig.window.session import Preview, Session
+from dearig.window.theme import pen, style_plot
 
 __all__ = ["RunPlots"]
 

@@ -9,7 +9,11 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, QThread, Signal, Slot
 
-from app.errors import (
+from dearig.acquisition.interrupts import Interrupts
+from dearig.acquisition.run import Beside, RunResult, record
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import LoadedSequence
+from dearig.errors import (
     DearigError,
     DiskFault,
     InputError,
@@ -18,14 +22,10 @@ from app.errors import (
     NotSafe,
     SafetyStop,
 )
-from app.interrupts import Interrupts
-from app.rigfile import RigFile
-from app.run import Beside, RunResult, record
-from app.sequencefile import LoadedSequence
-from app.window.hv import HighVoltage
-from app.window.live import Live
-from sim_backend.factory import is_simulated
-from sim_backend.faults import FaultPlan
+from dearig.sim_backend.factory import is_simulated
+from dearig.sim_backend.faults import FaultPlan
+from dearig.window.hv import HighVoltage
+from dearig.window.live import Live
 
 __all__ = ["RunEnd", "RunOrder", "Runner", "next_free"]
 

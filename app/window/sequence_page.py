@@ -28,13 +28,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.errors import InputError
-from app.presets import PRESETS
-from app.recording.files import check_output, replaced_when_done
-from app.sequencefile import SEGMENT_KINDS
-from app.toml_input import read_text
-from app.window.background import Background
-from app.window.draft import (
+from dearig.config.presets import PRESETS
+from dearig.config.sequencefile import SEGMENT_KINDS
+from dearig.config.toml_input import read_text
+from dearig.drivers.gate import Margin
+from dearig.errors import InputError
+from dearig.recording.files import check_output, replaced_when_done
+from dearig.window.background import Background
+from dearig.window.draft import (
     NEW_SEGMENTS,
     Draft,
     Place,
@@ -42,14 +43,13 @@ from app.window.draft import (
     place_of,
     relative_csv,
 )
-from app.window.fields import FormField, form_fields, shown_value
-from app.window.form import Form
-from app.window.preview_plots import PreviewPlots
-from app.window.room import remember
-from app.window.session import Preview, Session
-from app.window.theme import SPACE
-from app.window.widgets import Sentence, button, card, label
-from drivers.gate import Margin
+from dearig.window.fields import FormField, form_fields, shown_value
+from dearig.window.form import Form
+from dearig.window.layout_state import remember
+from dearig.window.preview_plots import PreviewPlots
+from dearig.window.session import Preview, Session
+from dearig.window.theme import SPACE
+from dearig.window.widgets import Sentence, button, card, label
 
 __all__ = ["SequencePage"]
 

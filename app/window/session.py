@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 from PySide6.QtCore import QObject, QSettings, Signal
 
-from app.modelfile import model_toml
-from app.plan import Plan
-from app.presets import PRESETS
-from app.rigfile import RigFile
-from app.sequencefile import LoadedSequence
-from app.window.theme import LIGHT, Theme
-from model.actuator import Actuator
-from model.material import TABLE_3
+from dearig.acquisition.plan import Plan
+from dearig.config.modelfile import model_toml
+from dearig.config.presets import PRESETS
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import LoadedSequence
+from dearig.model.actuator import Actuator
+from dearig.model.material import TABLE_3
+from dearig.window.theme import LIGHT, Theme
 
 __all__ = ["Breach", "OverlayModel", "Preview", "Session"]
 

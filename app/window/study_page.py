@@ -29,22 +29,24 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome
-from app.recording.files import in_words
-from app.report import diagnosis, tables, words
-from app.report.numbers import seconds
-from app.report.tables import Table
-from app.study import Study, Task, study
-from app.together import BRANCHES_MAX
-from app.window.before_after_plot import BeforeAfterPlot
-from app.window.library import library_of
-from app.window.report_table import ReportTable
-from app.window.residual_plots import ResidualPlots
-from app.window.room import remember
-from app.window.session import Session
-from app.window.theme import SPACE
-from app.window.widgets import Sentence, button, card, label
-from app.window.worker import Job, Worker
+from dearig.analysis.compatibility import BRANCHES_MAX
+from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome
+from dearig.analysis.study import Study, Task, study
+from dearig.recording.files import in_words
+from dearig.report import diagnosis, tables, words
+from dearig.report.numbers import seconds
+from dearig.report.page import write_report
+from dearig.report.tables import Table
+from dearig.units import readable
+from dearig.window.before_after_plot import BeforeAfterPlot
+from dearig.window.layout_state import remember
+from dearig.window.library import library_of
+from dearig.window.report_table import ReportTable
+from dearig.window.residual_plots import ResidualPlots
+from dearig.window.session import Session
+from dearig.window.theme import SPACE
+from dearig.window.widgets import Sentence, button, card, label
+from dearig.window.worker import Job, Worker
 
 __all__ = ["StudyPage"]
 
@@ -336,7 +338,9 @@ class StudyPage(QWidget):
             return
         self.saying.say("")
         task = self.task()
-        self._job = self._worker.submit(study, task, self._session.folder, whole=task.diagnose)
+        self._job = self._worker.submit(
+            study, task, self._session.folder, write_report, whole=task.diagnose
+        )
         self._job.progressed.connect(self._progressed)
         self._job.finished.connect(self._finished)
         self._job.failed.connect(self._failed)
@@ -451,7 +455,7 @@ class StudyPage(QWidget):
         self.ranking.show_pieces(
             [*(rounds or ["No round of candidates was finished."]), *([dropped] if dropped else [])]
         )
-        proposal: list[str | Table] = [diagnosis.readable(f"{outcome.experiment_words}.")]
+        proposal: list[str | Table] = [readable(f"{outcome.experiment_words}.")]
         considered = diagnosis.experiment_table(outcome)
         if considered is not None:
             proposal.append(considered)

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.window.theme import SPACE, digits
+from dearig.window.theme import SPACE, digits
 
 __all__ = ["Readout", "Sentence", "button", "card", "label", "set_role"]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
-from app.errors import DearigError
+from dearig.errors import DearigError
 
 __all__ = ["Answer", "Ask", "Stop", "serve"]
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Qt, Signal, Slot
 
-from app.window.workbench import Answer, Ask, Stop, serve
+from dearig.window.workbench import Answer, Ask, Stop, serve
 
 __all__ = ["Estimate", "Job", "Worker"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from drivers.errors import AddressError
+from dearig.drivers.errors import AddressError
 
 __all__ = ["Address"]
 

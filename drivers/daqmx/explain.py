@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from drivers.errors import RigError
+from dearig.drivers.errors import RigError
 
 __all__ = ["INPUT_OVERWRITTEN", "RESERVED", "TIMEOUT", "explained", "instrument_errors"]
 

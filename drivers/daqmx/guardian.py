@@ -15,9 +15,9 @@ import sys
 import threading
 from typing import Protocol
 
-from drivers.daqmx.address import Address
-from drivers.errors import RigError
-from drivers.settings import RigSettings
+from dearig.drivers.daqmx.address import Address
+from dearig.drivers.errors import RigError
+from dearig.drivers.settings import RigSettings
 
 __all__ = ["Guardian", "GuardianProcess"]
 
@@ -67,7 +67,13 @@ class GuardianProcess:
             ).model_dump(mode="json"),
         }
         self._process = subprocess.Popen(  # noqa: S603  (this interpreter, a module of ours)
-            [sys.executable, "-m", "drivers.daqmx.guardian_process", json.dumps(config)],
+            [
+                sys.executable,
+                "-P",
+                "-m",
+                "dearig.drivers.daqmx.guardian_process",
+                json.dumps(config),
+            ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             encoding="utf-8",

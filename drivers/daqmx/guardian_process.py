@@ -16,10 +16,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from drivers.daqmx.link import Link
-from drivers.daqmx.outputs import Outputs
-from drivers.errors import RigError
-from drivers.settings import RigSettings
+from dearig.drivers.daqmx.link import Link
+from dearig.drivers.daqmx.outputs import Outputs
+from dearig.drivers.errors import RigError
+from dearig.drivers.settings import RigSettings
 
 __all__ = ["Guard", "main"]
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from drivers.daqmx.explain import instrument_errors
-from drivers.daqmx.link import Link
-from drivers.daqmx.outputs import Outputs
-from drivers.daqmx.tasks import ClockedTasks
-from drivers.errors import RigError
-from drivers.findings import Finding
-from drivers.settings import RigSettings
-from drivers.trek import Monitors
+from dearig.drivers.daqmx.explain import instrument_errors
+from dearig.drivers.daqmx.link import Link
+from dearig.drivers.daqmx.outputs import Outputs
+from dearig.drivers.daqmx.tasks import ClockedTasks
+from dearig.drivers.errors import RigError
+from dearig.drivers.findings import Finding
+from dearig.drivers.settings import RigSettings
+from dearig.drivers.trek import Monitors
 
 __all__ = ["Inspection", "inspect"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from drivers.errors import RigError
+from dearig.drivers.errors import RigError
 
 if TYPE_CHECKING:
     import grpc

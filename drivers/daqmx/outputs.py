@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivers.daqmx.explain import RESERVED, instrument_errors
-from drivers.daqmx.link import Link
-from drivers.errors import RigError
-from drivers.settings import RigSettings
+from dearig.drivers.daqmx.explain import RESERVED, instrument_errors
+from dearig.drivers.daqmx.link import Link
+from dearig.drivers.errors import RigError
+from dearig.drivers.settings import RigSettings
 
 __all__ = ["Outputs"]
 

@@ -9,17 +9,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from drivers.daqmx.address import Address
-from drivers.daqmx.explain import TIMEOUT, explained
-from drivers.daqmx.guardian import Guardian, GuardianProcess
-from drivers.daqmx.link import Link
-from drivers.daqmx.outputs import Outputs
-from drivers.daqmx.tasks import ClockedTasks, identify_card
-from drivers.errors import RigError
-from drivers.gate import GatedWaveform, ramp_down
-from drivers.identity import instruments
-from drivers.rig import Block, Event, RigIdentity, RigState, expect
-from drivers.settings import RigSettings
+from dearig.drivers.daqmx.address import Address
+from dearig.drivers.daqmx.explain import TIMEOUT, explained
+from dearig.drivers.daqmx.guardian import Guardian, GuardianProcess
+from dearig.drivers.daqmx.link import Link
+from dearig.drivers.daqmx.outputs import Outputs
+from dearig.drivers.daqmx.tasks import ClockedTasks, identify_card
+from dearig.drivers.errors import RigError
+from dearig.drivers.gate import GatedWaveform, ramp_down
+from dearig.drivers.identity import instruments
+from dearig.drivers.rig import Block, Event, RigIdentity, RigState, expect
+from dearig.drivers.settings import RigSettings
 
 __all__ = ["DaqmxRig", "open_daqmx_rig"]
 
@@ -43,7 +43,8 @@ def open_daqmx_rig(
 
 
 class DaqmxRig:
-    """The card at ``address``; see ``drivers.rig.Rig`` for the calls, which any thread may make.
+    """The card at ``address``; see ``dearig.drivers.rig.Rig`` for the calls, which any thread may
+    make.
 
     Blocks hold ``block_samples`` samples, or a tenth of a second when that is None. ``clock`` says
     how long nothing came.

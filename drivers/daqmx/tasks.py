@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drivers.channels import Channel
-from drivers.daqmx.explain import TIMEOUT, instrument_errors
-from drivers.daqmx.link import Link
-from drivers.errors import RigError
-from drivers.settings import RigSettings
+from dearig.drivers.channels import Channel
+from dearig.drivers.daqmx.explain import TIMEOUT, instrument_errors
+from dearig.drivers.daqmx.link import Link
+from dearig.drivers.errors import RigError
+from dearig.drivers.settings import RigSettings
 
 if TYPE_CHECKING:
     import nidaqmx

@@ -1,8 +1,8 @@
 """The Keyence LK-G5000 laser controller on its RS-232C port."""
 
-from drivers.keyence.compare import ControllerSettings, compare
-from drivers.keyence.controller import Keyence, LaserError, NoReading, Port, open_port
-from drivers.keyence.inspection import (
+from dearig.drivers.keyence.compare import ControllerSettings, compare
+from dearig.drivers.keyence.controller import Keyence, LaserError, NoReading, Port, open_port
+from dearig.drivers.keyence.inspection import (
     LaserInspection,
     analog_findings,
     inspect,

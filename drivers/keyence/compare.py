@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from drivers.findings import Finding, Verdict
-from drivers.settings import LaserSettings
+from dearig.drivers.findings import Finding, Verdict
+from dearig.drivers.settings import LaserSettings
 
 __all__ = ["ControllerSettings", "compare", "settings_findings"]
 

@@ -11,8 +11,8 @@ from enum import Enum
 from types import TracebackType
 from typing import Protocol, TypeVar
 
-from drivers.errors import RigError
-from drivers.keyence.commands import (
+from dearig.drivers.errors import RigError
+from dearig.drivers.keyence.commands import (
     AVERAGING,
     CALCULATIONS,
     COMMANDS,
@@ -24,8 +24,8 @@ from drivers.keyence.commands import (
     STATUS_ERROR,
     Command,
 )
-from drivers.keyence.compare import ControllerSettings
-from drivers.settings import LaserSettings
+from dearig.drivers.keyence.compare import ControllerSettings
+from dearig.drivers.settings import LaserSettings
 
 __all__ = ["POLL", "Keyence", "LaserError", "NoReading", "Port", "open_port"]
 

@@ -6,10 +6,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from drivers.findings import Finding
-from drivers.keyence.compare import ControllerSettings, compare, settings_findings
-from drivers.keyence.controller import Keyence, LaserError, NoReading, Port, open_port
-from drivers.settings import LaserSettings
+from dearig.drivers.findings import Finding
+from dearig.drivers.keyence.compare import ControllerSettings, compare, settings_findings
+from dearig.drivers.keyence.controller import Keyence, LaserError, NoReading, Port, open_port
+from dearig.drivers.settings import LaserSettings
 
 __all__ = ["LaserInspection", "analog_findings", "inspect", "require_agreement"]
 

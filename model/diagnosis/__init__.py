@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from model.diagnosis.findings import Diagnosis
-from model.diagnosis.search import diagnose
+from dearig.model.diagnosis.results import Diagnosis
+from dearig.model.diagnosis.search import diagnose
 
 __all__ = ["Diagnosis", "diagnose"]

@@ -16,23 +16,23 @@ from threading import Lock
 import numpy as np
 from scipy.stats.qmc import Sobol
 
-from model import kernel
-from model.actuator import Actuator, at_rest
-from model.diagnosis.findings import NOISE_RMS, NOT_BY_CHANCE, Stage
-from model.effects import follows_path
-from model.film import Strip
-from model.fitting.identify import fit_globally, is_determined, is_worth_freeing
-from model.fitting.intervals import correlation_time, covariance, is_flat, unevenness
-from model.fitting.levenberg import LocalFit, descend
-from model.fitting.parameters import Estimate, Layout
-from model.fitting.problem import Problem
-from model.fitting.search import moving_starts, voltage_misfit, voltage_starts
-from model.fitting.secant import descend_by_secants
-from model.fitting.sketch import sketched
-from model.fitting.thinning import thinned
-from model.fitting.threads import Job, Result, together
-from model.fitting.walks import Walking
-from model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
+from dearig.model import kernel
+from dearig.model.actuator import Actuator, at_rest
+from dearig.model.diagnosis.results import NOISE_RMS, NOT_BY_CHANCE, Stage
+from dearig.model.effects import follows_path
+from dearig.model.film import Strip
+from dearig.model.fitting.broyden import descend_by_secants
+from dearig.model.fitting.coarse_drive import sketched
+from dearig.model.fitting.drift import Walking
+from dearig.model.fitting.identify import fit_globally, is_determined, is_worth_freeing
+from dearig.model.fitting.intervals import correlation_time, covariance, is_flat, unevenness
+from dearig.model.fitting.levenberg import LocalFit, descend
+from dearig.model.fitting.parameters import Estimate, Layout
+from dearig.model.fitting.problem import Problem
+from dearig.model.fitting.search import moving_starts, voltage_misfit, voltage_starts
+from dearig.model.fitting.thinning import thinned
+from dearig.model.fitting.threads import Job, Result, together
+from dearig.model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
 __all__ = [
     "FILM_MODEL_ERROR",

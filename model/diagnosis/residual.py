@@ -9,10 +9,10 @@ import numpy as np
 from scipy.signal import welch
 from scipy.stats import chi2, norm
 
-from model.diagnosis.bench import Trial
-from model.diagnosis.findings import NOISE_RMS, NOT_BY_CHANCE, Dependence, Signature
-from model.fitting.intervals import correlation_time, unevenness
-from model.records import ActuatorRecord, Record
+from dearig.model.diagnosis.bench import Trial
+from dearig.model.diagnosis.results import NOISE_RMS, NOT_BY_CHANCE, Dependence, Signature
+from dearig.model.fitting.intervals import correlation_time, unevenness
+from dearig.model.records import ActuatorRecord, Record
 
 __all__ = ["signatures"]
 

@@ -19,14 +19,14 @@ from itertools import islice, product
 
 import numpy as np
 
-from model import kernel
-from model.actuator import Actuator
-from model.diagnosis.bench import Bench, Trial
-from model.diagnosis.findings import MUCH_LEFT
-from model.effects import EFFECTS, Effect, EffectValues, Parameter, follows_path
-from model.film import Strip
-from model.fitting.problem import Problem, is_told
-from model.records import ActuatorRecord, FilmRecord
+from dearig.model import kernel
+from dearig.model.actuator import Actuator
+from dearig.model.diagnosis.bench import Bench, Trial
+from dearig.model.diagnosis.results import MUCH_LEFT
+from dearig.model.effects import EFFECTS, Effect, EffectValues, Parameter, follows_path
+from dearig.model.film import Strip
+from dearig.model.fitting.problem import Problem, is_told
+from dearig.model.records import ActuatorRecord, FilmRecord
 
 __all__ = ["Promise", "Screen", "is_of", "sizes_of", "with_effect"]
 

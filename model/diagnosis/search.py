@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from model.actuator import Actuator
-from model.diagnosis.bench import Bench, Trial, Work, akaike, information, merged, relieved
-from model.diagnosis.findings import (
+from dearig.model.actuator import Actuator
+from dearig.model.diagnosis.bench import Bench, Trial, Work, akaike, information, merged, relieved
+from dearig.model.diagnosis.residual import signatures
+from dearig.model.diagnosis.results import (
     EXPLAINED,
     MUCH_LEFT,
     NOTHING_MISSING,
@@ -22,15 +23,14 @@ from model.diagnosis.findings import (
     Round,
     Step,
 )
-from model.diagnosis.residual import signatures
-from model.diagnosis.screening import Promise, Screen, is_of, sizes_of, with_effect
-from model.diagnosis.stress import missing_stress
-from model.diagnosis.unnamed import describe_unnamed
-from model.effects import EFFECTS, Effect, follows_path
-from model.film import Strip
-from model.fitting import Estimate
-from model.fitting.parameters import Layout
-from model.records import ActuatorRecord, Record
+from dearig.model.diagnosis.screening import Promise, Screen, is_of, sizes_of, with_effect
+from dearig.model.diagnosis.stress import missing_stress
+from dearig.model.diagnosis.symbolic_regression import describe_unnamed
+from dearig.model.effects import EFFECTS, Effect, follows_path
+from dearig.model.film import Strip
+from dearig.model.fitting import Estimate
+from dearig.model.fitting.parameters import Layout
+from dearig.model.records import ActuatorRecord, Record
 
 __all__ = ["diagnose"]
 

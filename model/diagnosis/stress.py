@@ -14,15 +14,15 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from model.actuator import Actuator, at_rest
-from model.coefficients import EFFECTS_AT, ELECTRIC, INERTIA, MODULUS, WIDTH
-from model.diagnosis.findings import MissingStress
-from model.effects import MEMORY, NEUTRAL, SLOTS, assembly
-from model.film import Strip, unit_stresses
-from model.fitting.search import SMOOTHING
-from model.kinematics import thinning
-from model.network import HEAD
-from model.records import ActuatorRecord, FilmRecord, Record
+from dearig.model.actuator import Actuator, at_rest
+from dearig.model.coefficients import EFFECTS_AT, ELECTRIC, INERTIA, MODULUS, WIDTH
+from dearig.model.diagnosis.results import MissingStress
+from dearig.model.effects import MEMORY, NEUTRAL, SLOTS, assembly
+from dearig.model.film import Strip, unit_stresses
+from dearig.model.fitting.search import SMOOTHING
+from dearig.model.kinematics import thinning
+from dearig.model.network import HEAD
+from dearig.model.records import ActuatorRecord, FilmRecord, Record
 
 __all__ = ["missing_stress"]
 

@@ -2,8 +2,8 @@
 
 A file holds ``EFFECT``, its description, from which reports, windows, fits and model files read all
 they need to know, and the compiled functions by which it takes part in the kernel (``HOOKS`` of
-``model.effects.assembly`` says which there are). To add an effect, add a file: it is found here,
-given its place in the coefficient vector and in the kernel's memory, and compiled in.
+``dearig.model.effects.assembly`` says which there are). To add an effect, add a file: it is found
+here, given its place in the coefficient vector and in the kernel's memory, and compiled in.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from types import MappingProxyType, ModuleType
 
 import numpy as np
 
-from model.coefficients import EFFECTS_AT
-from model.effects.description import FAMILIES, Effect, EffectValues, Parameter
+from dearig.model.coefficients import EFFECTS_AT
+from dearig.model.effects.description import FAMILIES, Effect, EffectValues, Parameter
 
 __all__ = [
     "EFFECTS",

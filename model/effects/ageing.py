@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "commit", "soften"]
 

@@ -6,9 +6,9 @@ overshooting where the damping ratio z is below 0.7.
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.filters import swung
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.filters import swung
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "supply"]
 

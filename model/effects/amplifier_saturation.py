@@ -6,8 +6,8 @@ it is short of s V (|V|/8 kV)^n, as behind a film that leaks: no record tells th
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "supply"]
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.filters import slewed
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.filters import slewed
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "supply"]
 

@@ -18,8 +18,8 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any
 
-from model.effects import EFFECTS, PLACES
-from model.jit import cache_folder
+from dearig.model.effects import EFFECTS, PLACES
+from dearig.model.jit import cache_folder
 
 __all__ = [
     "BITS",
@@ -129,9 +129,9 @@ def _active(name: str) -> str:
 def _text() -> str:
     """Source of the hooks."""
     names = sorted(EFFECTS, key=_rank)
-    lines = ["from model.jit import jit"]
+    lines = ["from dearig.model.jit import jit"]
     modules = {n: PLACES[n].module.__name__.rsplit(".", 1)[1] for n in names}
-    lines += [f"from model.effects import {m} as _{m}" for m in modules.values()]
+    lines += [f"from dearig.model.effects import {m} as _{m}" for m in modules.values()]
     for hook, (arguments, how) in HOOKS.items():
         taking = f", {arguments}" if arguments else ""
         first, each, last = _TOGETHER.get(how, ("", f"{how} = {{}}", how))
@@ -167,7 +167,7 @@ def _load() -> ModuleType:
         with os.fdopen(handle, "w", encoding="utf-8") as file:
             file.write(text)
         Path(partial).replace(path)
-    spec = importlib.util.spec_from_file_location("model.effects.hooks", path)
+    spec = importlib.util.spec_from_file_location("dearig.model.effects.hooks", path)
     if spec is None or spec.loader is None:
         raise ImportError(f"{path} cannot be loaded")
     module = importlib.util.module_from_spec(spec)

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 
-from model.creep import relaxed
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.creep import relaxed
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 
-from model.effects.description import Effect, Parameter
-from model.effects.dielectric_relaxation import SETTLED
-from model.filters import lagged
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.dielectric_relaxation import SETTLED
+from dearig.model.filters import lagged
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "polarise"]
 

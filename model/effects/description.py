@@ -96,7 +96,7 @@ class Effect:
     it is sought only where that one leads and leaves more than noise. ``ways`` is of an effect that
     goes another way in each recording, and adds to the reading what is linear in its sizes: at
     times (N,) s what each of them adds by itself, (N, sizes). Of several recordings each has sizes
-    of its own then (``model.fitting.walks``).
+    of its own then (``dearig.model.fitting.drift``).
     ``words`` is one sentence for a person: what the effect is and what betrays it.
     """
 

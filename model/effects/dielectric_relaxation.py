@@ -7,9 +7,9 @@ With g = 1 eps is the permittivity at rest, with g = 0 that of fast fields: data
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.filters import lagged
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.filters import lagged
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "polarise"]
 

@@ -12,9 +12,9 @@ damped by it.
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.filters import slid
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.filters import slid
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 

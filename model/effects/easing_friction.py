@@ -11,11 +11,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from model.effects.description import Parameter
-from model.effects.dry_friction import EFFECT as DRY
-from model.effects.dry_friction import stiffness
-from model.filters import slid
-from model.jit import jit
+from dearig.model.effects.description import Parameter
+from dearig.model.effects.dry_friction import EFFECT as DRY
+from dearig.model.effects.dry_friction import stiffness
+from dearig.model.filters import slid
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 

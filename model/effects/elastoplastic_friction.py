@@ -12,11 +12,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from model.effects.description import Parameter
-from model.effects.easing_friction import EFFECT as EASING
-from model.effects.easing_friction import stiffness
-from model.filters import bent, bristles_slip
-from model.jit import jit
+from dearig.model.effects.description import Parameter
+from dearig.model.effects.easing_friction import EFFECT as EASING
+from dearig.model.effects.easing_friction import stiffness
+from dearig.model.filters import bent, bristles_slip
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 

@@ -8,9 +8,9 @@ good part of the stroke, where those of dry friction open within a few micrometr
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.filters import wound_on
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.filters import wound_on
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 

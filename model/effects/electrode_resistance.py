@@ -7,11 +7,11 @@ Carbon grease and powders have kilohms to megohms a square, and cracks make it m
 
 from __future__ import annotations
 
-from model.coefficients import CAPACITANCE, HELD
-from model.effects.description import Effect, Parameter
-from model.filters import lagged
-from model.jit import jit
-from model.kinematics import thinning_squared
+from dearig.model.coefficients import CAPACITANCE, HELD
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.filters import lagged
+from dearig.model.jit import jit
+from dearig.model.kinematics import thinning_squared
 
 __all__ = ["EFFECT", "supply"]
 

@@ -8,9 +8,9 @@ unnamed stress that sets in at one displacement looks like.
 
 from __future__ import annotations
 
-from model.coefficients import LENGTH, REST
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.coefficients import LENGTH, REST
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "stiffness", "stress"]
 

@@ -5,10 +5,10 @@ The Maxwell stress is multiplied by 1/(1 - b (E/E_0)^2), E_0 = 8 MV/m, E = V/z t
 
 from __future__ import annotations
 
-from model.coefficients import HELD, THICKNESS
-from model.effects.description import Effect, Parameter
-from model.jit import jit
-from model.kinematics import thinning_squared
+from dearig.model.coefficients import HELD, THICKNESS
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
+from dearig.model.kinematics import thinning_squared
 
 __all__ = ["EFFECT", "permittivity"]
 

@@ -5,9 +5,9 @@ From the time t_0 on the voltage counts 1 - s of what it did, over 20 ms so that
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.filters import switched
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.filters import switched
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "supply"]
 

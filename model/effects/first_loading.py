@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 
-from model.coefficients import REST
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.coefficients import REST
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "commit", "soften"]
 

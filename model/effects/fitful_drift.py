@@ -7,9 +7,9 @@ anything slow, and is sought only where nine have led and have left something.
 
 from __future__ import annotations
 
-from model.effects.restless_drift import EFFECT as RESTLESS
-from model.effects.wandering_drift import finer, walked
-from model.jit import jit
+from dearig.model.effects.restless_drift import EFFECT as RESTLESS
+from dearig.model.effects.wandering_drift import finer, walked
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
 

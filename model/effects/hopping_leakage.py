@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from model.conduction import HOPS, behind
-from model.effects.leakage import EFFECT as BY_TRAPS
-from model.jit import jit
+from dearig.model.conduction import HOPS, behind
+from dearig.model.effects.leakage import EFFECT as BY_TRAPS
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "supply"]
 

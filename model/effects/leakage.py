@@ -7,9 +7,9 @@ conductivity goes with exp(b E^n): nothing is lost at small voltages, most at th
 
 from __future__ import annotations
 
-from model.conduction import REMEMBERED, behind
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.conduction import REMEMBERED, behind
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "supply"]
 

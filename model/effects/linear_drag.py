@@ -6,8 +6,8 @@ anything the record shows does the same, so the two are one and the same to slow
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "stiffness", "stress"]
 

@@ -7,9 +7,9 @@ against the film's own 1.9 kg/m. The film alone rings at about 70 Hz, with the l
 
 from __future__ import annotations
 
-from model.coefficients import LENGTH, SECTION
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.coefficients import LENGTH, SECTION
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "inertia"]
 

@@ -5,9 +5,9 @@ The stress p is taken from the load from the time t_0 on, over 20 ms so that a f
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.filters import switched
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.filters import switched
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "stress"]
 

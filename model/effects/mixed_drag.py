@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from model.effects.description import Parameter
-from model.effects.linear_drag import EFFECT as LINEAR
-from model.effects.power_drag import greatest_rate
-from model.jit import jit
+from dearig.model.effects.description import Parameter
+from dearig.model.effects.linear_drag import EFFECT as LINEAR
+from dearig.model.effects.power_drag import greatest_rate
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "stiffness", "stress"]
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 
-from model.coefficients import HELD, REST
-from model.effects.description import Effect, Parameter
-from model.jit import jit
-from model.kinematics import strain_and_pull
+from dearig.model.coefficients import HELD, REST
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
+from dearig.model.kinematics import strain_and_pull
 
 __all__ = ["EFFECT", "commit", "soften"]
 

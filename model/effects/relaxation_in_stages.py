@@ -5,10 +5,10 @@ Three Debye terms as of ``dielectric_relaxation``, each of its own strength, at 
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.effects.dielectric_relaxation import SETTLED
-from model.filters import lagged
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.dielectric_relaxation import SETTLED
+from dearig.model.filters import lagged
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "polarise"]
 

@@ -6,9 +6,9 @@ in half a minute. So many numbers play much that is slow: they are sought only w
 
 from __future__ import annotations
 
-from model.effects.wandering_drift import EFFECT as WANDERING
-from model.effects.wandering_drift import finer, walked
-from model.jit import jit
+from dearig.model.effects.wandering_drift import EFFECT as WANDERING
+from dearig.model.effects.wandering_drift import finer, walked
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
 

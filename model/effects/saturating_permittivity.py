@@ -6,9 +6,9 @@ first, levelling off at a change of a r after the stretch r, as sharply as n say
 
 from __future__ import annotations
 
-from model.coefficients import REST
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.coefficients import REST
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "permittivity"]
 

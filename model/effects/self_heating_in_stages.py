@@ -6,9 +6,9 @@ The network's stress is multiplied by 1 + a T + b T_2.
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.filters import lagged
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.filters import lagged
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "polarise", "soften"]
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 
-from model.effects.description import Effect, Parameter
-from model.filters import along_cubic
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.filters import along_cubic
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
 

@@ -5,8 +5,8 @@ Beyond the knee the reading has 1 - s of its slope.
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
 

@@ -6,9 +6,9 @@ rates. As late as a first-order lag of 2 tau, and rounder.
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.filters import low_pass
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.filters import low_pass
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
 

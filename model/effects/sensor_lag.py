@@ -5,9 +5,9 @@ The reading r follows r' = (x - r)/tau, solved exactly for the cubic through pos
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.filters import low_pass
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.filters import low_pass
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
 

@@ -5,8 +5,8 @@ A travel y beyond the knee reads y/(1 + y/s); at s the half of it.
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
 

@@ -5,9 +5,9 @@ The reading is moved by d from the time t_0 on, over 20 ms so that a fit can fin
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.filters import switched
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.filters import switched
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
 

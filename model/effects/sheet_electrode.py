@@ -13,12 +13,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from model.coefficients import CAPACITANCE, HELD
-from model.effects.description import Parameter
-from model.effects.electrode_resistance import EFFECT as LUMPED
-from model.filters import lagged
-from model.jit import jit
-from model.kinematics import thinning_squared
+from dearig.model.coefficients import CAPACITANCE, HELD
+from dearig.model.effects.description import Parameter
+from dearig.model.effects.electrode_resistance import EFFECT as LUMPED
+from dearig.model.filters import lagged
+from dearig.model.jit import jit
+from dearig.model.kinematics import thinning_squared
 
 __all__ = ["EFFECT", "supply"]
 

@@ -7,8 +7,8 @@ bending. Only a film pulled by its ends can do this.
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "felt"]
 

@@ -6,8 +6,8 @@ n = 1 at one rate, with 1/2 as by diffusion, near 0 with the logarithm of time.
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
 

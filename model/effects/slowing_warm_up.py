@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from model.effects.description import Parameter
-from model.effects.warm_up import EFFECT as WARM_UP
-from model.jit import jit
+from dearig.model.effects.description import Parameter
+from dearig.model.effects.warm_up import EFFECT as WARM_UP
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "soften"]
 

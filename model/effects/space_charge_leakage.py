@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from model.conduction import CROWDED, behind
-from model.effects.leakage import EFFECT as BY_TRAPS
-from model.jit import jit
+from dearig.model.conduction import CROWDED, behind
+from dearig.model.effects.leakage import EFFECT as BY_TRAPS
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "supply"]
 

@@ -5,9 +5,9 @@ The Maxwell stress is multiplied by 1 + a (lam - lam_rest).
 
 from __future__ import annotations
 
-from model.coefficients import REST
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.coefficients import REST
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "permittivity"]
 

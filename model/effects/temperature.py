@@ -6,8 +6,8 @@ network's stress is multiplied by 1 + a (theta - theta_0), with the thermometer'
 
 from __future__ import annotations
 
-from model.effects.description import Effect, Parameter
-from model.jit import jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "soften"]
 

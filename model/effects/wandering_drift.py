@@ -13,8 +13,8 @@ from functools import partial
 
 import numpy as np
 
-from model.effects.description import Effect, Parameter
-from model.jit import allocating, jit
+from dearig.model.effects.description import Effect, Parameter
+from dearig.model.jit import allocating, jit
 
 __all__ = ["EFFECT", "sense"]
 

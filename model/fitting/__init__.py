@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from model.fitting.identify import Identification, add_intervals, identify
-from model.fitting.parameters import Estimate
+from dearig.model.fitting.identify import Identification, add_intervals, identify
+from dearig.model.fitting.parameters import Estimate
 
 __all__ = ["Estimate", "Identification", "add_intervals", "identify"]

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from model.fitting.levenberg import LocalFit
-from model.fitting.problem import Problem
+from dearig.model.fitting.levenberg import LocalFit
+from dearig.model.fitting.problem import Problem
 
 __all__ = ["by_sketches"]
 

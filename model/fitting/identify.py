@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from model.actuator import Actuator
-from model.errors import ModelError
-from model.film import Strip
-from model.fitting.intervals import CHI2_95, correlation_time, covariance, profile
-from model.fitting.levenberg import LocalFit, descend
-from model.fitting.parameters import Estimate, Layout, require_free
-from model.fitting.problem import Problem
-from model.fitting.search import Progress, algorithm_1, film_starts, voltage_starts
-from model.fitting.thinning import thinned
-from model.material import Network
-from model.records import ActuatorRecord, FilmRecord, Record
+from dearig.model.actuator import Actuator
+from dearig.model.errors import ModelError
+from dearig.model.film import Strip
+from dearig.model.fitting.intervals import CHI2_95, correlation_time, covariance, profile
+from dearig.model.fitting.levenberg import LocalFit, descend
+from dearig.model.fitting.parameters import Estimate, Layout, require_free
+from dearig.model.fitting.problem import Problem
+from dearig.model.fitting.search import Progress, algorithm_1, film_starts, voltage_starts
+from dearig.model.fitting.thinning import thinned
+from dearig.model.material import Network
+from dearig.model.records import ActuatorRecord, FilmRecord, Record
 
 __all__ = [
     "METHODS",

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import kolmogorov
 
-from model.fitting.levenberg import descend
-from model.fitting.problem import Problem
+from dearig.model.fitting.levenberg import descend
+from dearig.model.fitting.problem import Problem
 
 __all__ = ["CHI2_95", "correlation_time", "covariance", "is_flat", "profile", "unevenness"]
 

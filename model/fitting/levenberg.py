@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
-from model.fitting.problem import Problem
+from dearig.model.fitting.problem import Problem
 
 __all__ = ["LocalFit", "descend"]
 

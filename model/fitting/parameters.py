@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from model.actuator import Actuator
-from model.coefficients import FORCE, HELD, KIND, LIMIT, LOCKING, MODULUS, RATE, WIDTH
-from model.effects import EFFECTS, PLACES, EffectValues, Parameter, follows_path
-from model.errors import ModelError
-from model.film import Strip
-from model.material import Branch, Network, Spring
-from model.network import HEAD, nominal_pull
-from model.springs import SPRINGS, locking_strain
+from dearig.model.actuator import Actuator
+from dearig.model.coefficients import FORCE, HELD, KIND, LIMIT, LOCKING, MODULUS, RATE, WIDTH
+from dearig.model.effects import EFFECTS, PLACES, EffectValues, Parameter, follows_path
+from dearig.model.errors import ModelError
+from dearig.model.film import Strip
+from dearig.model.material import Branch, Network, Spring
+from dearig.model.network import HEAD, nominal_pull
+from dearig.model.springs import SPRINGS, locking_strain
 
 __all__ = ["THESIS_RANGES", "Estimate", "Layout", "Quantity"]
 

@@ -7,15 +7,15 @@ from copy import copy
 
 import numpy as np
 
-from model import kernel
-from model.actuator import Actuator, readings_of
-from model.effects import EFFECTS, SENSED
-from model.errors import ModelError
-from model.film import Strip, stress_of
-from model.fitting.parameters import Layout
-from model.fitting.threads import together
-from model.fitting.walks import Walking, walks_of
-from model.records import ActuatorRecord, FilmRecord, Record
+from dearig.model import kernel
+from dearig.model.actuator import Actuator, readings_of
+from dearig.model.effects import EFFECTS, SENSED
+from dearig.model.errors import ModelError
+from dearig.model.film import Strip, stress_of
+from dearig.model.fitting.drift import Walking, walks_of
+from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.threads import together
+from dearig.model.records import ActuatorRecord, FilmRecord, Record
 
 __all__ = ["Problem", "is_told"]
 
@@ -41,8 +41,9 @@ class Problem:
     counts records simulated, and ``told`` is called with each such number. What the numbers
     ``sketched`` (d,) bool do is told by the records' sketches, None where nothing is.
 
-    Walks that each of several records has of its own are found on the way (``model.fitting.walks``)
-    and are part of every prediction; the layout's numbers of them then do nothing.
+    Walks that each of several records has of its own are found on the way
+    (``dearig.model.fitting.drift``) and are part of every prediction; the layout's numbers of them
+    then do nothing.
     """
 
     def __init__(

@@ -11,17 +11,17 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import OptimizeResult, differential_evolution, nnls
 
-from model import kernel
-from model.actuator import Actuator
-from model.coefficients import ELECTRIC, INERTIA, LENGTH, MODULUS, SECTION
-from model.errors import ModelError
-from model.film import unit_stresses
-from model.fitting.parameters import THESIS_RANGES, Layout
-from model.fitting.problem import Problem
-from model.kinematics import electric_along
-from model.material import Branch, Network, Spring
-from model.network import HEAD
-from model.records import ActuatorRecord, FilmRecord
+from dearig.model import kernel
+from dearig.model.actuator import Actuator
+from dearig.model.coefficients import ELECTRIC, INERTIA, LENGTH, MODULUS, SECTION
+from dearig.model.errors import ModelError
+from dearig.model.film import unit_stresses
+from dearig.model.fitting.parameters import THESIS_RANGES, Layout
+from dearig.model.fitting.problem import Problem
+from dearig.model.kinematics import electric_along
+from dearig.model.material import Branch, Network, Spring
+from dearig.model.network import HEAD
+from dearig.model.records import ActuatorRecord, FilmRecord
 
 __all__ = [
     "ALGORITHM_1",

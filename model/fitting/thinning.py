@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from model import kernel
-from model.actuator import Actuator, reading_of
-from model.records import ActuatorRecord
+from dearig.model import kernel
+from dearig.model.actuator import Actuator, reading_of
+from dearig.model.records import ActuatorRecord
 
 __all__ = ["thinned"]
 

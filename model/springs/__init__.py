@@ -7,8 +7,8 @@ links n of an Arruda-Boyce chain, nothing for the neo-Hookean one.
 
 from __future__ import annotations
 
-from model.jit import jit
-from model.springs import arruda_boyce, gent, neo_hookean
+from dearig.model.jit import jit
+from dearig.model.springs import arruda_boyce, gent, neo_hookean
 
 __all__ = ["SPRINGS", "curvature", "energy", "locking_strain", "slope"]
 

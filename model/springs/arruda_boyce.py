@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from model.jit import jit
+from dearig.model.jit import jit
 
 NAME = "arruda-boyce"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from model.jit import jit
+from dearig.model.jit import jit
 
 NAME = "gent"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from model.jit import jit
+from dearig.model.jit import jit
 
 NAME = "neo-hookean"
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_backend.daqmx.output import TICK_TOLERANCE, Generation, Track
-from sim_backend.signal_path import CHUNK, PathState, SignalPath
+from dearig.sim_backend.daqmx.output import TICK_TOLERANCE, Generation, Track
+from dearig.sim_backend.signal_path import CHUNK, PathState, SignalPath
 
 __all__ = ["OwnTicks", "Run", "SharedTicks", "Ticks"]
 

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sim_backend.daqmx.device import Device
-from sim_backend.daqmx.errors import Code, DaqmxError
-from sim_backend.daqmx.setup import INPUT_RANGES, INPUTS, LINES, OUTPUTS
-from sim_backend.daqmx.tasks import AnalogInput, AnalogOutput, Kind, Lines, Task
+from dearig.sim_backend.daqmx.device import Device
+from dearig.sim_backend.daqmx.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.setup import INPUT_RANGES, INPUTS, LINES, OUTPUTS
+from dearig.sim_backend.daqmx.tasks import AnalogInput, AnalogOutput, Kind, Lines, Task
 
 __all__ = ["SERIAL", "Asked", "get", "reset", "set_"]
 

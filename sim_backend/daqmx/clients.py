@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
-from sim_backend.clock import Clock
-from sim_backend.daqmx.device import Device
-from sim_backend.daqmx.tasks import Kind
+from dearig.sim_backend.clock import Clock
+from dearig.sim_backend.daqmx.device import Device
+from dearig.sim_backend.daqmx.tasks import Kind
 
 __all__ = ["Clients"]
 

@@ -14,18 +14,18 @@ from typing import TypeVar
 
 import numpy as np
 
-from drivers.channels import COUNT_MAX, COUNT_MIN
-from drivers.settings import RigSettings
-from sim_backend.clock import Clock
-from sim_backend.daqmx.acquisition import OwnTicks, Run, SharedTicks
-from sim_backend.daqmx.behind import Behind
-from sim_backend.daqmx.errors import Code, DaqmxError
-from sim_backend.daqmx.output import Generation, Waveform
-from sim_backend.daqmx.setup import LINES, OUTPUTS, Setup
-from sim_backend.daqmx.tasks import Kind, SampleClock, State, Task, Watchdog
-from sim_backend.daqmx.wire import Change, Wire
-from sim_backend.faults import Fault, FaultKind, FaultPlan
-from sim_backend.plant import Plant
+from dearig.drivers.channels import COUNT_MAX, COUNT_MIN
+from dearig.drivers.settings import RigSettings
+from dearig.sim_backend.clock import Clock
+from dearig.sim_backend.daqmx.acquisition import OwnTicks, Run, SharedTicks
+from dearig.sim_backend.daqmx.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.output import Generation, Waveform
+from dearig.sim_backend.daqmx.setup import LINES, OUTPUTS, Setup
+from dearig.sim_backend.daqmx.tasks import Kind, SampleClock, State, Task, Watchdog
+from dearig.sim_backend.daqmx.wire import Change, Wire
+from dearig.sim_backend.daqmx.wiring import Behind
+from dearig.sim_backend.faults import Fault, FaultKind, FaultPlan
+from dearig.sim_backend.plant import Plant
 
 __all__ = ["Device", "Reading"]
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from drivers.settings import RigSettings
-from model.material import Film, Load
-from sim_backend.clock import Clock, ManualClock, PacedClock
-from sim_backend.daqmx.device import Device
-from sim_backend.factory import plant_of
-from sim_backend.faults import FaultPlan
+from dearig.drivers.settings import RigSettings
+from dearig.model.material import Film, Load
+from dearig.sim_backend.clock import Clock, ManualClock, PacedClock
+from dearig.sim_backend.daqmx.device import Device
+from dearig.sim_backend.factory import plant_of
+from dearig.sim_backend.faults import FaultPlan
 
 __all__ = ["open_device"]
 
@@ -23,7 +23,7 @@ def open_device(
     clock: Clock | None = None,
     faults: FaultPlan | None = None,
 ) -> Device:
-    """The card of the rig at ``address``; see ``sim_backend.factory.open_simulated_rig``."""
+    """The card of the rig at ``address``; see ``dearig.sim_backend.factory.open_simulated_rig``."""
     plant, hidden = plant_of(address, film, load)
     return Device(
         settings,

@@ -13,12 +13,12 @@ from typing import Any
 import grpc
 from nidaqmx._stubs import nidaqmx_pb2_grpc as pb_grpc
 
-from sim_backend.clock import Clock, PacedClock
-from sim_backend.daqmx.clients import Clients
-from sim_backend.daqmx.device import Device
-from sim_backend.daqmx.errors import DaqmxError
-from sim_backend.daqmx.servicer import Servicer, refuse
-from sim_backend.faults import FaultKind
+from dearig.sim_backend.clock import Clock, PacedClock
+from dearig.sim_backend.daqmx.clients import Clients
+from dearig.sim_backend.daqmx.device import Device
+from dearig.sim_backend.daqmx.errors import DaqmxError
+from dearig.sim_backend.daqmx.servicer import Servicer, refuse
+from dearig.sim_backend.faults import FaultKind
 
 __all__ = ["DaqmxServer"]
 

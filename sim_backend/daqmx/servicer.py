@@ -15,12 +15,12 @@ from nidaqmx._stubs import nidaqmx_pb2 as pb
 from nidaqmx._stubs import nidaqmx_pb2_grpc as pb_grpc
 from session_pb2 import Session
 
-from drivers.channels import COUNT_MAX, COUNT_MIN
-from sim_backend.daqmx import attributes
-from sim_backend.daqmx.attributes import Asked
-from sim_backend.daqmx.device import Device, Reading
-from sim_backend.daqmx.errors import WORDS, Code, DaqmxError
-from sim_backend.daqmx.tasks import Kind, Task
+from dearig.drivers.channels import COUNT_MAX, COUNT_MIN
+from dearig.sim_backend.daqmx import attributes
+from dearig.sim_backend.daqmx.attributes import Asked
+from dearig.sim_backend.daqmx.device import Device, Reading
+from dearig.sim_backend.daqmx.errors import WORDS, Code, DaqmxError
+from dearig.sim_backend.daqmx.tasks import Kind, Task
 
 __all__ = ["Servicer", "refuse"]
 

@@ -6,10 +6,9 @@ import math
 import threading
 from collections.abc import Iterable, Sequence
 
-from drivers.settings import RigSettings
-from sim_backend.daqmx.behind import OUTPUT_MONITOR
-from sim_backend.daqmx.errors import Code, DaqmxError
-from sim_backend.daqmx.tasks import (
+from dearig.drivers.settings import RigSettings
+from dearig.sim_backend.daqmx.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.tasks import (
     AnalogInput,
     AnalogOutput,
     Kind,
@@ -19,6 +18,7 @@ from sim_backend.daqmx.tasks import (
     Watchdog,
     physical_names,
 )
+from dearig.sim_backend.daqmx.wiring import OUTPUT_MONITOR
 
 __all__ = ["INPUTS", "INPUT_RANGES", "LINES", "OUTPUTS", "Setup"]
 

@@ -6,9 +6,9 @@ import re
 from dataclasses import dataclass, field
 from enum import Enum
 
-from sim_backend.daqmx.acquisition import Run, Ticks
-from sim_backend.daqmx.errors import Code, DaqmxError
-from sim_backend.daqmx.output import Generation, Waveform
+from dearig.sim_backend.daqmx.acquisition import Run, Ticks
+from dearig.sim_backend.daqmx.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.output import Generation, Waveform
 
 __all__ = [
     "AnalogInput",

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.settings import CardSettings
-from sim_backend.daqmx.behind import Behind
-from sim_backend.daqmx.output import Generation, Track
+from dearig.drivers.settings import CardSettings
+from dearig.sim_backend.daqmx.output import Generation, Track
+from dearig.sim_backend.daqmx.wiring import Behind
 
 __all__ = ["Change", "Wire"]
 

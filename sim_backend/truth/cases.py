@@ -8,9 +8,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from model.material import TABLE_3, Branch, Film, Load, Network, Spring
-from sim_backend.truth.effect import Draw, TruthEffect
-from sim_backend.truth.effects import (
+from dearig.model.material import TABLE_3, Branch, Film, Load, Network, Spring
+from dearig.sim_backend.truth.effect import Draw, TruthEffect
+from dearig.sim_backend.truth.effects import (
     amplifier,
     creep,
     dielectric_relaxation,
@@ -32,8 +32,8 @@ from sim_backend.truth.effects import (
     sudden,
     thermal,
 )
-from sim_backend.truth.film import FilmNumbers
-from sim_backend.truth.plant import TruthPlant
+from dearig.sim_backend.truth.film import FilmNumbers
+from dearig.sim_backend.truth.plant import TruthPlant
 
 __all__ = ["FORMS", "KINDS", "UNKNOWN", "TruthCase", "draw"]
 

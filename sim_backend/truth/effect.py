@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from model.material import Load
-from sim_backend.truth.film import FilmNumbers
+from dearig.model.material import Load
+from dearig.sim_backend.truth.film import FilmNumbers
 
 __all__ = ["Course", "Draw", "Stage", "TruthEffect"]
 

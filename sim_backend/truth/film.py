@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from model.jit import allocating, jit
-from model.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY, Film, Load, Network
+from dearig.model.jit import allocating, jit
+from dearig.model.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY, Film, Load, Network
 
 __all__ = [
     "COURSE_ELECTRIC",

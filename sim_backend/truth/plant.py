@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim_backend.plant import Motion
-from sim_backend.truth.effect import Course, Stage, TruthEffect
-from sim_backend.truth.film import (
+from dearig.sim_backend.plant import Motion
+from dearig.sim_backend.truth.effect import Course, Stage, TruthEffect
+from dearig.sim_backend.truth.film import (
     COURSE_ELECTRIC,
     COURSE_HEATING,
     NO_COURSE,
@@ -62,7 +62,7 @@ class TruthPlant:
         )
 
     def renewed(self, chance: np.random.Generator) -> TruthPlant:
-        """See ``sim_backend.plant.Plant.renewed``."""
+        """See ``dearig.sim_backend.plant.Plant.renewed``."""
         effects = [e if e.anew is None else e.anew(chance) for e in self.effects]
         return TruthPlant.at_rest(self.plain, effects)
 

@@ -18,10 +18,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from app.recording import open_recording
-from app.rigfile import load_rig_file
-from app.run import record
-from app.sequencefile import parse_sequence
+from dearig.acquisition.run import record
+from dearig.config.rigfile import load_rig_file
+from dearig.config.sequencefile import parse_sequence
+from dearig.recording import open_recording
 from tests.benchmarks.bench_recording import peak_memory
 
 RIG = """\
@@ -52,7 +52,7 @@ def served(rig_file: Path, pace: str) -> Iterator[str]:
     """Address of a simulated card in a process of its own."""
     server = subprocess.Popen(
         [
-            sys.executable, "-m", "app", "serve-daqmx", "--rig-file", str(rig_file), pace,
+            sys.executable, "-m", "dearig", "serve-daqmx", "--rig-file", str(rig_file), pace,
             "--client-timeout", "6",
         ],
         stdout=subprocess.PIPE, text=True,

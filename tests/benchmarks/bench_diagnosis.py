@@ -23,12 +23,12 @@ from pathlib import Path
 
 import numpy as np
 
-from app.recording import open_recording
-from app.records import as_record
-from model.actuator import Actuator
-from model.fitting import identify
-from model.material import THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
-from model.records import ActuatorRecord
+from dearig.analysis.records import as_record
+from dearig.model.actuator import Actuator
+from dearig.model.fitting import identify
+from dearig.model.material import THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
+from dearig.model.records import ActuatorRecord
+from dearig.recording import open_recording
 from tests.benchmarks.residual_peers import PEERS, Course, missing, predicted
 from tests.blind.play import MODES, Bench, Case, diagnose
 from tests.blind.seeds import clean_seeds, drawn, family_seeds

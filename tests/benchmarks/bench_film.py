@@ -16,11 +16,11 @@ from pathlib import Path
 
 import pytest
 
-from app.quality import beyond
-from app.recording import open_recording
-from app.recording.recording import Recording
-from tests.command import done
-from tests.recording_tools import measured_data
+from dearig.analysis.quality import beyond
+from dearig.recording import open_recording
+from dearig.recording.recording import Recording
+from tests.tools.command import done
+from tests.tools.recordings import measured_data
 
 NAMES = {
     "slow cycle": "vhb4910_cycle_rate0.01_stretch2.0",

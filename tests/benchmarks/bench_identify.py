@@ -11,13 +11,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from model.actuator import Actuator, Drive
-from model.excitation import Sequence
-from model.fitting import Identification, identify
-from model.fitting.search import ALGORITHM_1
-from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
-from model.measures import errors
-from model.records import ActuatorRecord
+from dearig.model.actuator import Actuator, Drive
+from dearig.model.excitation import Sequence
+from dearig.model.fitting import Identification, identify
+from dearig.model.fitting.search import ALGORITHM_1
+from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.model.measures import errors
+from dearig.model.records import ActuatorRecord
 
 NOISE = 1e-6
 STEP = 0.01

@@ -11,8 +11,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from app.recording.index import index_folder
-from tests.recording_tools import run_counts, write_run
+from dearig.recording.index import index_folder
+from tests.tools.recordings import run_counts, write_run
 
 
 def main() -> None:

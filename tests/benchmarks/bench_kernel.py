@@ -4,8 +4,8 @@ Run as ``python -m tests.benchmarks.bench_kernel``. One thesis record is two per
 (22.8 s) with Table 3's film. The same right-hand side, compiled, goes to every solver; the general
 ones are set as loosely as their error against a 1e-10 reference stays below 0.1 um. SciPy has LSODA
 twice: stepped from Python (solve_ivp) and all in Fortran (odeint). A second table has what effects
-of ``model.effects`` cost, a third what the quick steps of a search save. Medians of repeats in one
-run: compare the ratios, the milliseconds belong to this machine and its load.
+of ``dearig.model.effects`` cost, a third what the quick steps of a search save. Medians of repeats
+in one run: compare the ratios, the milliseconds belong to this machine and its load.
 """
 
 import math
@@ -20,21 +20,21 @@ import numpy as np
 from scipy.integrate import odeint, solve_ivp
 from sksundae.cvode import CVODE
 
-from model import kernel
-from model.actuator import Actuator, Drive, at_rest, initial_state, reading_of
-from model.coefficients import REST
-from model.effects import EFFECTS, EffectValues
-from model.excitation import Sequence
-from model.fitting.sketch import sketched
-from model.material import (
+from dearig.model import kernel
+from dearig.model.actuator import Actuator, Drive, at_rest, initial_state, reading_of
+from dearig.model.coefficients import REST
+from dearig.model.effects import EFFECTS, EffectValues
+from dearig.model.excitation import Sequence
+from dearig.model.fitting.coarse_drive import sketched
+from dearig.model.material import (
     STANDARD_GRAVITY,
     TABLE_3,
     THESIS_FILM,
     THESIS_LOAD,
     VACUUM_PERMITTIVITY,
 )
-from model.records import ActuatorRecord
-from tests.engine_tools import NOISE, posed, typical
+from dearig.model.records import ActuatorRecord
+from tests.tools.engine import NOISE, posed, typical
 
 STAIRCASE = 200.0  # the same of a record that is diagnosed
 RATE = 400.0  # samples a second: with them the kernel stays below 0.1 um

@@ -19,12 +19,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from app.recording import RecordingWriter, open_recording
-from app.recording import writer as writer_module
-from app.recording.layout import LIBVER
-from drivers.rig import Block, RigIdentity
-from model.material import THESIS_FILM, THESIS_LOAD
-from tests.recording_tools import CHANNELS, SEQUENCE, Clock
+from dearig.drivers.rig import Block, RigIdentity
+from dearig.model.material import THESIS_FILM, THESIS_LOAD
+from dearig.recording import RecordingWriter, open_recording
+from dearig.recording import writer as writer_module
+from dearig.recording.layout import LIBVER
+from tests.tools.recordings import CHANNELS, SEQUENCE, Clock
 
 THREE = (CHANNELS[0], CHANNELS[1], CHANNELS[3])
 RATE = 1e6 / 3.0

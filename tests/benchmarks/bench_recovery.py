@@ -13,12 +13,12 @@ from collections import Counter
 
 import numpy as np
 
-from model.actuator import Actuator, Drive
-from model.excitation import THESIS_FREQUENCIES, Sequence
-from model.fitting import identify
-from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Network
-from model.measures import errors
-from model.records import ActuatorRecord
+from dearig.model.actuator import Actuator, Drive
+from dearig.model.excitation import THESIS_FREQUENCIES, Sequence
+from dearig.model.fitting import identify
+from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Network
+from dearig.model.measures import errors
+from dearig.model.records import ActuatorRecord
 
 RATE = 1000.0
 NOISE = 1e-6

@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from drivers.gate import GatedWaveform, Prediction, admit
-from drivers.settings import RigSettings, ThermometerSettings
-from model.material import THESIS_FILM, THESIS_LOAD
-from sim_backend.amplifier import Amplifier
-from sim_backend.card import Card
-from sim_backend.factory import open_simulated_rig
-from sim_backend.laser import Laser
-from sim_backend.model_plant import ModelPlant
-from sim_backend.rig import SimulatedRig
-from sim_backend.streams import Streams
-from sim_backend.truth.plant import TruthPlant
+from dearig.drivers.gate import GatedWaveform, Prediction, admit
+from dearig.drivers.settings import RigSettings, ThermometerSettings
+from dearig.model.material import THESIS_FILM, THESIS_LOAD
+from dearig.sim_backend.amplifier import Amplifier
+from dearig.sim_backend.card import Card
+from dearig.sim_backend.factory import open_simulated_rig
+from dearig.sim_backend.laser import Laser
+from dearig.sim_backend.model_plant import ModelPlant
+from dearig.sim_backend.rig import SimulatedRig
+from dearig.sim_backend.streams import Streams
+from dearig.sim_backend.truth.plant import TruthPlant
 
 RATE = 1000.0
 REPEATS = 15

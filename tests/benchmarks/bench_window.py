@@ -25,17 +25,17 @@ from PySide6.QtCore import QCoreApplication, QEvent, QEventLoop, QObject, QSetti
 from PySide6.QtGui import QPaintEvent
 from PySide6.QtWidgets import QApplication
 
-from app.plan import plan
-from app.rigfile import RigFile
-from app.sequencefile import parse_sequence
-from app.window.collector import Collector
-from app.window.live import Live
-from app.window.planner import foresee
-from app.window.run_plots import RunPlots
-from app.window.session import Session
-from app.window.theme import LIGHT, apply, prepare_plots
-from drivers.channels import Channel, Scaling
-from drivers.rig import Block, RigIdentity
+from dearig.acquisition.plan import plan
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import parse_sequence
+from dearig.drivers.channels import Channel, Scaling
+from dearig.drivers.rig import Block, RigIdentity
+from dearig.window.collector import Collector
+from dearig.window.live import Live
+from dearig.window.planner import foresee
+from dearig.window.run_plots import RunPlots
+from dearig.window.session import Session
+from dearig.window.theme import LIGHT, apply, prepare_plots
 
 RATE = 1e6 / 3.0  # Hz: a million conversions a second over three inputs
 BLOCK = 0.1  # s

@@ -6,9 +6,10 @@
     python -m tests.blind --seeds 17,41      these alone
     python -m tests.blind --table            the table of what is there
 
-Every case is recorded with ``app.run.record`` on ``sim:SEED`` and diagnosed by ``dearig diagnose``
-in a process of its own. What is done is kept (one JSON each) and skipped the next time, unless the
-model or the hidden effects have changed since; ``--keep`` takes it nevertheless.
+Every case is recorded with ``dearig.acquisition.run.record`` on ``sim:SEED`` and diagnosed by
+``dearig diagnose`` in a process of its own. What is done is kept (one JSON each) and skipped the
+next time, unless the model or the hidden effects have changed since; ``--keep`` takes it
+nevertheless.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ import platformdirs
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from app.errors import DearigError
+from dearig.errors import DearigError
 from tests.blind.play import MODES, Bench, Case
 from tests.blind.score import Score, score
 from tests.blind.seeds import chosen

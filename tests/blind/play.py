@@ -19,14 +19,14 @@ from typing import Any
 
 import numpy as np
 
-from app.errors import DearigError
-from app.recording import open_recording
-from app.rigfile import load_rig_file
-from app.run import record
-from app.sequencefile import load_sequence
-from app.toml_input import read_text
-from model.records import counted
-from sim_backend.streams import Streams
+from dearig.acquisition.run import record
+from dearig.config.rigfile import load_rig_file
+from dearig.config.sequencefile import load_sequence
+from dearig.config.toml_input import read_text
+from dearig.errors import DearigError
+from dearig.model.records import counted
+from dearig.recording import open_recording
+from dearig.sim_backend.streams import Streams
 from tests.blind.seeds import drawn
 
 __all__ = ["MODES", "VALIDATION", "Bench", "Case", "sources_digest"]
@@ -182,7 +182,7 @@ def diagnose(
     train: Sequence[Path], validation: Sequence[Path], out: Path
 ) -> tuple[dict[str, Any] | None, str, float]:
     """Run ``dearig diagnose``: its JSON, or None and what went wrong, and the seconds it took."""
-    command = [sys.executable, "-m", "app", "diagnose", *map(str, train)]
+    command = [sys.executable, "-m", "dearig", "diagnose", *map(str, train)]
     for path in validation:
         command += ["--validate", str(path)]
     command += ["--json", str(out)]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import count
 
-from app.rigfile import RigFile
-from sim_backend.truth import cases
-from sim_backend.truth.cases import FORMS, UNKNOWN, TruthCase
+from dearig.config.rigfile import RigFile
+from dearig.sim_backend.truth import cases
+from dearig.sim_backend.truth.cases import FORMS, UNKNOWN, TruthCase
 
 __all__ = ["CLEAN_FROM", "FAMILY_FROM", "chosen", "clean_seeds", "drawn", "family_seeds"]
 

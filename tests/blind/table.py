@@ -6,7 +6,7 @@ import math
 import statistics
 from collections.abc import Callable, Iterable, Sequence
 
-from sim_backend.truth.cases import FORMS, UNKNOWN
+from dearig.sim_backend.truth.cases import FORMS, UNKNOWN
 from tests.blind.score import FAILED, GROUP, RIGHT, WRONG, Score
 
 __all__ = ["line", "report"]

@@ -19,17 +19,17 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from app.errors import DearigError
-from app.recording import open_recording
-from app.rigfile import load_rig_file
-from drivers.settings import LaserSettings
-from sim_backend.clock import PacedClock
-from sim_backend.daqmx.device import Device
-from sim_backend.daqmx.opening import open_device
-from sim_backend.daqmx.server import DaqmxServer
-from sim_backend.faults import FaultKind, FaultPlan
-from sim_backend.keyence import SimulatedController
-from sim_backend.serial_port import serve_on_socket
+from dearig.config.rigfile import load_rig_file
+from dearig.drivers.settings import LaserSettings
+from dearig.errors import DearigError
+from dearig.recording import open_recording
+from dearig.sim_backend.clock import PacedClock
+from dearig.sim_backend.daqmx.device import Device
+from dearig.sim_backend.daqmx.opening import open_device
+from dearig.sim_backend.daqmx.server import DaqmxServer
+from dearig.sim_backend.faults import FaultKind, FaultPlan
+from dearig.sim_backend.keyence import SimulatedController
+from dearig.sim_backend.serial_port import serve_on_socket
 
 __all__ = ["KINDS", "Outcome", "run_case"]
 
@@ -155,7 +155,7 @@ def run_case(kind: str, seed: int, folder: Path, patience: float = 0.0) -> Outco
         with DaqmxServer(device, client_timeout=tracking) as server:
             run = subprocess.Popen(
                 [
-                    sys.executable, "-m", "app", "record", str(sequence),
+                    sys.executable, "-m", "dearig", "record", str(sequence),
                     "--rig", f"daqmx:Dev1@127.0.0.1:{server.port}",
                     "--rig-file", str(rig_file), "--out", str(out),
                 ],

@@ -17,10 +17,10 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-from app.recording import open_recording
+from dearig.recording import open_recording
 from tests.crash.changes import Change, again, changes_of
 from tests.crash.check import check, told
-from tests.recording_tools import write_run
+from tests.tools.recordings import write_run
 
 ROOT = Path(__file__).parents[2]
 VICTIM = (sys.executable, "-m", "tests.crash.victim")

@@ -9,11 +9,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from app.errors import InputError
-from app.recording import open_recording, recover
-from app.recording.opening import opened
-from app.recording.verify import verify
-from tests.recording_victim import pattern
+from dearig.errors import InputError
+from dearig.recording import open_recording, recover
+from dearig.recording.opening import opened
+from dearig.recording.verify import verify
+from tests.tools.recording_victim import pattern
 
 __all__ = ["Told", "check", "told"]
 

@@ -13,9 +13,9 @@ import os
 import time
 from pathlib import Path
 
-from drivers.rig import Block, Event
-from tests.recording_tools import Clock, writer
-from tests.recording_victim import pattern
+from dearig.drivers.rig import Block, Event
+from tests.tools.recording_victim import pattern
+from tests.tools.recordings import Clock, writer
 
 
 def main() -> None:

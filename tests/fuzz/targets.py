@@ -12,17 +12,17 @@ import numpy as np
 from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
-from app.modelfile import load_model
-from app.presets import PRESETS
-from app.recording import export_recording, open_recording, save_recording
-from app.recording.importers.chosen import Chosen
-from app.recording.importers.importing import source_at
-from app.rigfile import load_rig_file, write_default
-from app.sequencefile import load_sequence
-from drivers.rig import Block
-from tests.command import LOBE, film_model, thesis_model
+from dearig.config.modelfile import load_model
+from dearig.config.presets import PRESETS
+from dearig.config.rigfile import load_rig_file, write_default
+from dearig.config.sequencefile import load_sequence
+from dearig.drivers.rig import Block
+from dearig.recording import export_recording, open_recording, save_recording
+from dearig.recording.importers.chosen import Chosen
+from dearig.recording.importers.importing import source_at
 from tests.fuzz.mutate import mutated_bytes, mutated_hdf5, mutated_text
-from tests.recording_tools import Clock, run_counts, write_run, writer
+from tests.tools.command import LOBE, film_model, thesis_model
+from tests.tools.recordings import Clock, run_counts, write_run, writer
 
 __all__ = ["TARGETS", "Target"]
 

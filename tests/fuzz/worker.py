@@ -9,7 +9,7 @@ import traceback
 import warnings
 from pathlib import Path
 
-from app.errors import InputError
+from dearig.errors import InputError
 from tests.fuzz.targets import TARGETS, seeds_of
 
 __all__ = ["complaint", "input_of"]

@@ -22,13 +22,13 @@ from PySide6.QtCore import (
 from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.rigfile import RigFile
-from app.window.frame import MainWindow
-from app.window.planner import Planner
-from app.window.run_page import RunPage
-from app.window.session import Session
-from app.window.theme import LIGHT, prepare_plots
-from drivers.settings import LimitsSettings
+from dearig.config.rigfile import RigFile
+from dearig.drivers.settings import LimitsSettings
+from dearig.window.frame import MainWindow
+from dearig.window.planner import Planner
+from dearig.window.run_page import RunPage
+from dearig.window.session import Session
+from dearig.window.theme import LIGHT, prepare_plots
 
 # the offscreen platform says this of every window that it shows, and means nothing by it
 _ALLOWED = ("This plugin does not support propagateSizeHints()",)

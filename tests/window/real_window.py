@@ -15,9 +15,9 @@ from pathlib import Path
 from PySide6.QtCore import QEventLoop, QPoint, QSettings, QTimer
 from PySide6.QtWidgets import QApplication, QWidget
 
-from app.window.frame import MainWindow
-from app.window.session import Session
-from app.window.theme import LIGHT, prepare_plots
+from dearig.window.frame import MainWindow
+from dearig.window.session import Session
+from dearig.window.theme import LIGHT, prepare_plots
 
 PATIENCE = 120_000  # ms
 KEYSYMS = {"Escape": 0xFF1B, "Control": 0xFFE3, "Alt": 0xFFE9, "Tab": 0xFF09, " ": 0x20}

@@ -6,11 +6,11 @@ import os
 import shutil
 from pathlib import Path
 
-from app.rigfile import RigFile
-from app.run import record
-from app.sequencefile import load_sequence, parse_sequence
-from drivers.rig import Block
-from tests.recording_tools import Clock, run_counts, writer
+from dearig.acquisition.run import record
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import load_sequence, parse_sequence
+from dearig.drivers.rig import Block
+from tests.tools.recordings import Clock, run_counts, writer
 
 SLOW_RIG = RigFile.model_validate({"card": {"sample_rate_Hz": 100.0}})
 

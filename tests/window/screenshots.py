@@ -20,13 +20,13 @@ from PySide6.QtCore import QEventLoop, QSettings, QTimer
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QApplication
 
-from app.presets import PRESETS
-from app.rigfile import RigFile
-from app.run import record
-from app.sequencefile import load_sequence
-from app.window.frame import MainWindow
-from app.window.session import Session
-from app.window.theme import LIGHT, prepare_plots
+from dearig.acquisition.run import record
+from dearig.config.presets import PRESETS
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import load_sequence
+from dearig.window.frame import MainWindow
+from dearig.window.session import Session
+from dearig.window.theme import LIGHT, prepare_plots
 
 SIZES = ((1366, 768), (1920, 1080))
 LOOKS = ("light", "dark")

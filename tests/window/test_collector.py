@@ -8,7 +8,7 @@ import weakref
 
 from pytestqt.qtbot import QtBot
 
-from app.window.collector import Collector
+from dearig.window.collector import Collector
 
 
 class Ring:

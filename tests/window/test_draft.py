@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from app.errors import InputError
-from app.presets import PRESETS
-from app.rigfile import RigFile
-from app.sequencefile import SEGMENT_KINDS, parse_sequence
-from app.toml_input import parse_toml
-from app.window.draft import NEW_SEGMENTS, Draft, Place, has_comments, place_of, relative_csv
-from app.window.fields import form_fields, shown_value, typed_value
-from app.window.planner import foresee
+from dearig.config.presets import PRESETS
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import SEGMENT_KINDS, parse_sequence
+from dearig.config.toml_input import parse_toml
+from dearig.errors import InputError
+from dearig.window.draft import NEW_SEGMENTS, Draft, Place, has_comments, place_of, relative_csv
+from dearig.window.fields import form_fields, shown_value, typed_value
+from dearig.window.planner import foresee
 
 
 @pytest.mark.parametrize("name", PRESETS)

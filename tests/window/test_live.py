@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.plan import plan
-from app.recording import open_recording
-from app.rigfile import RigFile
-from app.run import record
-from app.sequencefile import parse_sequence
-from app.window.live import Live
-from app.window.session import OverlayModel
-from drivers.channels import Channel, Scaling
-from drivers.rig import Block, RigIdentity
-from model.actuator import Actuator, Drive
-from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.acquisition.plan import plan
+from dearig.acquisition.run import record
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import parse_sequence
+from dearig.drivers.channels import Channel, Scaling
+from dearig.drivers.rig import Block, RigIdentity
+from dearig.model.actuator import Actuator, Drive
+from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.recording import open_recording
+from dearig.window.live import Live
+from dearig.window.session import OverlayModel
 from tests.window.conftest import SHORT
 
 THESIS = OverlayModel("thesis", Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3))

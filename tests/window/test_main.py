@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.recording import open_recording
+from dearig.recording import open_recording
 
 
 def gui(*arguments: object, code: str = "", **environment: str) -> subprocess.CompletedProcess[str]:
@@ -79,8 +79,8 @@ def test_a_rig_file_that_is_none_is_told_in_the_terminal(tmp_path: Path) -> None
 RUN = """\
 import signal
 from PySide6.QtCore import QTimer
-import app.window.main as main
-from app.window.frame import MainWindow
+import dearig.window.main as main
+from dearig.window.frame import MainWindow
 shown = MainWindow.show
 def show(self):
     shown(self)

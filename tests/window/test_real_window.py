@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from app.recording import open_recording
+from dearig.recording import open_recording
 
 pytestmark = [
     pytest.mark.slow,

@@ -11,14 +11,14 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
-from app.modelfile import save_model
-from app.window.folder_table import COLUMNS
-from app.window.recordings_page import RecordingsPage
-from app.window.report_table import ReportTable
-from app.window.session import Session
-from app.window.theme import DARK
-from model.actuator import Actuator
-from model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Network
+from dearig.config.modelfile import save_model
+from dearig.model.actuator import Actuator
+from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Network
+from dearig.window.folder_table import COLUMNS
+from dearig.window.recordings_page import RecordingsPage
+from dearig.window.report_table import ReportTable
+from dearig.window.session import Session
+from dearig.window.theme import DARK
 from tests.window.recordings import killed, made
 
 # a process has to start, on a machine that may be busy

@@ -7,8 +7,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPalette
 from pytestqt.qtbot import QtBot
 
-from app.report.tables import Row, Table
-from app.window.report_table import ReportTable
+from dearig.report.tables import Row, Table
+from dearig.window.report_table import ReportTable
 
 TABLE = Table(
     "Candidates",

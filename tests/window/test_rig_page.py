@@ -10,9 +10,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.rigfile import write_default
-from app.window.rig_page import RigPage
-from app.window.session import Session
+from dearig.config.rigfile import write_default
+from dearig.window.rig_page import RigPage
+from dearig.window.session import Session
 
 
 @pytest.fixture

@@ -21,13 +21,13 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from app.recording import open_recording
-from app.recording.recording import Recording
-from app.window.frame import MainWindow
-from app.window.hv import HighVoltage
-from app.window.run_page import RunPage
-from app.window.session import Session
-from sim_backend.faults import FaultPlan
+from dearig.recording import open_recording
+from dearig.recording.recording import Recording
+from dearig.sim_backend.faults import FaultPlan
+from dearig.window.frame import MainWindow
+from dearig.window.hv import HighVoltage
+from dearig.window.run_page import RunPage
+from dearig.window.session import Session
 from tests.window.conftest import SHORT
 
 LEFT = Qt.MouseButton.LeftButton
@@ -269,7 +269,7 @@ def test_a_defect_of_the_program_leaves_nothing_taken_for_safe(
     def broken(*_: object, **__: object) -> None:
         raise RuntimeError("a defect")
 
-    monkeypatch.setattr("app.window.running.record", broken)
+    monkeypatch.setattr("dearig.window.running.record", broken)
     click(qtbot, run_page.arm_button)
     with qtbot.captureExceptions() as caught:
         with qtbot.waitSignal(run_page.runner.ended, timeout=RUN_MS):

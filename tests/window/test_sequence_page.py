@@ -13,11 +13,11 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
-import app.window.planner as planner_module
-from app.presets import PRESETS
-from app.window.planner import Planner
-from app.window.sequence_page import SequencePage
-from app.window.session import Preview, Session
+import dearig.window.planner as planner_module
+from dearig.config.presets import PRESETS
+from dearig.window.planner import Planner
+from dearig.window.sequence_page import SequencePage
+from dearig.window.session import Preview, Session
 
 WAIT = 60_000
 

@@ -10,14 +10,14 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.browse import glance
-from app.modelfile import load_model
-from app.outcomes import DiagnoseOutcome
-from app.study import Study
-from app.window.frame import MainWindow
-from app.window.hv import HighVoltage
-from app.window.session import Session
-from app.window.study_page import StudyPage
+from dearig.analysis.outcomes import DiagnoseOutcome
+from dearig.analysis.study import Study
+from dearig.analysis.summary import glance
+from dearig.config.modelfile import load_model
+from dearig.window.frame import MainWindow
+from dearig.window.hv import HighVoltage
+from dearig.window.session import Session
+from dearig.window.study_page import StudyPage
 from tests.window.recordings import SLOW_RIG, made, of_rig
 
 _PATIENCE = 240_000  # ms; a search on a machine that may be busy

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.window.traces import Pyramid, RunningErrors
+from dearig.window.traces import Pyramid, RunningErrors
 
 
 def pushed(values: np.ndarray, cuts: list[int], capacity: int = 64) -> Pyramid:

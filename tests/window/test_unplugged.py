@@ -11,13 +11,13 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from app.recording import open_recording
-from app.rigfile import RigFile
-from app.window.hv import HighVoltage
-from app.window.run_page import RunPage
-from drivers.daqmx.guardian import GuardianProcess
-from sim_backend.clock import PacedClock
-from tests.daqmx_tools import served
+from dearig.config.rigfile import RigFile
+from dearig.drivers.daqmx.guardian import GuardianProcess
+from dearig.recording import open_recording
+from dearig.sim_backend.clock import PacedClock
+from dearig.window.hv import HighVoltage
+from dearig.window.run_page import RunPage
+from tests.tools.daqmx import served
 from tests.window.conftest import SHORT
 
 RIG_FILE = RigFile.model_validate(

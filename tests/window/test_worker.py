@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from app.errors import InputError
-from app.progress import Progress
-from app.window.worker import Estimate, Job, Worker
+from dearig.errors import InputError
+from dearig.progress import Progress
+from dearig.window.worker import Estimate, Job, Worker
 
 # long enough for an interpreter to start on a busy machine
 _PATIENCE = 60_000

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from app.recording.importers.importing import import_file
+from dearig.recording.importers.importing import import_file
 
 __all__ = ["import_file"]

@@ -7,9 +7,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from app.errors import InputError
-from app.recording.clockwork import not_forward
-from app.recording.importers.columns import (
+from dearig.errors import InputError
+from dearig.recording.importers.columns import (
     QUANTITIES,
     TARGETS,
     Scale,
@@ -17,7 +16,8 @@ from app.recording.importers.columns import (
     names_of,
     suggestion,
 )
-from app.recording.importers.source import Source, listing
+from dearig.recording.importers.source import Source, listing
+from dearig.recording.timestamps import not_forward
 
 __all__ = ["Chosen"]
 

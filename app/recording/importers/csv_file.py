@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from app.errors import InputError
-from app.recording.files import in_words
-from app.recording.importers.source import no_such_column
+from dearig.errors import InputError
+from dearig.recording.files import in_words
+from dearig.recording.importers.source import no_such_column
 
 __all__ = ["CsvFile"]
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-from app.recording.layout import FORMAT, ZERO_ORDER
-from model.errors import ModelError
-from model.kinematics import KINEMATICS
-from model.material import Film, Load
+from dearig.model.errors import ModelError
+from dearig.model.kinematics import KINEMATICS
+from dearig.model.material import Film, Load
+from dearig.recording.layout import FORMAT, ZERO_ORDER
 
 __all__ = ["Exported", "exported"]
 

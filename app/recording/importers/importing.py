@@ -9,21 +9,21 @@ from pathlib import Path
 
 import numpy as np
 
-from app.errors import InputError
-from app.recording.files import check_output, file_sha256, in_words
-from app.recording.importers.chosen import Chosen
-from app.recording.importers.csv_file import CsvFile
-from app.recording.importers.exported import exported
-from app.recording.importers.mat_file import MatFile
-from app.recording.importers.parquet_file import ParquetFile
-from app.recording.importers.plausible import doubts
-from app.recording.importers.source import Source
-from app.recording.importers.tdms_file import TdmsChannels
-from app.recording.quiet import lead_in, mean_beyond_noise
-from app.recording.save import save_recording
-from drivers.rig import Event
-from model.kinematics import KINEMATICS
-from model.material import Film, Load
+from dearig.drivers.rig import Event
+from dearig.errors import InputError
+from dearig.model.kinematics import KINEMATICS
+from dearig.model.material import Film, Load
+from dearig.recording.files import check_output, file_sha256, in_words
+from dearig.recording.importers.chosen import Chosen
+from dearig.recording.importers.csv_file import CsvFile
+from dearig.recording.importers.exported import exported
+from dearig.recording.importers.mat_file import MatFile
+from dearig.recording.importers.parquet_file import ParquetFile
+from dearig.recording.importers.plausible import doubts
+from dearig.recording.importers.source import Source
+from dearig.recording.importers.tdms_file import TdmsChannels
+from dearig.recording.rest_noise import lead_in, mean_beyond_noise
+from dearig.recording.save import save_recording
 
 __all__ = ["import_file", "source_at"]
 

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.errors import InputError
-from app.recording.files import in_words
-from app.recording.importers.mat5 import Damaged, Value, columns, variables
-from app.recording.importers.source import no_such_column, printable
+from dearig.errors import InputError
+from dearig.recording.files import in_words
+from dearig.recording.importers.mat5 import Damaged, Value, columns, variables
+from dearig.recording.importers.source import no_such_column, printable
 
 __all__ = ["MatFile"]
 

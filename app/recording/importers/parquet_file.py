@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from app.errors import InputError
-from app.recording.files import one_line
-from app.recording.importers.source import PARSER_FAILURES, no_such_column
+from dearig.errors import InputError
+from dearig.recording.files import one_line
+from dearig.recording.importers.source import PARSER_FAILURES, no_such_column
 
 __all__ = ["ParquetFile"]
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from model.material import Film
+from dearig.model.material import Film
 
 __all__ = ["doubts"]
 

@@ -10,8 +10,8 @@ from typing import Protocol
 
 import numpy as np
 
-from app.errors import InputError
-from app.recording.importers.columns import suggestion
+from dearig.errors import InputError
+from dearig.recording.importers.columns import suggestion
 
 __all__ = ["PARSER_FAILURES", "Source", "listing", "no_such_column", "printable"]
 

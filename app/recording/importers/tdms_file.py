@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
-from app.errors import InputError
-from app.recording.files import one_line
-from app.recording.importers.source import PARSER_FAILURES, no_such_column, printable
+from dearig.errors import InputError
+from dearig.recording.files import one_line
+from dearig.recording.importers.source import PARSER_FAILURES, no_such_column, printable
 
 if TYPE_CHECKING:
     from nptdms import TdmsFile

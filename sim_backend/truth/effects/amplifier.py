@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
-from model.material import Load
-from sim_backend.truth import loops
-from sim_backend.truth.chance import either_sign, log_uniform
-from sim_backend.truth.effect import Stage, TruthEffect
+from dearig.model.material import Load
+from dearig.sim_backend.truth import kernels as loops
+from dearig.sim_backend.truth.effect import Stage, TruthEffect
+from dearig.sim_backend.truth.sampling import either_sign, log_uniform
 
 __all__ = ["offset", "saturation", "second_order", "slew"]
 

@@ -15,10 +15,10 @@ import math
 
 import numpy as np
 
-from model.material import Load
-from sim_backend.truth.chance import log_uniform
-from sim_backend.truth.effect import TruthEffect
-from sim_backend.truth.film import FilmNumbers
+from dearig.model.material import Load
+from dearig.sim_backend.truth.effect import TruthEffect
+from dearig.sim_backend.truth.film import FilmNumbers
+from dearig.sim_backend.truth.sampling import log_uniform
 
 __all__ = ["elasto_plastic", "lugre", "oiled", "tustin"]
 

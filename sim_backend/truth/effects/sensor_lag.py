@@ -10,10 +10,10 @@ from typing import cast
 
 import numpy as np
 
-from model.material import Load
-from sim_backend.truth import loops
-from sim_backend.truth.chance import log_uniform
-from sim_backend.truth.effect import TruthEffect
+from dearig.model.material import Load
+from dearig.sim_backend.truth import kernels as loops
+from dearig.sim_backend.truth.effect import TruthEffect
+from dearig.sim_backend.truth.sampling import log_uniform
 
 __all__ = ["low_pass", "moving_average"]
 

@@ -12,9 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from model.material import Load
-from sim_backend.truth.chance import either_sign, log_uniform
-from sim_backend.truth.effect import TruthEffect
+from dearig.model.material import Load
+from dearig.sim_backend.truth.effect import TruthEffect
+from dearig.sim_backend.truth.sampling import either_sign, log_uniform
 
 __all__ = ["cubic", "ripple", "soft_clip"]
 

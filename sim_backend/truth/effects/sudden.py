@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from model.material import Load
-from sim_backend.truth.chance import either_sign, log_uniform
-from sim_backend.truth.effect import Course, TruthEffect
-from sim_backend.truth.film import COURSE_ELECTRIC, COURSE_PULL
+from dearig.model.material import Load
+from dearig.sim_backend.truth.effect import Course, TruthEffect
+from dearig.sim_backend.truth.film import COURSE_ELECTRIC, COURSE_PULL
+from dearig.sim_backend.truth.sampling import either_sign, log_uniform
 
 __all__ = ["electrode_tears", "load_slips", "mount_slips"]
 

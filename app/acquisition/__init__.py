@@ -1,0 +1,1 @@
+"""One run: planned, checked, played, watched and recorded."""

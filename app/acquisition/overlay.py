@@ -1,0 +1,142 @@
+"""A model stepped in time with a run: each block of samples in, its displacement out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from dearig.drivers.channels import Channel
+from dearig.drivers.rig import Block
+from dearig.model import kernel
+from dearig.model.actuator import STATUS_WORDS, Actuator, at_rest, initial_state
+from dearig.model.effects import SENSOR_MEMORY
+from dearig.model.errors import ModelError
+from dearig.model.sensor import at_sensor
+
+__all__ = ["Overlay"]
+
+_WARM = 1.0  # s over which a temperature is the mean, as a fit takes it
+
+
+class Overlay:
+    """``actuator`` driven by the ``command`` or the ``monitor`` voltage of a run's blocks.
+
+    ``channels`` are those of the blocks, in their order, on a clock of ``rate`` Hz. The film starts
+    at rest; its state and the sensor's are carried from block to block, so that the same record in
+    blocks of any length gives what it gives at once, but for the last digits of the integration
+    (hundredths of a micrometre). A thermometer counts as the mean of the last second above that of
+    the first.
+
+    Raises ``ModelError`` for a film without a rest state, and ``ValueError`` where the channels
+    hold no such voltage.
+    """
+
+    def __init__(
+        self,
+        actuator: Actuator,
+        channels: Sequence[Channel],
+        rate: float,
+        drive: str = "command",
+    ) -> None:
+        names = [channel.name for channel in channels]
+        if f"voltage_{drive}" not in names:
+            raise ValueError(f"drive {drive!r}: the channels are {', '.join(names)}")
+        self._row = names.index(f"voltage_{drive}")
+        self._scaling = channels[self._row].scaling
+        self._thermometer = names.index("temperature") if "temperature" in names else None
+        self._channels = tuple(channels)
+        reading = next((c for c in channels if c.name == "displacement"), None)
+        self._lag = 0.0 if reading is None else reading.delay - reading.skew
+        self._rate = rate
+        self._length = actuator.film.length
+        self._coefficients = actuator.coefficients()
+        status, self._rest = at_rest(self._coefficients)
+        if status != kernel.OK:
+            raise ModelError(STATUS_WORDS[status])
+        self._state = initial_state(self._coefficients, self._rest)
+        self._memory = np.zeros(SENSOR_MEMORY)
+        self._next = 0
+        self._voltage = 0.0
+        # what a late sensor still has to show: time, displacement, velocity
+        self._past = np.zeros((3, 0))
+        self._keep = max(2, math.ceil(max(self._lag, 0.0) * rate) + 2)
+        self._read = (0.0, 0.0)  # displacement and velocity before the sensor's effects
+        self._warmth = _Warmth(rate)
+        self._words = ""
+
+    @property
+    def words(self) -> str:
+        """Why the model could follow no further; empty while it can."""
+        return self._words
+
+    def advance(self, block: Block) -> np.ndarray:
+        """Displacement (n,) m that the sensor would read at the samples of ``block``.
+
+        NaN from where the model could not follow. Raises ``ValueError`` for a block that does not
+        begin where the one before ended.
+        """
+        samples = block.counts.shape[1]
+        if block.start != self._next:
+            raise ValueError(f"a block starts at sample {block.start}, not at {self._next}")
+        self._next += samples
+        if self._words or samples == 0:
+            return np.full(samples, np.nan)
+        first = 0 if block.start == 0 else 1  # the sample before, from which the state goes on
+        time = (block.start - first + np.arange(first + samples)) / self._rate
+        voltage = np.empty(first + samples)
+        voltage[:first] = self._voltage
+        voltage[first:] = self._scaling.physical(block.counts[self._row])
+        self._voltage = float(voltage[-1])
+        warmth = np.zeros(0)
+        if self._thermometer is not None:
+            scaling = self._channels[self._thermometer].scaling
+            now = self._warmth.after(scaling.physical(block.counts[self._thermometer]))
+            warmth = np.full(time.size, now)
+        stretch, speed = np.empty(time.size), np.empty(time.size)
+        status, reached, _ = kernel.drive_by_voltage(
+            self._coefficients, time, voltage, voltage, warmth, self._state, stretch, speed
+        )
+        moved = (stretch - self._rest) * self._length
+        out = self._sensed(time[first:], moved[first:], speed[first:] * self._length)
+        if status != kernel.OK:
+            self._words = f"{STATUS_WORDS[status]} (at {time[min(reached, time.size - 1)]:.4g} s)"
+            out[max(reached - first, 0) :] = np.nan
+        return out
+
+    def _sensed(self, time: np.ndarray, moved: np.ndarray, speed: np.ndarray) -> np.ndarray:
+        known = np.concatenate((self._past, np.stack((time, moved, speed))), axis=1)
+        self._past = known[:, -self._keep :].copy()
+        begin = known.shape[1] - time.size
+        before = 1 if begin else 0
+        times = known[0, begin - before :].copy()
+        reading, velocity = np.empty(times.size), np.empty(times.size)
+        at, value, rate = (np.ascontiguousarray(row) for row in known)
+        at_sensor(at, value, rate, times - self._lag, reading, velocity)
+        if before:
+            reading[0], velocity[0] = self._read
+        self._read = (float(reading[-1]), float(velocity[-1]))
+        kernel.read_sensor(self._coefficients, times, reading, velocity, self._memory)
+        return reading[before:]
+
+
+class _Warmth:
+    """Temperature above that of the first second, as the mean of the last second."""
+
+    def __init__(self, rate: float) -> None:
+        self._count = max(1, round(_WARM * rate))
+        self._blocks: list[np.ndarray] = []
+        self._first: list[np.ndarray] = []
+        self._start = 0.0
+
+    def after(self, temperature: np.ndarray) -> float:
+        """K, once ``temperature`` (n,) K has been read too."""
+        seen = sum(part.size for part in self._first)
+        if seen < self._count:
+            self._first.append(temperature[: self._count - seen])
+            self._start = float(np.concatenate(self._first).mean())
+        self._blocks.append(temperature)
+        while sum(part.size for part in self._blocks[1:]) >= self._count:
+            self._blocks.pop(0)
+        return float(np.concatenate(self._blocks)[-self._count :].mean()) - self._start

@@ -1,0 +1,121 @@
+"""A sequence before it is played: its voltage, what the model foresees, and what the gate says."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import LoadedSequence
+from dearig.drivers.errors import RefusedWaveform
+from dearig.drivers.gate import GatedWaveform, Prediction, admit
+from dearig.errors import InputError
+from dearig.model.actuator import Actuator, Drive
+from dearig.model.errors import ModelError
+from dearig.model.kinematics import thinning
+from dearig.model.material import TABLE_3
+
+__all__ = ["Plan", "plan"]
+
+# Hz: a film with milliseconds of ringing is foreseen well enough at this rate, however fast the
+# clock; what the field is judged by is every sample of the voltage all the same
+_FORESEEN_AT = 5000.0
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A sequence on the rig's clock of ``rate`` Hz, N samples.
+
+    ``voltage`` (N,) V. What the model foresees is one number for each ``stride`` samples, M in all:
+    ``displacement`` (M,) m, the true ``field`` (M,) V/m at the highest voltage among them, both NaN
+    from where it cannot. ``waveform`` is what passed the gate, or None with the ``reasons``, one
+    sentence each.
+    """
+
+    name: str
+    rate: float
+    voltage: np.ndarray
+    stride: int
+    displacement: np.ndarray
+    field: np.ndarray
+    waveform: GatedWaveform | None
+    reasons: tuple[str, ...] = ()
+
+    @property
+    def time(self) -> np.ndarray:
+        """Time (M,) s of what is foreseen."""
+        return np.arange(self.displacement.size) * (self.stride / self.rate)
+
+    @property
+    def displacement_of_samples(self) -> np.ndarray:
+        """Displacement (N,) m of every sample, in single precision: a run may have many."""
+        foreseen = self.displacement.astype(np.float32)
+        return np.repeat(foreseen, self.stride)[: self.voltage.size]
+
+    def admitted(self) -> GatedWaveform:
+        """What may be played. Raises ``InputError`` with a sentence for every limit it breaks."""
+        if self.waveform is None:
+            raise InputError(
+                f"sequence {self.name!r} is refused: {'; '.join(self.reasons)} "
+                f"(limits of the rig file)"
+            )
+        return self.waveform
+
+
+def plan(
+    loaded: LoadedSequence, rig_file: RigFile, model: Actuator | None = None, film: str = ""
+) -> Plan:
+    """``loaded`` as the rig would play it, and whether it may.
+
+    The film is foreseen with ``model``, by default that of the rig file's film with Table 3's
+    network: a stretched film is thinner, and feels a higher field. ``film`` names the film that
+    hangs there; the rig file's own, unless another is named. Raises ``InputError`` where the model
+    cannot be asked at all (a film without a rest state).
+    """
+    rate, limits = float(rig_file.card.sample_rate_Hz), rig_file.gate_limits()
+    film = film or rig_file.film.name
+    name = loaded.sequence.name
+    voltage = loaded.sample(rate)[1]
+    stride = max(1, math.floor(rate / _FORESEEN_AT))
+    peaks = _peaks(voltage, stride)
+    unknown = np.full(peaks.size, np.nan)
+    try:
+        actuator = model or Actuator(rig_file.as_film(), rig_file.as_load(), TABLE_3)
+        actuator.rest()
+        volume = actuator.film.electric_volume
+        # the film at its thickest: what is refused here needs no prediction, and what a voltage far
+        # beyond every limit would do to the model is not the operator's question
+        thick = np.full(peaks.size, 1.0 / actuator.film.thickness)
+        admit(voltage, rate, limits, Prediction(thick, volume, film=film, stride=stride))
+        time = np.arange(peaks.size) * (stride / rate)
+        response = actuator.simulate(Drive(time, peaks, hold=True))
+    except RefusedWaveform as error:
+        return Plan(name, rate, voltage, stride, unknown, unknown, None, error.reasons)
+    except ModelError as error:
+        raise InputError(f"sequence {name!r} with this rig file: {error}") from error
+    thin = thinning(actuator.film.held, response.stretch) / actuator.film.thickness
+    displacement, field = response.displacement.copy(), np.abs(peaks) * thin
+    failed = ""
+    if not response.ok:
+        displacement[response.reached :] = field[response.reached :] = np.nan
+        failed = response.in_words
+    prediction = Prediction(thin, volume, failed, film, stride)
+    try:
+        waveform = admit(voltage, rate, limits, prediction)
+    except RefusedWaveform as error:
+        return Plan(name, rate, voltage, stride, displacement, field, None, error.reasons)
+    return Plan(name, rate, voltage, stride, displacement, field, waveform)
+
+
+def _peaks(voltage: np.ndarray, stride: int) -> np.ndarray:
+    """Of each ``stride`` samples of ``voltage`` (N,), the one farthest from 0 V."""
+    if stride == 1:
+        return voltage
+    whole = voltage.size // stride * stride
+    groups = voltage[:whole].reshape(-1, stride)
+    high, low = groups.max(axis=1), groups.min(axis=1)
+    peaks = np.where(high >= -low, high, low)
+    rest = voltage[whole:]
+    return np.append(peaks, rest[np.argmax(np.abs(rest))]) if rest.size else peaks

@@ -1,0 +1,85 @@
+"""A run repeated from its recording alone: sequence, rig file, rig and seed as they stand there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import LoadedSequence, parse_sequence
+from dearig.config.toml_input import parse_toml
+from dearig.errors import InputError
+from dearig.model.material import Film, Load
+from dearig.recording.reader import open_recording
+from dearig.sim_backend.factory import is_simulated
+
+__all__ = ["Original", "original_of"]
+
+
+@dataclass(frozen=True)
+class Original:
+    """What ``dearig.acquisition.run.record`` needs to make the run of ``path`` again.
+
+    ``configuration`` is the text of the rig file. ``rig`` is the address that it was made on, ""
+    for data that no run made here; ``seed`` that of its simulated noise.
+    """
+
+    path: Path
+    sequence: LoadedSequence
+    rig_file: RigFile
+    configuration: str
+    rig: str
+    seed: int
+    film: Film | None
+    load: Load | None
+
+    def on(self, rig: str) -> str:
+        """The address for ``rig``: ``sim`` is the simulated rig of the original, if it had one."""
+        return self.rig if rig == "sim" and is_simulated(self.rig) else rig
+
+    def check_film(self, rig_file: RigFile) -> None:
+        """Raise ``InputError`` unless film and load of ``rig_file`` are those of the original.
+
+        They are not where the simulated rig was made of a model file.
+        """
+        if (self.film, self.load) != (rig_file.as_film(), rig_file.as_load()):
+            raise InputError(
+                f"{self.path} was made with another film or load than its rig file says, of a "
+                f"model file: give that one with --model"
+            )
+
+
+def original_of(path: str | Path) -> Original:
+    """What the recording at ``path`` says of its run.
+
+    A waveform in a CSV file is looked for beside the recording. Raises ``InputError`` for what is
+    no recording of a run, or is of a sequence or rig file that this version does not take.
+    """
+    path = Path(path)
+    recording = open_recording(path)
+    if not recording.sequence_toml:
+        raise InputError(f"{path} holds no sequence: only a run that was recorded can be repeated")
+    noted = recording.provenance
+    configuration = str(noted.get("configuration", ""))
+    name = f"the rig file in {path}"
+    try:
+        rig_file = RigFile.model_validate(parse_toml(configuration, name))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise InputError(f"{name} is not of this version: {key}: {first['msg']}") from error
+    seed = noted.get("seed", 0)
+    if not isinstance(seed, int) or seed < 0:
+        raise InputError(f"{path}: its seed {seed!r} is no whole number from 0 on")
+    return Original(
+        path=path,
+        sequence=parse_sequence(recording.sequence_toml, f"the sequence in {path}", path.parent),
+        rig_file=rig_file,
+        configuration=configuration,
+        rig=str(noted.get("rig", "")),
+        seed=seed,
+        film=recording.film,
+        load=recording.load,
+    )

@@ -1,0 +1,421 @@
+"""One run: sequence -> gate -> rig -> recording, watched all the way, and 0 V at its end."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dearig.acquisition.interrupts import Interrupts
+from dearig.acquisition.overlay import Overlay
+from dearig.acquisition.plan import Plan, plan
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import LoadedSequence
+from dearig.drivers.errors import AddressError, RefusedWaveform, RigError
+from dearig.drivers.gate import Margin
+from dearig.drivers.interlocks import Interlocks, Trip
+from dearig.drivers.rig import Block, Event, Rig, RigIdentity
+from dearig.errors import (
+    DearigError,
+    DiskFault,
+    InputError,
+    InstrumentFault,
+    Interrupted,
+    NotSafe,
+    SafetyStop,
+)
+from dearig.model.actuator import Actuator
+from dearig.model.errors import ModelError
+from dearig.progress import Progress, quiet
+from dearig.recording.disk_space import check_room
+from dearig.recording.files import check_output
+from dearig.recording.writer import RecordingWriter
+from dearig.sim_backend.factory import is_simulated, open_simulated_rig
+from dearig.sim_backend.faults import FaultPlan
+
+__all__ = ["Beside", "Onlooker", "RunResult", "open_rig", "record"]
+
+log = logging.getLogger(__name__)
+
+_DISK_INTERVAL = 1.0  # s between two looks at the room on the disk
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A model that runs beside the measurement: ``actuator``, and its ``toml`` to be kept."""
+
+    actuator: Actuator
+    toml: str
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """A run that was recorded: where, how much, how it ended, and what happened on the way.
+
+    ``margins`` say how near it was planned to come to each limit of the gate.
+    """
+
+    path: Path
+    samples: int
+    rate_Hz: float
+    outcome: str
+    events: tuple[str, ...]
+    margins: tuple[Margin, ...]
+
+
+class Onlooker:
+    """Is told of a run while it goes on; this one does not care.
+
+    Called from the thread that runs the rig, which waits: whoever draws or computes must take the
+    samples elsewhere and return at once.
+    """
+
+    def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:
+        """The sample clock of ``rate`` Hz is about to start."""
+
+    def block(self, block: Block) -> None:
+        """The next samples, as they were recorded."""
+
+    def event(self, event: Event) -> None:
+        """Something happened; it is in the recording."""
+
+
+def open_rig(
+    address: str,
+    rig_file: RigFile,
+    *,
+    seed: int,
+    paced: bool,
+    actuator: Actuator | None = None,
+    faults: FaultPlan | None = None,
+) -> Rig:
+    """The rig at ``address``. Raises ``InputError`` for an address that names none.
+
+    ``actuator`` takes the place of the film that ``sim`` has by default, ``faults`` go wrong in a
+    simulated rig. Raises ``InstrumentFault`` where the instruments are not there.
+    """
+    if actuator is not None and address != "sim":
+        raise InputError(f"rig {address!r} has a film of its own; only sim takes a model")
+    try:
+        if is_simulated(address):
+            return open_simulated_rig(
+                address, rig_file, rig_file.as_film(), rig_file.as_load(), seed=seed, paced=paced,
+                actuator=actuator, faults=faults or FaultPlan(),
+            )  # fmt: skip
+    except AddressError as error:
+        raise InputError(str(error)) from error
+    except ValueError as error:  # a film that cannot hang at rest
+        raise InputError(f"rig {address!r} with this rig file: {error}") from error
+    if faults is not None and faults.faults:
+        raise InputError(f"rig {address!r} is not simulated; faults are for simulated rigs")
+    if not address.startswith("daqmx:"):
+        raise InputError(
+            f"rig {address!r} is not known: write sim, sim:SEED such as sim:7, daqmx:Dev1 or "
+            f"daqmx:Dev1@HOST:PORT"
+        )
+    if not rig_file.film.name:
+        raise InputError(
+            f"rig {address!r}: no film is declared; give a --rig-file whose [film] has a name, so "
+            f"that its limits are those of the film that hangs there"
+        )
+    # not everybody who simulates has what a card needs
+    from dearig.acquisition.check import check_rig
+    from dearig.drivers.daqmx import open_daqmx_rig
+
+    check_rig(address, rig_file).refuse()
+    try:
+        return open_daqmx_rig(address, rig_file)
+    except RigError as error:
+        raise InstrumentFault(str(error)) from error
+
+
+def record(
+    loaded: LoadedSequence,
+    address: str,
+    rig_file: RigFile,
+    configuration: str,
+    out: str | Path,
+    *,
+    seed: int = 0,
+    paced: bool = False,
+    actuator: Actuator | None = None,
+    faults: FaultPlan | None = None,
+    operator: str = "",
+    film_id: str = "",
+    notes: str = "",
+    overwrite: bool = False,
+    progress: Progress = quiet,
+    beside: Beside | None = None,
+    fsync: bool = False,
+    onlooker: Onlooker | None = None,
+    interrupts: Interrupts | None = None,
+    clock: Callable[[], float] = time.monotonic,
+) -> RunResult:
+    """Play ``loaded`` on the rig at ``address`` and record it to ``out``.
+
+    ``configuration`` is the text of the rig file, kept with the recording; ``actuator`` is what the
+    simulated rig ``sim`` is made of, where it is not Table 3's film. ``beside`` is a model that
+    runs in step with the data and is recorded with them. With ``fsync``, what is flushed outlives a
+    power cut. ``interrupts`` is how another thread ends the run; by default ctrl-C does.
+
+    Raises ``InputError`` before anything is touched; after the rig was made safe and the recording
+    was closed, ``SafetyStop`` where an interlock ended it, ``InstrumentFault`` or ``DiskFault`` for
+    what failed, and ``Interrupted`` where the operator ended it: the first ctrl-C ramps down in the
+    set time, the second is 0 V at once.
+    """
+    out = check_output(out, overwrite)
+    planned = plan(loaded, rig_file, actuator, film_id)
+    waveform = planned.admitted()
+    rig = open_rig(address, rig_file, seed=seed, paced=paced, actuator=actuator, faults=faults)
+    try:
+        with interrupts or Interrupts() as interrupts:
+            try:
+                rate = rig.load(waveform)
+                identity = rig.identify()
+            except RefusedWaveform as error:
+                raise InputError(f"the rig refuses the sequence: {error}") from error
+            except RigError as error:
+                raise InstrumentFault(str(error)) from error
+            check_room(out, len(identity.channels), rate, waveform.voltage.size)
+            writer = RecordingWriter(
+                out, identity, rate, waveform.voltage.size, loaded.toml, rig_file.as_film(),
+                rig_file.as_load(), configuration, operator=operator,
+                film_id=film_id or rig_file.film.name, notes=notes,
+                seed=seed if is_simulated(address) else None, overwrite=overwrite, fsync=fsync,
+            )  # fmt: skip
+            onlooker = onlooker or Onlooker()
+            onlooker.started(planned, identity, rate)
+            interlocks = Interlocks(
+                rig_file, identity.channels, rate, planned.displacement_of_samples, planned.voltage
+            )
+            overlay = None
+            if beside is not None:
+                try:
+                    overlay = Overlay(beside.actuator, identity.channels, rate)
+                except ModelError as error:
+                    raise InputError(f"the model beside the run: {error}") from error
+            model = beside.toml if beside is not None else ""
+            run = _Run(rig, writer, interlocks, interrupts, onlooker, clock, overlay, model)
+            events = run.follow(waveform.voltage.size, progress)
+        return RunResult(out, writer.samples, rate, "finished", events, waveform.margins)
+    finally:
+        _close(rig)
+
+
+class _Run:
+    """A loaded rig being played, watched and recorded."""
+
+    def __init__(
+        self,
+        rig: Rig,
+        writer: RecordingWriter,
+        interlocks: Interlocks,
+        interrupts: Interrupts,
+        onlooker: Onlooker,
+        clock: Callable[[], float],
+        overlay: Overlay | None,
+        model_toml: str,
+    ) -> None:
+        self._rig = rig
+        self._writer = writer
+        self._interlocks = interlocks
+        self._interrupts = interrupts
+        self._onlooker = onlooker
+        self._clock = clock
+        self._looked = clock()  # at the disk
+        self._events: list[str] = []
+        self._overlay = overlay
+        self._model_toml = model_toml
+        self._beside: list[np.ndarray] = []  # what the overlay gave, in single precision
+        self._trip: Trip | None = None  # the first one: what came after it follows from it
+
+    def follow(self, samples: int, progress: Progress) -> tuple[str, ...]:
+        """Play and record; whatever happens, 0 V comes first, then the file's end."""
+        writer = self._writer
+        try:
+            try:
+                self._play(samples, progress)
+            finally:
+                # 0 V first: a disk that is slow or full must not keep the voltage up
+                self._interrupts.close()
+                _make_safe(self._rig)
+            if self._trip is not None:
+                kept = self._end(f"stopped by an interlock: {self._trip.message}")
+                raise SafetyStop(
+                    f"{self._trip.message}; {_DONE[self._trip.action]} to 0 V, and {kept}"
+                )
+            if self._interrupts.at_once():
+                raise self._ended_at_once()
+            if self._interrupts.asked():
+                kept = self._end("interrupted by the operator; ramped down to 0 V")
+                raise Interrupted(f"interrupted: the voltage was ramped down to 0 V, and {kept}")
+            if writer.samples == 0:
+                raise InstrumentFault(f"the rig gave no samples; {self._end('no samples')}")
+            self._close_file("finished")
+        except KeyboardInterrupt as error:
+            raise self._ended_at_once() from error
+        except RigError as error:
+            kept = self._end(f"instrument fault: {error}", f"instrument fault: {error}", "fault")
+            raise InstrumentFault(f"{error}; the rig was made safe, and {kept}") from error
+        except DearigError as error:
+            if writer.closed:
+                raise
+            kept = self._end(f"ended early: {error}", f"ended early: {error}", "fault")
+            safe = "" if isinstance(error, NotSafe) else "the rig was made safe, and "
+            raise type(error)(f"{error}; {safe}{kept}") from error
+        finally:
+            # only what nobody foresaw comes here with an open file
+            self._end("ended early by a fault of the program")
+        return tuple(self._events)
+
+    def _ended_at_once(self) -> Interrupted:
+        kept = self._end("interrupted by the operator", "interrupted by the operator: 0 V at once")
+        return Interrupted(f"interrupted: the output was taken to 0 V at once, and {kept}")
+
+    def _play(self, samples: int, progress: Progress) -> None:
+        rig, interrupts = self._rig, self._interrupts
+        rig.arm()
+        if interrupts.asked():
+            return
+        rig.start()
+        try:
+            stopping = False
+            while (block := rig.read()) is not None:
+                self._take(block)
+                progress("recording", self._writer.samples / samples)
+                trip = self._watch(block)
+                if trip is not None and trip.action == "at once":
+                    return
+                if interrupts.at_once():
+                    return
+                if (trip is not None or interrupts.asked()) and not stopping:
+                    stopping = True
+                    if trip is None:
+                        self._note(
+                            self._writer.samples,
+                            "warning",
+                            "interrupted by the operator: ramping down to 0 V",
+                        )
+                    rig.stop()
+        except (RigError, KeyboardInterrupt):
+            raise
+        except BaseException:
+            # the instruments are well: a disk or a fault of ours is no reason for a jolt
+            _ramp_down(rig)
+            raise
+
+    def _take(self, block: Block) -> None:
+        self._writer.append(block)
+        if self._overlay is not None:
+            self._beside.append(self._overlay.advance(block).astype(np.float32))
+        self._onlooker.block(block)
+        for event in block.events:
+            self._tell(event)
+
+    def _watch(self, block: Block) -> Trip | None:
+        """What trips an interlock now; noted, each one."""
+        trips = self._interlocks.watch(block)
+        trips += [trip for trip in (self._interlocks.late(self._rig.waiting), self._disk()) if trip]
+        for trip in trips:
+            self._note(trip.sample, "fault", f"interlock {trip.interlock}: {trip.message}")
+            self._trip = self._trip or trip
+        if not trips:
+            return None
+        # the stronger action counts
+        return next((trip for trip in trips if trip.action == "at once"), trips[0])
+
+    def _disk(self) -> Trip | None:
+        now = self._clock()
+        if now - self._looked < _DISK_INTERVAL:
+            return None
+        self._looked = now
+        folder = self._writer.path.parent
+        try:
+            free = shutil.disk_usage(folder).free
+        except OSError as error:
+            raise DiskFault(
+                f"{folder} is gone: {error.strerror}; see that the drive is there"
+            ) from error
+        return self._interlocks.disk(free)
+
+    def _note(self, sample: int, level: str, message: str) -> None:
+        event = Event(sample, level, message)
+        self._writer.event(sample, level, message)
+        self._tell(event)
+
+    def _end(self, outcome: str, event: str = "", level: str = "warning") -> str:
+        """Close the recording of a run that ended early; where it is, in words.
+
+        A disk that fails here too is one more thing to say, and must not hide what ended the run.
+        """
+        writer = self._writer
+        if writer.closed:
+            return f"what was recorded is in {writer.path}"
+        if writer.samples == 0:
+            writer.discard()
+            return "nothing was recorded"
+        trouble = ""
+        try:
+            if event:
+                writer.event(writer.samples - 1, level, event)
+        except DearigError as error:
+            trouble = str(error)
+        try:
+            self._close_file(outcome)
+        except DearigError as error:
+            trouble = str(error)
+        where = f"what was recorded is in {writer.path} ({writer.samples} samples)"
+        return f"{where}; {trouble}" if trouble else where
+
+    def _close_file(self, outcome: str) -> None:
+        """Finish the recording, with what the model beside it gave."""
+        modelled = None
+        if self._overlay is not None and self._beside:
+            modelled = np.concatenate(self._beside)[: self._writer.samples]
+        if modelled is not None and modelled.size < self._writer.samples:
+            modelled = None  # the model failed in a block that was written
+        model = "" if modelled is None else self._model_toml
+        self._writer.close(outcome, displacement_model=modelled, model_toml=model)
+
+    def _tell(self, event: Event) -> None:
+        self._events.append(f"{event.level}: {event.message}")
+        log.log(_LEVELS.get(event.level, logging.INFO), "%s", event.message)
+        self._onlooker.event(event)
+
+
+def _ramp_down(rig: Rig) -> None:
+    """Down to 0 V in the set time; what is read meanwhile has nowhere to go."""
+    try:
+        rig.stop()
+        while rig.read() is not None:
+            pass
+    except RigError as error:
+        log.warning("the ramp down failed (%s); the output is taken to 0 V at once", error)
+
+
+def _make_safe(rig: Rig) -> None:
+    try:
+        rig.make_safe()
+    except RigError as error:
+        raise NotSafe(
+            f"THE RIG COULD NOT BE MADE SAFE ({error}): switch the amplifier's high voltage off "
+            f"by hand"
+        ) from error
+
+
+def _close(rig: Rig) -> None:
+    try:
+        rig.close()
+    except RigError as error:
+        raise NotSafe(
+            f"THE RIG COULD NOT BE CLOSED ({error}): see that the amplifier is at 0 V"
+        ) from error
+
+
+_LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "fault": logging.ERROR}
+_DONE = {"ramp": "the voltage was ramped down", "at once": "the output was taken at once"}

@@ -1,0 +1,156 @@
+"""Whether recordings go together, and the model that is to be fitted to them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
+
+from dearig.analysis.quality import overlap
+from dearig.config.rigfile import FilmSection, LoadSection, RigFile
+from dearig.errors import InputError
+from dearig.model.actuator import Actuator
+from dearig.model.errors import ModelError
+from dearig.model.film import Strip
+from dearig.model.material import Branch, Film, Load, Network, Spring
+from dearig.recording.recording import Recording
+
+__all__ = [
+    "BRANCHES_MAX",
+    "base_model",
+    "check_apart",
+    "check_branches",
+    "check_named_once",
+    "of_rig",
+]
+
+#: Maxwell branches of a model, at most: no data of this kind determine more.
+BRANCHES_MAX = 8
+
+
+def check_branches(count: int) -> None:
+    """Refuse a number of branches that cannot be fitted."""
+    if not 1 <= count <= BRANCHES_MAX:
+        raise InputError(
+            f"{count} branches cannot be fitted; give a number from 1 to {BRANCHES_MAX}"
+        )
+
+
+def check_named_once(train: Sequence[str | Path], validation: Sequence[str | Path]) -> None:
+    """Refuse a file that is named both to fit and to validate."""
+    named = {Path(path).resolve() for path in train}
+    for path in validation:
+        if Path(path).resolve() in named:
+            raise InputError(
+                f"{path} is given both to fit and to validate: an error on fitted data proves "
+                f"nothing; leave it out of one of them"
+            )
+
+
+def base_model(
+    recordings: Sequence[Recording],
+    branches: int,
+    spring: str,
+    rest_length_mm: float | None,
+    rig_file: RigFile | None,
+) -> Actuator | Strip:
+    """What to fit: its structure matters, its numbers do not."""
+    limit = {"neo-hookean": math.inf, "gent": 1e4, "arruda-boyce": 1e4}.get(spring)
+    if limit is None:
+        raise InputError(f"spring {spring!r} is not one of neo-hookean, gent, arruda-boyce")
+    one = Spring(1e5, limit, spring)
+    network = Network(one, tuple(Branch(one, 1.0) for _ in range(branches)))
+    if recordings[0].kind == "film":
+        held = {r.kinematics for r in recordings}
+        if len(held) > 1:
+            raise InputError(
+                f"films held in different ways ({', '.join(sorted(held))}) are fitted one by one"
+            )
+        if rest_length_mm is not None:
+            raise InputError("a rest length is of an actuator; these recordings are of films")
+        return Strip(network, recordings[0].kinematics)
+    films = {r.film for r in recordings if r.film is not None}
+    loads = {r.load for r in recordings if r.load is not None}
+    if len(films) > 1 or len(loads) > 1:
+        raise InputError(_differing(recordings))
+    default = rig_file or RigFile()
+    film = films.pop() if films and rig_file is None else default.as_film()
+    load = loads.pop() if loads and rig_file is None else default.as_load()
+    if rest_length_mm is not None:
+        # not (>), so that NaN is refused too
+        if not film.length * 1e3 < rest_length_mm < 1e4:
+            raise InputError(
+                f"a rest length of {rest_length_mm:g} mm is not above the film's own "
+                f"{film.length * 1e3:g} mm, or beyond 10 m: under its load the film is longer than "
+                f"before"
+            )
+        try:
+            load = Load(load.mass, rest_length_mm / 1e3)
+        except ModelError as error:
+            raise InputError(f"a rest length of {rest_length_mm:g} mm: {error}") from error
+    return Actuator(film, load, network)
+
+
+def check_apart(train: Sequence[Recording], validation: Sequence[Recording]) -> None:
+    """Refuse data that would be both fitted and validated, and kinds that do not go together."""
+    fitted = {r.sha256: r.path for r in train}
+    for recording in validation:
+        if recording.sha256 in fitted:
+            raise InputError(
+                f"{recording.path}, to validate, is a copy of {fitted[recording.sha256]}, to fit: "
+                f"an error on fitted data proves nothing; leave it out of one of them"
+            )
+        if recording.kind != train[0].kind:
+            raise InputError(
+                f"{recording.path}, to validate, is of kind {recording.kind}, and "
+                f"{train[0].path}, to fit, of kind {train[0].kind}: give data of one kind"
+            )
+        for other in train:
+            same = overlap(other, recording)
+            if same is not None:
+                raise InputError(
+                    f"{recording.path}, to validate, holds from {same[1]:.4g} s on the samples of "
+                    f"{other.path}, to fit, from {same[0]:.4g} s on: an error on fitted data "
+                    f"proves nothing; give recordings that do not overlap"
+                )
+
+
+def _differing(recordings: Sequence[Recording]) -> str:
+    """Which two recordings are not of one film and load."""
+    first = next(r for r in recordings if r.film is not None or r.load is not None)
+    for other in recordings:
+        for what, one, two in (
+            ("films", first.film, other.film),
+            ("loads", first.load, other.load),
+        ):
+            if one is not None and two is not None and one != two:
+                return (
+                    f"{first.path} and {other.path} are of different {what} "
+                    f"({_apart(one, two)}, in SI units); fit them one by "
+                    f"one, or say with --rig-file what holds for all"
+                )
+    return "these recordings are of different films or loads; fit them one by one"
+
+
+def _apart(one: Film | Load, two: Film | Load) -> str:
+    """The numbers in which two films or two loads differ."""
+    pairs = ((f.name, getattr(one, f.name), getattr(two, f.name)) for f in fields(one))
+    return ", ".join(f"{name.replace('_', ' ')} {a} and {b}" for name, a, b in pairs if a != b)
+
+
+def of_rig(rig_file: RigFile, film: Film, load: Load) -> RigFile:
+    """``rig_file`` with ``film`` under ``load`` in it: its limits hold for what was measured."""
+    film_section = FilmSection(
+        length_mm=film.length * 1e3,
+        width_mm=film.width * 1e3,
+        thickness_mm=film.thickness * 1e3,
+        relative_permittivity=film.permittivity,
+        density_kg_m3=film.density,
+        kinematics=film.kinematics,  # type: ignore[arg-type]
+    )
+    rest = load.rest_length
+    load_section = LoadSection(
+        mass_g=load.mass * 1e3, rest_length_mm=None if rest is None else rest * 1e3
+    )
+    return rig_file.model_copy(update={"film": film_section, "load": load_section})

@@ -1,0 +1,411 @@
+"""Diagnosis: from recordings to the effect that the model lacks, and the error before and after."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from dearig.acquisition.interrupts import Interrupts
+from dearig.acquisition.run import record
+from dearig.analysis.compatibility import (
+    base_model,
+    check_apart,
+    check_branches,
+    check_named_once,
+    of_rig,
+)
+from dearig.analysis.cores import for_simulations
+from dearig.analysis.experiment import separating_experiment
+from dearig.analysis.outcomes import (
+    Comparison,
+    DiagnoseOutcome,
+    SeparatingExperiment,
+    Stand,
+    pooled_rms,
+)
+from dearig.analysis.quality import beyond, check_enough, inspect
+from dearig.analysis.records import as_record, compare, open_all
+from dearig.config.modelfile import save_model
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import load_sequence, parse_sequence
+from dearig.errors import (
+    DearigError,
+    DiskFault,
+    InputError,
+    InstrumentFault,
+    Interrupted,
+    NotSafe,
+    SafetyStop,
+)
+from dearig.model.actuator import Actuator
+from dearig.model.diagnosis import diagnose
+from dearig.model.diagnosis.results import Diagnosis
+from dearig.model.errors import ModelError
+from dearig.progress import Progress, quiet
+from dearig.recording.files import check_output
+from dearig.recording.recording import Recording
+from dearig.units import SHOWN
+
+__all__ = ["VALIDATION", "diagnose_recordings", "diagnose_rig"]
+
+#: What a rig is asked for at the end, to validate on: one run of each of the thesis's tables.
+VALIDATION = ("validation-a-0.6", "validation-b-7.0")
+
+_ENDS = (Interrupted, SafetyStop, InstrumentFault, DiskFault)  # of a run, the rig safe
+
+
+def diagnose_recordings(
+    train: Sequence[str | Path],
+    *,
+    validation: Sequence[str | Path] = (),
+    model_out: str | Path | None = None,
+    branches: int = 3,
+    drive: str = "command",
+    rig_file: RigFile | None = None,
+    thorough: bool = False,
+    overwrite: bool = False,
+    clock: Callable[[], float],
+    progress: Progress = quiet,
+) -> DiagnoseOutcome:
+    """Find what the thesis's model of ``train`` lacks; errors on ``validation`` are read last.
+
+    The improved model goes to ``model_out``. ``progress`` is told the fraction of the whole work.
+    A search that is not ``thorough`` is ended after about a minute. The first ctrl-C ends it and
+    keeps what was found (``finding.interrupted``); the second raises. Raises ``InputError`` for
+    what cannot be diagnosed, before anything is written.
+    """
+    started = clock()
+    _check_outputs(train, validation, model_out, overwrite)
+    recordings = open_all(train)
+    others = open_all(validation)
+    base, quality = _prepared(recordings, others, branches, drive, rig_file)
+    finding = _search(recordings, base, drive, thorough, progress)
+    outcome = _outcome(recordings, others, finding, quality, drive, rig_file, "", started, clock)
+    return _saved(outcome, recordings, model_out, overwrite)
+
+
+def diagnose_rig(
+    address: str,
+    out: Path,
+    *,
+    experiments: int = 1,
+    train: Sequence[str | Path] = (),
+    validation: Sequence[str | Path] = (),
+    model_out: str | Path | None = None,
+    branches: int = 3,
+    drive: str = "command",
+    rig_file: RigFile | None = None,
+    configuration: str = "",
+    seed: int = 0,
+    thorough: bool = False,
+    overwrite: bool = False,
+    clock: Callable[[], float],
+    progress: Progress = quiet,
+) -> DiagnoseOutcome:
+    """Diagnose the rig at ``address``: record, diagnose, run what separates the rivals, again.
+
+    The first recording is the thesis's (unless ``train`` are given), then come at most
+    ``experiments`` more, for as long as rivals are left; at the end ``VALIDATION`` are recorded
+    (unless ``validation`` are given) and read once. All recordings go to the folder ``out``.
+    ``seed`` is of a simulated rig's noise, ``thorough`` as of ``diagnose_recordings``. What ends a
+    run, ctrl-C, an interlock, an instrument or the disk, ends the recording, the rig safe: what was
+    found before is kept, and ``ended`` of the outcome says why. Raises what ends the first run, and
+    ``NotSafe`` at once.
+    """
+    started = clock()
+    _check_outputs(train, validation, model_out, overwrite)
+    settings = rig_file or RigFile()
+    names = [*([] if train else ["thesis"]), *(f"experiment-{n + 1}" for n in range(experiments))]
+    planned = [*names, *([] if validation else VALIDATION)]
+    for name in planned:
+        check_output(out / f"{name}.h5", overwrite)
+    runs = len(planned)
+    parts = 2.0 * (1 + experiments) + 1.0  # a diagnosis counts two, all recordings together one
+    done = 0.0
+
+    def part(size: float) -> Progress:
+        first = done
+        return lambda stage, fraction: progress(stage, (first + size * fraction) / parts)
+
+    files = [Path(path) for path in train]
+    made: list[Path] = []
+
+    def run(sequence: str, name: str) -> None:
+        nonlocal done
+        path = out / f"{name}.h5"
+        loaded = load_sequence(name) if not sequence else parse_sequence(sequence, name, Path())
+        report = part(1.0 / runs)
+        record(
+            loaded, address, settings, configuration, path,
+            # another seed a run: the noise of two runs has nothing in common
+            seed=seed * 1000 + len(made), overwrite=overwrite,
+            progress=lambda _, fraction: report(f"recording {name}", fraction),
+        )  # fmt: skip
+        made.append(path)
+        done += 1.0 / runs
+
+    def run_until_ended(sequence: str, *names: str) -> DearigError | None:
+        try:
+            for name in names:
+                run(sequence, name)
+        except NotSafe:
+            raise
+        except _ENDS as error:
+            return error  # the rig is safe, and what was found before still holds
+        return None
+
+    if not files:
+        run("", "thesis")
+        files += made
+    performed: list[str] = []
+    ended: DearigError | None = None
+    while True:
+        recordings = open_all(files)
+        base, _ = _prepared(recordings, [], branches, drive, rig_file)
+        finding = _search(recordings, base, drive, thorough, part(2.0))
+        done += 2.0
+        if finding.interrupted or len(performed) >= experiments:
+            break
+        experiment, words = _experiment(finding, _noise(recordings, drive), settings)
+        if experiment is None:
+            break
+        name = f"experiment-{len(performed) + 1}"
+        ended = run_until_ended(experiment.sequence, name)
+        if ended is not None:
+            break
+        files.append(made[-1])
+        performed.append(f"{words}. It was run, and its recording, {name}.h5, was added.")
+    others: list[Recording] = []
+    if validation:
+        others = open_all(validation)
+    elif not (ended or finding.interrupted):
+        recorded = len(made)
+        ended = run_until_ended("", *VALIDATION)
+        others = open_all(made[recorded:])
+    if ended is not None:
+        stopped = finding.interrupted or isinstance(ended, Interrupted)
+        notes = (*finding.notes, f"No more was recorded: {ended}")
+        finding = replace(finding, interrupted=stopped, notes=notes)
+    _, quality = _prepared(recordings, others, branches, drive, rig_file)
+    outcome = _outcome(
+        recordings, others, finding, quality, drive, rig_file, address, started, clock, performed
+    )
+    return _saved(replace(outcome, ended=ended), recordings, model_out, overwrite)
+
+
+# ---------------------------------------------------------------- before
+
+
+def _check_outputs(
+    train: Sequence[str | Path],
+    validation: Sequence[str | Path],
+    model_out: str | Path | None,
+    overwrite: bool,
+) -> None:
+    if model_out is not None:
+        check_output(model_out, overwrite, *train, *validation)
+    check_named_once(train, validation)
+
+
+def _prepared(
+    recordings: Sequence[Recording],
+    others: Sequence[Recording],
+    branches: int,
+    drive: str,
+    rig_file: RigFile | None,
+) -> tuple[Any, tuple[str, ...]]:
+    """The baseline to fit, and what is to be said of the recordings. Raises ``InputError``."""
+    check_branches(branches)
+    check_apart(recordings, others)
+    base = base_model(recordings, branches, "gent", None, rig_file)
+    said = [
+        f"{r.name}: {sentence}"
+        for r in (*recordings, *others)
+        for sentence in inspect(r, drive, to_fit=r in recordings).findings
+    ]
+    said += beyond(recordings, others, drive)
+    films = sorted({r.film_id for r in (*recordings, *others) if r.film_id})
+    if len(films) > 1:
+        said.append(f"the recordings name different films: {', '.join(films)}")
+    check_enough(recordings, drive)
+    return base, tuple(said)
+
+
+# ---------------------------------------------------------------- the search, and after
+
+
+@for_simulations()
+def _search(
+    recordings: Sequence[Recording], base: Any, drive: str, thorough: bool, progress: Progress
+) -> Diagnosis:
+    records = [as_record(r, drive) for r in recordings]
+    try:
+        with Interrupts() as interrupts:
+            return diagnose(
+                records, base, progress=progress, stop=interrupts.asked, thorough=thorough
+            )
+    except ModelError as error:
+        raise InputError(f"these recordings cannot be diagnosed: {error}") from error
+
+
+def _outcome(
+    recordings: Sequence[Recording],
+    others: Sequence[Recording],
+    finding: Diagnosis,
+    quality: tuple[str, ...],
+    drive: str,
+    rig_file: RigFile | None,
+    rig: str,
+    started: float,
+    clock: Callable[[], float],
+    performed: Sequence[str] = (),
+) -> DiagnoseOutcome:
+    if finding.held:
+        recordings = [replace(r, hold=True) for r in recordings]
+        others = [replace(r, hold=True) for r in others]
+    failed: list[str] = []
+    models = [finding.baseline, *(s.stage for s in finding.steps[:-1]), finding.final]
+    if not finding.steps:
+        models = [finding.baseline, finding.final]
+    stands = tuple(
+        Stand(
+            tuple(name for name, _ in stage.model.effects),
+            _compared(recordings, stage.of_each(len(recordings)), "train", drive, failed),
+            _compared(others, [stage.predicting] * len(others), "validation", drive, failed),
+        )
+        for stage in models
+    )
+    noise = _noise(recordings, drive)
+    experiment, words = None, "The recordings are of films: sequences of voltage do not apply."
+    if recordings[0].kind == "actuator":
+        experiment, words = _experiment(finding, noise, rig_file or RigFile())
+    return DiagnoseOutcome(
+        title=_title(recordings),
+        kind=recordings[0].kind,
+        drive=drive,
+        finding=finding,
+        stands=stands,
+        noise=noise,
+        experiment=experiment,
+        experiment_words=words,
+        quality=(*quality, *dict.fromkeys(failed)),
+        model_path="",
+        seconds=clock() - started,
+        performed=tuple(performed),
+        rig=rig,
+    )
+
+
+def _title(recordings: Sequence[Recording]) -> str:
+    titles = list(dict.fromkeys(r.title or r.name for r in recordings))
+    return ", ".join(titles) if len(titles) <= 3 else f"{titles[0]} and {len(titles) - 1} more"
+
+
+def _compared(
+    recordings: Sequence[Recording], models: Sequence[Any], role: str, drive: str, failed: list[str]
+) -> tuple[Comparison, ...]:
+    found = []
+    for recording, model in zip(recordings, models, strict=True):
+        try:
+            found.append(compare(recording, model, role, drive))
+        except InputError as error:
+            # an hour's search is not lost for one drive that a model cannot follow
+            failed.append(f"{recording.name} is left out of the {role} errors: {error}")
+    return tuple(found)
+
+
+def _noise(recordings: Sequence[Recording], drive: str) -> float:
+    """The pooled floor of the training recordings, m or Pa."""
+    floors = [as_record(r, drive).noise for r in recordings]
+    return math.sqrt(sum(n * n for n in floors) / len(floors))
+
+
+def _experiment(
+    finding: Diagnosis, noise: float, rig_file: RigFile
+) -> tuple[SeparatingExperiment | None, str]:
+    """What separates the final model from its rivals; a sentence, also where there is nothing."""
+    final = finding.final.model
+    if not isinstance(final, Actuator) or not finding.rivals:
+        return None, "No other family explains these data as well: there is nothing to separate"
+    contested = [s for s in finding.steps if s.indistinguishable_from] or list(finding.steps)
+    label = " with ".join(name for name, _ in final.effects) or "the baseline"
+    family = contested[0].family if contested else "none"
+    rivals = [(label, family, final)]
+    for family_of, model in finding.rivals:
+        if isinstance(model, Actuator):
+            label = " with ".join(name for name, _ in model.effects) or "the baseline"
+            rivals.append((label, family_of, model))
+    return separating_experiment(rivals, of_rig(rig_file, final.film, final.load), noise)
+
+
+def _saved(
+    outcome: DiagnoseOutcome,
+    recordings: Sequence[Recording],
+    model_out: str | Path | None,
+    overwrite: bool,
+) -> DiagnoseOutcome:
+    """``outcome`` with its model written."""
+    if model_out is None:
+        return outcome
+    effects = ", ".join(name for name, _ in outcome.finding.final.predicting.effects)
+    name = f"{outcome.title}, with {effects}" if effects else f"{outcome.title}, nothing added"
+    path = save_model(
+        model_out, name, outcome.finding.final.predicting, _history(outcome, recordings), overwrite
+    )
+    return replace(outcome, model_path=str(path))
+
+
+def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[str, Any]:
+    """Where the model comes from, for its file."""
+    finding = outcome.finding
+    shown = SHOWN[outcome.kind]
+
+    def rms(comparisons: Sequence[Comparison]) -> float | None:
+        return pooled_rms(comparisons) * shown.error_factor if comparisons else None
+
+    def errors(stand: Stand) -> dict[str, Any]:
+        return {
+            f"train_rms_{shown.suffix}": rms(stand.train),
+            f"validation_rms_{shown.suffix}": rms(stand.validation),
+        }
+
+    return {
+        "method": "diagnosis",
+        "drive": outcome.drive,
+        "seconds": outcome.seconds,
+        "simulations": finding.simulations,
+        "verdict": finding.verdict,
+        "interrupted": finding.interrupted,
+        "mean_square_over_noise": finding.final.cost,
+        f"noise_floor_{shown.suffix}": outcome.noise * shown.error_factor,
+        "notes": [*finding.notes, *outcome.quality],
+        "before": errors(outcome.before),
+        "after": errors(outcome.after),
+        "train": [{"name": r.name, "sha256": r.sha256} for r in recordings],
+        "validation": [{"name": c.name} for c in outcome.after.validation],
+        "step": [
+            {
+                "effect": s.effect,
+                "family": s.family,
+                "acts_on": s.acts_on,
+                "indistinguishable_from": list(s.indistinguishable_from),
+                "evidence": list(s.evidence),
+            }
+            for s in finding.steps
+        ],
+        "estimate": [
+            {
+                "name": e.name,
+                "unit": e.unit,
+                "value": e.value,
+                "low95": e.low if math.isfinite(e.low) else None,
+                "high95": e.high if math.isfinite(e.high) else None,
+                "determined": e.determined,
+                "note": e.note,
+            }
+            for e in finding.final.estimates
+        ],
+    }

@@ -1,0 +1,247 @@
+"""The excitation that tells rival models apart best, within what a rig allows."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from dearig.acquisition.plan import Plan, plan
+from dearig.analysis.outcomes import SeparatingExperiment
+from dearig.config.presets import PRESETS
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import LoadedSequence, parse_sequence
+from dearig.drivers.gate import GatedWaveform
+from dearig.drivers.interlocks import would_trip
+from dearig.errors import InputError
+from dearig.model.actuator import Actuator, Drive
+from dearig.model.excitation import THESIS_AMPLITUDES
+from dearig.model.kernel import OK
+
+__all__ = ["SEPARATES", "candidates", "separating_experiment"]
+
+#: RMS difference of two predictions, in noise floors, from which on an experiment tells them apart.
+SEPARATES = 0.5
+
+# amplitudes are lowered in these steps until a sequence can be played, and read
+_SCALES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
+_CALM = 0.7  # of what trips an interlock: a film does not do quite what any of the rivals foresees
+_BLURRED = 1.0  # of the noise: what the film may move while it is not known when the laser looks
+_NEARLY = 0.9  # of the best separation: among such, the one that separates most a second
+
+
+def candidates(top_kV: float) -> Mapping[str, str]:
+    """TOML of sequences that ask different questions, up to ``top_kV``, by name."""
+    half = round(0.45 * top_kV, 3)
+    low, middle = round(0.4 * top_kV, 3), round(0.7 * top_kV, 3)
+    found: dict[str, list[dict[str, Any]]] = {
+        "slow lobes of four heights": [
+            {"kind": "half_sine", "amplitude_kV": round(a * top_kV, 3), "frequency_Hz": 0.2}
+            for a in (0.4, 0.6, 0.8, 1.0)
+        ],
+        "fast lobes": [
+            {
+                "kind": "half_sine",
+                "amplitude_kV": round(a * top_kV, 3),
+                "frequency_Hz": f,
+                "repeats": 6,
+            }
+            for a, f in ((0.6, 2.0), (1.0, 2.0), (0.6, 5.0), (1.0, 5.0))
+        ],
+        "triangles within triangles": [
+            {"kind": "triangle", "amplitude_kV": a, "frequency_Hz": 0.25, "repeats": 2}
+            for a in (top_kV, low, middle, top_kV)
+        ],
+        "quick steps": [_steps(top_kV, 0.5, 2)],
+        "steps": [_steps(top_kV, 2.0, 1)],
+        "slow steps": [_steps(top_kV, 6.0, 1)],
+        "a long hold": [
+            {"kind": "ramp", "to_kV": round(0.9 * top_kV, 3), "duration_s": 0.2},
+            {"kind": "hold", "duration_s": 25.0},
+            {"kind": "ramp", "to_kV": 0.0, "duration_s": 0.2},
+            {"kind": "hold", "duration_s": 12.0},
+        ],
+    }
+    for name, (first, last) in {
+        "a slow chirp": (0.05, 1.0), "a chirp": (0.5, 15.0), "a fast chirp": (5.0, 60.0),
+    }.items():  # fmt: skip
+        found[name] = [
+            {"kind": "ramp", "to_kV": round(0.5 * top_kV, 3), "duration_s": 1.0},
+            {
+                "kind": "chirp", "amplitude_kV": half, "from_Hz": first, "to_Hz": last,
+                "duration_s": 20.0,
+            },
+            {"kind": "ramp", "to_kV": 0.0, "duration_s": 1.0},
+            {"kind": "hold", "duration_s": 1.0},
+        ]  # fmt: skip
+    made = {name: tomli_w.dumps({"name": name, "segment": found[name]}) for name in found}
+    named = ("rich", "validation-a-0.2", "validation-a-1.0", "validation-b-8.0")
+    return made | {name: PRESETS[name] for name in named}
+
+
+def _steps(top_kV: float, dwell_s: float, repeats: int) -> dict[str, Any]:
+    levels = [round(a * top_kV, 3) for a in (0.5, 1.0, 0.7, 0.9, 0.3, 0.8)]
+    return {
+        "kind": "steps", "levels_kV": [*levels, 0.0], "dwell_s": dwell_s, "rise_s": 0.02,
+        "repeats": repeats,
+    }  # fmt: skip
+
+
+def separating_experiment(
+    rivals: Sequence[tuple[str, str, Actuator]], rig_file: RigFile, noise: float
+) -> tuple[SeparatingExperiment | None, str]:
+    """The sequence under which the least separated two of ``rivals`` lie farthest apart.
+
+    Two that no sequence at all would separate do not count: others may be told from both.
+
+    ``rivals`` are (label, family, fitted model), the final model among them; ``noise`` is the floor
+    of one reading in m. Every sequence has passed the gate of ``rig_file``, and trips no interlock
+    where the film does what any of the rivals foresees. Also returned is a sentence, which says why
+    where there is no such sequence.
+    """
+    labels = tuple(label for label, _, _ in rivals)
+    families = tuple(dict.fromkeys(family for _, family, _ in rivals))
+    # as much as the rig may give, and no more than the thesis's experiments
+    top = math.floor(min(rig_file.gate_limits().voltage_max / 1e3, 8.0) * 1e3) / 1e3
+    made: list[tuple[str, dict[tuple[str, str], float], float, str]] = []
+    for name, text in candidates(top).items():
+        playable = _playable(text, name, rivals, rig_file, noise)
+        if playable is None:
+            continue
+        loaded, waveform, predictions = playable
+        apart = {
+            (labels[i], labels[j]): _rms(predictions[i] - predictions[j]) / noise
+            for i, j in combinations(range(len(rivals)), 2)
+        }
+        made.append((name, apart, waveform.duration, loaded.toml))
+    if not made:
+        return None, (
+            "None of the excitations that were considered could be played: the limits or the "
+            "interlocks of the rig file would end them"
+        )
+    pairs = list(made[0][1])
+    separable = [p for p in pairs if max(apart[p] for _, apart, _, _ in made) >= SEPARATES]
+    tried: list[tuple[str, float, float, tuple[str, str], str]] = []
+    for name, apart, seconds, toml in made:
+        closest = min(separable or pairs, key=lambda pair: apart[pair])
+        tried.append((name, apart[closest], seconds, closest, toml))
+    tried.sort(key=lambda t: -t[1])
+    best = tried[0][1]
+    if best < SEPARATES:
+        return None, (
+            f"None of {len(tried)} excitations within the rig's limits would separate "
+            f"{_and(labels)}: at best their predictions differ by {best:.2g} times the noise"
+        )
+    good = [t for t in tried if t[1] >= _NEARLY * best]
+    name, separation, seconds, closest, toml = max(good, key=lambda t: t[1] / t[2])
+    alike = [_and(p) for p in pairs if p not in separable]
+    but = f", but for {'; '.join(alike)}, which none would separate" if alike else ""
+    found = SeparatingExperiment(
+        name=name,
+        sequence=toml,
+        rivals=labels,
+        separates=families,
+        separation=separation,
+        closest=closest,
+        seconds=seconds,
+        tried=tuple((t[0], t[1], t[2]) for t in tried),
+    )
+    return found, (
+        f"Of {len(tried)} excitations within the rig's limits, {name!r} ({seconds:.0f} s) "
+        f"separates {_and(labels)} best: the predictions of any two differ by at least "
+        f"{separation:.2g} times the noise{but}"
+    )
+
+
+def _playable(
+    text: str,
+    name: str,
+    rivals: Sequence[tuple[str, str, Actuator]],
+    rig_file: RigFile,
+    noise: float,
+) -> tuple[LoadedSequence, GatedWaveform, list[np.ndarray]] | None:
+    """The sequence as high as it can be played and read, and what the ``rivals`` foresee (m).
+
+    None where that is at no height.
+    """
+    for scale in _SCALES:
+        try:
+            loaded = parse_sequence(_scaled(text, scale), name, Path())
+            planned = plan(loaded, rig_file)
+            waveform = planned.admitted()
+        except InputError:
+            continue
+        predictions = _predictions(rivals, waveform)
+        if predictions is None:
+            continue
+        if not any(_would_end(planned, waveform, p, rig_file, noise) for p in predictions):
+            return loaded, waveform, predictions
+    return None
+
+
+def _would_end(
+    planned: Plan, waveform: GatedWaveform, moved: np.ndarray, rig_file: RigFile, noise: float
+) -> bool:
+    """Whether a film that is ``moved`` (N,) m would trip an interlock, or outrun the laser.
+
+    The laser has a clock of its own: how old a reading is, is not known to less than its period.
+    """
+    speed = float(np.max(np.abs(np.diff(moved)))) * waveform.rate
+    if speed * rig_file.laser.delay_error > _BLURRED * noise:
+        return True
+    foreseen = planned.displacement_of_samples
+    # further than the film is foreseen to go, and not as far
+    return any(
+        would_trip(rig_file, waveform.rate, waveform.voltage, part * moved, foreseen)
+        for part in (1.0 / _CALM, _CALM)
+    )
+
+
+def _scaled(text: str, scale: float) -> str:
+    """The sequence with all its voltages times ``scale``."""
+    if scale == 1.0:
+        return text
+
+    def lower(value: Any, key: str = "") -> Any:
+        if isinstance(value, dict):
+            return {k: lower(v, k) for k, v in value.items()}
+        if isinstance(value, list):
+            return [lower(v, key) for v in value]
+        return round(value * scale, 3) if key.endswith("_kV") else value
+
+    data = tomllib.loads(text)
+    for segment in data["segment"]:
+        if segment["kind"] == "thesis":
+            segment.setdefault("amplitudes_kV", [a / 1e3 for a in THESIS_AMPLITUDES])
+    return tomli_w.dumps(lower(data))
+
+
+def _predictions(
+    rivals: Sequence[tuple[str, str, Actuator]], waveform: GatedWaveform
+) -> list[np.ndarray] | None:
+    """Displacements of all rivals in m; None where one fails or sees more field than allowed."""
+    time = np.arange(waveform.voltage.size) / waveform.rate
+    drive = Drive(time, waveform.voltage, hold=True)
+    found = []
+    for _, _, model in rivals:
+        response = model.simulate(drive)
+        if response.status != OK:
+            return None
+        if float(np.max(np.abs(response.field))) > waveform.limits.field:
+            return None
+        found.append(response.displacement)
+    return found
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _and(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else "".join(names)

@@ -1,0 +1,205 @@
+"""Identification of a model from recordings, into a model file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dearig.analysis.compatibility import base_model, check_apart, check_branches, check_named_once
+from dearig.analysis.cores import for_simulations
+from dearig.analysis.outcomes import BranchTrial, Comparison, IdentifyOutcome
+from dearig.analysis.records import PUBLISHED_FIT, as_record, compare, open_all
+from dearig.config.modelfile import save_model
+from dearig.config.rigfile import RigFile
+from dearig.errors import InputError
+from dearig.model.errors import ModelError
+from dearig.model.fitting import Identification, add_intervals, identify
+from dearig.model.material import Network
+from dearig.model.records import Record
+from dearig.progress import Progress, quiet
+from dearig.recording.files import check_output
+from dearig.recording.recording import Recording
+
+__all__ = ["identify_recordings"]
+
+
+@for_simulations()
+def identify_recordings(
+    train: Sequence[str | Path],
+    out: str | Path,
+    *,
+    validation: Sequence[str | Path] = (),
+    method: str = "hybrid",
+    branches: Sequence[int] = (3,),
+    spring: str = "gent",
+    drive: str = "command",
+    rest_length_mm: float | None = None,
+    rig_file: RigFile | None = None,
+    seed: int = 0,
+    intervals: bool = True,
+    overwrite: bool = False,
+    clock: Callable[[], float],
+    progress: Progress = quiet,
+) -> IdentifyOutcome:
+    """Fit the recordings ``train`` and write the model to ``out``.
+
+    With several numbers of ``branches`` each is fitted, and the one with the least information
+    criterion on the training data is kept; the ``validation`` recordings are read once, at the end,
+    and play no part in the choice. Film and load come from the recordings, else from ``rig_file``.
+    ``clock`` gives seconds. Raises ``InputError`` for everything that cannot be fitted, before
+    anything is written.
+    """
+    check_output(out, overwrite, *train, *validation)
+    check_named_once(train, validation)
+    started = clock()
+    recordings = open_all(train)
+    others = open_all(validation)
+    check_apart(recordings, others)
+    records = [as_record(r, drive) for r in recordings]
+    kind = recordings[0].kind
+    for count in branches:
+        check_branches(count)
+    counts = sorted(set(branches))
+    alone = len(counts) == 1
+    fits: list[Identification] = []
+    smaller: Network | None = None
+    for i, count in enumerate(counts):
+        base = base_model(recordings, count, spring, rest_length_mm, rig_file)
+
+        def report(stage: str, fraction: float, done: int = i) -> None:
+            if alone:
+                progress(stage, fraction)
+            else:
+                progress(f"{counts[done]} branches", (done + fraction) / len(counts))
+
+        try:
+            fit = identify(
+                records, base, method, seed, intervals and alone, smaller,
+                progress=report,
+            )  # fmt: skip
+        except ModelError as error:
+            raise InputError(f"these recordings cannot be fitted: {error}") from error
+        smaller = fit.model.network
+        fits.append(fit)
+    # one count of independent samples for all, from the fit that left the least structure behind
+    correlation = max(1.0, min(fit.correlation for fit in fits))
+    scores = [_bic(fit, records, correlation) for fit in fits]
+    best = int(np.argmin(scores))
+    count, fit = counts[best], fits[best]
+    trials: list[BranchTrial] = []
+    if not alone:
+        trials = [
+            _trial(n, candidate, recordings, others, drive, score, chosen=n == count)
+            for n, candidate, score in zip(counts, fits, scores, strict=True)
+        ]
+        if intervals and method == "hybrid":
+            fit = add_intervals(records, fit, progress=progress)
+    compared = [compare(r, fit.model, "train", drive) for r in recordings]
+    validated = [compare(r, fit.model, "validation", drive) for r in others]
+    seconds = clock() - started
+    title = recordings[0].title or recordings[0].name
+    name = f"{title}, {count} branches" if count != 1 else f"{title}, 1 branch"
+    history = _history(fit, recordings, compared, validated, spring, drive, seconds)
+    path = save_model(out, name, fit.model, history, overwrite)
+    is_thesis_run = kind == "actuator" and any(c.row == "identification" for c in compared)
+    return IdentifyOutcome(
+        title=name,
+        kind=kind,
+        method=method,
+        fit=fit,
+        train=tuple(compared),
+        validation=tuple(validated),
+        trials=tuple(trials),
+        model_path=str(path),
+        seconds=seconds,
+        published_fit=PUBLISHED_FIT if is_thesis_run else None,
+    )
+
+
+def _bic(fit: Identification, records: Sequence[Record], correlation: float) -> float:
+    """Bayesian information criterion that counts correlated residuals as what they are worth."""
+    samples = sum(r.measured.size for r in records) / correlation
+    free = sum(e.free for e in fit.estimates)
+    return float(samples * math.log(fit.cost) + free * math.log(max(samples, 2.0)))
+
+
+def _trial(
+    count: int,
+    fit: Identification,
+    train: Sequence[Recording],
+    validation: Sequence[Recording],
+    drive: str,
+    bic: float,
+    chosen: bool,
+) -> BranchTrial:
+    fitted = [compare(r, fit.model, "train", drive) for r in train]
+    checked = [compare(r, fit.model, "validation", drive) for r in validation]
+    return BranchTrial(
+        branches=count,
+        train_rms=_pooled(fitted),
+        train_peak_pct=_mean_peak(fitted),
+        validation_rms=_pooled(checked) if checked else None,
+        validation_peak_pct=_mean_peak(checked) if checked else None,
+        bic=bic,
+        chosen=chosen,
+    )
+
+
+def _pooled(comparisons: Sequence[Comparison]) -> float:
+    """RMS over all files, each file counting the same."""
+    return math.sqrt(float(np.mean([c.errors.rms**2 for c in comparisons])))
+
+
+def _mean_peak(comparisons: Sequence[Comparison]) -> float:
+    return float(np.mean([c.errors.peak_pct for c in comparisons]))
+
+
+def _history(
+    fit: Identification,
+    recordings: Sequence[Recording],
+    train: Sequence[Comparison],
+    validation: Sequence[Comparison],
+    spring: str,
+    drive: str,
+    seconds: float,
+) -> dict[str, Any]:
+    """Where the model comes from, for its file."""
+    unit, scale = ("um", 1e6) if train[0].kind == "actuator" else ("kPa", 1e-3)
+
+    def figures(comparison: Comparison) -> dict[str, Any]:
+        return {
+            "name": comparison.name,
+            f"rms_{unit}": comparison.errors.rms * scale,
+            "nrmse_pct": comparison.errors.nrmse_pct,
+        }
+
+    return {
+        "method": fit.method,
+        "spring": spring,
+        "drive": drive,
+        "seconds": seconds,
+        "simulations": fit.simulations,
+        "mean_square_over_noise": fit.cost,
+        "residual_correlation_samples": fit.correlation,
+        "warnings": list(fit.warnings),
+        "train": [
+            {**figures(c), "sha256": r.sha256} for c, r in zip(train, recordings, strict=True)
+        ],
+        "validation": [figures(c) for c in validation],
+        "estimate": [
+            {
+                "name": e.name,
+                "unit": e.unit,
+                "value": e.value,
+                "low95": e.low if e.low > 0.0 else None,
+                "high95": e.high if math.isfinite(e.high) else None,
+                "determined": e.determined,
+                "note": e.note,
+            }
+            for e in fit.estimates
+        ],
+    }

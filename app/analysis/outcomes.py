@@ -1,0 +1,190 @@
+"""What identification, validation and diagnosis hand to terminal, JSON and report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dearig.errors import DearigError
+
+if TYPE_CHECKING:
+    # a report's words are needed by commands that fit nothing; these import SciPy
+    from dearig.model.diagnosis.results import Diagnosis
+    from dearig.model.fitting import Identification
+    from dearig.model.measures import Errors
+
+__all__ = [
+    "BranchTrial",
+    "Comparison",
+    "DiagnoseOutcome",
+    "IdentifyOutcome",
+    "Published",
+    "SeparatingExperiment",
+    "Stand",
+    "ValidateOutcome",
+    "pooled_noise",
+    "pooled_rms",
+]
+
+
+@dataclass(frozen=True)
+class Published:
+    """The thesis's own figures for one run, in per cent as printed."""
+
+    e_rms_pct: float
+    e_m_pct: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One recording beside a model of it.
+
+    ``kind`` is actuator (``drive`` in V, ``measured`` and ``model`` in m) or film (``drive`` is the
+    stretch, the others in Pa); all arrays are (N,) on ``time`` s, ``measured`` is NaN where a
+    reading must not be used. ``noise`` is the noise floor in
+    the measured unit, None where it could not be read. ``role`` is train or validation. ``table``
+    is A, B, or "" for a run that is in neither of the thesis's validation tables, ``row`` its label
+    there (f = 0.2 Hz).
+    """
+
+    name: str
+    kind: str
+    role: str
+    time: np.ndarray
+    drive: np.ndarray
+    measured: np.ndarray
+    model: np.ndarray
+    errors: Errors
+    noise: float | None
+    table: str = ""
+    row: str = ""
+    published: Published | None = None
+    warnings: tuple[str, ...] = field(default=())
+
+
+@dataclass(frozen=True)
+class BranchTrial:
+    """What one number of branches did: errors (Pa or m, and per cent of peak) pooled over files.
+
+    ``bic`` is the information criterion on the training data, by which the number is chosen;
+    validation plays no part in that choice.
+    """
+
+    branches: int
+    train_rms: float
+    train_peak_pct: float
+    validation_rms: float | None
+    validation_peak_pct: float | None
+    bic: float
+    chosen: bool
+
+
+@dataclass(frozen=True)
+class IdentifyOutcome:
+    """A finished identification: the fit, the training runs beside it, and validation if any."""
+
+    title: str
+    kind: str
+    method: str
+    fit: Identification
+    train: tuple[Comparison, ...]
+    validation: tuple[Comparison, ...]
+    trials: tuple[BranchTrial, ...]
+    model_path: str
+    seconds: float
+    published_fit: Published | None = None
+
+
+@dataclass(frozen=True)
+class ValidateOutcome:
+    """A finished validation: one comparison a recording."""
+
+    title: str
+    kind: str
+    model_name: str
+    model_path: str
+    comparisons: tuple[Comparison, ...]
+
+
+@dataclass(frozen=True)
+class Stand:
+    """One model beside all recordings: ``effects`` it has, and how it does on them.
+
+    ``train`` was fitted, ``validation`` was not seen by any fit or choice.
+    """
+
+    effects: tuple[str, ...]
+    train: tuple[Comparison, ...]
+    validation: tuple[Comparison, ...]
+
+
+@dataclass(frozen=True)
+class SeparatingExperiment:
+    """The sequence under which rival models differ most.
+
+    ``rivals`` are the labels of the models, ``separates`` their families. ``separation`` is the
+    smallest RMS difference between the predictions of any two of them, in noise floors; ``closest``
+    names those two. ``tried`` are all sequences with that number and their duration in s.
+    """
+
+    name: str
+    sequence: str
+    rivals: tuple[str, ...]
+    separates: tuple[str, ...]
+    separation: float
+    closest: tuple[str, str]
+    seconds: float
+    tried: tuple[tuple[str, float, float], ...]
+
+
+@dataclass(frozen=True)
+class DiagnoseOutcome:
+    """A finished (or interrupted) diagnosis, with its errors on recordings of either role.
+
+    ``stands`` are the baseline, the model after each step, and last the final one. ``noise`` is the
+    pooled noise floor of the training recordings in m or Pa. ``experiment`` separates what the data
+    do not; ``experiment_words`` says of it, or of why there is none. ``performed`` tells of the
+    experiments that were run on a rig, one sentence each. ``quality`` are sentences on recordings.
+    ``ended`` is why no more was recorded on the rig than was, None where all was.
+    """
+
+    title: str
+    kind: str
+    drive: str
+    finding: Diagnosis
+    stands: tuple[Stand, ...]
+    noise: float
+    experiment: SeparatingExperiment | None
+    experiment_words: str
+    quality: tuple[str, ...]
+    model_path: str
+    seconds: float
+    performed: tuple[str, ...] = ()
+    rig: str = ""
+    ended: DearigError | None = None
+
+    @property
+    def before(self) -> Stand:
+        """The baseline."""
+        return self.stands[0]
+
+    @property
+    def after(self) -> Stand:
+        """The final model."""
+        return self.stands[-1]
+
+
+def pooled_rms(comparisons: Sequence[Comparison]) -> float:
+    """RMS over all samples of all recordings, in m or Pa."""
+    samples = sum(c.errors.samples for c in comparisons)
+    return math.sqrt(sum(c.errors.rms**2 * c.errors.samples for c in comparisons) / samples)
+
+
+def pooled_noise(comparisons: Sequence[Comparison]) -> float | None:
+    """RMS of the noise floors that are known, in m or Pa; None where none is."""
+    floors = [c.noise for c in comparisons if c.noise is not None]
+    return math.sqrt(sum(n * n for n in floors) / len(floors)) if floors else None

@@ -1,0 +1,289 @@
+"""From recordings to the records that a fit takes, and back to comparisons with a model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from dearig.analysis.outcomes import Comparison, Published
+from dearig.analysis.quality import driven_by, inspect
+from dearig.config.presets import PRESETS, VALIDATION_A, VALIDATION_B
+from dearig.config.sequencefile import parse_sequence
+from dearig.errors import InputError
+from dearig.model.actuator import Actuator, Drive
+from dearig.model.denoise import quieted, reading_noise
+from dearig.model.errors import ModelError
+from dearig.model.excitation import Lobes
+from dearig.model.film import Strip
+from dearig.model.measures import errors
+from dearig.model.records import ActuatorRecord, FilmRecord, Record, counted, noise_of
+from dearig.recording.reader import open_recording
+from dearig.recording.recording import Recording
+from dearig.recording.rest_noise import MIN_QUIET, noise_floor
+
+__all__ = ["PUBLISHED_FIT", "as_record", "compare", "open_all"]
+
+#: What the thesis prints for its identification run.
+PUBLISHED_FIT = Published(2.13, 4.07)
+
+# Tables 4 and 5 of the thesis, by preset: e_rms and e_m in per cent, as printed
+_TABLE_4 = dict(
+    zip(
+        VALIDATION_A,
+        ((5.8484, 6.9696), (8.8924, 2.4462), (5.8952, 3.8678), (8.7797, 5.8924), (5.9604, 3.8877)),
+        strict=True,
+    )
+)
+_TABLE_5 = dict(
+    zip(
+        VALIDATION_B,
+        ((2.4729, 7.4374), (2.9408, 6.7550), (3.5766, 7.0148), (7.7592, 5.6113), (8.6652, 4.6098)),
+        strict=True,
+    )
+)
+
+
+def open_all(paths: Sequence[str | Path]) -> list[Recording]:
+    """Recordings at ``paths``, all of one kind.
+
+    Raises ``InputError`` for one that cannot be read, for a mixture of kinds, and for a file named
+    twice or beside a copy of it (its samples would count double).
+    """
+    named: set[Path] = set()
+    for path in paths:
+        where = Path(path).resolve()
+        if where in named:
+            raise InputError(f"{path} is named twice; each recording counts once")
+        named.add(where)
+    recordings = [open_recording(p) for p in paths]
+    seen: dict[str, Path] = {}
+    for recording in recordings:
+        if recording.sha256 in seen:
+            raise InputError(
+                f"{recording.path} is a copy of {seen[recording.sha256]}; each recording counts "
+                f"once: leave one of them out"
+            )
+        seen[recording.sha256] = recording.path
+    kinds = {r.kind for r in recordings}
+    if len(kinds) > 1:
+        words = ", ".join(f"{r.path} is of {_KIND_WORDS[r.kind]}" for r in recordings)
+        raise InputError(f"these recordings cannot be used together: {words}")
+    return recordings
+
+
+_THERMOMETER = 1.0  # s, over which a temperature is the mean: films do not warm faster
+
+_KIND_WORDS = {"actuator": "an actuator (voltage)", "film": "a film (stretch)"}
+
+
+def as_record(recording: Recording, drive: str = "command") -> Record:
+    """What a fit sees of a recording; ``drive`` is command or monitor, for actuators.
+
+    The noise comes from the quiet lead-in, or from second differences where there is none. Readings
+    that must not be used (see ``dearig.analysis.quality``) are masked, and replaced by a line
+    across them.
+    """
+    try:
+        if recording.kind == "film":
+            stretch, stress = _present(recording.stretch), _present(recording.nominal_stress)
+            _noise(stress)  # one that never changes has its own words
+            valid = inspect(recording, drive).valid
+            stress = _bridged(recording.time, stress, valid)
+            return FilmRecord(
+                recording.name, recording.time, stretch, stress, _noise(stress), valid
+            )
+        displacement = _present(recording.displacement)
+        noise = recording.noise_floor or _noise(displacement)
+        driven = recording_drive(recording, drive)
+        valid = inspect(recording, drive).valid
+        if valid is not None:
+            displacement = _bridged(recording.time, displacement, valid)
+            quiet = recording.quiet & valid
+            noise = noise_floor(recording.time[quiet], displacement[quiet]) or _noise(displacement)
+        return ActuatorRecord(
+            recording.name,
+            driven,
+            displacement,
+            noise,
+            recording.displacement_delay - recording.displacement_skew,
+            valid,
+            _lead_in(recording),
+            lag_error=recording.displacement_delay_error,
+        )
+    except ModelError as error:
+        raise InputError(f"{recording.path}: {error}") from error
+
+
+def _lead_in(recording: Recording) -> int:
+    """Samples from whose mean displacement is counted; 0 where that is within the noise."""
+    return recording.quiet_samples if recording.quiet_samples >= MIN_QUIET else 0
+
+
+def _bridged(time: np.ndarray, values: np.ndarray, valid: np.ndarray | None) -> np.ndarray:
+    """``values`` (N,) with a straight line across what is not ``valid``."""
+    if valid is None:
+        return values
+    return np.where(valid, values, np.interp(time, time[valid], values[valid]))
+
+
+def recording_drive(recording: Recording, drive: str) -> Drive:
+    """The voltage of a recording: what was commanded, or what the monitor read.
+
+    A voltage that was read, not commanded, is freed of the reading's noise. With a thermometer, the
+    temperature above that of the first second comes along, as a mean over a second.
+    """
+    voltage = driven_by(recording, drive)
+    warmth = None
+    if recording.temperature is not None:
+        start = recording.time < recording.time[0] + _THERMOMETER
+        samples = max(int(np.count_nonzero(start)), 1)
+        warmth = uniform_filter1d(recording.temperature, samples, mode="nearest")
+        warmth -= float(recording.temperature[start].mean())
+    try:
+        volts = _present(voltage)
+        noise = reading_noise(volts)
+        if noise > 0.0:
+            volts = quieted(volts, noise)
+        return Drive(recording.time, volts, recording.hold, warmth)
+    except ModelError as error:
+        raise InputError(f"{recording.path}: {error}") from error
+
+
+def _present(values: np.ndarray | None) -> np.ndarray:
+    if values is None:
+        raise ModelError("a channel that its kind needs is missing")
+    return values
+
+
+def _noise(values: np.ndarray) -> float:
+    noise = noise_of(values)
+    if noise > 0.0:
+        return noise
+    raise ModelError(
+        "the signal never changes, or on a straight line only: nothing can be learned from it; see "
+        "that the sensor was connected and the right column was imported"
+    )
+
+
+def compare(
+    recording: Recording,
+    model: Actuator | Strip,
+    role: str,
+    drive: str = "command",
+) -> Comparison:
+    """The recording beside what ``model`` says, with its errors.
+
+    Readings that must not be used are NaN in it, and no part of its errors. Raises ``InputError``
+    where model and recording are not of one kind, or where the model cannot follow the drive.
+    """
+    look = inspect(recording, drive, to_fit=False)
+    warnings = list(look.findings)
+    signal = recording.signal
+    usable = np.ones(signal.size, dtype=bool) if look.valid is None else look.valid
+    if recording.kind == "film":
+        if isinstance(model, Actuator):
+            raise InputError(
+                f"{recording.path} is of a film (stretch), and the model is of an actuator "
+                f"(voltage): validate it on recordings of the actuator, or identify a film model"
+            )
+        if recording.kinematics != model.kinematics:
+            warnings.append(
+                f"the film was held {recording.kinematics}, the model's {model.kinematics}"
+            )
+        stretch = _present(recording.stretch)
+        answer = replace(model, kinematics=recording.kinematics).simulate(recording.time, stretch)
+        if not answer.ok:
+            raise InputError(f"{recording.path}: the model cannot follow it: {answer.in_words}")
+        predicted, driven = answer.stress, stretch
+        try:
+            noise: float | None = _noise(signal[usable])
+        except ModelError as error:
+            raise InputError(f"{recording.path}: {error}") from error
+        table, row, published = "", "", None
+    else:
+        if not isinstance(model, Actuator):
+            raise InputError(
+                f"{recording.path} is of an actuator (voltage), and the model is of a bare film "
+                f"(stretch), which knows no load and no electrodes: validate it on recordings of "
+                f"films, or identify an actuator model"
+            )
+        warnings += _other_rig(recording, model)
+        drive_of = recording_drive(recording, drive)
+        lag = recording.displacement_delay - recording.displacement_skew
+        response = model.simulate(drive_of, lag)
+        if not response.ok:
+            raise InputError(f"{recording.path}: the model cannot follow it: {response.in_words}")
+        predicted = counted(response.displacement, _lead_in(recording))
+        quiet = recording.quiet & usable
+        driven, noise = drive_of.voltage, noise_floor(recording.time[quiet], signal[quiet])
+        table, row, published = _place(recording)
+    if not recording.complete:
+        warnings.append("the recording is incomplete: the run was interrupted or killed")
+    return Comparison(
+        name=recording.name,
+        kind=recording.kind,
+        role=role,
+        time=recording.time,
+        drive=driven,
+        measured=np.where(usable, signal, np.nan),
+        model=predicted,
+        errors=errors(signal[usable], predicted[usable]),
+        noise=noise,
+        table=table,
+        row=row,
+        published=published,
+        warnings=tuple(warnings),
+    )
+
+
+def _other_rig(recording: Recording, model: Actuator) -> list[str]:
+    """Sentences about a film or load in the recording that is not the model's."""
+    sentences = []
+    if recording.film is not None and recording.film != model.film:
+        sentences.append("the recording was made with another film than the model's")
+    if recording.load is not None and recording.load.mass != model.load.mass:
+        sentences.append(
+            f"the recording was made under {recording.load.mass * 1e3:g} g, the model is of "
+            f"{model.load.mass * 1e3:g} g"
+        )
+    return sentences
+
+
+def _place(recording: Recording) -> tuple[str, str, Published | None]:
+    """Table, row and printed figures of a run that the thesis made too."""
+    elsewhere = ("", recording.name, None)
+    if not recording.sequence_toml:
+        return elsewhere
+    try:
+        played = _lobes(recording.sequence_toml, recording.name)
+    except InputError:
+        return elsewhere  # a sequence with a CSV that is not here: not one of the thesis's
+    return elsewhere if played is None else _thesis_runs().get(played, elsewhere)
+
+
+@cache
+def _thesis_runs() -> Mapping[Lobes, tuple[str, str, Published | None]]:
+    """Table, row and printed figures of the thesis's runs, by one period of their lobes."""
+    places: dict[str, tuple[str, str, Published | None]] = {
+        "thesis": ("", "identification", PUBLISHED_FIT)
+    }
+    for preset, frequency in VALIDATION_A.items():
+        places[preset] = ("A", f"f = {frequency:g} Hz", Published(*_TABLE_4[preset]))
+    for preset, amplitude in VALIDATION_B.items():
+        places[preset] = ("B", f"a = {amplitude:g} kV", Published(*_TABLE_5[preset]))
+    runs = {_lobes(PRESETS[preset], preset): place for preset, place in places.items()}
+    return {lobes: place for lobes, place in runs.items() if lobes is not None}
+
+
+def _lobes(toml: str, name: str) -> Lobes | None:
+    """One period of a sequence that is nothing but the thesis's lobes; None for any other."""
+    segments = parse_sequence(toml, name, Path()).sequence.segments
+    if len(segments) == 1 and isinstance(segments[0], Lobes):
+        # one period, so that runs of any length compare equal
+        return replace(segments[0], periods=1)
+    return None

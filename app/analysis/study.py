@@ -1,0 +1,216 @@
+"""A fit or a diagnosis in a folder of its own: model and report, and the residual to look at."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from dearig.analysis.compatibility import of_rig
+from dearig.analysis.diagnose import diagnose_recordings
+from dearig.analysis.identify import identify_recordings
+from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome
+from dearig.analysis.residual import even, spectrum
+from dearig.config.rigfile import RigFile
+from dearig.errors import InputError
+from dearig.model.diagnosis.results import Dependence, MissingStress, Signature
+from dearig.progress import Progress, quiet
+from dearig.recording.files import in_words, replaced_when_done
+from dearig.recording.reader import open_recording
+
+__all__ = ["Residual", "Study", "Task", "Trace", "study"]
+
+#: More studies than this in one folder are a mistake.
+_STUDIES_MAX = 10_000
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is to be done with which recordings.
+
+    ``diagnose`` or else identify, with Maxwell ``branches``, a ``spring`` (for identify) and
+    ``drive`` command or monitor. ``train`` are fitted, ``validation`` read once at the end.
+    ``limits`` is the rig file within whose limits an experiment is proposed; film and load are
+    those of the recordings.
+    """
+
+    diagnose: bool
+    train: tuple[Path, ...]
+    validation: tuple[Path, ...]
+    branches: int = 3
+    spring: str = "gent"
+    drive: str = "command"
+    limits: RigFile | None = None
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A curve with its name, in SI units."""
+
+    name: str
+    x: np.ndarray
+    y: np.ndarray
+
+
+@dataclass(frozen=True)
+class Residual:
+    """What is left of one recording, first with the thesis's model and then with what was found.
+
+    ``over_time`` (measured less model, m or Pa) and ``density`` (its amplitude density per root Hz)
+    have one trace each, or two. ``noise`` is the floor of one reading and ``floor`` its density.
+    ``dependences`` and ``missing`` are of a diagnosis, before and after.
+    """
+
+    name: str
+    kind: str
+    noise: float | None
+    floor: float | None
+    over_time: tuple[Trace, ...]
+    density: tuple[Trace, ...]
+    dependences: tuple[tuple[Dependence, ...], ...] = ()
+    missing: tuple[MissingStress, ...] = ()
+    words: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Study:
+    """What came of a task: the outcome, the residual of every fitted recording, and the files."""
+
+    task: Task
+    outcome: IdentifyOutcome | DiagnoseOutcome
+    residuals: tuple[Residual, ...]
+    model: Path
+    report: Path
+
+
+def study(
+    task: Task,
+    folder: Path,
+    write_report: Callable[[IdentifyOutcome | DiagnoseOutcome, Path], object],
+    *,
+    clock: Callable[[], float] = time.monotonic,
+    progress: Progress = quiet,
+) -> Study:
+    """Do ``task`` in a new folder within ``folder``: study-1, study-2, ...
+
+    ``write_report`` makes the page that lies beside the model. A first ctrl-C during a diagnosis
+    keeps what had been found. Raises ``InputError`` for what cannot be done; the folder is made
+    only when there is something to put into it.
+    """
+    if not task.train:
+        raise InputError("no recording was chosen to fit; choose one or more")
+    if not (folder.is_dir() and os.access(folder, os.W_OK)):
+        raise InputError(f"{folder} cannot be written to; choose another folder for the results")
+    found: IdentifyOutcome | DiagnoseOutcome
+    # elsewhere until it is done: who ends it by force finds nothing half made beside the recordings
+    with TemporaryDirectory() as scratch:
+        made = Path(scratch) / "model.toml"
+        if task.diagnose:
+            found = diagnose_recordings(
+                task.train, validation=task.validation, model_out=made, branches=task.branches,
+                drive=task.drive, rig_file=_rig_of(task), clock=clock, progress=progress,
+            )  # fmt: skip
+        else:
+            found = identify_recordings(
+                task.train, made, validation=task.validation, branches=(task.branches,),
+                spring=task.spring, drive=task.drive, clock=clock, progress=progress,
+            )  # fmt: skip
+        where = _new_folder(folder)
+        model, report = where / "model.toml", where / "report.html"
+        with replaced_when_done(model) as partial:
+            shutil.copyfile(made, partial)
+    found = replace(found, model_path=str(model))
+    progress("report", 1.0)
+    write_report(found, report)
+    if isinstance(found, DiagnoseOutcome):
+        return Study(task, found, _diagnosed(found), model, report)
+    residuals = tuple(_compared(c) for c in (*found.train, *found.validation))
+    return Study(task, found, residuals, model, report)
+
+
+def _new_folder(folder: Path) -> Path:
+    """A folder that nobody else has: study-1, or the next that is free."""
+    where = folder
+    try:
+        for number in range(1, _STUDIES_MAX):
+            where = folder / f"study-{number}"
+            try:
+                where.mkdir()
+            except FileExistsError:
+                continue
+            return where
+    except OSError as error:
+        raise InputError(f"{where} cannot be made: {in_words(error)}") from error
+    raise InputError(
+        f"{folder} holds {_STUDIES_MAX} studies; choose another folder for the results"
+    )
+
+
+def _rig_of(task: Task) -> RigFile | None:
+    """The limits of the rig with the film and load of the recordings, as far as they name any."""
+    if task.limits is None:
+        return None
+    for path in task.train:
+        recording = open_recording(path)
+        if recording.film is not None and recording.load is not None:
+            return of_rig(task.limits, recording.film, recording.load)
+    return task.limits
+
+
+def _diagnosed(outcome: DiagnoseOutcome) -> tuple[Residual, ...]:
+    finding = outcome.finding
+    found = []
+    for before in finding.before:
+        changed = bool(finding.steps)
+        both = [before, *(_of(finding.after, before.record) if changed else [])]
+        missing = [
+            *_of(finding.missing_before, before.record),
+            *(_of(finding.missing_after, before.record) if changed else []),
+        ]
+        found.append(
+            Residual(
+                name=before.record,
+                kind=outcome.kind,
+                noise=before.noise,
+                floor=float(np.sqrt(before.floor_density)),
+                over_time=tuple(Trace("", s.time, s.residual) for s in both),
+                density=tuple(_density(s) for s in both),
+                dependences=tuple(s.dependences for s in both),
+                missing=tuple(missing),
+                words=before.words,
+            )
+        )
+    return tuple(found)
+
+
+def _of(found: Sequence, record: str) -> list:
+    return [item for item in found if item.record == record]
+
+
+def _density(signature: Signature) -> Trace:
+    positive = (signature.frequency > 0.0) & (signature.density > 0.0)
+    return Trace("", signature.frequency[positive], np.sqrt(signature.density[positive]))
+
+
+def _compared(comparison: Comparison) -> Residual:
+    good = np.isfinite(comparison.measured)
+    time_ = comparison.time[good]
+    left = comparison.measured[good] - comparison.model[good]
+    step, evenly = even(time_, left)
+    noise = comparison.noise
+    return Residual(
+        name=comparison.name,
+        kind=comparison.kind,
+        noise=noise,
+        # white noise of this size at this rate
+        floor=None if noise is None else noise * float(np.sqrt(2.0 * step)),
+        over_time=(Trace("", time_, left),),
+        density=(Trace("", *spectrum(step, evenly)),),
+        words=comparison.warnings,
+    )

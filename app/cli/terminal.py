@@ -1,0 +1,303 @@
+"""What the terminal shows of an outcome, and of the work towards it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rich.box import SIMPLE_HEAD, Box
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
+from rich.measure import Measurement
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from dearig.report.as_json import diagnosis_json, outcome_json, write_json
+from dearig.report.diagnosis import (
+    before_after,
+    effect_table,
+    experiment_table,
+    headline,
+    ranking,
+    road,
+    summary,
+    thesis_before_after,
+    warnings,
+)
+from dearig.report.numbers import plain
+from dearig.report.tables import (
+    Table,
+    branch_trials,
+    by_thesis_table,
+    error_table,
+    parameter_table,
+    thesis_error_table,
+)
+from dearig.report.words import identify_summary, listed, validate_summary, warnings_of
+
+if TYPE_CHECKING:
+    from dearig.analysis.outcomes import (
+        Comparison,
+        DiagnoseOutcome,
+        IdentifyOutcome,
+        Published,
+        ValidateOutcome,
+    )
+
+__all__ = [
+    "branch_table",
+    "diagnosis_json",
+    "diagnosis_tables",
+    "identify_table",
+    "outcome_json",
+    "progress",
+    "validate_tables",
+    "write_json",
+]
+
+_NAME_MAX = 28  # of a row; longer names are cut in the middle, where they differ least
+_GAP = 2  # between columns
+# rich's own substitute on such terminals is full of vertical bars
+_ASCII_HEAD = Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
+
+
+# ---------------------------------------------------------------- tables
+
+
+def identify_table(outcome: IdentifyOutcome) -> RenderableType:
+    """What an identification found: in sentences, then its parameters, then its errors.
+
+    How other numbers of branches did is ``branch_table``'s to show.
+    """
+    published = outcome.published_fit if len(outcome.train) == 1 else None
+    return _Fitted(
+        [
+            *identify_summary(outcome),
+            parameter_table(outcome.fit),
+            *_errors("Training", outcome.train, published),
+            *_grouped("Validation", outcome.validation),
+        ],
+        warnings_of(outcome),
+    )
+
+
+def validate_tables(outcome: ValidateOutcome) -> RenderableType:
+    """Errors of every recording, beside the thesis's Tables 4 and 5 where it belongs to them."""
+    return _Fitted(
+        [*validate_summary(outcome), *_grouped("By recording", outcome.comparisons)],
+        warnings_of(outcome),
+    )
+
+
+def branch_table(outcome: IdentifyOutcome) -> RenderableType:
+    """What each number of branches did; nothing where only one was tried."""
+    if not outcome.trials:
+        return Group()
+    return _Fitted([branch_trials(outcome.trials, outcome.kind)], ())
+
+
+_RANKED = 6  # candidates of a round that a terminal shows
+
+
+def diagnosis_tables(outcome: DiagnoseOutcome) -> RenderableType:
+    """The verdict in words, errors before and after, what was found, and what was tried."""
+    finding = outcome.finding
+    pieces: list[_Piece] = [f"{headline(finding)}.", *summary(outcome)]
+    for heading, before, after in (
+        ("Untouched recordings", outcome.before.validation, outcome.after.validation),
+        ("Training recordings", outcome.before.train, outcome.after.train),
+    ):
+        if before and after:
+            pieces.append(before_after(heading, before, after, outcome.kind))
+            theirs = f"{heading}, by the thesis's formulas"
+            pieces.append(thesis_before_after(theirs, before, after, outcome.kind))
+    pieces.append(road(outcome))
+    if finding.steps:
+        pieces.append(effect_table(outcome))
+    for found in finding.rounds:
+        table = ranking(found, _RANKED)
+        pieces.append(table if table.rows else f"{table.title}: {table.note}")
+    experiments = experiment_table(outcome)
+    if experiments is not None:
+        pieces.append(experiments)
+    return _Fitted(pieces, warnings(outcome))
+
+
+def _grouped(alone: str, comparisons: tuple[Comparison, ...]) -> list[_Piece]:
+    pieces: list[_Piece] = []
+    for title, members in by_thesis_table(comparisons, alone):
+        pieces += _errors(title, members, None)
+    return pieces
+
+
+def _errors(
+    title: str, comparisons: tuple[Comparison, ...], published: Published | None
+) -> list[_Piece]:
+    ours = error_table(title, comparisons)
+    theirs = thesis_error_table("By the thesis's formulas, in %", comparisons, published)
+    return [ours] if theirs is None else [(ours, theirs)]
+
+
+#: A sentence, a table, or two tables that become one where the terminal is wide enough.
+_Piece = str | Table | tuple[Table, Table]
+
+
+class _Fitted:
+    """Pieces laid out once it is known how wide the terminal is and what it can show."""
+
+    def __init__(self, pieces: list[_Piece], warnings: tuple[str, ...]) -> None:
+        self._pieces = pieces
+        self._warnings = warnings
+
+    def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Measurement:
+        return Measurement(min(20, options.max_width), options.max_width)
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        show = plain if options.ascii_only else str
+        width = options.max_width
+        for i, piece in enumerate(self._pieces):
+            if isinstance(piece, str):
+                yield Text(show(piece))
+                continue
+            if i:
+                yield Text()
+            if isinstance(piece, Table):
+                yield from _laid_out(piece, show, width)
+                continue
+            joined = piece[0].beside(_in_per_cent(piece[1]))
+            if _width(joined, show) <= width:
+                yield from _laid_out(joined, show, width)
+            else:
+                yield from _laid_out(piece[0], show, width)
+                yield Text()
+                yield from _laid_out(piece[1], show, width)
+        if self._warnings:
+            yield Text()
+        for warning in self._warnings:
+            yield Text(show(f"Warning: {warning}"), style="yellow")
+
+
+def _in_per_cent(table: Table) -> Table:
+    """The same table with the unit in its head, for where its title is lost."""
+    head = tuple((name, f"% {unit}" if unit else "") for name, unit in table.head)
+    return Table(table.title, head, table.rows, table.note)
+
+
+def _laid_out(table: Table, show: Callable[[str], str], width: int) -> Iterator[RenderableType]:
+    yield Text(show(table.title), style="bold")
+    widths = _widths(table, show)
+    if _width(table, show) > width:
+        yield from _listed(table, show)
+    else:
+        grid = RichTable(
+            box=_ASCII_HEAD if show is plain else SIMPLE_HEAD,
+            show_edge=False, pad_edge=False, padding=(0, _GAP - 1, 0, 0), header_style="",
+        )  # fmt: skip
+        for i, (name, unit) in enumerate(table.head):
+            grid.add_column(
+                Text(show(f"{name}\n{unit}".strip("\n"))),
+                justify="right" if i else "left",
+                no_wrap=True,
+                min_width=widths[i],
+                vertical="bottom",
+            )
+        for row in table.rows:
+            cells = [show(_cut(row.cells[0])), *(show(c) for c in row.cells[1:])]
+            look = "dim" if row.muted else "bold" if row.mark else ""
+            grid.add_row(*(Text(c) for c in cells), style=look)
+        yield grid
+    details: dict[str, list[str]] = {}
+    for row in table.rows:
+        if row.detail:
+            details.setdefault(row.detail, []).append(row.cells[0])
+    lines = [f"{listed(names)}: {detail}" for detail, names in details.items()]
+    for line in (*lines, *([table.note] if table.note else [])):
+        yield Text(show(line), style="dim")
+
+
+def _listed(table: Table, show: Callable[[str], str]) -> Iterator[RenderableType]:
+    """A table too wide for the terminal, as one line for each row, to be wrapped."""
+    for row in table.rows:
+        cells = [
+            " ".join(part for part in (*head, cell) if part)
+            for head, cell in zip(table.head[1:], row.cells[1:], strict=True)
+            if cell
+        ]
+        text = show(f"{row.cells[0]}: {'; '.join(cells)}")
+        yield Text(text, style="dim" if row.muted else "bold" if row.mark else "")
+
+
+def _widths(table: Table, show: Callable[[str], str]) -> list[int]:
+    widths = [max(len(show(name)), len(show(unit))) for name, unit in table.head]
+    for row in table.rows:
+        cells = (_cut(row.cells[0]), *row.cells[1:])
+        widths = [max(w, Text(show(c)).cell_len) for w, c in zip(widths, cells, strict=True)]
+    return widths
+
+
+def _width(table: Table, show: Callable[[str], str]) -> int:
+    widths = _widths(table, show)
+    return sum(widths) + _GAP * (len(widths) - 1)
+
+
+def _cut(name: str) -> str:
+    if len(name) <= _NAME_MAX:
+        return name
+    half = (_NAME_MAX - 1) // 2
+    return f"{name[:half]}\N{HORIZONTAL ELLIPSIS}{name[len(name) - (_NAME_MAX - 1 - half) :]}"
+
+
+# ---------------------------------------------------------------- progress
+
+
+@contextmanager
+def progress(
+    description: str, console: Console | None = None, whole: bool = False
+) -> Iterator[Callable[[str, float], None]]:
+    """A progress bar on standard error while the body runs.
+
+    Gives a callback ``(stage, fraction)`` with the fraction of that stage that is done; the bar
+    starts anew with every stage, the time elapsed does not. With ``whole`` the fraction is of all
+    the work, and the bar only changes its words. Where standard error is no terminal, nothing is
+    written.
+    """
+    console = Console(stderr=True) if console is None else console
+    if not console.is_terminal:
+        yield _unseen
+        return
+    bar = Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=None),
+        TextColumn("{task.percentage:>3.0f} %", markup=False),
+        TimeElapsedColumn(),
+        TextColumn("left", markup=False),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+        expand=True,
+    )
+    task = bar.add_task(description, total=1.0)
+    current = ""
+
+    def report(stage: str, fraction: float) -> None:
+        nonlocal current
+        done = min(max(fraction, 0.0), 1.0) if math.isfinite(fraction) else 0.0
+        if stage != current and whole:
+            current = stage
+            bar.update(task, description=f"{description}: {stage}")
+        elif stage != current:
+            # a new stage has another speed, by which the remaining time is reckoned
+            current = stage
+            began = bar.tasks[0].start_time
+            bar.reset(task, total=1.0, description=f"{description}: {stage}")
+            bar.tasks[0].start_time = began
+        bar.update(task, completed=done)
+
+    with bar:
+        yield report
+
+
+def _unseen(stage: str, fraction: float) -> None:
+    """Progress that nobody watches."""

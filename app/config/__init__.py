@@ -1,0 +1,1 @@
+"""Files that a person keeps: rig, sequence and model files, and the named sequences."""

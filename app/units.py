@@ -1,0 +1,63 @@
+"""In which unit each quantity is shown."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from types import MappingProxyType
+
+__all__ = ["SHOWN", "Shown", "parameter_unit", "readable"]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How one kind of recording is shown: factors from SI, and the names and units they lead to.
+
+    ``suffix`` is the unit of errors as it ends a key in JSON (``rms_um``).
+    """
+
+    drive: str
+    drive_factor: float
+    drive_unit: str
+    quantity: str
+    factor: float
+    unit: str
+    error_factor: float
+    error_unit: str
+    suffix: str
+
+    @property
+    def drive_label(self) -> str:
+        """Axis label of the drive."""
+        return f"{self.drive} ({self.drive_unit})" if self.drive_unit else self.drive
+
+    @property
+    def label(self) -> str:
+        """Axis label of the measured quantity."""
+        return f"{self.quantity} ({self.unit})"
+
+    @property
+    def error_label(self) -> str:
+        """Axis label of the error."""
+        return f"Error ({self.error_unit})"
+
+
+#: By the kind of recording: actuator (V to m) or film (stretch to Pa).
+SHOWN = MappingProxyType(
+    {
+        "actuator": Shown(
+            "Voltage", 1e-3, "kV", "Displacement", 1e3, "mm", 1e6, "\N{MICRO SIGN}m", "um"
+        ),
+        "film": Shown("Stretch", 1.0, "", "Nominal stress", 1e-3, "kPa", 1e-3, "kPa", "kPa"),
+    }
+)
+
+
+def parameter_unit(unit: str) -> tuple[float, str]:
+    """``(factor, unit)`` in which a parameter of SI ``unit`` is shown to people."""
+    return (1e-3, "kPa") if unit == "Pa" else (1.0, unit)
+
+
+def readable(text: str) -> str:
+    """``text`` with the sign of the micrometre, which the model does without."""
+    return re.sub(r"(?<=\d) um\b", " \N{MICRO SIGN}m", text)

@@ -1,0 +1,185 @@
+"""What is behind the card's terminals: amplifier, film and laser, wired as the rig file says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from pydantic import Field
+
+from dearig.drivers.channels import COUNT_MAX
+from dearig.drivers.settings import RigSettings
+from dearig.sim_backend.card import Card
+from dearig.sim_backend.daqmx.tasks import AnalogInput
+from dearig.sim_backend.faults import FaultPlan
+from dearig.sim_backend.plant import Plant
+from dearig.sim_backend.signal_path import PathState, SignalPath
+from dearig.sim_backend.streams import Streams
+
+__all__ = ["OUTPUT_MONITOR", "Behind"]
+
+#: The card's internal way from its output back to its inputs.
+OUTPUT_MONITOR = "_{}_vs_aognd"
+
+
+class _TaskSettings(RigSettings):
+    """The rig as a task converts it: each of its inputs ``conversions`` s after the tick."""
+
+    conversions: tuple[float, ...] = Field(default=())
+
+    def skew(self, place: int) -> float:
+        """Time in s from the tick to the conversion of the rig's input in ``place``."""
+        return self.conversions[place] if self.conversions else super().skew(place)
+
+
+class Behind:
+    """The instruments of ``settings``, the film ``plant`` at rest, noise of ``noise_seed``."""
+
+    def __init__(
+        self, settings: RigSettings, plant: Plant, noise_seed: tuple[int, ...], faults: FaultPlan
+    ) -> None:
+        self._settings = settings
+        self._plant = plant
+        self._streams = Streams(noise_seed)
+        self._faults = faults
+        self._output = Card(settings, self._streams).channels[0].scaling
+        self._names = {t: n for n, t in settings.terminals().items() if n != "voltage_command"}
+        self._monitor = OUTPUT_MONITOR.format(settings.card.ao_command)
+        laser = settings.laser
+        self._laser_at_rest = laser.direction * laser.rest_position_mm / laser.mm_per_V
+        self.zero = int(self._output.counts(np.zeros(1))[0])
+
+    def warm_up(self) -> None:
+        """Compute two samples: the kernels are compiled now, not while somebody waits for 0 V."""
+        rate = self._settings.card.sample_rate_Hz
+        wired = [t for n, t in self._settings.terminals().items() if n != "voltage_command"]
+        inputs = [AnalogInput(t, t, (-10.0, 10.0), 10.0, 0) for t in wired]
+        skews = [self._settings.skew(place) for place in range(len(inputs))]
+        path, state = self.run(0, rate, inputs, skews)
+        path.advance(0, np.full(2, self.zero, dtype=np.int16), state)
+
+    def film_voltage(self, counts: int) -> float:
+        """Voltage in V at the film for ``counts`` on the output, with the amplifier enabled."""
+        limit = self._settings.amplifier.range_kV * 1e3
+        held = float(self._output.physical(np.array([counts], dtype=np.int16))[0])
+        return min(max(held, -limit), limit)
+
+    def output_volts(self, counts: int) -> float:
+        """Voltage in V at the output's terminal."""
+        return counts * self._settings.card.ao_range_V / (COUNT_MAX + 1)
+
+    def coefficients(self, channel: AnalogInput) -> tuple[float, ...]:
+        """V over counts, lowest power first, that scale what ``channel`` delivers."""
+        name = self._names.get(channel.terminal)
+        if name is None:
+            return (0.0, channel.range / (COUNT_MAX + 1), 0.0, 0.0)
+        card = self._card([channel])
+        return next(c.scaling.coefficients for c in card.channels if c.name == name)
+
+    def run(
+        self, number: int, rate: float, inputs: Sequence[AnalogInput], skews: Sequence[float]
+    ) -> tuple[SignalPath, PathState]:
+        """The way of the samples of run ``number`` at ``rate`` Hz, and the state before them.
+
+        ``skews`` are the times in s from the tick to the conversion of each of ``inputs``.
+        """
+        at = dict(zip((c.terminal for c in inputs), skews, strict=True))
+        wired = self._settings.terminals()
+        settings = self._as_converted(
+            inputs,
+            # what the task does not read is converted at any time
+            tuple(at.get(wired[n], skews[0]) for n in self._settings.channel_names[1:]),
+        )
+        card = Card(settings, self._streams)
+        path = SignalPath(settings, card, self._streams, number, rate, self._faults)
+        return path, path.start(self._plant)
+
+    def laser_reading(self, counts: np.ndarray, inputs: Sequence[AnalogInput]) -> tuple[int, float]:
+        """Last reading of the laser's input in the rig's ``counts`` (channels, n), and range."""
+        ranges = [c.range for c in inputs if c.terminal == self._settings.card.ai_displacement]
+        limit = ranges[0] if ranges else self._settings.card.range_displacement_V
+        return int(counts[self._settings.channel_names.index("displacement"), -1]), limit
+
+    def as_read(
+        self, counts: np.ndarray, output: np.ndarray, inputs: Sequence[AnalogInput]
+    ) -> np.ndarray:
+        """Counts (inputs, n) of a task from the rig's ``counts`` (channels, n).
+
+        ``output`` (n,) are the counts that stood on the output; an input without a wire reads 0.
+        """
+        rows = {name: i for i, name in enumerate(self._settings.channel_names)}
+        read = np.zeros((len(inputs), counts.shape[1]), dtype=np.int16)
+        for row, channel in zip(read, inputs, strict=True):
+            name = self._names.get(channel.terminal)
+            if name is not None:
+                row[:] = counts[rows[name]]
+            elif channel.terminal == self._monitor:
+                row[:] = self._returned(output, channel)
+        return read
+
+    def still(
+        self,
+        inputs: Sequence[AnalogInput],
+        samples: int,
+        reading: int,
+        film: float,
+        output: int,
+        laser: tuple[int, float] | None,
+    ) -> np.ndarray:
+        """Counts (inputs, samples) of reading number ``reading`` of a rig on which nothing moves.
+
+        ``film`` V stands at the film, ``output`` counts on the output. ``laser`` is what its input
+        read last, in counts, and the range then; None: the film is at rest.
+        """
+        amplifier = self._settings.amplifier
+        noise = self._streams.before_run("card", reading).standard_normal((2, samples))
+        noise *= amplifier.monitor_noise_mV * 1e-3
+        volts: Mapping[str, np.ndarray] = {
+            "voltage_monitor": film * 1e-3 * amplifier.monitor_V_per_kV + noise[0],
+            "current_monitor": noise[1],
+            "displacement": np.full(samples, self._laser_volts(laser)),
+            "temperature": np.full(samples, self._room()),
+        }
+        card = self._card(inputs)
+        read = np.zeros((len(inputs), samples), dtype=np.int16)
+        for row, channel in zip(read, inputs, strict=True):
+            name = self._names.get(channel.terminal)
+            if name is not None:
+                row[:] = card.convert(name, volts[name])
+            elif channel.terminal == self._monitor:
+                row[:] = self._returned(np.full(samples, output, dtype=np.int16), channel)
+        return read
+
+    def _returned(self, output: np.ndarray, channel: AnalogInput) -> np.ndarray:
+        scale = self._settings.card.ao_range_V / channel.range
+        return np.clip(np.rint(output * scale), -COUNT_MAX - 1, COUNT_MAX).astype(np.int16)
+
+    def _laser_volts(self, last: tuple[int, float] | None) -> float:
+        if last is None:
+            return self._laser_at_rest
+        counts, limit = last
+        terminal = self._settings.card.ai_displacement
+        channel = AnalogInput("", terminal, (-limit, limit), limit, 0)
+        return float(np.polynomial.polynomial.polyval(counts, self.coefficients(channel)))
+
+    def _room(self) -> float:
+        thermometer = self._settings.thermometer
+        if thermometer is None:
+            return 0.0
+        return (thermometer.room_celsius - thermometer.celsius_at_0_V) / thermometer.celsius_per_V
+
+    def _card(self, inputs: Sequence[AnalogInput]) -> Card:
+        return Card(self._as_converted(inputs, ()), self._streams)
+
+    def _as_converted(
+        self, inputs: Sequence[AnalogInput], conversions: tuple[float, ...]
+    ) -> _TaskSettings:
+        """The settings with the ranges of ``inputs``, which a task may choose for itself."""
+        ranges = {
+            f"range_{self._names[c.terminal]}_V": c.range
+            for c in inputs
+            if c.terminal in self._names
+        }
+        card = self._settings.card.model_copy(update=ranges)
+        parts = {name: getattr(self._settings, name) for name in RigSettings.model_fields}
+        return _TaskSettings.model_construct(**{**parts, "card": card, "conversions": conversions})

@@ -1,0 +1,200 @@
+"""Compiled loops of the stages that remember: they take numbers and arrays, and call nobody."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from dearig.model.jit import allocating, jit
+
+__all__ = ["lag_voltage", "limit_slew", "low_pass", "moving_average", "polarise", "sway"]
+
+
+@jit
+def polarise(
+    time: np.ndarray,
+    voltage: np.ndarray,
+    shares: np.ndarray,
+    times: np.ndarray,
+    slow: np.ndarray,
+    effective: np.ndarray,
+) -> None:
+    """Voltage (N,) V whose square is voltage times polarisation, held from node to node.
+
+    ``slow`` (m,) V are the relaxing parts, with ``shares`` (m,) of the polarisation and relaxation
+    ``times`` (m,) s, carried in place up to the last node. Each is averaged over its interval.
+    """
+    nodes = time.shape[0]
+    share = 0.0
+    for i in range(shares.shape[0]):
+        share += shares[i]
+    for k in range(nodes):
+        v = voltage[k]
+        polarisation = (1.0 - share) * v
+        last = k == nodes - 1
+        interval = 0.0 if last else time[k + 1] - time[k]
+        for i in range(shares.shape[0]):
+            gap = slow[i] - v
+            if last:
+                polarisation += shares[i] * slow[i]
+            else:
+                left = -math.expm1(-interval / times[i])
+                polarisation += shares[i] * (v + gap * left * times[i] / interval)
+                slow[i] = v + gap * (1.0 - left)
+        effective[k] = math.copysign(math.sqrt(max(v * polarisation, 0.0)), v)
+
+
+@jit
+def limit_slew(
+    time: np.ndarray, voltage: np.ndarray, slew: float, output: float, effective: np.ndarray
+) -> float:
+    """Follow ``voltage`` (N,) V at no more than ``slew`` V/s from ``output``, which is returned.
+
+    ``effective`` (N,) V is the root mean square of the straight course in each interval.
+    """
+    nodes = time.shape[0]
+    for k in range(nodes - 1):
+        reach = slew * (time[k + 1] - time[k])
+        end = min(max(voltage[k], output - reach), output + reach)
+        square = (output * output + output * end + end * end) / 3.0
+        effective[k] = math.copysign(math.sqrt(square), output + end)
+        output = end
+    effective[nodes - 1] = output
+    return output
+
+
+@jit
+def lag_voltage(
+    time: np.ndarray,
+    voltage: np.ndarray,
+    frequency: float,
+    damping: float,
+    state: np.ndarray,
+    effective: np.ndarray,
+) -> None:
+    """Follow ``voltage`` (N,) V, held, by y'' + 2 d w y' + w^2 (y - v) = 0 with d below 1.
+
+    ``state`` (2,) is y V and y' V/s, carried in place; ``effective`` (N,) V the mean of y at both
+    ends of each interval.
+    """
+    nodes = time.shape[0]
+    sigma = damping * frequency
+    omega = frequency * math.sqrt(1.0 - damping * damping)
+    for k in range(nodes - 1):
+        h = time[k + 1] - time[k]
+        gap, slope = state[0] - voltage[k], state[1]
+        decay, c, s = math.exp(-sigma * h), math.cos(omega * h), math.sin(omega * h)
+        b = (slope + sigma * gap) / omega
+        end = voltage[k] + decay * (gap * c + b * s)
+        effective[k] = 0.5 * (state[0] + end)
+        state[1] = decay * ((b * omega - sigma * gap) * c - (gap * omega + sigma * b) * s)
+        state[0] = end
+    effective[nodes - 1] = state[0]
+
+
+@jit
+def low_pass(time: np.ndarray, rows: np.ndarray, tau: float, state: np.ndarray) -> None:
+    """Pass ``rows`` (2, N), position and velocity, through two equal lags of ``tau`` s, in place.
+
+    The input runs straight between nodes. ``state`` (2,) m holds both lags, carried in place.
+    """
+    first, second = state[0], state[1]
+    before = rows[0, 0]
+    for k in range(time.shape[0]):
+        if k > 0:
+            h = time[k] - time[k - 1]
+            left = math.exp(-h / tau)
+            x = rows[0, k]
+            slope = (x - before) / h
+            start = first
+            first = x - tau * slope + (first - before + tau * slope) * left
+            slope_2 = (first - start) / h
+            second = first - tau * slope_2 + (second - start + tau * slope_2) * left
+            before = x
+        rows[0, k] = second
+        rows[1, k] = (first - second) / tau
+    state[0], state[1] = first, second
+
+
+@jit
+def moving_average(
+    time: np.ndarray, rows: np.ndarray, first: int, window: float, out: np.ndarray
+) -> None:
+    """Mean of the cubic through ``rows`` (2, N) over the last ``window`` s at nodes from ``first``.
+
+    Before node 0 the film stood still where it was there. Fills ``out`` (2, N - first).
+    """
+    j = 0
+    for k in range(first, time.shape[0]):
+        begin = time[k] - window
+        while j < k and time[j + 1] <= begin:
+            j += 1
+        total = 0.0
+        if begin <= time[0]:
+            oldest = rows[0, 0]
+            total += (time[0] - begin) * oldest
+            low = 0
+        else:
+            h = time[j + 1] - time[j]
+            u = (begin - time[j]) / h
+            x0, v0 = rows[0, j], rows[1, j] * h
+            rise, v1 = rows[0, j + 1] - x0, rows[1, j + 1] * h
+            c2, c3 = 3.0 * rise - 2.0 * v0 - v1, v0 + v1 - 2.0 * rise
+            oldest = x0 + u * (v0 + u * (c2 + u * c3))
+            all_of_it = x0 + v0 / 2.0 + c2 / 3.0 + c3 / 4.0
+            part = u * (x0 + u * (v0 / 2.0 + u * (c2 / 3.0 + u * c3 / 4.0)))
+            total += h * (all_of_it - part)
+            low = j + 1
+        for i in range(low, k):
+            h = time[i + 1] - time[i]
+            total += 0.5 * h * (rows[0, i] + rows[0, i + 1])
+            total += h * h / 12.0 * (rows[1, i] - rows[1, i + 1])
+        out[0, k - first] = total / window
+        out[1, k - first] = (rows[0, k] - oldest) / window
+
+
+@allocating
+def sway(
+    time: np.ndarray,
+    rows: np.ndarray,
+    frequency: float,
+    damping: float,
+    coupling: float,
+    state: np.ndarray,
+    out: np.ndarray,
+) -> None:
+    """Displacement of w'' + 2 d f w' + f^2 w = -g x'' for the motion ``rows`` (2, N) of x.
+
+    In W = w + g x no acceleration is needed. ``state`` (2,) is W and W', carried in place;
+    ``out`` (2, N) is w and w'. One Runge-Kutta step of fourth order an interval.
+    """
+    slopes = np.empty((4, 2))
+    for k in range(time.shape[0]):
+        if k > 0:
+            h = time[k] - time[k - 1]
+            x0, x1 = rows[0, k - 1], rows[0, k]
+            v0, v1 = rows[1, k - 1], rows[1, k]
+            for stage in range(4):
+                x, v, ahead = x0, v0, 0.0
+                if stage == 3:
+                    x, v, ahead = x1, v1, h
+                elif stage > 0:
+                    x = 0.5 * (x0 + x1) + h / 8.0 * (v0 - v1)
+                    v = 1.5 * (x1 - x0) / h - 0.25 * (v0 + v1)
+                    ahead = 0.5 * h
+                p, q = state[0], state[1]
+                if stage > 0:
+                    p += ahead * slopes[stage - 1, 0]
+                    q += ahead * slopes[stage - 1, 1]
+                slopes[stage, 0] = q
+                slopes[stage, 1] = -2.0 * damping * frequency * (q - coupling * v)
+                slopes[stage, 1] -= frequency * frequency * (p - coupling * x)
+            for i in range(2):
+                state[i] += (
+                    h
+                    / 6.0
+                    * (slopes[0, i] + 2.0 * slopes[1, i] + 2.0 * slopes[2, i] + slopes[3, i])
+                )
+        out[0, k] = state[0] - coupling * rows[0, k]
+        out[1, k] = state[1] - coupling * rows[1, k]

@@ -1,0 +1,115 @@
+"""A model stepped in time with a run is the model over the whole run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dearig.acquisition.overlay import Overlay
+from dearig.drivers.channels import Channel, Scaling
+from dearig.drivers.rig import Block
+from dearig.model.actuator import Actuator, Drive
+from dearig.model.excitation import Lobes, Ramp, Sequence, Steps
+from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+
+RATE = 1000.0
+SCALING = Scaling((0.0, 10.0 / 32768), 1000.0)
+COMMAND = Channel("voltage_command", "V", SCALING)
+MONITOR = Channel("voltage_monitor", "V", SCALING)
+READING = Channel("displacement", "m", SCALING, skew=7e-5, delay=2e-3)
+CHANNELS = (COMMAND, MONITOR, READING)
+THESIS = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
+DRAG = replace(THESIS, effects=(("linear drag", (("drag", 300.0),)),))
+LATE = replace(THESIS, effects=(("sensor lag", (("time_constant", 0.01),)),))
+
+
+def counts(voltage: np.ndarray) -> np.ndarray:
+    rows = np.zeros((3, voltage.size), dtype=np.int16)
+    rows[0] = SCALING.counts(voltage)
+    rows[1] = SCALING.counts(0.9 * voltage)
+    return rows
+
+
+def driven() -> np.ndarray:
+    sequence = Sequence(
+        "s", (Lobes(periods=1), Steps((5e3, 8e3), 0.5), Ramp(0.0, 0.2)), lead_in=0.5, tail=0.5
+    )
+    return sequence.sample(RATE)[1]
+
+
+def stepped(actuator: Actuator, rows: np.ndarray, cuts: list[int], **more: object) -> np.ndarray:
+    overlay = Overlay(actuator, CHANNELS, RATE, **more)  # type: ignore[arg-type]
+    parts, start = [], 0
+    for part in np.split(rows, cuts, axis=1):
+        parts.append(overlay.advance(Block(start, part)))
+        start += part.shape[1]
+    assert overlay.words == ""
+    return np.concatenate(parts)
+
+
+@pytest.mark.parametrize("cuts", [[], list(range(100, 13_000, 100)), [1, 2, 3, 777, 5000]])
+@pytest.mark.parametrize("drive", ["command", "monitor"])
+@pytest.mark.parametrize("actuator", [THESIS, DRAG, LATE], ids=["plain", "drag", "late"])
+def test_blocks_of_any_length_are_the_whole_record(
+    cuts: list[int], drive: str, actuator: Actuator
+) -> None:
+    rows = counts(driven())
+    volts = SCALING.physical(rows[0 if drive == "command" else 1])
+    lag = READING.delay - READING.skew
+    time = np.arange(volts.size) / RATE
+    whole = actuator.simulate(Drive(time, volts, hold=True), lag).displacement
+    found = stepped(actuator, rows, [c for c in cuts if c < volts.size], drive=drive)
+    assert np.max(np.abs(found - whole)) < 3e-8  # m, on 1.6 mm
+    assert np.ptp(whole) > 1e-3
+
+
+def test_two_overlays_owe_each_other_nothing() -> None:
+    rows = counts(driven())
+    soft = replace(THESIS, load=replace(THESIS_LOAD, mass=0.25))
+    one, two = Overlay(THESIS, CHANNELS, RATE), Overlay(soft, CHANNELS, RATE)
+    for start in range(0, 3000, 100):
+        block = Block(start, rows[:, start : start + 100])
+        first, second = one.advance(block), two.advance(block)
+    alone = stepped(THESIS, rows[:, :3000], list(range(100, 3000, 100)))
+    np.testing.assert_array_equal(first, alone[-100:])
+    assert np.max(np.abs(first - second)) > 1e-5
+
+
+def test_a_film_that_runs_away_ends_in_nan_with_a_word() -> None:
+    overlay = Overlay(
+        THESIS, (Channel("voltage_command", "V", replace(SCALING, gain=1e5)), READING), RATE
+    )
+    rows = np.zeros((2, 4000), dtype=np.int16)
+    rows[0, 1000:] = 32767
+    found = overlay.advance(Block(0, rows))
+    assert np.isfinite(found[:1000]).all()
+    assert np.isnan(found[-1])
+    assert "pull-in" in overlay.words
+    assert np.isnan(overlay.advance(Block(4000, rows))).all()
+
+
+def test_a_block_that_is_missing_is_refused() -> None:
+    overlay = Overlay(THESIS, CHANNELS, RATE)
+    with pytest.raises(ValueError, match="starts at sample 100, not at 0"):
+        overlay.advance(Block(100, counts(np.zeros(10))))
+
+
+def test_a_drive_that_was_not_recorded_is_refused() -> None:
+    with pytest.raises(ValueError, match="the channels are voltage_command, displacement"):
+        Overlay(THESIS, (COMMAND, READING), RATE, "monitor")
+
+
+def test_a_thermometer_counts_from_the_first_second() -> None:
+    warm = replace(THESIS, effects=(("temperature", (("stiffening", 0.02),)),))
+    kelvin = Channel("temperature", "K", Scaling((0.0, 10.0 / 32768), 10.0, 273.15))
+    channels = (COMMAND, READING, kelvin)
+    rows = np.zeros((3, 6000), dtype=np.int16)
+    rows[0, 500:] = SCALING.counts(np.array([6e3]))
+    rows[2] = kelvin.scaling.counts(np.where(np.arange(6000) < 2000, 295.0, 305.0))
+    blocks = [Block(s, rows[:, s : s + 100]) for s in range(0, 6000, 100)]
+    warmed, steady = Overlay(warm, channels, RATE), Overlay(THESIS, channels, RATE)
+    difference = [warmed.advance(b) - steady.advance(b) for b in blocks]
+    assert np.max(np.abs(np.concatenate(difference[:20]))) < 1e-7
+    assert np.max(np.abs(difference[-1])) > 1e-5

@@ -1,0 +1,86 @@
+"""A run repeated from its recording: the same counts, to the last bit."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from dearig.recording import open_recording, save_recording
+from tests.tools.command import LOBE, SLOW_RIG, dearig, done, thesis_model, write
+from tests.tools.recordings import Clock
+
+
+def counts(path: Path) -> dict[str, np.ndarray]:
+    with h5py.File(path) as file:
+        data = file["entry/data"]
+        return {name: data[name][()] for name in data if name.endswith("_counts")}
+
+
+def same(first: Path, second: Path) -> bool:
+    one, two = counts(first), counts(second)
+    assert one.keys() == two.keys()
+    assert len(one) >= 3
+    return all(np.array_equal(one[name], two[name]) for name in one)
+
+
+@pytest.mark.parametrize("rig", ["sim", "sim:7"])
+def test_the_same_seed_gives_the_same_bytes(tmp_path: Path, rig: str) -> None:
+    first, again, other = (tmp_path / f"{n}.h5" for n in ("first", "again", "other"))
+    files = write(tmp_path / "lobe.toml", LOBE), write(tmp_path / "rig.toml", SLOW_RIG)
+    done("record", files[0], "--rig", rig, "--rig-file", files[1], "--seed", "5", "--out", first)
+    for path in files:
+        path.unlink()
+    done("record", "--like", first, "--rig", "sim", "--out", again)
+    assert same(first, again)
+    made = [open_recording(path) for path in (first, again)]
+    for what in ("rig", "seed", "configuration"):
+        assert made[0].provenance[what] == made[1].provenance[what]
+    assert made[0].sequence_toml == made[1].sequence_toml
+    done("record", "--like", first, "--seed", "6", "--out", other)
+    assert not same(first, other)
+
+
+def test_a_run_of_a_model_file_needs_it_again(tmp_path: Path) -> None:
+    first, again = tmp_path / "first.h5", tmp_path / "again.h5"
+    rig = "[film]\nthickness_mm = 2.0\n" + SLOW_RIG
+    lobe, rig_file = write(tmp_path / "lobe.toml", LOBE), write(tmp_path / "rig.toml", rig)
+    model = thesis_model(tmp_path / "model.toml")
+    record = ("record", lobe, "--rig-file", rig_file, "--model", model, "--out", first)
+    assert dearig(*record).code == 0
+    refused = dearig("record", "--like", first, "--out", again)
+    assert refused.code == 2
+    assert "give that one with --model" in refused.err
+    done("record", "--like", first, "--model", model, "--out", again)
+    assert same(first, again)
+
+
+def test_what_cannot_be_repeated(tmp_path: Path) -> None:
+    time = np.arange(10.0)
+    values = {"time": time, "stretch": 1 + time, "nominal_stress": time}
+    film = save_recording(tmp_path / "film.h5", "film", values, title="x", now=Clock())
+    run, bad, out = (tmp_path / f"{n}.h5" for n in ("run", "bad", "out"))
+    lobe, rig = write(tmp_path / "lobe.toml", LOBE), write(tmp_path / "rig.toml", SLOW_RIG)
+    done("record", lobe, "--rig-file", rig, "--out", run)
+    shutil.copyfile(run, bad)
+    with h5py.File(bad, "r+") as file:
+        del file["entry/provenance/configuration"]
+        file["entry/provenance/configuration"] = "[card]\nspeed = 3\n"
+    for line, words in (
+        (("--like", film), "holds no sequence: only a run"),
+        (("--like", run, lobe), "one of them"),
+        ((), "give a sequence to play, or a recording"),
+        (("--like", run, "--rig-file", rig), "brings its own rig file"),
+        (("--like", bad), "is not of this version: card.speed"),
+        (("--like", tmp_path / "none.h5"), "none.h5 is not there"),
+    ):
+        answer = dearig("record", *line, "--out", out)
+        assert answer.code == 2, answer.err
+        assert words in answer.err
+        assert not out.exists()
+    assert (
+        "is the file that is read" in dearig("record", "--like", run, "--out", run, "--force").err
+    )

@@ -1,0 +1,155 @@
+"""The excitation that separates rivals: what the gate admits, and what tells them apart."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dearig.acquisition.plan import plan
+from dearig.analysis.compatibility import of_rig
+from dearig.analysis.experiment import SEPARATES, candidates, separating_experiment
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import parse_sequence
+from dearig.drivers.interlocks import would_trip
+from dearig.drivers.settings import CardSettings
+from dearig.model.actuator import Actuator, Drive
+from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load
+
+NOISE = 1e-6
+
+
+def with_effect(name: str, **values: float) -> Actuator:
+    return Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, ((name, tuple(values.items())),))
+
+
+PLAIN = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
+LAG = with_effect("sensor lag", time_constant=5e-3)
+DRAG = with_effect("linear drag", drag=300.0)
+SLOW = RigFile(card=CardSettings(sample_rate_Hz=200.0))
+RIVALS = [("sensor lag", "sensor_lag", LAG), ("linear drag", "drag", DRAG)]
+
+
+def predicted(model: Actuator, sequence: str) -> np.ndarray:
+    waveform = plan(parse_sequence(sequence, "x", Path()), SLOW).admitted()
+    time = np.arange(waveform.voltage.size) / waveform.rate
+    return model.simulate(Drive(time, waveform.voltage, hold=True)).displacement
+
+
+def test_it_separates_as_much_as_it_says():
+    found, words = separating_experiment(RIVALS, SLOW, NOISE)
+    assert found.separates == ("sensor_lag", "drag")
+    apart = predicted(LAG, found.sequence) - predicted(DRAG, found.sequence)
+    assert found.separation == pytest.approx(np.sqrt(np.mean(apart**2)) / NOISE, rel=1e-9)
+    assert found.separation > SEPARATES
+    assert found.name in words
+    assert f"{found.separation:.2g} times the noise" in words
+
+
+def test_no_other_separates_much_more():
+    found, _ = separating_experiment(RIVALS, SLOW, NOISE)
+    best = max(found.tried, key=lambda t: t[1])
+    assert found.separation >= 0.9 * best[1]
+    assert [t[1] for t in found.tried] == sorted((t[1] for t in found.tried), reverse=True)
+    mine = next(t for t in found.tried if t[0] == found.name)
+    nearly = [t for t in found.tried if t[1] >= 0.9 * best[1]]
+    assert mine[1] / mine[2] == max(t[1] / t[2] for t in nearly)
+
+
+def test_of_three_the_nearest_two_count():
+    three = [*RIVALS, ("nothing", "none", PLAIN)]
+    found, _ = separating_experiment(three, SLOW, NOISE)
+    curves = {label: predicted(model, found.sequence) for label, _, model in three}
+    apart = {
+        pair: np.sqrt(np.mean((curves[pair[0]] - curves[pair[1]]) ** 2)) / NOISE
+        for pair in combinations(curves, 2)
+    }
+    assert found.separation == pytest.approx(min(apart.values()), rel=1e-9)
+    assert found.closest == min(apart, key=lambda pair: apart[pair])
+
+
+def test_where_nothing_separates_it_says_so():
+    twins = [("one", "drag", DRAG), ("other", "creep", DRAG)]
+    found, words = separating_experiment(twins, SLOW, NOISE)
+    assert found is None
+    assert "would separate one and other" in words
+    assert "0 times the noise" in words
+
+
+def test_twins_do_not_stand_in_the_way_of_a_third():
+    twin = ("twin", "amplifier", LAG)
+    found, words = separating_experiment([*RIVALS, twin], SLOW, NOISE)
+    alone, _ = separating_experiment(RIVALS, SLOW, NOISE)
+    assert (found.name, found.separation) == (alone.name, alone.separation)
+    assert "but for sensor lag and twin, which none would separate" in words
+
+
+def test_limits_lower_every_candidate():
+    low = SLOW.model_copy(update={"limits": SLOW.limits.model_copy(update={"voltage_max_kV": 3.0})})
+    found, _ = separating_experiment(RIVALS, low, NOISE)
+    assert len(found.tried) == len(candidates(3.0))
+    waveform = plan(parse_sequence(found.sequence, "x", Path()), low).admitted()
+    assert 2e3 < waveform.voltage.max() <= 3e3
+
+
+def test_every_candidate_passes_the_gate_of_the_thesis_rig():
+    for name, text in candidates(8.0).items():
+        waveform = plan(parse_sequence(text, name, Path()), SLOW).admitted()
+        assert waveform.voltage.max() > 5e3, name
+
+
+def played(found, settings: RigFile) -> tuple[np.ndarray, float, list[np.ndarray]]:
+    """Voltage, its rate, and what each of the two foresees of the film."""
+    waveform = plan(parse_sequence(found.sequence, "x", Path()), settings).admitted()
+    time = np.arange(waveform.voltage.size) / waveform.rate
+    drive = Drive(time, waveform.voltage, hold=True)
+    moved = [model.simulate(drive).displacement for model in (LAG, DRAG)]
+    return waveform.voltage, waveform.rate, moved
+
+
+def with_interlocks(**changes: float) -> RigFile:
+    locks = RigFile().interlocks.model_copy(update=changes)
+    return RigFile().model_copy(update={"interlocks": locks})
+
+
+@pytest.mark.parametrize("most", [3.0, 0.5])
+def test_it_trips_no_interlock_of_its_own(most):
+    settings = with_interlocks(displacement_max_mm=most)
+    found, _ = separating_experiment(RIVALS, settings, NOISE)
+    voltage, rate, moved = played(found, settings)
+    for each in moved:
+        # with room for a film that goes further than any of them foresees
+        assert would_trip(settings, rate, voltage, each / 0.75) == ()
+    assert max(each.max() for each in moved) < 0.75e-3 * most
+
+
+def test_where_interlocks_would_end_everything_it_says_so():
+    found, words = separating_experiment(RIVALS, with_interlocks(displacement_max_mm=1e-3), NOISE)
+    assert found is None
+    assert "could be played: the limits or the interlocks" in words
+
+
+def test_it_is_no_faster_than_the_laser_can_tell():
+    # a laser that looks every 0.2 ms, whenever that is
+    laser = RigFile().laser.model_copy(update={"sampling_us": 200.0})
+    settings = RigFile().model_copy(update={"laser": laser})
+    found, _ = separating_experiment(RIVALS, settings, NOISE)
+    _, rate, moved = played(found, settings)
+    fastest = max(np.abs(np.diff(each)).max() for each in moved) * rate
+    assert fastest * 100e-6 < NOISE
+    quick, _ = separating_experiment(RIVALS, RigFile(), NOISE)
+    _, rate, moved = played(quick, RigFile())
+    assert max(np.abs(np.diff(each)).max() for each in moved) * rate > fastest
+
+
+def test_the_rig_file_takes_on_the_film_that_was_measured():
+    film, load = Film(0.05, 0.04, 5e-4, 3.1, 970.0, "uniaxial"), Load(0.1, 0.0555)
+    settings = of_rig(SLOW, film, load)
+    assert settings.card == SLOW.card
+    for name in ("length", "width", "thickness", "permittivity", "density", "kinematics"):
+        assert getattr(settings.as_film(), name) == pytest.approx(getattr(film, name)) or (
+            name == "kinematics" and settings.as_film().kinematics == "uniaxial"
+        )
+    assert settings.as_load() == load

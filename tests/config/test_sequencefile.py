@@ -1,0 +1,106 @@
+"""Sequence files: what each kind of segment plays, and what a recording keeps of it."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dearig.config.presets import PRESETS
+from dearig.config.sequencefile import SAMPLES_MAX, load_sequence, parse_sequence
+from dearig.errors import InputError
+from dearig.model.excitation import Sequence
+
+HEAD = 'name = "x"\nlead_in_s = 0.1\ntail_s = 0.1\n'
+
+
+def sampled(text: str, folder: Path = Path()) -> np.ndarray:
+    _, voltage = parse_sequence(HEAD + text, "x", folder).sample(1000.0)
+    return voltage
+
+
+def test_the_defaults_are_the_thesis() -> None:
+    loaded = parse_sequence('name = "x"\n[[segment]]\nkind = "thesis"\n', "x", Path())
+    np.testing.assert_array_equal(loaded.sample(1000.0)[1], Sequence.thesis().sample(1000.0)[1])
+    # the quiet frame, in which the noise floor is read
+    assert (loaded.sequence.lead_in, loaded.sequence.tail) == (2.0, 1.0)
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_preset_starts_and_ends_at_0_volts(name: str) -> None:
+    time, voltage = load_sequence(name).sample(500.0)
+    assert voltage[0] == voltage[-1] == 0.0
+    assert voltage.min() >= 0.0
+    assert 7.9e3 <= voltage.max() <= 8.0e3 or name.startswith("validation-b")
+    assert time[1] == 0.002
+
+
+@pytest.mark.parametrize(
+    ("keys", "samples", "peak"),
+    [
+        ('kind = "half_sine"\namplitude_kV = 2.0\nfrequency_Hz = 2.0', 701, 2000.0),
+        ('kind = "triangle"\namplitude_kV = 2.0\nfrequency_Hz = 2.0\nrepeats = 3', 1701, 2000.0),
+        ('kind = "steps"\nlevels_kV = [1.0, 3.0, 0.0]\ndwell_s = 0.5', 1701, 3000.0),
+        ('kind = "sine"\namplitude_kV = 2.0\nfrequency_Hz = 2.0\ncycles = 4.0', 2201, 2000.0),
+        (
+            'kind = "chirp"\namplitude_kV = 1.0\nfrom_Hz = 1.0\nto_Hz = 20.0\nduration_s = 2.0',
+            2201,
+            1000.0,
+        ),
+        (
+            'kind = "multisine"\namplitude_kV = 1.0\nfrequencies_Hz = [1.0, 3.0]\nduration_s = 2',
+            2201,
+            1000.0,
+        ),
+    ],
+)
+def test_kinds_of_segment(keys: str, samples: int, peak: float) -> None:
+    voltage = sampled(f"[[segment]]\n{keys}\n")
+    assert voltage.size == samples
+    assert np.abs(voltage).max() == pytest.approx(peak, rel=0.02)
+
+
+def test_a_start_that_is_left_out_is_where_the_segment_before_ended() -> None:
+    voltage = sampled(
+        '[[segment]]\nkind = "ramp"\nto_kV = 2.0\nduration_s = 0.1\n'
+        '[[segment]]\nkind = "hold"\nduration_s = 0.1\n'
+        '[[segment]]\nkind = "ramp"\nto_kV = 0.0\nduration_s = 0.1\n'
+    )
+    assert voltage[150] == pytest.approx(1000.0)
+    assert voltage[250] == 2000.0
+    assert voltage[350] == pytest.approx(1000.0)
+
+
+@pytest.mark.parametrize(("column", "factor"), [("voltage_V", 1.0), ("voltage_kV", 1e3)])
+def test_a_waveform_from_csv(tmp_path: Path, column: str, factor: float) -> None:
+    text = f"time_s,{column}\n5.0,0\n5.1,{3000.0 / factor}\n5.3,0\n"
+    (tmp_path / "w.csv").write_text(text, encoding="utf-8", newline="\n")
+    toml = HEAD + '[[segment]]\nkind = "csv"\nfile = "w.csv"\n'
+    loaded = parse_sequence(toml, "x", tmp_path)
+    _, voltage = loaded.sample(1000.0)
+    assert voltage[200] == pytest.approx(3000.0)
+    assert voltage[300] == pytest.approx(1500.0)
+    # the recording keeps the sequence, and which file it played
+    digest = hashlib.sha256((tmp_path / "w.csv").read_bytes()).hexdigest()
+    assert loaded.toml == f"{toml}# segment 1: w.csv had sha256 {digest}\n"
+
+
+def test_a_run_as_long_as_it_may_be() -> None:
+    text = 'name = "x"\nlead_in_s = 0.0\ntail_s = 0.0\n[[segment]]\nkind = "hold"\nduration_s = '
+    longest = SAMPLES_MAX / 1000.0
+    assert (
+        parse_sequence(f"{text}{longest}\n", "x", Path()).sample(10.0)[1].size == longest * 10 + 1
+    )
+    with pytest.raises(InputError, match=f"at most {SAMPLES_MAX:,} can be played"):
+        parse_sequence(f"{text}{longest + 1.0}\n", "x", Path()).sample(1000.0)
+
+
+def test_faults_that_a_wrong_name_causes_are_not_counted() -> None:
+    text = f'{HEAD}[[segment]]\nkind = "hold"\nduration_ms = 3.0\n'
+    with pytest.raises(InputError, match=r"in s, as duration_s$"):
+        parse_sequence(text, "x", Path())
+    text += "colour = 3\n"
+    with pytest.raises(InputError, match=r"\(1 more fault after that\)$"):
+        parse_sequence(text, "x", Path())

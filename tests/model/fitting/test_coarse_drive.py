@@ -1,0 +1,251 @@
+"""Sketches of a drive: fewer and longer steps, and the same answer to what a number does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dearig.model import kernel
+from dearig.model.actuator import Drive, reading_of
+from dearig.model.diagnosis.bench import Bench
+from dearig.model.diagnosis.screening import Screen
+from dearig.model.effects import EFFECTS
+from dearig.model.excitation import Chirp, Lobes, Ramp, Sequence, Steps
+from dearig.model.fitting.broyden import descend_by_secants
+from dearig.model.fitting.coarse_drive import sketched
+from dearig.model.fitting.levenberg import descend
+from dearig.model.material import Branch, Network, Spring
+from tests.tools.engine import NOISE, PLAIN, effect, posed, record_of, typical
+
+RATE = 200.0
+SLOW = (Lobes(periods=1),)
+CHIRP = (Ramp(4e3, 1.0), Chirp(3.5e3, 0.2, 1.0, 12.0), Ramp(0.0, 1.0))
+STEPS = (Steps((3e3, 7e3, 2e3, 0.0), 8.0, 0.02),)
+
+
+def played(*segments, hold=True, rate=RATE):
+    return replace(Drive(*Sequence("played", segments).sample(rate)), hold=hold)
+
+
+def record(*segments, model=PLAIN, hold=True, rate=RATE):
+    return record_of(model, played(*segments, hold=hold, rate=rate))
+
+
+def seen(record, model, drive=None, haste=kernel.CAREFUL):
+    found, status = reading_of(
+        model.coefficients(), model.film.length, drive or record.drive, record.lag, haste,
+        record.time,
+    )  # fmt: skip
+    assert status == kernel.OK
+    return found
+
+
+def with_sketch(record, model=PLAIN):
+    sketch = sketched(record, model)
+    assert sketch is not None
+    return replace(record, sketch=sketch)
+
+
+@pytest.mark.parametrize("lag", [0.0, 9e-5, 3e-3])
+@pytest.mark.parametrize("hold", [True, False])
+@pytest.mark.parametrize(("segments", "part"), [(SLOW, 0.3), (CHIRP, 0.4), (STEPS, 0.5)])
+def test_a_sketch_is_shorter_and_shows_the_same(segments, part, hold, lag):
+    one = replace(record(*segments, hold=hold), lag=lag)
+    sketch = sketched(one, PLAIN)
+    assert sketch is not None
+    assert sketch.time.size < part * one.time.size
+    off = seen(one, PLAIN, sketch, kernel.SKETCHED) - seen(one, PLAIN)
+    assert np.sqrt(np.mean(off**2)) < 0.5 * NOISE
+
+
+def test_slow_and_fast_are_cut_as_they_ask():
+    one = record(*SLOW, *STEPS)
+    sketch = sketched(one, PLAIN)
+    begins = Sequence("played", SLOW).duration
+    steps = np.diff(sketch.time)
+    assert np.median(steps[sketch.time[:-1] < begins]) == pytest.approx(0.02)
+    edge = np.abs(sketch.time[:-1] - begins - 0.01) < 0.01  # the first rise
+    np.testing.assert_allclose(steps[edge], 1.0 / RATE)
+    np.testing.assert_array_equal(np.isin(sketch.time, one.time), True)
+
+
+@pytest.mark.parametrize("hold", [True, False])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_it_pulls_as_much(hold, sign):
+    drive = played(*SLOW, hold=hold)
+    one = record_of(PLAIN, replace(drive, voltage=sign * drive.voltage))
+    sketch = sketched(one, PLAIN)
+
+    def pull(d):
+        a, b = d.voltage[:-1], d.ends[:-1]
+        return np.sum(np.diff(d.time) * (a * a + a * b + b * b)) / 3.0
+
+    assert pull(sketch) == pytest.approx(pull(one.drive), rel=1e-4)
+    assert (sign * sketch.voltage >= 0.0).all()
+    # where it goes on from where it came to, nothing rings
+    jumps = np.abs(sketch.voltage[1:-1] - sketch.to[:-2])
+    assert np.median(jumps) < 0.01 * np.max(np.abs(sketch.voltage))
+
+
+def test_the_temperature_is_that_of_the_step():
+    drive = played(*SLOW)
+    warm = replace(drive, warmth=0.2 * drive.time)
+    sketch = sketched(record_of(PLAIN, warm), PLAIN)
+    middle = 0.5 * (sketch.time[1:-1] + sketch.time[:-2])
+    # the samples of a step are the first half and more of it
+    np.testing.assert_allclose(sketch.warmth[:-2], 0.2 * middle, atol=0.2 * 0.5 / RATE)
+
+
+def test_what_cannot_be_sketched():
+    slow = record(*SLOW)
+    held = replace(PLAIN, film=replace(PLAIN.film, kinematics="uniaxial"))
+    assert sketched(slow, held) is None  # its swinging is not in closed form
+    branches = tuple(Branch(Spring(10e3, 1e4), t) for t in (0.2, 0.4, 1.0, 4.0))
+    many = replace(PLAIN, network=Network(PLAIN.network.springs[0], branches))
+    assert sketched(slow, many) is None
+    strong = replace(slow, drive=replace(slow.drive, voltage=60.0 * slow.drive.voltage))
+    assert sketched(strong, PLAIN) is None  # it pulls in
+    assert sketched(record(Chirp(3.5e3, 20.0, 60.0, 5.0)), PLAIN) is None
+    assert sketched(record(*SLOW, rate=60.0), PLAIN) is None  # as long as a step may be
+
+
+def test_which_numbers_are_told():
+    slow = with_sketch(record(*SLOW))
+    for effects in (effect("linear drag", drag=300.0), effect("linear drift", drift=1e-6)):
+        problem, x, free = posed(replace(PLAIN, effects=effects), slow)
+        np.testing.assert_array_equal(problem.told_by_sketches(x, free), free)
+    # a moment within a step is not seen, nor bristles that slip within one
+    late = effect("sudden change of force", stress=30.0, moment=4.003)
+    problem, x, free = posed(replace(PLAIN, effects=late), slow)
+    moment = problem.layout.names.index("sudden change of force: moment")
+    assert not problem.told_by_sketches(x, free)[moment]
+    bristles = replace(PLAIN, effects=(typical("easing friction"),))
+    problem, x, free = posed(bristles, slow)
+    assert not problem.told_by_sketches(x, free).any()
+    problem, x, free = posed(PLAIN, record(*SLOW))
+    assert not problem.told_by_sketches(x, free).any()
+
+
+def test_what_is_known_is_not_asked_again():
+    slow = with_sketch(record(*SLOW))
+    plain, x, free = posed(PLAIN, slow)
+    springs = plain.told_by_sketches(x, free)
+    problem, x, free = posed(replace(PLAIN, effects=effect("linear drag", drag=300.0)), slow)
+    told = problem.told_by_sketches(x, free)
+    asked = problem.simulations
+    problem.simulations = 0
+    np.testing.assert_array_equal(problem.told_by_sketches(x, free, springs), told)
+    # the place itself three times, and the one number twice
+    assert problem.simulations == 5 < asked
+    # who was not told is not
+    doubted = springs.copy()
+    doubted[0] = False
+    assert not problem.told_by_sketches(x, free, doubted)[0]
+
+
+def test_springs_are_asked_once_for_all_effects_that_leave_a_film_its_turns():
+    two = replace(PLAIN, network=Network.gent((45e3, 60e3, 20e3), (1e4, 1e4, 1e4), (0.4, 3.0)))
+    bench = Bench([record(*SLOW, model=two)], two, workers=1)
+    base = bench.baseline(two, lambda *_: None)
+    asked = []
+
+    def told(effects):
+        model = replace(base.model, effects=effects)
+        layout = bench.problem(model).layout
+        start = layout.coordinates(layout.initial())
+        fixed = np.append(base.fixed, np.zeros(layout.size - base.fixed.size, dtype=bool))
+        before = bench.simulations
+        bench.fit(model, [(start, None)], fixed)
+        asked.append(bench.simulations - before)
+        return bench.problem(model).sketched
+
+    springs = bench.problem(base.model).sketched
+    np.testing.assert_array_equal(springs, ~base.fixed)
+    np.testing.assert_array_equal(told(effect("linear drift", drift=1e-6))[:-1], springs)
+    # one that sticks and slips is asked anew, and no sketch tells it
+    assert not told((typical("easing friction"),)).any()
+    assert asked[0] < asked[1]
+
+
+def test_differences_by_sketches_are_those_of_the_whole():
+    model = replace(PLAIN, effects=effect("linear drag", drag=300.0))
+    problem, x, free = posed(model, with_sketch(record(*SLOW, model=model)))
+    residuals = problem.residuals(x)
+    whole = problem.jacobian(x, free, residuals)
+    problem.sketched = problem.told_by_sketches(x, free)
+    np.testing.assert_array_equal(problem.jacobian(x, free, residuals), whole)
+    by_sketch = problem.jacobian(x, free, residuals, sketched=True)
+    assert not np.array_equal(by_sketch, whole)
+    off = np.linalg.norm(by_sketch - whole, axis=0) / np.linalg.norm(whole, axis=0)
+    assert off.max() < 0.05
+    # of one number not told, the whole itself
+    problem.sketched[0] = False
+    some = problem.jacobian(x, free, residuals, sketched=True)
+    np.testing.assert_allclose(some[:, 0], whole[:, 0], rtol=1e-9, atol=1e-12)
+    np.testing.assert_array_equal(some[:, 1:], by_sketch[:, 1:])
+
+
+AWAY = replace(
+    PLAIN,
+    network=Network.gent((50e3, 54e3), (1e4, 1e4), (0.5,)),
+    effects=effect("linear drag", drag=100.0),
+)
+
+
+@pytest.mark.parametrize("off", [1.0, 0.9997, 0.98, 0.6], ids=["good", "near", "off", "useless"])
+def test_a_descent_ends_where_the_whole_record_says(off):
+    truth = replace(PLAIN, effects=effect("linear drag", drag=400.0))
+    one = with_sketch(record(*SLOW, model=truth))
+    sketch = replace(one.sketch, voltage=off * one.sketch.voltage, to=off * one.sketch.to)
+    problem, x, free = posed(AWAY, replace(one, sketch=sketch))
+    wanted = descend(problem, x, ~free, gain=0.01)
+    problem.sketched = free
+    fit = descend_by_secants(problem, x, ~free, gain=0.01)
+    assert fit.cost == pytest.approx(wanted.cost, abs=0.1 / problem.samples)
+    assert fit.cost == pytest.approx(problem.costs(fit.x[None])[0], rel=1e-12)
+    np.testing.assert_allclose(fit.residuals, problem.residuals(fit.x))
+
+
+def screens(truth):
+    """The score tests of one record, by the whole of it and by its sketch."""
+    one = record(*SLOW, model=truth)
+    for sketch in (None, sketched(one, PLAIN)):
+        bench = Bench([one], PLAIN, workers=1)
+        trial = bench.baseline(PLAIN, lambda *_: None)
+        assert trial.problem.records[0].sketch is not None
+        bench.records = tuple(replace(r, sketch=sketch) for r in bench.records)
+        yield Screen(bench, replace(trial, problem=bench.problem(PLAIN)))
+
+
+def test_what_effects_promise_by_sketches():
+    truth = replace(PLAIN, effects=effect("Mullins softening", softening=0.004, width=0.3))
+    names = ("Mullins softening", "ageing", "linear drift", "dielectric relaxation")
+    whole, told = (
+        [screen.promises(EFFECTS[n])[0].share for n in names] for screen in screens(truth)
+    )
+    assert max(whole) > 0.9
+    assert told == pytest.approx(whole, abs=0.01)
+    assert told != whole
+
+
+def test_a_sketch_that_does_not_tell_what_is_asked_is_not_believed():
+    _, screen = screens(PLAIN)
+    model = replace(
+        screen.trial.model, effects=effect("Mullins softening", softening=0.0, width=0.3)
+    )
+    problem = screen.bench.problem(model, kernel.ROUGH)
+    start = problem.layout.values(problem.layout.coordinates(problem.layout.initial()))
+    population = np.tile(start, (3, 1))
+    # of so much it rings at each turn
+    population[:, problem.layout.names.index("Mullins softening: softening")] = 1e-3, 2e-3, 0.3
+    whole = (problem.predict(population)[0] - problem.measured) / problem.sigma
+    whole -= screen.trial.residuals
+    moved, _ = screen._moved(problem, population, [2])
+    np.testing.assert_array_equal(moved, whole)
+    moved, _ = screen._moved(problem, population, [0])
+    np.testing.assert_array_equal(moved[0], whole[0])
+    off = np.linalg.norm(moved - whole, axis=1)
+    assert 0.0 < off[1] < 0.15 * np.linalg.norm(whole[1])
+    assert off[2] > 0.15 * np.linalg.norm(whole[2])

@@ -1,0 +1,112 @@
+"""A folder of recordings, looked at once and then only where it changed."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from dearig.drivers.rig import Block
+from dearig.errors import InputError
+from dearig.recording import index as index_module
+from dearig.recording import save_recording
+from dearig.recording.index import Entry, index_folder, lines
+from tests.recording.test_reader import film_values
+from tests.tools.command import dearig
+from tests.tools.recordings import Clock, run_counts, write_run, writer
+
+
+@pytest.fixture(scope="module")
+def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("shelf")
+    (folder / "day 1").mkdir()
+    write_run(folder / "day 1" / "run.h5")
+    save_recording(folder / "film.h5", "film", film_values(), title="pull", now=Clock(1.7e9))
+    recorder = writer(folder / "other.h5")
+    recorder.append(Block(0, run_counts(500)))
+    recorder._flush_all(1.8e9)
+    shutil.copyfile(folder / "other.h5", folder / "killed.nxs")
+    recorder.discard()
+    (folder / "text.h5").write_text("no recording")
+    (folder / "notes.txt").write_text("not looked at")
+    return folder
+
+
+def test_what_lies_in_a_folder(shelf: Path, tmp_path: Path) -> None:
+    found = {entry.path: entry for entry in index_folder(shelf, cache=tmp_path / "c.json")}
+    assert list(found) == ["day 1/run.h5", "film.h5", "killed.nxs", "text.h5"]
+    run = found["day 1/run.h5"]
+    assert (run.kind, run.title, run.samples, run.duration_s) == (
+        "actuator", "two lobes", 3000, 2.999,
+    )  # fmt: skip
+    assert (run.complete, run.rig, run.film_id, run.operator) == (True, "sim:7", "film 3", "Ada")
+    assert run.start_time.startswith("2027-01-15T08:00:00")
+    assert run.bytes == (shelf / run.path).stat().st_size
+    assert (found["film.h5"].kind, found["film.h5"].samples) == ("film", 200)
+    assert found["film.h5"].duration_s == pytest.approx(10.0**1.5)
+    killed = found["killed.nxs"]
+    assert (killed.samples, killed.complete) == (500, False)
+    assert killed.outcome == "killed, or still running"
+    assert "is not an HDF5 file" in found["text.h5"].trouble
+
+
+def test_only_what_changed_is_opened_again(
+    shelf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, cache = tmp_path / "shelf", tmp_path / "c.json"
+    shutil.copytree(shelf, folder)
+    looked: list[str] = []
+    real = index_module.glance
+
+    def glance(path: Path, name: str, size: int) -> Entry:
+        looked.append(name)
+        return real(path, name, size)
+
+    monkeypatch.setattr(index_module, "glance", glance)
+    first = index_folder(folder, cache=cache)
+    assert len(looked) == 4
+    assert index_folder(folder, cache=cache) == first
+    assert len(looked) == 4
+    (folder / "text.h5").write_text("still none")
+    (folder / "film.h5").unlink()
+    parts: list[float] = []
+    assert len(index_folder(folder, parts.append, cache)) == 3
+    assert looked[4:] == ["text.h5"]
+    assert parts == [1.0]
+    for broken in ("", "[]", '{"format": "dearig-index/0"}', json.dumps({"format": "x"}), "[" * 9):
+        cache.write_text(broken)
+        assert len(index_folder(folder, cache=cache)) == 3
+    assert len(looked) == 5 + 5 * 3
+
+
+def test_a_cache_that_cannot_be_kept_is_no_reason_to_fail(shelf: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    assert len(index_folder(shelf, cache=tmp_path / "file" / "c.json")) == 4
+
+
+def test_folders_that_cannot_be_looked_at(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"nowhere is not there"):
+        index_folder(tmp_path / "nowhere", cache=tmp_path / "c.json")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=r"file is no folder"):
+        index_folder(tmp_path / "file", cache=tmp_path / "c.json")
+    assert lines(index_folder(tmp_path, cache=tmp_path / "c.json")) == ["no recordings"]
+
+
+def test_the_command(shelf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(index_module, "user_cache_path", lambda _: tmp_path / "cache")
+    answer = dearig("index", shelf, "--json", "-")
+    assert answer.code == 0
+    assert [e["path"] for e in answer.json["recordings"]] == [
+        "text.h5", "film.h5", "day 1/run.h5", "killed.nxs",
+    ]  # fmt: skip
+    told = dearig("index", shelf).out.splitlines()
+    assert told[0].startswith("not read")
+    assert told[2] == (
+        "2027-01-15 08:00:00     2.999 s  day 1/run.h5: two lobes, sim:7, film 3, Ada"
+    )
+    assert told[3].endswith("INCOMPLETE: killed, or still running")
+    assert dearig("index", tmp_path / "no").code == 2
+    assert len(list((tmp_path / "cache").iterdir())) == 1

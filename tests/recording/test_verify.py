@@ -1,0 +1,163 @@
+"""A file that is not what it claims is found out, and told in words."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import pytest
+
+from dearig.drivers.rig import Block
+from dearig.recording import save_recording
+from dearig.recording.text import fixed
+from dearig.recording.verify import verify
+from tests.recording.test_reader import attribute, film_values, removed, value
+from tests.tools.command import dearig
+from tests.tools.recordings import IDENTITY, Clock, run_counts, write_run, writer
+
+N = 70_000
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("good") / "run.h5"
+    write_run(path, run_counts(N))
+    return path
+
+
+def test_a_sound_run(run: Path) -> None:
+    found = verify(run)
+    assert (found.faults, found.notes) == ([], [])
+    assert "checksums of the counts of 70000 samples" in found.checked
+
+
+def test_sound_imported_data(tmp_path: Path) -> None:
+    path = save_recording(tmp_path / "x.h5", "film", film_values(), title="x", now=Clock())
+    assert (verify(path).faults, verify(path).notes) == ([], [])
+
+
+def cut(name: str, samples: int) -> Callable[[h5py.File], None]:
+    return lambda file: file[f"entry/data/{name}_counts"].resize((samples,))
+
+
+def row(where: str, at: int, column: str, number: float) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        rows = file[where][()]
+        rows[column][at] = number
+        file[where][...] = rows
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        (
+            value("displacement_counts", 66_000, 7),
+            r"counts of displacement are not those .*: samples 65536 to 69999 \(65\.536 to 70 s\)",
+        ),
+        (value("displacement_counts", 3, 7), "displacement is not what its counts give"),
+        (value("voltage_monitor", 9, 4.5), "voltage_monitor is not what its counts give: 4.5 at s"),
+        (value("time", 10, 0.0101), "time is not what its counts give"),
+        (
+            lambda f: f["entry/pyramid/bins_of_64"].__setitem__((5, 0, 0), -9),
+            "pyramid is not of these counts",
+        ),
+        (lambda f: f["entry/pyramid/bins_of_64"].resize(3, axis=0), "pyramid has 3 bins of 64"),
+        (lambda f: f["entry/checksums"].resize(1, axis=0), "the last 4464 samples have no checksu"),
+        (attribute("entry", "samples", 69_000), "claims 69000 samples and holds 70000"),
+        (attribute("entry/data", "samples_expected", 80_000), "finished, with 70000 of 80000"),
+        (cut("voltage_monitor", 69_999), "voltage_monitor has 69999 counts, not 70000"),
+        (
+            attribute("entry/data/displacement_counts", "rest_reading", 0.1),
+            "displacement is counted from 0.1 m",
+        ),
+        (row("entry/events", 0, "sample", 70_001), "is at sample 70001, which is not there"),
+        (row("entry/events", 0, "time", 2.0), "is at 2 s, and its sample 510 at 0.51 s"),
+        (row("entry/wall_clock", 0, "sample", 70_001), "wall_clock notes samples that go back"),
+        (
+            attribute("entry/provenance", "configuration_sha256", fixed("0" * 64)),
+            "not the one of its SHA-256",
+        ),
+        (attribute("entry", "default", fixed("plot")), "names 'plot' as its default plot"),
+        (attribute("entry/data", "signal", fixed("force")), "no plot of displacement over time"),
+        (removed("entry/sample"), "the group /entry/sample is missing"),
+    ],
+)
+def test_what_is_wrong_is_said(
+    tmp_path: Path, run: Path, change: Callable[[h5py.File], None], match: str
+) -> None:
+    path = tmp_path / "bad.h5"
+    shutil.copyfile(run, path)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    found = verify(path)
+    assert not found.sound
+    assert any(re.search(match, fault) for fault in found.faults), found.faults
+
+
+@pytest.mark.parametrize("name", ["displacement", "voltage_command_counts"])
+def test_a_byte_turned_on_the_disk_is_found(tmp_path: Path, run: Path, name: str) -> None:
+    path = tmp_path / "bad.h5"
+    raw = bytearray(run.read_bytes())
+    with h5py.File(run) as file:
+        at = file[f"entry/data/{name}"].id.get_chunk_info(0).byte_offset
+    raw[at + 1000] ^= 0x40
+    path.write_bytes(raw)
+    found = verify(path)
+    assert not found.sound
+    assert any("checksum" in fault for fault in found.faults), found.faults
+
+
+def test_what_a_killed_run_cannot_claim_is_noted(tmp_path: Path) -> None:
+    path, copy = tmp_path / "run.h5", tmp_path / "copy.h5"
+    clock = Clock()
+    recorder = writer(path, now=clock)
+    clock.moment += 1.0
+    recorder.append(Block(0, run_counts(70_000)))
+    recorder.event(70_000, "fault", "amplifier tripped")
+    clock.moment += 1.0
+    recorder.event(70_000, "info", "on again")
+    copy.write_bytes(path.read_bytes())
+    recorder.close()
+    found = verify(copy)
+    assert found.faults == []
+    assert found.notes == [
+        "the last 4464 samples have no checksum yet: the run was killed before",
+        "it was killed, or is being written; dearig recover mends it",
+        "the run did not come to its end: killed, or still running",
+        "fault at sample 70000 (70 s): amplifier tripped",
+    ]
+
+
+def test_clocks_that_disagree(tmp_path: Path) -> None:
+    clock = Clock()
+    path = tmp_path / "run.h5"
+    identity = replace(IDENTITY, simulated=False)
+    with writer(path, identity=identity, samples_expected=30_000, now=clock) as recorder:
+        counts = run_counts(30_000)
+        for i in range(30):
+            clock.moment += 1.05
+            recorder.append(Block(1000 * i, counts[:, 1000 * i : 1000 * i + 1000]))
+    assert any("counted 29 s and the computer's clock 30.45 s" in f for f in verify(path).faults)
+
+
+def test_the_command_says_it_and_ends_with_4(tmp_path: Path, run: Path) -> None:
+    good = dearig("info", "--verify", run, "--json", "-")
+    assert good.code == 0
+    assert good.json["sound"]
+    path = tmp_path / "bad.h5"
+    shutil.copyfile(run, path)
+    with h5py.File(path, "r+") as file:
+        file["entry/data/displacement_counts"][1] = 77
+    bad = dearig("info", path, "--verify", "--json", "-")
+    assert bad.code == 4
+    assert not bad.json["sound"]
+    assert bad.json["format"] == "dearig-verification/1"
+    assert "displacement" in bad.json["faults"][0]
+    assert "WRONG: the counts of displacement" in dearig("info", path, "--verify").out
+    assert dearig("info", tmp_path / "none.h5", "--verify").code == 2

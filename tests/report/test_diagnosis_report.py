@@ -1,0 +1,328 @@
+"""What is told of a diagnosis: the page, the terminal and the JSON say the same, and all of it."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dearig.cli.terminal import diagnosis_tables
+from dearig.model.diagnosis import results as findings
+from dearig.report.as_json import diagnosis_json
+from dearig.report.diagnosis import (
+    HEADLINES,
+    before_after,
+    dropped,
+    headline,
+    pooled,
+    ranking,
+    summary,
+    thesis_before_after,
+    warnings,
+)
+from dearig.report.diagnosis_figures import (
+    bars_figure,
+    before_after_figure,
+    dependence_figure,
+    missing_figures,
+    residual_time_figure,
+    spectra_figure,
+)
+from dearig.report.diagnosis_page import write_diagnosis_report
+from dearig.report.numbers import significant
+from tests.cli.test_terminal import shown
+from tests.report.test_page import check
+from tests.tools.diagnosis import (
+    EXPERIMENT,
+    ROUND,
+    STEP,
+    diagnose_outcome,
+    film_diagnosis,
+    finding,
+    nothing_missing,
+)
+from tests.tools.reports import NOISE, actuator_comparison
+
+OUTCOMES = {
+    "explained": diagnose_outcome(),
+    "nothing missing": nothing_missing(),
+    "a film": film_diagnosis(),
+}
+MEASURES_UM = {"rms_um", "nrmse_pct", "e_rms_thesis_pct", "e_m_thesis_pct", "max_um"}
+MEASURES_KPA = {"rms_kPa", "nrmse_pct", "e_rms_thesis_pct", "e_m_thesis_pct", "max_kPa"}
+
+
+@pytest.fixture(scope="module", params=list(OUTCOMES))
+def page(request, tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    outcome = OUTCOMES[request.param]
+    assert write_diagnosis_report(outcome, path) == path
+    assert path.stat().st_size < 3_000_000
+    return outcome, check(path)
+
+
+def test_no_model_of_a_film_is_asked_to_reach_the_noise():
+    outcome = film_diagnosis()
+    for verdict, words in (
+        ("explained", "with that, only noise, or 0.5 % of the largest stress, is left."),
+        ("nothing_missing", "down to the noise, or 0.5 % of the largest stress, and no other"),
+    ):
+        told = summary(replace(outcome, finding=replace(outcome.finding, verdict=verdict)))
+        assert words in told[0]
+    assert summary(diagnose_outcome())[0].endswith("with that, only noise is left.")
+    assert "down to the noise, and no other" in summary(nothing_missing())[0]
+
+
+class TestPage:
+    def test_the_verdict_stands_on_top(self, page):
+        outcome, read = page
+        top = read.words.index(HEADLINES[outcome.finding.verdict])
+        assert top < read.words.index("The error before and after")
+
+    def test_errors_before_and_after_of_every_recording(self, page):
+        outcome, read = page
+        scale = 1e6 if outcome.kind == "actuator" else 1e-3
+        for stand in (outcome.before, outcome.after):
+            for c in (*stand.train, *stand.validation):
+                assert significant(c.errors.rms * scale) in read.cells
+                assert significant(c.errors.max * scale) in read.cells
+                assert significant(c.errors.e_m_thesis_pct) in read.cells
+                if outcome.kind == "actuator":
+                    assert significant(c.errors.e_rms_thesis_pct) in read.cells
+
+    def test_evidence_and_doubt(self, page):
+        outcome, read = page
+        for step in outcome.finding.steps:
+            for sentence in step.evidence:
+                assert sentence[1:] in read.words
+            for e in step.estimates:
+                assert f"{step.effect}: {e.name.replace('_', ' ')}" in read.cells
+        for family in (f for s in outcome.finding.steps for f in s.indistinguishable_from):
+            assert f"explained as well by {family}" in read.words
+        for candidate in (c for r in outcome.finding.rounds for c in r.candidates):
+            assert candidate.effect in read.cells
+
+    def test_the_experiment_with_its_sequence(self, page):
+        outcome, read = page
+        assert outcome.experiment_words.rstrip(".") in read.words
+        there = "[[segment]]" in read.words
+        assert there == (outcome.experiment is not None)
+
+    def test_roles_and_measures_are_explained(self, page):
+        outcome, read = page
+        for words in ("Three roles are kept apart", "How to read the errors", "RMS / noise"):
+            assert words in read.words
+        assert ("not normalised" in read.words) == (outcome.kind == "actuator")
+
+
+class TestWords:
+    def test_every_verdict_has_its_sentence(self):
+        for verdict in (
+            findings.NOTHING_MISSING, findings.EXPLAINED, findings.PARTLY_EXPLAINED,
+            findings.UNEXPLAINED,
+        ):  # fmt: skip
+            assert verdict in HEADLINES
+            steps = () if verdict == "nothing_missing" else (STEP,)
+            said = summary(diagnose_outcome(finding=finding(verdict=verdict, steps=steps)))
+            assert len(said[0]) > 40
+
+    def test_the_numbers_of_the_summary(self):
+        outcome = diagnose_outcome()
+        before, after = pooled(outcome.before.validation), pooled(outcome.after.validation)
+        words = " ".join(summary(outcome))
+        first, last = significant(before.rms * 1e6), significant(after.rms * 1e6)
+        assert f"falls from {first} to {last}" in words
+        assert "cannot tell sensor lag from amplifier" in words
+
+    def test_without_untouched_recordings_it_says_so(self):
+        assert "No untouched recordings were given" in " ".join(summary(nothing_missing()))
+
+    def test_an_interruption_is_told(self):
+        words = " ".join(summary(diagnose_outcome(finding=finding(interrupted=True))))
+        assert "was interrupted" in words
+
+    def test_a_search_that_ended_within_its_first_round_says_how_far_it_came(self):
+        early = finding(interrupted=True, rounds=())
+        assert early.steps
+        assert "all effects were tried" in headline(early)
+        assert "did best until then" in " ".join(summary(diagnose_outcome(finding=early)))
+        nothing = replace(early, steps=())
+        assert "anything was tried" in headline(nothing)
+        assert "nothing is known yet" in " ".join(summary(diagnose_outcome(finding=nothing)))
+
+    def test_quality_and_notes_are_warnings(self):
+        said = warnings(diagnose_outcome(finding=finding(notes=("it was odd",))))
+        assert said == (
+            "train.h5: the sensor is clipped at 0.7 mm from sample 400 (4 s) on.", "It was odd.",
+        )  # fmt: skip
+
+    def test_what_was_chosen_and_dropped(self):
+        assert dropped(diagnose_outcome()) == ""
+        other = replace(ROUND, chosen="load inertia")
+        said = dropped(diagnose_outcome(finding=finding(rounds=(other, ROUND))))
+        assert said.startswith("load inertia was the best alone and is not in the final model")
+
+
+class TestPooled:
+    def test_over_all_samples(self):
+        runs = [actuator_comparison(seed=1), actuator_comparison(seed=2, rate=40.0)]
+        every = np.concatenate([c.measured - c.model for c in runs])
+        found = pooled(runs)
+        assert found.rms == pytest.approx(math.sqrt(np.mean(every**2)), rel=1e-12)
+        assert found.max == np.abs(every).max()
+        assert found.samples == every.size
+        span = max(c.measured.max() for c in runs) - min(c.measured.min() for c in runs)
+        assert found.nrmse_pct == pytest.approx(100.0 * found.rms / span)
+        assert found.e_rms_thesis_pct == pytest.approx(found.rms * 1e5)
+        model = max(c.model.max() for c in runs) - min(c.model.min() for c in runs)
+        assert found.e_m_thesis_pct == pytest.approx(100.0 * found.max / model)
+
+    def test_of_one_it_is_that_ones(self):
+        one = actuator_comparison()
+        found = pooled([one])
+        assert found.rms == pytest.approx(one.errors.rms, rel=1e-12)
+        assert found.nrmse_pct == pytest.approx(one.errors.nrmse_pct)
+        assert found.peak_pct == pytest.approx(one.errors.peak_pct)
+        assert found.e_m_thesis_pct == pytest.approx(one.errors.e_m_thesis_pct)
+
+    def test_of_none_there_is_none(self):
+        assert pooled([]) is None
+
+
+class TestTables:
+    def test_a_row_of_all_together(self):
+        outcome = diagnose_outcome()
+        table = before_after("x", outcome.before.validation, outcome.after.validation, "actuator")
+        assert [r.cells[0] for r in table.rows] == ["validation-0.h5", "validation-1.h5", "all"]
+        first, last = pooled(outcome.before.validation), pooled(outcome.after.validation)
+        assert table.rows[-1].cells[1:3] == (
+            significant(first.rms * 1e6), significant(last.rms * 1e6),
+        )  # fmt: skip
+        assert table.rows[-1].cells[5] == significant(first.rms / NOISE)
+        theirs = thesis_before_after("x", outcome.before.train, outcome.after.train, "actuator")
+        assert len(theirs.rows) == 1
+        assert {len(r.cells) for r in (*table.rows, *theirs.rows)} == {7}
+
+    def test_ranking(self):
+        whole, brief = ranking(ROUND), ranking(ROUND, 3)
+        assert len(whole.rows) == len(ROUND.candidates)
+        assert [r.cells[-1] for r in brief.rows] == ["chosen", "not told apart", "helps, but less"]
+        assert "9 more did worse" in brief.note
+        assert whole.rows[0].detail == ROUND.candidates[0].note
+
+    @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+    @pytest.mark.parametrize("width", [100, 80, 44, 24])
+    @pytest.mark.parametrize("name", OUTCOMES)
+    def test_the_terminal_shows_it_in_any_width(self, name, width, encoding):
+        text = shown(diagnosis_tables(OUTCOMES[name]), width, encoding)
+        assert max(map(len, text.splitlines())) <= width
+        assert HEADLINES[OUTCOMES[name].finding.verdict].split()[0] in text
+
+    def test_nothing_is_cut_off_at_80_columns(self):
+        text = shown(diagnosis_tables(diagnose_outcome()), 80)
+        for words in ("sensor lag: time constant", "0.00910 to 0.00990", "not told apart"):
+            assert words in text
+
+
+class TestJson:
+    @pytest.mark.parametrize("name", OUTCOMES)
+    def test_the_contract(self, name):
+        outcome = OUTCOMES[name]
+        found = json.loads(json.dumps(diagnosis_json(outcome), allow_nan=False))
+        film = outcome.kind == "film"
+        measures = MEASURES_KPA if film else MEASURES_UM
+        assert found["format"] == "dearig-diagnosis/1"
+        assert found["verdict"] == outcome.finding.verdict
+        assert found["noise_floor_kPa" if film else "noise_floor_um"] > 0.0
+        assert found["baseline"]["model"] == "thesis"
+        for stand in (found["baseline"], found["final"]):
+            assert stand["train"].keys() == measures
+            if found["records"]["validation"]:
+                assert stand["validation"].keys() == measures
+                assert list(stand["validation_by_record"]) == found["records"]["validation"]
+            else:
+                assert stand["validation"] is None
+                assert stand["validation_by_record"] is None
+        assert len(found["steps"]) == len(outcome.finding.steps)
+        for step in found["steps"]:
+            assert step.keys() == {
+                "effect", "family", "acts_on", "parameters", "train", "selection", "validation",
+                "indistinguishable_from", "evidence",
+            }  # fmt: skip
+            assert step["train"].keys() == step["selection"].keys() == measures
+            for p in step["parameters"]:
+                assert {"name", "value", "unit", "ci95"} <= p.keys()
+                assert len(p["ci95"]) == 2
+        assert found["residual_after"].keys() == {"is_noise", "signature"}
+        assert (found["experiment"] is None) == (outcome.experiment is None)
+        assert (found["unnamed"] is None) == (outcome.finding.unnamed is None)
+        assert found["seconds"] == 12.3
+
+    def test_its_numbers_are_those_of_the_outcome(self):
+        outcome = diagnose_outcome()
+        found = diagnosis_json(outcome)
+        last = pooled(outcome.after.validation)
+        assert found["final"]["validation"]["rms_um"] == pytest.approx(last.rms * 1e6)
+        assert found["steps"][0]["validation"] == found["final"]["validation"]
+        assert found["steps"][0]["selection"]["rms_um"] == pytest.approx(1.1 * 1.02)
+        assert found["steps"][0]["parameters"][0]["ci95"] == [9.1e-3, 9.9e-3]
+        assert found["experiment"]["sequence"] == EXPERIMENT.sequence
+        assert found["experiment"]["separates"] == ["sensor_lag", "amplifier"]
+        assert found["residual_after"]["is_noise"] is True
+        assert found["rounds"][0]["candidates"][1]["behind"] == 2.5
+
+
+class TestFigures:
+    def test_before_and_after_are_drawn_with_the_noise(self):
+        outcome = diagnose_outcome()
+        before, after = outcome.before.validation[0], outcome.after.validation[0]
+        figure = before_after_figure(before, after)
+        _, both, first, last = figure.axes
+        assert [t.get_text() for t in both.get_legend().get_texts()] == [
+            "measured", "before", "after",
+        ]  # fmt: skip
+        for ax, comparison in ((first, before), (last, after)):
+            floors = sorted(line.get_ydata()[0] for line in ax.lines if len(line.get_ydata()) == 2)
+            assert floors == pytest.approx([-1.0, 0.0, 1.0])
+            curve = max(ax.lines, key=lambda line: len(line.get_ydata())).get_ydata()
+            error = (comparison.measured - comparison.model) * 1e6
+            assert np.max(curve) == pytest.approx(error.max())
+
+    def test_the_residual_separates_loading_from_unloading(self):
+        signature = finding().before[0]
+        dependence = signature.dependences[0]
+        figure = dependence_figure(dependence, "actuator")
+        (ax,) = figure.axes
+        drawn = {line.get_label(): line.get_ydata() for line in ax.lines}
+        np.testing.assert_allclose(drawn["loading"], dependence.loading * 1e6)
+        np.testing.assert_allclose(drawn["unloading"], dependence.unloading * 1e6)
+        assert ax.get_xlabel() == "Voltage squared (kV\N{SUPERSCRIPT TWO})"
+
+    def test_the_spectrum_has_its_floor(self):
+        found = finding()
+        (ax,) = spectra_figure(found.before[0], found.after[0], "actuator").axes
+        (floor,) = [line for line in ax.lines if line.get_label() == "noise floor"]
+        assert floor.get_ydata()[0] == pytest.approx(math.sqrt(found.before[0].floor_density) * 1e6)
+
+    def test_alone_the_residual_has_one_panel(self):
+        found = finding()
+        assert len(residual_time_figure(found.before[0], None, "actuator").axes) == 1
+        assert len(residual_time_figure(found.before[0], found.after[0], "actuator").axes) == 2
+
+    def test_missing_stress_against_what_drives(self):
+        missing = finding().missing_before[0]
+        names = [name for name, _ in missing_figures(missing, "actuator")]
+        assert names == ["stretch", "voltage squared", "rate"]
+        assert [n for n, _ in missing_figures(missing, "film")] == ["stretch", "rate"]
+
+    def test_bars(self):
+        outcome = diagnose_outcome()
+        pairs = list(zip(outcome.before.validation, outcome.after.validation, strict=True))
+        (ax,) = bars_figure(pairs, NOISE, "actuator").axes
+        widths = [p.get_width() for p in ax.patches]
+        stands = (outcome.before, outcome.after)
+        wanted = [c.errors.rms * 1e6 for stand in stands for c in stand.validation]
+        assert widths == pytest.approx(wanted)

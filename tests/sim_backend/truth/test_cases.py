@@ -1,0 +1,170 @@
+"""Which seed hides what: chances, films, and the sizes of everything that can be drawn."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from dearig.config.sequencefile import load_sequence
+from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.sim_backend.truth import cases
+from dearig.sim_backend.truth.effects import drift
+
+#: The families that a diagnosis may name, as its JSON spells them.
+FAMILIES = {
+    "load_inertia",
+    "drag",
+    "friction",
+    "rate_independent_hysteresis",
+    "electrode_resistance",
+    "leakage",
+    "dielectric_relaxation",
+    "permittivity",
+    "creep",
+    "softening",
+    "thermal",
+    "drift",
+    "sensor_lag",
+    "sensor_nonlinearity",
+    "amplifier",
+    "interference",
+    "unknown",
+}
+FORMS = [
+    pytest.param(family, form, id=f"{family}-{form.__name__}")
+    for family, forms in cases.FORMS.items()
+    for form in forms
+]
+
+
+def draw(seed, kind="any"):
+    return cases.draw(seed, THESIS_FILM, THESIS_LOAD, kind)
+
+
+def test_every_family_has_forms_and_nothing_has_another_name():
+    assert set(cases.FORMS) == FAMILIES
+    assert len(cases.FORMS[cases.UNKNOWN]) >= 5
+
+
+@pytest.mark.parametrize(("family", "form"), FORMS)
+def test_a_form_is_of_its_family(family, form):
+    effect = form(np.random.default_rng(0), THESIS_LOAD)
+    assert effect.family == family
+    acting = (effect.on_film, effect.on_course, effect.on_voltage, effect.on_motion)
+    assert any(place is not None for place in acting)
+
+
+def test_a_seed_is_a_case_for_good():
+    drawn, again = [[draw(seed) for seed in range(40)] for _ in range(2)]
+    assert [c.description for c in drawn] == [c.description for c in again]
+    assert [c.network for c in drawn] == [c.network for c in again]
+    hiding = [c.description for c in drawn if c.effects]
+    assert len(set(hiding)) == len(hiding)
+
+
+def test_kinds_come_as_often_as_they_should():
+    seeds = 2000
+    drawn = [draw(seed) for seed in range(seeds)]
+    kinds = Counter(
+        "clean"
+        if not c.effects
+        else "pair"
+        if len(c.effects) == 2
+        else cases.UNKNOWN
+        if c.families == (cases.UNKNOWN,)
+        else "covered"
+        for c in drawn
+    )
+    for kind, chance in cases.KINDS.items():
+        assert abs(kinds[kind] - seeds * chance) < 4.0 * np.sqrt(seeds * chance * (1.0 - chance))
+    singles = Counter(c.families[0] for c in drawn if len(c.effects) == 1)
+    covered = [singles[family] for family in FAMILIES - {cases.UNKNOWN}]
+    expected = seeds * cases.KINDS["covered"] / len(covered)
+    assert np.abs(np.array(covered) - expected).max() < 4.0 * np.sqrt(expected)
+    pairs = [c.families for c in drawn if len(c.effects) == 2]
+    assert all(a != b and cases.UNKNOWN not in (a, b) for a, b in pairs)
+    order = list(cases.FORMS)
+    assert all(order.index(a) < order.index(b) for a, b in pairs)
+
+
+@pytest.mark.parametrize("kind", ["clean", "covered", "pair", *cases.FORMS])
+def test_a_kind_can_be_asked_for(kind):
+    for seed in range(6):
+        families = draw(seed, kind).families
+        if kind in cases.FORMS:
+            assert families == (kind,)
+        else:
+            assert len(families) == {"clean": 0, "covered": 1, "pair": 2}[kind]
+            assert cases.UNKNOWN not in families
+
+
+def test_every_form_of_a_family_is_drawn():
+    words = Counter(draw(seed, "amplifier").description.split(" ")[2] for seed in range(60))
+    assert len(words) == len(cases.FORMS["amplifier"])
+    assert min(words.values()) >= 5
+
+
+def test_a_kind_that_is_not_one():
+    with pytest.raises(ValueError, match=r"no case of kind 'gremlins'.*clean.*drag"):
+        draw(0, "gremlins")
+
+
+def test_films_differ_as_films_do():
+    seeds = range(400)
+    networks = [draw(seed, "clean").network for seed in seeds]
+    moduli = np.log([[s.modulus for s in n.springs] for n in networks])
+    times = np.log([n.times for n in networks])
+    np.testing.assert_allclose(moduli.std(axis=0), 0.15, rtol=0.12)
+    np.testing.assert_allclose(times.std(axis=0), 0.20, rtol=0.12)
+    np.testing.assert_allclose(
+        moduli.mean(axis=0), np.log([s.modulus for s in TABLE_3.springs]), atol=0.03
+    )
+    assert [s.limit for s in networks[0].springs] == [s.limit for s in TABLE_3.springs]
+    # the film of a seed is the same whatever is hidden in it
+    assert draw(3, "drag").network == draw(3, "clean").network == draw(3).network
+
+
+def test_a_clean_film_is_that_film_and_nothing_else():
+    case = draw(5, "clean")
+    assert (case.effects, case.families, case.description) == ((), (), "")
+    time, voltage = load_sequence("thesis").sample(250.0)
+    assert case.size(time, voltage) == 0.0
+
+
+@pytest.mark.parametrize(("family", "form"), FORMS)
+def test_sizes_are_worth_finding_and_bearable(family, form):
+    time, voltage = load_sequence("thesis").sample(1000.0)
+    rich = load_sequence("rich").sample(1000.0)
+    for seed in range(3):
+        generator = np.random.default_rng(seed)
+        film = draw(seed, "clean").network
+        effect = form(generator, THESIS_LOAD)
+        case = cases.TruthCase(seed, THESIS_FILM, THESIS_LOAD, (effect,), film)
+        assert 1e-6 < case.size(time, voltage) < 400e-6
+        # what resonates shows more on the chirp, but nothing fails
+        assert 1e-6 < case.size(*rich) < 2e-3
+
+
+@pytest.mark.parametrize(("family", "form"), FORMS)
+def test_all_but_a_walk_is_the_same_in_every_run(family, form):
+    case = cases.TruthCase(
+        0, THESIS_FILM, THESIS_LOAD, (form(np.random.default_rng(0), THESIS_LOAD),)
+    )
+    time, voltage = np.arange(301) * 1e-3, np.full(301, 4000.0)
+    runs = [
+        plant.advance(time, voltage, True)[0].displacement
+        for plant in (case.plant(), case.plant().renewed(np.random.default_rng(5)))
+    ]
+    own = case.of_one_run(time, voltage, np.random.default_rng(5))
+    assert np.array_equal(*runs) == (not own.any()) == (form is not drift.wander)
+
+
+def test_drawn_cases_are_worth_finding_and_bearable():
+    time, voltage = load_sequence("thesis").sample(1000.0)
+    sizes = np.array([draw(s).size(time, voltage) for s in range(120) if draw(s).effects]) * 1e6
+    assert sizes.min() > 1.0
+    assert sizes.max() < 400.0
+    # a decade and more between the smaller and the larger ones
+    low, high = np.percentile(sizes, [10, 90])
+    assert low < 8.0
+    assert high > 50.0

@@ -1,0 +1,310 @@
+"""What every rig must do: the one suite that each rig's own test file runs.
+
+Derive a class ``Test...`` from ``RigContract`` and say in ``open_rig`` how the rig is opened.
+"""
+
+import itertools
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from dearig.drivers.channels import CHANNEL_NAMES
+from dearig.drivers.errors import RigError, RigStateError
+from dearig.drivers.gate import GatedWaveform, Limits, Prediction, admit
+from dearig.drivers.rig import Block, Event, Rig, RigState
+from dearig.drivers.settings import LimitsSettings
+
+LIMITS = LimitsSettings().gate_limits()
+RATE = 1000.0
+FIELD_PER_VOLT = 1.25e3  # 1/m: a film of 1 mm, stretched
+
+
+def foreseen(samples: int) -> Prediction:
+    """A film that stays as it is."""
+    return Prediction(np.full(samples, FIELD_PER_VOLT), 2e-16)
+
+
+def lobes(
+    peaks=(6000.0, 8000.0),
+    seconds=0.15,
+    quiet=0.02,
+    rate=RATE,
+    limits: Limits = LIMITS,
+) -> GatedWaveform:
+    """Half-sine lobes between quiet ends, past the gate."""
+    time = np.arange(round(seconds * rate)) / rate
+    lobe = np.sin(np.pi * time / seconds)
+    still = np.zeros(round(quiet * rate))
+    voltage = np.concatenate((still, *(peak * lobe for peak in peaks), still))
+    return admit(voltage, rate, limits, foreseen(voltage.size))
+
+
+@dataclass(frozen=True)
+class Record:
+    """All that one run delivered."""
+
+    counts: np.ndarray
+    blocks: tuple[Block, ...]
+    events: tuple[Event, ...]
+
+    def physical(self, rig: Rig, name: str) -> np.ndarray:
+        channels = rig.identify().channels
+        at = [channel.name for channel in channels].index(name)
+        return channels[at].scaling.physical(self.counts[at])
+
+
+def begin(rig: Rig, waveform: GatedWaveform) -> None:
+    rig.load(waveform)
+    rig.arm()
+    rig.start()
+
+
+def drain(rig: Rig) -> Record:
+    """Read until the end."""
+    blocks = []
+    while (block := rig.read()) is not None:
+        blocks.append(block)
+    counts = np.concatenate([block.counts for block in blocks], axis=1)
+    return Record(counts, tuple(blocks), tuple(e for block in blocks for e in block.events))
+
+
+def play(rig: Rig, waveform: GatedWaveform) -> Record:
+    begin(rig, waveform)
+    return drain(rig)
+
+
+CALLS: dict[str, Callable[[Rig], object]] = {
+    "load": lambda rig: rig.load(lobes()),
+    "arm": lambda rig: rig.arm(),
+    "start": lambda rig: rig.start(),
+    "read": lambda rig: rig.read(),
+    "stop": lambda rig: rig.stop(),
+    "identify": lambda rig: rig.identify(),
+}
+
+#: The calls that a rig takes in each state.
+ALLOWED = {
+    RigState.SAFE: {"identify", "load"},
+    RigState.LOADED: {"identify", "arm"},
+    RigState.ARMED: {"identify", "start"},
+    RigState.RUNNING: {"identify", "read", "stop"},
+    RigState.DONE: {"identify", "load", "read", "stop"},
+    RigState.CLOSED: set(),
+}
+
+
+def bring_to(rig: Rig, state: RigState) -> None:
+    """Take a new rig to ``state`` by the ordinary way."""
+    if state is RigState.CLOSED:
+        rig.close()
+    if state in (RigState.SAFE, RigState.CLOSED):
+        return
+    rig.load(lobes())
+    if state is RigState.LOADED:
+        return
+    rig.arm()
+    if state is RigState.ARMED:
+        return
+    rig.start()
+    if state is RigState.DONE:
+        drain(rig)
+
+
+class RigContract:
+    """The suite."""
+
+    MONITOR_TOLERANCE = 20.0  # V at the film between command and monitor
+
+    def open_rig(self, *, block_samples: int | None = None, seed: int = 0) -> Rig:
+        """A new rig with the settings' defaults, as fast as it can."""
+        raise NotImplementedError
+
+    @contextmanager
+    def opened(self, **options) -> Iterator[Rig]:
+        rig = self.open_rig(**options)
+        try:
+            yield rig
+        finally:
+            rig.close()
+
+    @pytest.fixture
+    def rig(self) -> Iterator[Rig]:
+        with self.opened() as rig:
+            yield rig
+
+    def test_identity_names_instruments_and_channels(self, rig):
+        identity = rig.identify()
+        assert {i.role for i in identity.instruments} >= {"card", "amplifier", "laser"}
+        assert all(i.model and i.serial for i in identity.instruments)
+        names = [channel.name for channel in identity.channels]
+        assert names == [name for name in CHANNEL_NAMES if name in names]
+        assert names[:4] == list(CHANNEL_NAMES[:4])
+        assert [c.unit for c in identity.channels[:4]] == ["V", "V", "A", "m"]
+        assert identity.channels[0].skew == 0.0
+        skews = [channel.skew for channel in identity.channels[1:]]
+        assert skews == sorted(skews)
+        assert len(set(skews)) == len(skews)
+
+    def test_identify_moves_nothing(self, rig):
+        first = rig.identify()
+        assert rig.state is RigState.SAFE
+        assert rig.identify() == first
+
+    @pytest.mark.parametrize("state", list(RigState))
+    @pytest.mark.parametrize("call", list(CALLS))
+    def test_calls_out_of_order_are_refused(self, rig, state, call):
+        bring_to(rig, state)
+        if call in ALLOWED[state]:
+            CALLS[call](rig)
+        else:
+            with pytest.raises(RigStateError, match=f"{call}: the rig is {state.value}"):
+                CALLS[call](rig)
+            assert rig.state is state
+
+    def test_states_follow_each_other(self, rig):
+        seen = [rig.state]
+        rig.load(lobes())
+        seen.append(rig.state)
+        rig.arm()
+        seen.append(rig.state)
+        rig.start()
+        seen.append(rig.state)
+        drain(rig)
+        seen.append(rig.state)
+        rig.make_safe()
+        seen.append(rig.state)
+        rig.close()
+        seen.append(rig.state)
+        expected = ["safe", "loaded", "armed", "running", "done", "safe", "closed"]
+        assert [state.value for state in seen] == expected
+
+    def test_takes_nothing_but_a_gated_waveform(self, rig):
+        with pytest.raises(TypeError, match="GatedWaveform"):
+            rig.load(np.zeros(100))
+        assert rig.state is RigState.SAFE
+
+    def test_refuses_a_waveform_admitted_under_wider_limits(self, rig):
+        wide = replace(LIMITS, voltage_max=2.0 * LIMITS.voltage_max)
+        with pytest.raises(RigError, match="wider limits"):
+            rig.load(lobes(limits=wide))
+        assert rig.state is RigState.SAFE
+
+    def test_says_the_rate_it_really_runs_at(self, rig):
+        assert rig.load(lobes(rate=997.0)) == pytest.approx(997.0, rel=1e-4)
+
+    def test_output_is_at_zero_before_the_first_sample(self, rig):
+        record = play(rig, lobes())
+        assert abs(record.physical(rig, "voltage_command")[0]) < 1.0
+        assert abs(record.physical(rig, "voltage_monitor")[0]) < self.MONITOR_TOLERANCE
+
+    def test_blocks_follow_without_gap_and_every_sample_comes_once(self, rig):
+        waveform = lobes()
+        record = play(rig, waveform)
+        expected = 0
+        for block in record.blocks:
+            assert block.start == expected
+            assert block.counts.dtype == np.int16
+            assert block.counts.shape[0] == len(rig.identify().channels)
+            expected += block.counts.shape[1]
+        assert expected == waveform.voltage.size
+        assert rig.read() is None
+
+    def test_command_channel_is_the_waveform_within_half_a_count(self, rig):
+        waveform = lobes()
+        command = play(rig, waveform).physical(rig, "voltage_command")
+        scaling = rig.identify().channels[0].scaling
+        half = 0.5 * abs(scaling.gain * scaling.coefficients[1])
+        assert np.abs(command - waveform.voltage).max() <= half * (1.0 + 1e-9)
+
+    def test_voltage_monitor_follows_the_command(self, rig):
+        record = play(rig, lobes())
+        command = record.physical(rig, "voltage_command")
+        monitor = record.physical(rig, "voltage_monitor")
+        assert np.abs(monitor - command).max() < self.MONITOR_TOLERANCE
+
+    def test_film_gets_longer_under_voltage_from_a_reading_that_needs_zeroing(self, rig):
+        displacement = play(rig, lobes()).physical(rig, "displacement")
+        rest = displacement[:20].mean()
+        assert abs(rest) > 1e-3
+        assert 2e-5 < displacement.max() - rest < 5e-3
+
+    @pytest.mark.parametrize("blocks_read", [0, 1, 3])
+    def test_stop_ramps_down_and_leaves_the_record_readable(self, blocks_read):
+        waveform = lobes(peaks=(8000.0,) * 10)
+        with self.opened(block_samples=50) as rig:
+            begin(rig, waveform)
+            head = [rig.read() for _ in range(blocks_read)]
+            rig.stop()
+            rig.stop()  # a second press of the button changes nothing
+            tail = drain(rig)
+            assert rig.state is RigState.DONE
+            first = tail.blocks[0].start
+            assert first == 50 * blocks_read
+            counts = np.concatenate([*(b.counts for b in head), tail.counts], axis=1)
+            command = rig.identify().channels[0].scaling.physical(counts[0])
+        assert command.size < waveform.voltage.size
+        assert command[-1] == pytest.approx(0.0, abs=1.0)
+        # the same as without the stop, and from there on a straight line to 0 within the limits
+        played = np.flatnonzero(np.abs(command - waveform.voltage[: command.size]) > 1.0)
+        at = played[0] if played.size else command.size
+        assert np.all(np.diff(command[at - 1 :]) <= 1.0)
+        assert np.all(np.abs(np.diff(command)) * RATE <= LIMITS.slew * 1.01)
+        if command[at - 1] > 1.0:
+            expected = LimitsSettings().ramp_down_s * RATE
+            assert command.size - at == pytest.approx(expected, abs=2.0)
+
+    def test_stop_after_the_end_changes_nothing(self, rig):
+        play(rig, lobes())
+        rig.stop()
+        assert rig.state is RigState.DONE
+
+    @pytest.mark.parametrize("state", list(RigState))
+    def test_make_safe_at_any_time_and_twice(self, rig, state):
+        bring_to(rig, state)
+        rig.make_safe()
+        rig.make_safe()
+        assert rig.state is (RigState.CLOSED if state is RigState.CLOSED else RigState.SAFE)
+        if state is not RigState.CLOSED:
+            assert play(rig, lobes()).counts.shape[1] == lobes().voltage.size
+
+    @pytest.mark.parametrize("state", list(RigState))
+    def test_close_at_any_time_and_twice(self, rig, state):
+        bring_to(rig, state)
+        rig.close()
+        rig.close()
+        assert rig.state is RigState.CLOSED
+
+    def test_runs_again(self, rig):
+        first, second = play(rig, lobes()), play(rig, lobes(peaks=(5000.0,)))
+        assert first.counts.shape[1] == lobes().voltage.size
+        assert second.blocks[0].start == 0
+        assert second.counts.shape[1] == lobes(peaks=(5000.0,)).voltage.size
+
+    def test_same_seed_gives_the_same_bytes(self):
+        records = []
+        for _ in range(2):
+            with self.opened(seed=5) as rig:
+                records.append([play(rig, lobes()).counts for _ in range(2)])
+        for before, after in zip(*records, strict=True):
+            np.testing.assert_array_equal(before, after)
+
+    def test_another_seed_or_run_gives_other_noise(self):
+        counts = []
+        for seed in (5, 6):
+            with self.opened(seed=seed) as rig:
+                counts += [play(rig, lobes()).counts for _ in range(2)]
+        for one, other in itertools.combinations(counts, 2):
+            assert not np.array_equal(one[3], other[3])
+
+    def test_block_length_changes_nothing(self):
+        waveform = lobes(peaks=(8000.0,) * 30)
+        records = []
+        for block_samples in (None, 1, 333, 10**6):
+            with self.opened(block_samples=block_samples) as rig:
+                records.append(play(rig, waveform))
+        for record in records[1:]:
+            np.testing.assert_array_equal(record.counts, records[0].counts)
+            assert record.events == records[0].events
