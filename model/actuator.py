@@ -265,16 +265,16 @@ def reading_of(
     length: float,
     drive: Drive,
     lag: float = 0.0,
-    haste: int = kernel.CAREFUL,
+    fidelity: int = kernel.CAREFUL,
     times: np.ndarray | None = None,
 ) -> tuple[np.ndarray, int]:
     """``(reading, status)`` of coefficient vector ``c`` (see ``dearig.model.coefficients``): (N,)
     m.
 
     At ``times`` (N,) s, those of the drive where none are given. ``lag`` s is the known age of a
-    reading, ``haste`` as the kernel has it. What the model did not reach reads 0.
+    reading, ``fidelity`` as the kernel has it. What the model did not reach reads 0.
     """
-    readings, status, _ = readings_of(c[None], length, drive, lag, haste, times)
+    readings, status, _ = readings_of(c[None], length, drive, lag, fidelity, times)
     return readings[0], status
 
 
@@ -283,7 +283,7 @@ def readings_of(
     length: float,
     drive: Drive,
     lag: float = 0.0,
-    haste: int = kernel.CAREFUL,
+    fidelity: int = kernel.CAREFUL,
     times: np.ndarray | None = None,
 ) -> tuple[np.ndarray, int, int]:
     """``(readings, status, steps)`` of coefficient vectors ``cs`` (P, C) of one film: (P, N) m.
@@ -299,7 +299,7 @@ def readings_of(
         x, u = np.zeros(drive.time.size), np.zeros(drive.time.size)
         status, _, steps = kernel.drive_by_voltage(
             c, drive.time, drive.voltage, drive.ends, drive.temperature,
-            initial_state(c, rest), x, u, haste,
+            initial_state(c, rest), x, u, fidelity,
         )  # fmt: skip
         x -= rest
         x *= length

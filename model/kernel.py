@@ -52,6 +52,7 @@ from dearig.model.springs import SPRINGS, gent, neo_hookean
 __all__ = [
     "BAD_INPUT",
     "CAREFUL",
+    "COARSE",
     "LOCKED",
     "NOT_CONVERGED",
     "NO_REST",
@@ -59,7 +60,6 @@ __all__ = [
     "PULL_IN",
     "QUICK",
     "ROUGH",
-    "SKETCHED",
     "drive_by_voltage",
     "is_swift",
     "read_sensor",
@@ -77,7 +77,7 @@ CAREFUL = 0  #: good to some hundredths of a micrometre
 QUICK = 1  #: to a tenth (some tenths on a step of 8 kV); careful where a force follows the path
 ROUGH = 2  #: nor careful there: to a tenth of what such an effect does, or some while it rings
 #: As rough, in steps from sample to sample, however far: ``model.fitting.coarse_drive``.
-SKETCHED = 3
+COARSE = 3
 
 
 _STRETCH_MAX = 100.0  # beyond any elastomer: a runaway, whatever the springs say
@@ -1084,15 +1084,15 @@ def drive_by_voltage(
     y: np.ndarray,
     stretch: np.ndarray,
     rate: np.ndarray,
-    haste: int = CAREFUL,
+    fidelity: int = CAREFUL,
 ) -> tuple[int, int, int]:
     """Carry state ``y`` (2 + n + MEMORY,) along a record; fill ``stretch`` and ``rate`` (N,).
 
     ``time`` s and ``voltage`` V are (N,), increasing and not necessarily even. From each sample to
     the next the voltage goes linearly to that in ``ends`` (N,), from where it may jump: of a
     converter's output, which stands until the next, that is ``voltage`` itself. ``warmth`` (N,) K
-    is the temperature above that of the start, or (0,) where none was recorded. ``haste`` says how
-    long steps may be: ``CAREFUL``, ``QUICK``, ``ROUGH``, ``SKETCHED``. Element 0 is the state as
+    is the temperature above that of the start, or (0,) where none was recorded. ``fidelity`` says
+    how long steps may be: ``CAREFUL``, ``QUICK``, ``ROUGH``, ``COARSE``. Element 0 is the state as
     given, so a record can be cut and continued. ``c`` must know the stretch at rest
     (``dearig.model.actuator.at_rest``).
 
@@ -1117,13 +1117,13 @@ def drive_by_voltage(
     # ringing is in closed form, but its turns are not, where a path is followed
     turning = acting & _TURNS
     # what softens on the way is content with quick steps as long as the film does not ring
-    wary = lean and QUICK <= haste <= ROUGH and turning != 0 and turning & ~_SOFTEN == 0
-    quick = not wary and (haste >= ROUGH or (haste == QUICK and turning == 0))
-    calm_below = _RINGING if haste == ROUGH else _CALM
-    phase_max = _ROUGH_PHASE_MAX if haste == ROUGH else _RK4_PHASE_MAX
+    wary = lean and QUICK <= fidelity <= ROUGH and turning != 0 and turning & ~_SOFTEN == 0
+    quick = not wary and (fidelity >= ROUGH or (fidelity == QUICK and turning == 0))
+    calm_below = _RINGING if fidelity == ROUGH else _CALM
+    phase_max = _ROUGH_PHASE_MAX if fidelity == ROUGH else _RK4_PHASE_MAX
     longest = 0.0
     if quick:
-        longest = _SKETCH_STEP_MAX if haste == SKETCHED else _QUICK_STEP_MAX
+        longest = _SKETCH_STEP_MAX if fidelity == COARSE else _QUICK_STEP_MAX
     work = np.zeros((15, y.shape[0]))
     before = np.empty(y.shape[0])
     trace = np.zeros(5)
@@ -1204,7 +1204,7 @@ def drive_by_voltage(
                     kick_gain, ring_gain, kick, kick_before, ring, v0 != last and looks > 1, trace
                 )
                 fine = looks if hasty else steps * refine
-            elif haste != SKETCHED and max(ring * fading, abs(kick)) > _RINGING * springy:
+            elif fidelity != COARSE and max(ring * fading, abs(kick)) > _RINGING * springy:
                 finer = swing * dt / phase_max
                 fine = max(fine, math.ceil(min(finer - 1e-6, _EFFECT_SUBSTEPS_MAX)))
             asked = 0.0

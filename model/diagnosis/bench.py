@@ -281,12 +281,12 @@ class Bench:
             for r in self.records
         )
 
-    def problem(self, model: Actuator | Strip, haste: int = kernel.QUICK) -> Problem:
+    def problem(self, model: Actuator | Strip, fidelity: int = kernel.QUICK) -> Problem:
         """The thinned records, or with ``CAREFUL`` all samples, with ``model``'s numbers free."""
         layout = Layout(model, self.times)
-        records = self.full if haste == kernel.CAREFUL else self.records
-        problem = Problem(records, layout, self.workers, haste, self._count)
-        if haste != kernel.CAREFUL:
+        records = self.full if fidelity == kernel.CAREFUL else self.records
+        problem = Problem(records, layout, self.workers, fidelity, self._count)
+        if fidelity != kernel.CAREFUL:
             problem.sketched = self._sketched.get(layout.names)
         return problem
 
@@ -414,7 +414,7 @@ class Bench:
         if layout.names not in self._sketched:
             springs: np.ndarray | None = None
             if effects and not follows_path(effects):
-                plain = self.problem(replace(layout.base, effects=()), problem.haste)
+                plain = self.problem(replace(layout.base, effects=()), problem.fidelity)
                 springs = self._told_by_sketches(plain, fixed[: plain.layout.size])
                 springs = springs if springs.any() else None
             x = layout.coordinates(layout.initial())
@@ -438,7 +438,7 @@ class Bench:
         Far from it a rough simulation is good enough, where an effect follows the path.
         """
         done = work(trial)
-        if done.problem.haste != kernel.ROUGH or done.cost > _ROUGHLY:
+        if done.problem.fidelity != kernel.ROUGH or done.cost > _ROUGHLY:
             return done
         problem = self.problem(done.model)
         here = descend_by_secants(problem, done.x, done.fixed, iterations=0)
@@ -735,7 +735,7 @@ class Bench:
             replace(r, lag=r.lag + r.lag_error) if isinstance(r, ActuatorRecord) else r
             for r in problem.records
         ]
-        there = Problem(older, problem.layout, self.workers, problem.haste, self._count)
+        there = Problem(older, problem.layout, self.workers, problem.fidelity, self._count)
         moved = _by_record(problem, there.residuals(trial.x) - trial.residuals)
         total = 0.0
         for residuals, by in zip(_by_record(problem, trial.residuals), moved, strict=True):

@@ -82,14 +82,14 @@ class Screen:
         self.jacobian = trial.jacobian()
         self._q, self._r = np.linalg.qr(self.jacobian)
         self._residual = trial.residuals - self._q @ (self._q.T @ trial.residuals)
-        self._haste, self._as_it_was = kernel.ROUGH, trial.residuals
+        self._fidelity, self._as_it_was = kernel.ROUGH, trial.residuals
         if follows_path(trial.model.effects):
             # what the base model does must be as it was: films turn elsewhere in a rough simulation
             if bench.is_dear and trial.cost >= MUCH_LEFT:
-                rough = bench.problem(trial.problem.layout.base, self._haste)
+                rough = bench.problem(trial.problem.layout.base, self._fidelity)
                 self._as_it_was = rough.residuals(trial.x)
             else:
-                self._haste = trial.problem.haste
+                self._fidelity = trial.problem.fidelity
         self._sketch = trial.problem.sketch(trial.x, trial.residuals)
 
     def promises(self, effect: Effect) -> list[Promise]:
@@ -132,7 +132,7 @@ class Screen:
         """
         if not found:
             return []
-        problem = self.bench.problem(found[0].model, self._haste)
+        problem = self.bench.problem(found[0].model, self._fidelity)
         layout = problem.layout
         first = self.trial.x.size
         rows: list[tuple[int, np.ndarray]] = []
@@ -278,7 +278,7 @@ class Screen:
                 rows.append(np.array((*values, *shape)))
         if not models:
             return []
-        problem = self.bench.problem(models[0], self._haste)
+        problem = self.bench.problem(models[0], self._fidelity)
         layout = problem.layout
         base_values = self.trial.problem.layout.values(self.trial.x)
         population = np.array([np.concatenate([base_values, row]) for row in rows])
@@ -306,7 +306,7 @@ class Screen:
             return None
         nothing = tuple(p.neutral or 0.0 for p in effect.sizes)
         model = with_effect(self.trial.model, effect.name, nothing)
-        problem = self.bench.problem(model, self._haste)
+        problem = self.bench.problem(model, self._fidelity)
         if problem.walks is None:
             return None
         columns = problem.own_jacobian()

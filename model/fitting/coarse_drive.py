@@ -58,7 +58,7 @@ def sketched(record: ActuatorRecord, model: Actuator) -> Sketch | None:
     if edges.size > _WORTH * record.time.size:
         return None
     drive = _drawn(record.drive, begins, ends, edges)
-    there, status = reading_of(c, length, drive, record.lag, kernel.SKETCHED, record.time)
+    there, status = reading_of(c, length, drive, record.lag, kernel.COARSE, record.time)
     near = float(np.mean((there / record.noise - foreseen) ** 2)) < _SAME**2
     return drive if status == kernel.OK and near else None
 

@@ -37,7 +37,7 @@ class Problem:
 
     ``records`` are all of actuators or all of films, and ``layout`` says what is free. Members of a
     population whose simulation ends early keep the last value they reached: a large but finite
-    residual, which a search walks away from. ``haste`` is as the kernel has it. ``simulations``
+    residual, which a search walks away from. ``fidelity`` is as the kernel has it. ``simulations``
     counts records simulated, and ``told`` is called with each such number. What the numbers
     ``sketched`` (d,) bool do is told by the records' sketches, None where nothing is.
 
@@ -51,7 +51,7 @@ class Problem:
         records: Sequence[Record],
         layout: Layout,
         workers: int = 2,
-        haste: int = kernel.CAREFUL,
+        fidelity: int = kernel.CAREFUL,
         told: Callable[[int, float], None] | None = None,
     ) -> None:
         if not records:
@@ -64,7 +64,7 @@ class Problem:
         self.records = tuple(records)
         self.layout = layout
         self.workers = workers
-        self.haste = haste
+        self.fidelity = fidelity
         self.told = told
         self.sketched: np.ndarray | None = None
         self._missed: np.ndarray | None = None  # by sketches, of all readings, where they are used
@@ -181,10 +181,10 @@ class Problem:
             return stress[None], status, record.time.size
         base = self.layout.base
         length = base.film.length if isinstance(base, Actuator) else 1.0
-        drive, haste = record.drive, self.haste
+        drive, fidelity = record.drive, self.fidelity
         if sketched and record.sketch is not None:
-            drive, haste = record.sketch, kernel.SKETCHED
-        moved, status, steps = readings_of(c, length, drive, record.lag, haste, record.time)
+            drive, fidelity = record.sketch, kernel.COARSE
+        moved, status, steps = readings_of(c, length, drive, record.lag, fidelity, record.time)
         return record.seen(moved), status, steps
 
     def residuals(self, x: np.ndarray) -> np.ndarray:

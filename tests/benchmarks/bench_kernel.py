@@ -92,12 +92,12 @@ def timed(run: Callable[[], np.ndarray], repeats: int) -> tuple[float, np.ndarra
     return statistics.median(spent), result
 
 
-def followed(c: np.ndarray, drive: Drive, haste: int = kernel.CAREFUL) -> np.ndarray:
-    """Stretch (N,) from rest, as a fit would have it, or in ``haste`` as a search would."""
+def followed(c: np.ndarray, drive: Drive, fidelity: int = kernel.CAREFUL) -> np.ndarray:
+    """Stretch (N,) from rest, as a fit would have it, or in ``fidelity`` as a search would."""
     y = initial_state(c, c[REST])
     stretch, rate = np.empty(drive.time.size), np.empty(drive.time.size)
     kernel.drive_by_voltage(
-        c, drive.time, drive.voltage, drive.ends, drive.temperature, y, stretch, rate, haste
+        c, drive.time, drive.voltage, drive.ends, drive.temperature, y, stretch, rate, fidelity
     )
     return stretch
 
@@ -171,7 +171,7 @@ def what_quick_steps_save(actuator: Actuator, sequence: Sequence) -> None:
 
 def drawn_up(c: np.ndarray, sketch: Drive, times: np.ndarray) -> np.ndarray:
     """Readings (N,) at ``times`` by a sketch."""
-    return reading_of(c, THESIS_FILM.length, sketch, 0.0, kernel.SKETCHED, times)[0]
+    return reading_of(c, THESIS_FILM.length, sketch, 0.0, kernel.COARSE, times)[0]
 
 
 def missed_by(model: Actuator, record: ActuatorRecord) -> float:

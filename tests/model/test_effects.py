@@ -685,8 +685,8 @@ def refitted(truth, start):
     The misfit is that of the prediction without the noise, over the noise (RMS).
     """
     closely = any(name in CLOSELY for name, _ in truth.effects)
-    haste = kernel.CAREFUL if closely else kernel.QUICK
-    problem = Problem(records(truth), Layout(start), workers=1, haste=haste)
+    fidelity = kernel.CAREFUL if closely else kernel.QUICK
+    problem = Problem(records(truth), Layout(start), workers=1, fidelity=fidelity)
     layout = problem.layout
     held = np.zeros(layout.size, dtype=bool)
     held[layout.column("J")] = True

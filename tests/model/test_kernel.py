@@ -378,7 +378,7 @@ def test_a_film_that_is_one_branch_goes_on_in_closed_form():
     c, far = actuator.coefficients(), slice(None, None, 8)
     fine, _ = reading_of(c, LENGTH, drive)
     held = Drive(time[far], drive.voltage[far])
-    coarse, status = reading_of(c, LENGTH, held, haste=kernel.SKETCHED)
+    coarse, status = reading_of(c, LENGTH, held, fidelity=kernel.COARSE)
     exact, _ = reading_of(c, LENGTH, held, times=time[far])
     assert status == kernel.OK
     assert np.ptp(fine) > 1e-6
@@ -409,7 +409,7 @@ def test_a_quick_step_may_be_longer_than_the_ringing(effects):
     actuator = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, effects)
     c = actuator.coefficients()
     drive = Drive(time, voltage, hold=True)
-    quick, status = reading_of(c, LENGTH, drive, haste=kernel.QUICK)
+    quick, status = reading_of(c, LENGTH, drive, fidelity=kernel.QUICK)
     fine, _ = reading_of(c, LENGTH, drive)
     assert status == kernel.OK
     rang = np.diff(fine, 2)[(time[2:] > 1.02) & (time[2:] < 1.3)]
@@ -432,7 +432,7 @@ def test_a_quick_look_at_a_drag_that_grows_with_the_rate(effects):
     c = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, effects).coefficients()
     careful, status = reading_of(c, LENGTH, drive)
     assert status == kernel.OK
-    quick, _ = reading_of(c, LENGTH, drive, haste=kernel.QUICK)
+    quick, _ = reading_of(c, LENGTH, drive, fidelity=kernel.QUICK)
     # what it misses would be told for an effect by which steps are shorter
     assert np.abs(quick - careful).max() < 0.2e-6
 
@@ -451,9 +451,9 @@ def test_drags_that_grow_are_followed_as_closely_as_the_film_moves():
             held = voltage[np.minimum(np.arange(fine.size) // 10, time.size - 1)]
             close, status = reading_of(c, LENGTH, Drive(fine, held, hold=True))
             assert status == kernel.OK
-            for haste, off in ((kernel.CAREFUL, 0.15e-6), (kernel.QUICK, 1.2e-6)):
+            for fidelity, off in ((kernel.CAREFUL, 0.15e-6), (kernel.QUICK, 1.2e-6)):
                 drive = Drive(time, voltage, hold=True)
-                (got,), _, count = readings_of(c[None], LENGTH, drive, haste=haste)
+                (got,), _, count = readings_of(c[None], LENGTH, drive, fidelity=fidelity)
                 assert np.abs(got - close[::10]).max() < off
                 taken += count
     # what a strong drag makes small needs few steps to be seen
@@ -464,13 +464,13 @@ TURNING = [e.name for e in EFFECTS.values() if e.turns]
 SOFTENING = [name for name in TURNING if EFFECTS[name].family == "softening"]
 
 
-def off_by(haste, effects, drive):
-    """RMS of what ``haste`` gets wrong, and of what the effects do."""
+def off_by(fidelity, effects, drive):
+    """RMS of what ``fidelity`` gets wrong, and of what the effects do."""
     plain = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
     c = replace(plain, effects=effects).coefficients()
     careful, status = reading_of(c, LENGTH, drive)
     assert status == kernel.OK
-    hasty, _ = reading_of(c, LENGTH, drive, haste=haste)
+    hasty, _ = reading_of(c, LENGTH, drive, fidelity=fidelity)
     without, _ = reading_of(plain.coefficients(), LENGTH, drive)
     return np.sqrt(np.mean((hasty - careful) ** 2)), np.sqrt(np.mean((careful - without) ** 2))
 
@@ -491,14 +491,16 @@ STEPPED = [0.0, 8e3, 8e3, 3e3, 3e3, 5e3]
 
 @pytest.mark.parametrize("size", [0.002, 0.02, -0.005])
 @pytest.mark.parametrize("name", SOFTENING)
-@pytest.mark.parametrize(("haste", "ringing"), [(kernel.QUICK, 0.01), (kernel.ROUGH, 0.02)])
-def test_what_softens_on_the_way_is_followed_with_care_while_it_rings(haste, ringing, name, size):
+@pytest.mark.parametrize(("fidelity", "ringing"), [(kernel.QUICK, 0.01), (kernel.ROUGH, 0.02)])
+def test_what_softens_on_the_way_is_followed_with_care_while_it_rings(
+    fidelity, ringing, name, size
+):
     time = ticks(6.0, 5e-3)
     effects = ((name, tuple({**dict(typical(name)[1]), "softening": size}.items())),)
     lobes = Drive(time, 7e3 * np.sin(np.pi * 0.5 * time) ** 2, hold=True)
     steps = np.interp(time, [1.0, 1.02, 3.0, 3.02, 4.0, 4.02], STEPPED)
     for drive, part in ((lobes, 0.005), (Drive(time, steps, hold=True), ringing)):
-        off, does = off_by(haste, effects, drive)
+        off, does = off_by(fidelity, effects, drive)
         assert off < part * does
 
 

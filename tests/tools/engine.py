@@ -77,13 +77,13 @@ def typical(name: str) -> tuple[str, tuple[tuple[str, float], ...]]:
 
 
 def posed(
-    model: Actuator, record: Record, haste: int = kernel.CAREFUL
+    model: Actuator, record: Record, fidelity: int = kernel.CAREFUL
 ) -> tuple[Problem, np.ndarray, np.ndarray]:
     """A problem, ``model``'s coordinates (d,) and which are free (d,): all but locking limits."""
     layout = Layout(model)
     free = np.ones(layout.size, dtype=bool)
     free[layout.column("J")] = False
-    problem = Problem([record], layout, workers=1, haste=haste)
+    problem = Problem([record], layout, workers=1, fidelity=fidelity)
     return problem, layout.coordinates(layout.initial()), free
 
 

@@ -43,7 +43,7 @@ def bench_of(*records):
     return Bench(records, PLAIN if isinstance(records[0], ActuatorRecord) else STRIP, workers=1)
 
 
-# --- haste
+# --- fidelity
 
 
 def aged(softening):
@@ -62,15 +62,15 @@ def test_what_is_far_from_the_noise_is_simulated_roughly():
     # all held: it stays as far away as it is
     far = bench.fit(model, [(start, None)], np.ones_like(held))
     assert far.cost > 100.0
-    assert far.problem.haste == kernel.ROUGH
+    assert far.problem.fidelity == kernel.ROUGH
     # what comes near it is carefully told from it
     near = bench.ended(replace(far, fixed=held))
     assert near.cost < 1.2
-    assert near.problem.haste == kernel.QUICK
+    assert near.problem.fidelity == kernel.QUICK
     again = bench.problem(model).residuals(near.x)
     assert np.array_equal(again, near.residuals)
     # and what is near from the beginning
-    assert bench.fit(model, [(near.x, None)], held).problem.haste == kernel.QUICK
+    assert bench.fit(model, [(near.x, None)], held).problem.fidelity == kernel.QUICK
 
 
 def test_what_follows_no_path_is_simulated_alike_near_and_far():
@@ -79,7 +79,7 @@ def test_what_follows_no_path_is_simulated_alike_near_and_far():
     start = layout.coordinates(layout.initial())
     far = bench.fit(PLAIN, [(start, None)], np.ones(layout.size, dtype=bool))
     assert far.cost > 100.0
-    assert far.problem.haste == kernel.QUICK
+    assert far.problem.fidelity == kernel.QUICK
 
 
 # --- no further than it takes

@@ -297,11 +297,11 @@ def test_far_from_the_noise_a_film_that_sticks_is_screened_in_rough_simulations(
         # by what is there without it in the same simulation: the effect alone is left
         found.append(screen.promises(EFFECTS["sensor curvature"])[0])
         small = with_effect(trial.model, "sensor curvature", (1e-9,))
-        problem = bench.problem(small, screen._haste)
+        problem = bench.problem(small, screen._fidelity)
         values = problem.layout.values(problem.layout.coordinates(problem.layout.initial()))
         moved, _ = screen._moved_by(problem, values[None], np.zeros(1, dtype=bool))
         assert np.max(np.abs(moved)) < 1e-3
-        rough = screen._haste == kernel.ROUGH
+        rough = screen._fidelity == kernel.ROUGH
         assert rough == (len(some) > 1)
     assert found[0].share == pytest.approx(found[1].share, abs=0.05)
     assert found[0].share > 0.5

@@ -33,9 +33,9 @@ def record(*segments, model=PLAIN, hold=True, rate=RATE):
     return record_of(model, played(*segments, hold=hold, rate=rate))
 
 
-def seen(record, model, drive=None, haste=kernel.CAREFUL):
+def seen(record, model, drive=None, fidelity=kernel.CAREFUL):
     found, status = reading_of(
-        model.coefficients(), model.film.length, drive or record.drive, record.lag, haste,
+        model.coefficients(), model.film.length, drive or record.drive, record.lag, fidelity,
         record.time,
     )  # fmt: skip
     assert status == kernel.OK
@@ -56,7 +56,7 @@ def test_a_sketch_is_shorter_and_shows_the_same(segments, part, hold, lag):
     sketch = sketched(one, PLAIN)
     assert sketch is not None
     assert sketch.time.size < part * one.time.size
-    off = seen(one, PLAIN, sketch, kernel.SKETCHED) - seen(one, PLAIN)
+    off = seen(one, PLAIN, sketch, kernel.COARSE) - seen(one, PLAIN)
     assert np.sqrt(np.mean(off**2)) < 0.5 * NOISE
 
 

@@ -477,8 +477,8 @@ def test_work_is_counted_in_steps_and_in_populations():
     record, plain = made(ONE), Actuator(THESIS_FILM, THESIS_LOAD, ONE)
     told = []
 
-    def work(model, haste=kernel.QUICK, members=1):
-        problem = Problem([record], Layout(model), 1, haste, lambda *work: told.append(work))
+    def work(model, fidelity=kernel.QUICK, members=1):
+        problem = Problem([record], Layout(model), 1, fidelity, lambda *work: told.append(work))
         problem.predict(np.tile(Layout(model).initial(), (members, 1)))
         return told[-1]
 
