@@ -23,6 +23,7 @@ import typer
 from typer.core import TyperCommand
 from typer.exceptions import TyperException
 
+from dearig.cli.docs import docs
 from dearig.errors import DearigError, InputError
 
 if TYPE_CHECKING:
@@ -905,6 +906,9 @@ def presets(json: Json = None, force: Force = False) -> None:
             for name, s in found.items()
         ]
         write_json({"format": "dearig-presets/1", "presets": listed}, json)
+
+
+app.command("docs")(docs)
 
 
 def _branches(text: str) -> list[int]:

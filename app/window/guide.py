@@ -1,4 +1,4 @@
-"""The guide: the window's own README, with its pictures."""
+"""The window's guide: the documents that ``dearig docs`` shows, from the operator's page on."""
 
 from __future__ import annotations
 
@@ -6,43 +6,75 @@ from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QImage, QTextDocument
+from PySide6.QtGui import QDesktopServices, QImage, QTextDocument
 from PySide6.QtWidgets import QDialog, QTextBrowser, QVBoxLayout, QWidget
+
+from dearig.docs import page_at, to_html
+from dearig.docs.pages import file_at
 
 __all__ = ["Guide"]
 
-_TEXT = Path(__file__).with_name("README.md")
+_FIRST = "app/docs/window.md"
 _WIDTH = 760  # px of a picture
-_QUESTIONED = "\n## What will be questioned"  # for those who change the window, not for its users
+_STYLE = """
+code, pre { font-family: monospace; }
+table { border-collapse: collapse; border: 1px solid gray; }
+td, th { border: 1px solid gray; padding: 3px; text-align: left; }
+"""
 
 
 class Guide(QDialog):
-    """Shows the guide and leaves the window usable."""
+    """Shows the documents and leaves the window usable."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setWindowTitle("dearig: the guide")
+        self.setWindowTitle("dearig: guide")
         self.setModal(False)
         self.resize(_WIDTH + 80, 700)
-        self.text = _Illustrated()
-        self.text.setOpenExternalLinks(False)
-        self.text.document().setDocumentMargin(16)
-        self.text.document().setBaseUrl(QUrl.fromLocalFile(str(_TEXT)))
-        self.text.setMarkdown(_TEXT.read_text(encoding="utf-8").partition(_QUESTIONED)[0])
+        self.text = _Documents()
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.text)
 
 
-class _Illustrated(QTextBrowser):
-    """A text whose pictures are no wider than it; without them it is a text."""
+class _Documents(QTextBrowser):
+    """Documents by their paths in the repository; a picture is no wider than the text."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setOpenLinks(False)
+        self.anchorClicked.connect(self._follow)
+        self.document().setDocumentMargin(16)
+        self.document().setDefaultStyleSheet(_STYLE)
+        self.setSource(QUrl(_FIRST))
 
     def loadResource(self, kind: int, name: QUrl | str) -> Any:  # noqa: N802
-        if kind != QTextDocument.ResourceType.ImageResource.value:
-            return super().loadResource(kind, name)
-        path = Path(self.document().baseUrl().resolved(QUrl(name)).toLocalFile())
-        # they lie beside the source, and are not part of an installed program
-        picture = QImage(str(path)) if path.is_file() else QImage()
-        if picture.isNull():
-            return QImage(1, 1, QImage.Format.Format_ARGB32)
+        path = QUrl(name).path()
+        if kind == QTextDocument.ResourceType.HtmlResource.value:
+            page = page_at(path)
+            return None if page is None else to_html(page, _address)
+        if kind == QTextDocument.ResourceType.ImageResource.value:
+            return _picture(file_at(path))
+        return super().loadResource(kind, name)
+
+    def _follow(self, link: QUrl) -> None:
+        if link.scheme():
+            QDesktopServices.openUrl(link)
+        else:
+            target = link if link.path() else QUrl(self.source().path() + link.toString())
+            self.setSource(target, QTextDocument.ResourceType.HtmlResource)
+
+
+def _address(path: str) -> str | None:
+    """A linked file as the guide names it; None where it is not packaged."""
+    known = page_at(path) is not None or (path.endswith(".png") and file_at(path) is not None)
+    return path if known else None
+
+
+def _picture(file: Path | None) -> QImage:
+    picture = QImage() if file is None else QImage(str(file))
+    if picture.isNull():
+        return QImage(1, 1, QImage.Format.Format_ARGB32)
+    if picture.width() > _WIDTH:
         return picture.scaledToWidth(_WIDTH, Qt.TransformationMode.SmoothTransformation)
+    return picture

@@ -1,0 +1,39 @@
+"""F1: the guide shows the documents, with their pictures, and follows their links."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QUrl
+from PySide6.QtGui import QTextDocument
+from pytestqt.qtbot import QtBot
+
+from dearig.docs import page_at, pages
+from dearig.window.guide import Guide
+
+
+def test_the_guide_opens_on_the_operators_page_with_its_pictures(qtbot: QtBot) -> None:
+    guide = Guide()
+    qtbot.addWidget(guide)
+    first = page_at("app/docs/window.md")
+    assert first is not None
+    assert guide.text.toPlainText().startswith(first.title)
+    picture = guide.text.loadResource(
+        QTextDocument.ResourceType.ImageResource.value, QUrl("app/docs/pictures/window/run.png")
+    )
+    assert picture.width() > 100
+
+
+def test_the_guide_follows_a_link_and_comes_back(qtbot: QtBot) -> None:
+    guide = Guide()
+    qtbot.addWidget(guide)
+    guide.text.anchorClicked.emit(QUrl("drivers/SAFETY.md#hazards"))
+    assert "hardware interlock" in guide.text.toPlainText()
+    guide.text.backward()
+    assert guide.text.source() == QUrl("app/docs/window.md")
+
+
+def test_the_guide_can_show_every_document(qtbot: QtBot) -> None:
+    guide = Guide()
+    qtbot.addWidget(guide)
+    for page in pages():
+        guide.text.anchorClicked.emit(QUrl(page.path))
+        assert guide.text.toPlainText().startswith(page.title), page.path
