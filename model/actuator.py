@@ -13,9 +13,9 @@ from dearig.model.effects import (
     EFFECTS,
     MEMORY,
     NEUTRAL,
+    PARAMETER_COUNT,
     PLACES,
     SENSOR_MEMORY,
-    SLOTS,
     EffectValues,
 )
 from dearig.model.errors import ModelError
@@ -147,7 +147,7 @@ class Actuator:
         c[at.CAPACITANCE] = permittivity * film.length * film.width / film.thickness
         if load.rest_length is not None:
             c[HEAD + at.MODULUS] = _modulus_at_rest(c, load.rest_length / film.length)
-        c[at.EFFECTS_AT : at.EFFECTS_AT + SLOTS] = effect_values(self.effects, "voltage")
+        c[at.EFFECTS_AT : at.EFFECTS_AT + PARAMETER_COUNT] = effect_values(self.effects, "voltage")
         return c
 
     def rest(self) -> float:
@@ -197,7 +197,7 @@ def ends_of(voltage: np.ndarray, hold: bool) -> np.ndarray:
 
 
 def effect_values(effects: EffectValues, drive: str) -> np.ndarray:
-    """The coefficients (SLOTS,) of ``effects``, neutral where there are none.
+    """The coefficients (PARAMETER_COUNT,) of ``effects``, neutral where there are none.
 
     Raises ``ModelError`` for effects and numbers that do not exist, are out of bounds, or are not
     of a film driven by ``drive`` (voltage or stretch).
@@ -288,8 +288,8 @@ def readings_of(
 ) -> tuple[np.ndarray, int, int]:
     """``(readings, status, steps)`` of coefficient vectors ``cs`` (P, C) of one film: (P, N) m.
 
-    They differ in ``dearig.model.effects.SENSED`` alone: in what the sensor makes of how the film
-    moves, which took so many ``steps``. The rest is as in ``reading_of``.
+    They differ in ``dearig.model.effects.SENSOR_COLUMNS`` alone: in how the sensor reads the
+    film, which moved in ``steps`` steps. The rest is as in ``reading_of``.
     """
     times = drive.time if times is None else times
     c = cs[0].copy()

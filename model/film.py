@@ -9,7 +9,7 @@ import numpy as np
 from dearig.model import kernel
 from dearig.model.actuator import STATUS_WORDS, effect_values
 from dearig.model.coefficients import EFFECTS_AT, MODULUS, REST, WIDTH
-from dearig.model.effects import MEMORY, NEUTRAL, SLOTS, EffectValues
+from dearig.model.effects import MEMORY, NEUTRAL, PARAMETER_COUNT, EffectValues
 from dearig.model.errors import ModelError
 from dearig.model.film_kernel import add_effects, drive_by_stretch
 from dearig.model.kinematics import KINEMATICS
@@ -64,7 +64,7 @@ class Strip:
     def coefficients(self) -> np.ndarray:
         """The kernels' coefficient vector (see ``model.coefficients``)."""
         c = self.network.coefficients(self.held)
-        c[EFFECTS_AT : EFFECTS_AT + SLOTS] = effect_values(self.effects, "stretch")
+        c[EFFECTS_AT : EFFECTS_AT + PARAMETER_COUNT] = effect_values(self.effects, "stretch")
         return c
 
     def simulate(self, time: np.ndarray, stretch: np.ndarray) -> StressResponse:
@@ -86,7 +86,7 @@ def stress_of(c: np.ndarray, time: np.ndarray, stretch: np.ndarray) -> tuple[np.
     """``(stress, status, reached)`` of coefficient vector ``c`` (see ``model.coefficients``)."""
     parts, status, reached = unit_stresses(c, time, stretch)
     stress = c[HEAD + MODULUS :: WIDTH] @ parts
-    if not np.array_equal(c[EFFECTS_AT : EFFECTS_AT + SLOTS], NEUTRAL):
+    if not np.array_equal(c[EFFECTS_AT : EFFECTS_AT + PARAMETER_COUNT], NEUTRAL):
         c = c.copy()
         c[REST] = stretch[0]
         add_effects(c, time, stretch, np.zeros(MEMORY), stress)

@@ -27,7 +27,7 @@ _GENTLE = 0.1  # relaxation within one interval below which the branch is not st
 _SMALLEST_PART = 1e-9  # of a sample interval
 
 _soften, _stress = assembly.soften, assembly.stress
-_commit, _felt, _acting = assembly.commit, assembly.felt, assembly.acting
+_commit, _felt, _acting = assembly.commit, assembly.measured_stress, assembly.active
 
 
 @jit

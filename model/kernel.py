@@ -124,11 +124,11 @@ _RODAS_WORTH = 10  # explicit steps that a sample by it takes as long as, at lea
 _inertia, _supply, _polarise = assembly.inertia, assembly.supply, assembly.polarise
 _permittivity, _soften, _stress = assembly.permittivity, assembly.soften, assembly.stress
 _stiffness, _commit, _sense = assembly.stiffness, assembly.commit, assembly.sense
-_acting, _sensing = assembly.acting, assembly.sensing
-_SUPPLY, _POLARISE = assembly.BITS["supply"], assembly.BITS["polarise"]
-_PERMITTIVITY, _SOFTEN = assembly.BITS["permittivity"], assembly.BITS["soften"]
-_STRESS, _COMMIT = assembly.BITS["stress"], assembly.BITS["commit"]
-_STIFFNESS, _TURNS = assembly.BITS["stiffness"], assembly.TURNS
+_acting, _sensing = assembly.active, assembly.active_sensors
+_SUPPLY, _POLARISE = assembly.HOOK_BITS["supply"], assembly.HOOK_BITS["polarise"]
+_PERMITTIVITY, _SOFTEN = assembly.HOOK_BITS["permittivity"], assembly.HOOK_BITS["soften"]
+_STRESS, _COMMIT = assembly.HOOK_BITS["stress"], assembly.HOOK_BITS["commit"]
+_STIFFNESS, _TURNS = assembly.HOOK_BITS["stiffness"], assembly.HYSTERETIC
 _MOVING = _SUPPLY | _POLARISE | _PERMITTIVITY | _SOFTEN | _STRESS
 
 _NEO_HOOKEAN, _GENT = SPRINGS.index(neo_hookean.NAME), SPRINGS.index(gent.NAME)

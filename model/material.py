@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dearig.model import coefficients as at
-from dearig.model.effects import NEUTRAL, SLOTS
+from dearig.model.effects import NEUTRAL, PARAMETER_COUNT
 from dearig.model.errors import ModelError
 from dearig.model.kinematics import KINEMATICS, thinning
 from dearig.model.network import HEAD
@@ -184,7 +184,7 @@ class Network:
         c = np.zeros(HEAD + at.WIDTH * len(springs))
         c[at.HELD] = held
         c[at.INERTIA] = c[at.LENGTH] = c[at.SECTION] = c[at.THICKNESS] = c[at.REST] = 1.0
-        c[at.EFFECTS_AT : at.EFFECTS_AT + SLOTS] = NEUTRAL
+        c[at.EFFECTS_AT : at.EFFECTS_AT + PARAMETER_COUNT] = NEUTRAL
         kinds = {SPRINGS.index(spring.kind) for spring in springs}
         c[at.UNIFORM] = kinds.pop() if len(kinds) == 1 else -1
         for i, spring in enumerate(springs):

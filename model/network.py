@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dearig.model.coefficients import EFFECTS_AT, HELD, KIND, LIMIT, LOCKING, MODULUS, WIDTH
-from dearig.model.effects import SLOTS
+from dearig.model.effects import PARAMETER_COUNT
 from dearig.model.jit import jit
 from dearig.model.kinematics import directions, pull_slope, strain_and_pull
 from dearig.model.springs import curvature, slope
@@ -19,7 +19,7 @@ __all__ = [
     "true_pull",
 ]
 
-HEAD = EFFECTS_AT + SLOTS  #: where the springs begin in the coefficient vector
+HEAD = EFFECTS_AT + PARAMETER_COUNT  #: where the springs begin in the coefficient vector
 
 
 @jit

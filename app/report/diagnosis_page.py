@@ -173,7 +173,7 @@ def _steps(outcome: DiagnoseOutcome) -> tuple[FoundEffect, ...]:
 
     found = []
     for step in outcome.finding.steps:
-        about = _ended(EFFECTS[step.effect].words)
+        about = _ended(EFFECTS[step.effect].summary)
         against: tuple[str, ...] = ()
         if step.indistinguishable_from:
             others = ", ".join(kin(f) for f in step.indistinguishable_from)

@@ -19,7 +19,7 @@ from scipy.stats.qmc import Sobol
 from dearig.model import kernel
 from dearig.model.actuator import Actuator, at_rest
 from dearig.model.diagnosis.results import NOISE_RMS, NOT_BY_CHANCE, Stage
-from dearig.model.effects import follows_path
+from dearig.model.effects import any_hysteretic
 from dearig.model.film import Strip
 from dearig.model.fitting.broyden import descend_by_secants
 from dearig.model.fitting.coarse_drive import sketched
@@ -384,7 +384,7 @@ class Bench:
             for start in anew
         ]
         best = min(scouts, key=lambda f: f.cost)
-        if best.cost > _ROUGHLY and follows_path(model.effects):
+        if best.cost > _ROUGHLY and any_hysteretic(model.effects):
             problem = scouted
 
         def down(trial: Trial) -> Trial:
@@ -413,7 +413,7 @@ class Bench:
         layout, effects = problem.layout, problem.layout.base.effects
         if layout.names not in self._sketched:
             springs: np.ndarray | None = None
-            if effects and not follows_path(effects):
+            if effects and not any_hysteretic(effects):
                 plain = self.problem(replace(layout.base, effects=()), problem.fidelity)
                 springs = self._told_by_sketches(plain, fixed[: plain.layout.size])
                 springs = springs if springs.any() else None

@@ -23,7 +23,7 @@ from dearig.model import kernel
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.bench import Bench, Trial
 from dearig.model.diagnosis.results import MUCH_LEFT
-from dearig.model.effects import EFFECTS, Effect, EffectValues, Parameter, follows_path
+from dearig.model.effects import EFFECTS, Effect, EffectValues, Parameter, any_hysteretic
 from dearig.model.film import Strip
 from dearig.model.fitting.problem import Problem, is_told
 from dearig.model.records import ActuatorRecord, FilmRecord
@@ -65,7 +65,7 @@ def with_effect(model: Actuator | Strip, name: str, values: tuple[float, ...]) -
 
 def sizes_of(size: Parameter, parts: Sequence[float] = _SIZES) -> list[float]:
     """Sizes from small to large, ``parts`` of the typical one, of both signs where there are."""
-    low, high = size.fitted
+    low, high = size.fit_bounds
     neutral = size.neutral or 0.0
     signs = (1.0, -1.0) if low < neutral else (1.0,)
     steps = [neutral + sign * part * size.typical for sign in signs for part in parts]
@@ -83,7 +83,7 @@ class Screen:
         self._q, self._r = np.linalg.qr(self.jacobian)
         self._residual = trial.residuals - self._q @ (self._q.T @ trial.residuals)
         self._fidelity, self._as_it_was = kernel.ROUGH, trial.residuals
-        if follows_path(trial.model.effects):
+        if any_hysteretic(trial.model.effects):
             # what the base model does must be as it was: films turn elsewhere in a rough simulation
             if bench.is_dear and trial.cost >= MUCH_LEFT:
                 rough = bench.problem(trial.problem.layout.base, self._fidelity)
@@ -97,27 +97,27 @@ class Screen:
         own = self._of_each_record(effect)
         if own is not None:
             return [own]
-        shapes = list(product(*(self._starts(p) for p in effect.shapes)))
+        shapes = list(product(*(self._starts(p) for p in effect.shape_parameters)))
         found = self._scored(effect, shapes)
-        only = effect.shapes[0] if len(effect.shapes) == 1 else None
+        only = effect.shape_parameters[0] if len(effect.shape_parameters) == 1 else None
         step = self._step(only) if only else 0.0
         found.sort(key=lambda p: -p.share)
         if only and step:
             found = [self._closer(effect, only, p, step) for p in _apart(found, step)]
             found.sort(key=lambda p: -p.share)
-        tried = self._simulated(effect, found, several=not step and len(effect.sizes) == 1)
+        tried = self._simulated(effect, found, several=not step and len(effect.amplitudes) == 1)
         return sorted(tried, key=lambda p: -p.share)
 
     def scattered(self, effect: Effect) -> list[Promise]:
         """Promises of ``effect``, best first, of shapes all over their bounds."""
-        several = len(effect.shapes)
-        spread = [_spread(p, several) or self._starts(p) for p in effect.shapes]
+        several = len(effect.shape_parameters)
+        spread = [_spread(p, several) or self._starts(p) for p in effect.shape_parameters]
         found = self._scored(effect, list(product(*spread)))
         return sorted(found, key=lambda p: -p.share)
 
     def _closer(self, effect: Effect, shape: Parameter, near: Promise, step: float) -> Promise:
         """The best promise within half a ``step`` or so of one that is ``near``."""
-        low, high = shape.fitted
+        low, high = shape.fit_bounds
         best = near
         for part, count in _CLOSER:
             finer = [(_place(best) + f * part * step,) for f in np.linspace(-1.0, 1.0, count)]
@@ -139,7 +139,7 @@ class Screen:
         for place, promise in enumerate(found[:_SIMULATED]):
             values = layout.values(promise.start)
             rows.append((place, values))
-            for size in self._sizes(effect.sizes[0]) if several else ():
+            for size in self._sizes(effect.amplitudes[0]) if several else ():
                 other = values.copy()
                 other[first] = size
                 rows.append((place, other))
@@ -162,8 +162,8 @@ class Screen:
             start = layout.coordinates(values)
             off[place] = own
             columns = found[place].columns
-            moved = values[first] - (effect.sizes[0].neutral or 0.0)
-            if len(effect.sizes) == 1 and moved != 0.0:
+            moved = values[first] - (effect.amplitudes[0].neutral or 0.0)
+            if len(effect.amplitudes) == 1 and moved != 0.0:
                 columns = ((residual - self.trial.residuals) / moved)[:, None]
             kept[place] = replace(found[place], start=start, columns=columns, share=share)
         for place, own in off.items():
@@ -191,16 +191,16 @@ class Screen:
 
     def _step(self, shape: Parameter) -> float:
         """How far apart places are between which a descent loses its way; 0 where it does not."""
-        if shape.part_of == "duration":
+        if shape.relative_to == "duration":
             return self._duration() / _MOMENTS
-        return 1.0 / self._duration() if shape.part_of == "spectrum" else 0.0
+        return 1.0 / self._duration() if shape.relative_to == "spectrum" else 0.0
 
     def _duration(self) -> float:
         return max(float(r.time[-1]) for r in self.bench.records)
 
     def _sizes(self, size: Parameter) -> list[float]:
         """Sizes to try, for these records."""
-        if size.part_of != "slope":
+        if size.relative_to != "slope":
             return list(size.starts) or sizes_of(size)
         slopes = np.concatenate(
             [
@@ -212,7 +212,7 @@ class Screen:
         moving = slopes[slopes > 0.0]
         if not moving.size:
             return []
-        low, high = size.fitted
+        low, high = size.fit_bounds
         steepest = np.quantile(moving, 1.0 - np.array(size.starts))
         return [float(s) for s in 1.0 / steepest if low <= s <= high]
 
@@ -220,24 +220,24 @@ class Screen:
         """Values of a shape to try, for these records."""
         records = self.bench.records
         starts = list(parameter.starts)
-        if parameter.part_of == "displacement":
+        if parameter.relative_to == "displacement":
             largest = max(
                 float(np.max(r.measured if r.valid is None else r.measured[r.valid]))
                 for r in records
             )
             starts = [s * largest for s in starts]
-        elif parameter.part_of == "voltage":
+        elif parameter.relative_to == "voltage":
             largest = max(
                 float(np.max(np.abs(r.drive.voltage)))
                 for r in records
                 if isinstance(r, ActuatorRecord)
             )
             starts = [s * largest for s in starts]
-        elif parameter.part_of == "duration":
+        elif parameter.relative_to == "duration":
             starts = list((np.arange(_MOMENTS) + 0.5) / _MOMENTS * self._duration())
-        elif parameter.part_of == "spectrum":
-            starts = [self._strongest_line(*parameter.fitted), *starts]
-        low, high = parameter.fitted
+        elif parameter.relative_to == "spectrum":
+            starts = [self._strongest_line(*parameter.fit_bounds), *starts]
+        low, high = parameter.fit_bounds
         return [min(max(s, low), high) for s in starts]
 
     def _strongest_line(self, low: float, high: float) -> float:
@@ -265,7 +265,7 @@ class Screen:
         return float(frequencies[int(np.argmax(power))])
 
     def _scored(self, effect: Effect, shapes: list[tuple[float, ...]]) -> list[Promise]:
-        sizes = effect.sizes
+        sizes = effect.amplitudes
         rows, models = [], []
         for shape in shapes:
             for i in range(len(sizes)):
@@ -294,7 +294,7 @@ class Screen:
             columns = moved[part].T / probes
             across = columns - self._q @ (self._q.T @ columns)
             size, share = self._solve(across, columns, total)
-            size = np.clip(size, *np.transpose([p.fitted for p in sizes]))
+            size = np.clip(size, *np.transpose([p.fit_bounds for p in sizes]))
             there_too = np.concatenate([base_values, size, shape])
             start = np.clip(layout.coordinates(there_too), layout.lower, layout.upper)
             found.append(Promise(models[n * per], start, columns, share))
@@ -302,9 +302,9 @@ class Screen:
 
     def _of_each_record(self, effect: Effect) -> Promise | None:
         """The promise of a walk that each record has of its own; None of any other effect."""
-        if effect.ways is None:
+        if effect.drift_basis is None:
             return None
-        nothing = tuple(p.neutral or 0.0 for p in effect.sizes)
+        nothing = tuple(p.neutral or 0.0 for p in effect.amplitudes)
         model = with_effect(self.trial.model, effect.name, nothing)
         problem = self.bench.problem(model, self._fidelity)
         if problem.walks is None:
@@ -367,9 +367,9 @@ class Screen:
 
 def _spread(shape: Parameter, several: int) -> list[float]:
     """Values of a ``shape`` all over its bounds, fewer of ``several``; none where records say."""
-    if shape.part_of:
+    if shape.relative_to:
         return []
-    low, high = shape.fitted
+    low, high = shape.fit_bounds
     count = _SPREAD[min(several, len(_SPREAD)) - 1]
     parts = (np.arange(count) + 0.5) / count
     if shape.logarithmic:

@@ -26,7 +26,7 @@ from dearig.model.diagnosis.results import (
 from dearig.model.diagnosis.screening import Promise, Screen, is_of, sizes_of, with_effect
 from dearig.model.diagnosis.stress import missing_stress
 from dearig.model.diagnosis.symbolic_regression import describe_unnamed
-from dearig.model.effects import EFFECTS, Effect, follows_path
+from dearig.model.effects import EFFECTS, Effect, any_hysteretic
 from dearig.model.film import Strip
 from dearig.model.fitting import Estimate
 from dearig.model.fitting.parameters import Layout
@@ -564,7 +564,7 @@ class _Search:
         So little may be left as a law in ``best`` is not quite the true one; a walk follows none.
         """
         explained = self.found[frozenset()].cost - best.cost
-        lawful = all(EFFECTS[n].recurs for n in best.effects)
+        lawful = all(EFFECTS[n].is_reproducible for n in best.effects)
         if lawful and best.cost - 1.0 < _OF_ITS_FORM * explained:
             return _FORM_SHARE
         return _SECOND_SHARE if gain < _BY_FAR else 0.0
@@ -574,7 +574,7 @@ class _Search:
 
         What happens at one moment, or at none again, is not asked: nothing else foretells it.
         """
-        if not EFFECTS[tried.name].recurs:
+        if not EFFECTS[tried.name].is_reproducible:
             return True
         return self.bench.left_out_cost(tried.trial) < self.bench.left_out_cost(best)
 
@@ -696,7 +696,7 @@ class _Search:
         if key not in self.screened or self.screened[key][0].trial is not parent:
             self.screened[key] = (Screen(self.bench, parent), {})
         screen, known = self.screened[key]
-        of_family = [e for e in self.effects if family in ("", e.family) and not e.refines]
+        of_family = [e for e in self.effects if family in ("", e.family) and not e.generalises]
         wanted = [e for e in of_family if e.name not in key]
         asked = [e for e in wanted if e.name not in known]
         for n in range(0, len(asked), _SCREENED):
@@ -726,7 +726,7 @@ class _Search:
         # from nothing: the first step, which all numbers take together, is the linear guess
         nothing = promises[0].start.copy()
         nothing[:first] = parent.x
-        nothing[first : first + len(effect.sizes)] = [p.neutral for p in effect.sizes]
+        nothing[first : first + len(effect.amplitudes)] = [p.neutral for p in effect.amplitudes]
         worth = [p for p in promises if p.share > _NEARLY * promises[0].share]
         for start, promise in ((nothing, promises[0]), *((p.start, p) for p in worth)):
             near = _near(jacobian, promise, effect)
@@ -738,7 +738,7 @@ class _Search:
         if other is not None and alone is not None:
             starts.append((self._in_place(model, other, alone), starts[0][1]))
         anew: list[np.ndarray] = []
-        if effect.relaxes and isinstance(model, Actuator):
+        if effect.is_viscoelastic and isinstance(model, Actuator):
             anew = self._relieved(parent, promises[0])
         elif effect.acts_on == "inertia" and parent.cost > MUCH_LEFT:
             anew = self._moving(parent, promises[0])
@@ -861,7 +861,7 @@ class _Search:
             for one in order:
                 rivalling = best.cost - one.trial.cost > _RIVALS * (best.cost - leader.cost)
                 named = EFFECTS[one.name].family != "unknown"
-                quick = not follows_path(one.trial.model.effects)
+                quick = not any_hysteretic(one.trial.model.effects)
                 if rivalling and named and (quick or _is_first_of_family(one.name, names)):
                     rivals.append(one.trial)
             for n in range(0, len(rivals), _ABREAST):
@@ -908,7 +908,7 @@ class _Search:
         shared = _taken_over(tried.name, simpler)
         more = [p for p in law.parameters if f"{law.name}: {p.name}" not in shared]
         known = {f"{law.name}: {p.name}": p.starts[0] for p in more if p.starts} | shared
-        places = [known | {f"{law.name}: {p.name}": end} for p in more for end in p.fitted]
+        places = [known | {f"{law.name}: {p.name}": end} for p in more for end in p.fit_bounds]
         xs = np.array([_placed(problem.layout, place) for place in places])
         away = np.abs(problem.costs(xs) / simpler.trial.cost - 1.0)
         found = int(np.argmin(away))
@@ -923,7 +923,7 @@ class _Search:
         """
         lead = tried[0]
         some = _explained(lead.parent, lead.trial) > _SHAKEN_FROM
-        if EFFECTS[lead.name].turns and some and not lead.trial.is_noise:
+        if EFFECTS[lead.name].is_hysteretic and some and not lead.trial.is_noise:
             wider = [t for t in tried if _extends(t, lead)]
             law = max([lead, *wider], key=lambda t: _intricacy(t.name))
             key = frozenset(law.trial.effects)
@@ -982,21 +982,21 @@ class _Search:
 
         From where that has ended, what there is more doing nothing; and what refines that.
         """
-        refining = [e for e in self.effects if e.refines in trial.effects]
+        refining = [e for e in self.effects if e.generalises in trial.effects]
         tried: list[_Tried] = []
         for effect in refining if not trial.is_white else ():
-            parent = self._without(trial, effect.refines)
+            parent = self._without(trial, effect.generalises)
             key = frozenset((*parent.effects, effect.name))
             if key not in self.found:
-                nothing = tuple(p.neutral or 0.0 for p in effect.sizes)
+                nothing = tuple(p.neutral or 0.0 for p in effect.amplitudes)
                 model = with_effect(parent.model, effect.name, nothing)
                 layout = self.bench.problem(model).layout
                 known = dict(zip(layout.names, layout.initial(), strict=True))
-                coarse = _Tried(effect.refines, parent, trial, 0.0)
+                coarse = _Tried(effect.generalises, parent, trial, 0.0)
                 start = _placed(layout, known | _taken_over(effect.name, coarse))
                 fixed = np.concatenate([parent.fixed, np.zeros(len(nothing), dtype=bool)])
                 self._keep(self.bench.ended(self.bench.fit(model, [(start, None)], fixed)))
-            fine = self._in_its_place(trial, effect.refines, [effect.name])
+            fine = self._in_its_place(trial, effect.generalises, [effect.name])
             tried += fine
             for one in fine:
                 tried += self._refining(one.trial)
@@ -1113,9 +1113,13 @@ class _Search:
         layout, known = trial.problem.layout, _taken_over(tried.name, lead)
         if _extends(lead, tried):
             return _placed(layout, known)
-        if len(law.sizes) != 1 or law.turns or trial.cost > _MAY_LEAD * lead.trial.cost:
+        if (
+            len(law.amplitudes) != 1
+            or law.is_hysteretic
+            or trial.cost > _MAY_LEAD * lead.trial.cost
+        ):
             return None
-        (size,) = law.sizes
+        (size,) = law.amplitudes
         rest, name = _numbers(trial) | known, f"{law.name}: {size.name}"
 
         def suited(sizes: Sequence[float]) -> tuple[float, float, np.ndarray]:
@@ -1147,7 +1151,7 @@ class _Search:
 
         def looked(place: int) -> tuple[float, int, float] | None:
             one = tried[place]
-            sizes = EFFECTS[one.name].sizes
+            sizes = EFFECTS[one.name].amplitudes
             # beside a leader that leaves much, others are looked for beside it next
             reach = _MAY_LEAD if leader.cost > MUCH_LEFT else _OUT_OF_REACH
             if len(sizes) != 1 or one.trial.cost > reach * leader.cost:
@@ -1300,7 +1304,7 @@ class _Search:
             start = layout.coordinates(layout.initial())
             # to its end, however far behind: what is needless shows only there
             starts = [start]
-            if EFFECTS[name].relaxes and isinstance(model, Actuator):
+            if EFFECTS[name].is_viscoelastic and isinstance(model, Actuator):
                 known = _numbers(trial)
                 numbers = [known[f"{name}: {p.name}"] for p in EFFECTS[name].parameters[:2]]
                 starts += merged(layout, start, *numbers)
@@ -1347,7 +1351,7 @@ class _Search:
         lawless = {
             EFFECTS[n].family
             for n in trial.effects
-            if not EFFECTS[n].recurs and not self._recurred(trial, self._without(trial, n))
+            if not EFFECTS[n].is_reproducible and not self._recurred(trial, self._without(trial, n))
         }
         return [n for n in trial.effects if EFFECTS[n].family in lawless]
 
@@ -1411,7 +1415,8 @@ class _Search:
     def _demerit(self, trial: Trial, correlation: float) -> float:
         """The criterion, and a margin for each effect that names no cause, or follows no law."""
         unnamed = sum(
-            EFFECTS[name].family == "unknown" or not EFFECTS[name].recurs for name in trial.effects
+            EFFECTS[name].family == "unknown" or not EFFECTS[name].is_reproducible
+            for name in trial.effects
         )
         return self._criterion(trial, correlation) + _UNNAMED_MARGIN * unnamed
 
@@ -1662,18 +1667,18 @@ def _near(jacobian: np.ndarray, promise: Promise, effect: Effect) -> np.ndarray:
 
     Of shapes, and far from the base model, the sensitivities are not known yet: NaN.
     """
-    shapes = np.full((jacobian.shape[0], len(effect.shapes)), np.nan)
+    shapes = np.full((jacobian.shape[0], len(effect.shape_parameters)), np.nan)
     return np.column_stack([jacobian, promise.columns, shapes])
 
 
 def _is_law(name: str) -> bool:
     """Whether an effect names a cause, which acts in the same way whenever the rig runs."""
-    return EFFECTS[name].recurs and EFFECTS[name].family != "unknown"
+    return EFFECTS[name].is_reproducible and EFFECTS[name].family != "unknown"
 
 
 def _is_walk(name: str) -> bool:
     """Whether an effect is of one recording, and of no moment in it."""
-    return not EFFECTS[name].recurs and EFFECTS[name].family != "unknown"
+    return not EFFECTS[name].is_reproducible and EFFECTS[name].family != "unknown"
 
 
 def _numbers(trial: Trial) -> dict[str, float]:
@@ -1746,7 +1751,7 @@ def _abreast(names: list[str]) -> list[list[str]]:
     """
 
     def late(name: str) -> tuple[bool, int]:
-        return EFFECTS[name].turns, _intricacy(name)
+        return EFFECTS[name].is_hysteretic, _intricacy(name)
 
     groups: list[list[str]] = []
     for name in sorted(names, key=late):
@@ -1771,8 +1776,8 @@ def _leads_to(name: str, other: str) -> bool:
 
 def _coarsest(name: str) -> str:
     """The effect that ``name`` refines, or what that one refines, ..., or ``name``."""
-    while EFFECTS[name].refines:
-        name = EFFECTS[name].refines
+    while EFFECTS[name].generalises:
+        name = EFFECTS[name].generalises
     return name
 
 

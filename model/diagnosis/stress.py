@@ -17,7 +17,7 @@ from scipy.ndimage import gaussian_filter1d
 from dearig.model.actuator import Actuator, at_rest
 from dearig.model.coefficients import EFFECTS_AT, ELECTRIC, INERTIA, MODULUS, WIDTH
 from dearig.model.diagnosis.results import MissingStress
-from dearig.model.effects import MEMORY, NEUTRAL, SLOTS, assembly
+from dearig.model.effects import MEMORY, NEUTRAL, PARAMETER_COUNT, assembly
 from dearig.model.film import Strip, unit_stresses
 from dearig.model.fitting.search import SMOOTHING
 from dearig.model.kinematics import thinning
@@ -76,8 +76,8 @@ def _of_actuator(record: ActuatorRecord, model: Actuator) -> MissingStress | Non
     time = record.time
     step = float(np.median(np.diff(time)))
     c = model.coefficients()
-    c[INERTIA] += assembly.inertia(assembly.acting(c), c, np.zeros(MEMORY))
-    c[EFFECTS_AT : EFFECTS_AT + SLOTS] = NEUTRAL
+    c[INERTIA] += assembly.inertia(assembly.active(c), c, np.zeros(MEMORY))
+    c[EFFECTS_AT : EFFECTS_AT + PARAMETER_COUNT] = NEUTRAL
     _, rest = at_rest(c)
     length = model.film.length
     width = SMOOTHING / step

@@ -34,7 +34,7 @@ def describe_unnamed(
     look = "; ".join(f"{s.record}: {', '.join(s.words)}" for s in after)
     if own:
         numbers = "; ".join(f"{s.effect} ({_values(s)})" for s in own)
-        words = "; ".join(EFFECTS[s.effect].words for s in own)
+        words = "; ".join(EFFECTS[s.effect].summary for s in own)
         return Unnamed(own[0].acts_on, numbers, f"{words}. What is left: {look}")
     if not missing:
         return None

@@ -24,15 +24,15 @@ __all__ = [
     "FAMILIES",
     "MEMORY",
     "NEUTRAL",
+    "PARAMETER_COUNT",
     "PLACES",
-    "SENSED",
+    "SENSOR_COLUMNS",
     "SENSOR_MEMORY",
-    "SLOTS",
     "Effect",
     "EffectValues",
     "Parameter",
     "Place",
-    "follows_path",
+    "any_hysteretic",
 ]
 
 _NOT_EFFECTS = ("assembly", "description")
@@ -80,10 +80,10 @@ EFFECTS: Mapping[str, Effect] = MappingProxyType(_effects)
 PLACES: Mapping[str, Place] = MappingProxyType(_places)
 #: How many coefficients all effects have together, and how many numbers those of the motion and
 #: those of the sensor remember.
-SLOTS = sum(len(e.parameters) for e in EFFECTS.values())
+PARAMETER_COUNT = sum(len(e.parameters) for e in EFFECTS.values())
 MEMORY, SENSOR_MEMORY = _motion, _sensor
 #: Indices of the coefficients of effects that act on the reading alone: no film moves by them.
-SENSED = np.array(
+SENSOR_COLUMNS = np.array(
     [
         PLACES[e.name].at + i
         for e in EFFECTS.values()
@@ -91,7 +91,7 @@ SENSED = np.array(
         for i in range(len(e.parameters))
     ]
 )
-#: The coefficients (SLOTS,) of a model without effects; shapes are at a typical value.
+#: The coefficients (PARAMETER_COUNT,) of a model without effects; shapes are at a typical value.
 NEUTRAL = np.array(
     [
         p.neutral if p.neutral is not None else p.typical
@@ -101,6 +101,6 @@ NEUTRAL = np.array(
 )
 
 
-def follows_path(effects: EffectValues) -> bool:
+def any_hysteretic(effects: EffectValues) -> bool:
     """Whether one of ``effects`` follows the path from turn to turn: then steps are small."""
-    return any(EFFECTS[name].turns for name, _ in effects)
+    return any(EFFECTS[name].is_hysteretic for name, _ in effects)

@@ -16,7 +16,7 @@ EFFECT = Effect(
     name="ageing",
     family="softening",
     acts_on="film stress",
-    words="softer with every cycle, most at the beginning",
+    summary="softer with every cycle, most at the beginning",
     parameters=(
         Parameter(
             "softening",
@@ -25,7 +25,7 @@ EFFECT = Effect(
             "part of the stress that is lost in the end",
             2e-3,
             0.0,
-            sought=(0.0, 0.9),
+            fit_within=(0.0, 0.9),
         ),
         Parameter(
             "path",
@@ -38,7 +38,7 @@ EFFECT = Effect(
         ),
     ),
     memory=1,
-    turns=True,
+    is_hysteretic=True,
     drives=("voltage", "stretch"),
 )
 

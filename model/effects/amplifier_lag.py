@@ -12,7 +12,7 @@ EFFECT = Effect(
     name="amplifier lag",
     family="amplifier",
     acts_on="amplifier",
-    words="the film gets the voltage late, by a fixed time",
+    summary="the film gets the voltage late, by a fixed time",
     parameters=(Parameter("time_constant", "s", (0.0, 1.0), "of the amplifier", 5e-3, 0.0),),
     memory=1,
 )

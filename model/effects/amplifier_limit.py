@@ -13,7 +13,7 @@ EFFECT = Effect(
     name="amplifier limit",
     family="amplifier",
     acts_on="amplifier",
-    words="the film sees less than was asked for beyond one voltage, and all of it below",
+    summary="the film sees less than was asked for beyond one voltage, and all of it below",
     parameters=(
         Parameter("flattening", "", (0.0, 1.0), "part of the slope lost beyond the knee", 0.2, 0.0),
         Parameter(
@@ -23,7 +23,7 @@ EFFECT = Effect(
             "voltage beyond which it flattens",
             7e3,
             starts=(0.85, 0.7, 0.5),
-            part_of="voltage",
+            relative_to="voltage",
         ),
     ),
 )

@@ -15,7 +15,7 @@ EFFECT = Effect(
     name="amplifier saturation",
     family="amplifier",
     acts_on="amplifier",
-    words="the film sees less than was asked for, the more the higher the voltage",
+    summary="the film sees less than was asked for, the more the higher the voltage",
     parameters=(
         Parameter("loss", "", (0.0, 0.5), "part of the voltage that is lost at 8 kV", 0.02, 0.0),
         Parameter(

@@ -12,7 +12,7 @@ EFFECT = Effect(
     name="amplifier slew",
     family="amplifier",
     acts_on="amplifier",
-    words="the film gets edges of the voltage late, and slow changes in time",
+    summary="the film gets edges of the voltage late, and slow changes in time",
     parameters=(
         # shown by the steepest edges only: sought where it would touch so much of the time
         Parameter(
@@ -37,7 +37,7 @@ EFFECT = Effect(
                 0.35,
                 0.5,
             ),
-            part_of="slope",
+            relative_to="slope",
         ),
     ),
     memory=1,

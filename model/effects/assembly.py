@@ -22,17 +22,17 @@ from dearig.model.effects import EFFECTS, PLACES
 from dearig.model.jit import cache_folder
 
 __all__ = [
-    "BITS",
     "HOOKS",
-    "TURNS",
-    "acting",
+    "HOOK_BITS",
+    "HYSTERETIC",
+    "active",
+    "active_sensors",
     "commit",
-    "felt",
     "inertia",
+    "measured_stress",
     "permittivity",
     "polarise",
     "sense",
-    "sensing",
     "soften",
     "stiffness",
     "stress",
@@ -42,8 +42,8 @@ __all__ = [
 #: Hooks: what an effect's function of that name takes besides ``(c, k, m, j)``, and what becomes
 #: of the answers. ``c`` are the coefficients and ``k`` where the effect's own begin; ``m`` is the
 #: memory of all effects of the motion, or of all of the sensor, and ``j`` where its own begins. A
-#: hook itself takes ``(on, c, m)`` and that, ``on`` being what ``acting(c)`` says, or, for
-#: ``sense``, ``sensing(c)``.
+#: hook itself takes ``(on, c, m)`` and that, ``on`` being what ``active(c)`` says, or, for
+#: ``sense``, ``active_sensors(c)``.
 #:
 #: * ``inertia`` kg/m, added to the coefficient of lam'';
 #: * ``supply`` carries the voltage from ``start`` to ``end`` V over ``h`` s to the film, one effect
@@ -55,7 +55,7 @@ __all__ = [
 #:   after the step began at ``lam0``, the memory being that of the beginning; ``commit`` carries
 #:   the memory to the end of the step;
 #: * ``stiffness`` says what ``stress`` adds at a rate, (Pa, Pa s) at most: for the length of steps;
-#: * ``felt`` is what a sample feels of the stress in it;
+#: * ``measured_stress`` is what a sample feels of the stress in it;
 #: * ``sense`` is what the sensor makes of displacement ``x`` m and velocity ``u`` m/s, ``dt`` s
 #:   after the reading before.
 #:
@@ -70,7 +70,7 @@ HOOKS = MappingProxyType(
         "stress": ("lam, rate, lam0, since, t", "sum"),
         "stiffness": ("lam, rate", "sums"),
         "commit": ("lam, rate, lam0, h, t", ""),
-        "felt": ("sigma", "sigma"),
+        "measured_stress": ("sigma", "sigma"),
         "sense": ("t, dt, x, u", "x"),
     }
 )
@@ -148,7 +148,7 @@ def _text() -> str:
                     f"            {each.format(call)}",
                 ]
         lines.append(f"    return {last}")
-    for function, sensed in (("acting", False), ("sensing", True)):
+    for function, sensed in (("active", False), ("active_sensors", True)):
         lines += ["", "", "@jit", f"def {function}(c):", "    found = 0"]
         for name in (n for n in names if _has(n, "sense") == sensed):
             lines += [f"    if {_active(name)}:", f"        found |= {_OF_EFFECT[name]}"]
@@ -177,11 +177,11 @@ def _load() -> ModuleType:
 
 
 _OF_EFFECT = _bits()
-#: What ``acting(c)`` has in common with these says which hooks have anything to do; for ``sense``,
-#: what ``sensing(c)`` has.
-BITS = MappingProxyType({h: _mask(n for n in EFFECTS if _has(n, h)) for h in HOOKS})
+#: What ``active(c)`` has in common with these says which hooks have anything to do; for ``sense``,
+#: what ``active_sensors(c)`` has.
+HOOK_BITS = MappingProxyType({h: _mask(n for n in EFFECTS if _has(n, h)) for h in HOOKS})
 #: The same of the effects that depend on turning points.
-TURNS = _mask(n for n, effect in EFFECTS.items() if effect.turns)
+HYSTERETIC = _mask(n for n, effect in EFFECTS.items() if effect.is_hysteretic)
 
 _hooks: Any = _load()
 _Hook = Callable[..., Any]
@@ -194,7 +194,7 @@ soften: _Hook = _hooks.soften
 stress: _Hook = _hooks.stress
 stiffness: _Hook = _hooks.stiffness
 commit: _Hook = _hooks.commit
-felt: _Hook = _hooks.felt
+measured_stress: _Hook = _hooks.measured_stress
 sense: _Hook = _hooks.sense
-acting: _Hook = _hooks.acting
-sensing: _Hook = _hooks.sensing
+active: _Hook = _hooks.active
+active_sensors: _Hook = _hooks.active_sensors

@@ -20,7 +20,7 @@ EFFECT = Effect(
     name="attached mode",
     family="unknown",
     acts_on="load",
-    words="something rings on its own frequency after every edge",
+    summary="something rings on its own frequency after every edge",
     parameters=(
         Parameter(
             "stiffness", "Pa", (0.0, 1e6), "of what holds it, as stress per stretch", 5e3, 0.0
@@ -32,7 +32,7 @@ EFFECT = Effect(
             "of its own ringing",
             5.0,
             starts=(4.0, 2.0, 8.0, 15.0),
-            part_of="spectrum",
+            relative_to="spectrum",
             logarithmic=True,
         ),
         Parameter("damping", "", (1e-3, 1.0), "ratio", 0.05, starts=(0.05,), logarithmic=True),

@@ -18,7 +18,7 @@ EFFECT = Effect(
     name="broad creep",
     family="creep",
     acts_on="film stress",
-    words="the film goes on creeping over decades of time after everything else has relaxed",
+    summary="the film goes on creeping over decades of time after everything else has relaxed",
     parameters=(
         Parameter("modulus", "Pa", (0.0, 1e7), "of the first branch", 1e3, 0.0),
         Parameter(
@@ -36,7 +36,7 @@ EFFECT = Effect(
     ),
     memory=6,
     drives=("voltage", "stretch"),
-    relaxes=True,
+    is_viscoelastic=True,
 )
 
 _BRANCHES = 6

@@ -49,18 +49,33 @@ EffectValues = tuple[tuple[str, tuple[tuple[str, float], ...]], ...]
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of an effect, in SI ``unit``, within ``bounds``.
+    """One parameter of an effect, in SI ``unit``, within ``bounds``.
 
-    ``neutral`` is the value at which the effect vanishes, of a size; a shape (a relaxation time, a
-    threshold) has no such value and is None there. ``typical`` is a value that would be noticed:
-    the scale on which a fit steps. ``starts`` are the values from which a fit sets out, of a shape;
-    a size starts where the residual says, or has them where that says little. With ``part_of``
-    displacement or voltage they are parts of the largest one in the records; with duration the
-    start is sought along the records, with spectrum also where the residual's spectrum is highest.
-    With slope they are of a size that is the inverse of a slope of the voltage: parts of the time
-    in which the voltage is steeper.
-    ``logarithmic`` numbers are sought by ratios. A fit stays within ``sought``, where that is
-    given: a model may have more of a number than a measurement is ever explained by.
+    An *amplitude* has a ``neutral`` value; the effect vanishes while all its amplitudes are
+    neutral. A *shape parameter* (a relaxation time, a threshold) has none (None).
+
+    Parameters
+    ----------
+    name, unit, meaning
+        For model files, reports and the window. ``meaning`` completes "the ``name`` is ...".
+    bounds
+        Values that a model may have.
+    typical
+        A value with a noticeable effect: the scale of a fit's steps.
+    neutral
+        Value at which an amplitude vanishes.
+    starts
+        Values from which a fit starts. A shape parameter needs them; an amplitude without them
+        starts at the values that the screening finds.
+    logarithmic
+        Fitted as the logarithm.
+    relative_to
+        What ``starts`` are fractions of: the largest ``displacement`` or ``voltage`` of the
+        records. ``duration``: starts are spread over the records; ``spectrum``: the strongest line
+        of the residual is a start too; ``slope``: the parameter is the inverse of a voltage slope,
+        starts are fractions of the time in which the voltage is steeper.
+    fit_within
+        Narrower bounds for fits. A model may have values that no measurement is explained by.
     """
 
     name: str
@@ -71,54 +86,74 @@ class Parameter:
     neutral: float | None = None
     starts: tuple[float, ...] = ()
     logarithmic: bool = False
-    part_of: str = ""
-    sought: tuple[float, float] | None = None
+    relative_to: str = ""
+    fit_within: tuple[float, float] | None = None
 
     @property
-    def fitted(self) -> tuple[float, float]:
-        """The range in which a fit seeks it."""
-        return self.sought or self.bounds
+    def fit_bounds(self) -> tuple[float, float]:
+        """The bounds of a fit: ``fit_within``, or ``bounds``."""
+        return self.fit_within or self.bounds
 
 
 @dataclass(frozen=True)
 class Effect:
-    """A physical effect: its name, its family, where it acts, its numbers, what it remembers.
+    """A physical effect: its name, family, place in the signal path, parameters and state.
 
-    The sizes come first among ``parameters``: while all of them are neutral, the effect is skipped.
-    ``memory`` is how many numbers of the kernel's state are its own; they are 0 at rest. ``drives``
-    says for which measurements it makes sense: under ``voltage``, under an imposed ``stretch``.
-    ``turns`` is True where what it does follows the path from turning point to turning point, so
-    that those of a film that rings must not be missed: of a force not even a tenth of a micrometre.
-    ``recurs`` is False for what happens in one recording and is no property of the rig: nothing
-    says that another recording has it too, or when. ``relaxes`` is True of what relaxes as the
-    network's branches do, its first two numbers being a modulus and a relaxation time: while it is
-    missing, branches stand in for it. ``refines`` names an effect that this one does more closely:
-    it is sought only where that one leads and leaves more than noise. ``ways`` is of an effect that
-    goes another way in each recording, and adds to the reading what is linear in its sizes: at
-    times (N,) s what each of them adds by itself, (N, sizes). Of several recordings each has sizes
-    of its own then (``dearig.model.fitting.drift``).
-    ``words`` is one sentence for a person: what the effect is and what betrays it.
+    Parameters
+    ----------
+    name
+        Unique among all effects; it stands in model files.
+    family
+        One of ``FAMILIES``.
+    acts_on
+        One of ``ACTS_ON``.
+    summary
+        One sentence for a person: what the effect does to the film or the reading.
+    parameters
+        The amplitudes come first.
+    memory
+        Number of state variables of the effect; they are 0 at rest.
+    drives
+        Measurements for which the effect makes sense: under ``voltage``, under an imposed
+        ``stretch``.
+    is_hysteretic
+        The effect depends on the path between turning points. The integrator then resolves every
+        turning point of a film that rings, even those of less than a tenth of a micrometre.
+    is_reproducible
+        False for an event of one recording that is no property of the rig, as a jump of the
+        sensor. No other recording is predicted with it.
+    is_viscoelastic
+        The effect relaxes as the network's branches do; its first two parameters are a modulus and
+        a relaxation time. While it is missing from a model, branches can imitate it.
+    generalises
+        Name of an effect that this one contains as a special case. A diagnosis tries this one only
+        where that one explains most and leaves more than noise.
+    drift_basis
+        For a drift of the reading that is linear in the amplitudes and different in every
+        recording: a function of times (N,) s that returns what a unit of each amplitude adds to the
+        reading, (N, amplitudes). Each recording then has amplitudes of its own
+        (``dearig.model.fitting.drift``).
     """
 
     name: str
     family: str
     acts_on: str
-    words: str
+    summary: str
     parameters: tuple[Parameter, ...]
     memory: int = 0
     drives: tuple[str, ...] = field(default=("voltage",))
-    turns: bool = False
-    recurs: bool = True
-    relaxes: bool = False
-    refines: str = ""
-    ways: Callable[[np.ndarray], np.ndarray] | None = None
+    is_hysteretic: bool = False
+    is_reproducible: bool = True
+    is_viscoelastic: bool = False
+    generalises: str = ""
+    drift_basis: Callable[[np.ndarray], np.ndarray] | None = None
 
     @property
-    def sizes(self) -> tuple[Parameter, ...]:
-        """The numbers at whose neutral values the effect vanishes."""
+    def amplitudes(self) -> tuple[Parameter, ...]:
+        """The parameters that have a neutral value."""
         return tuple(p for p in self.parameters if p.neutral is not None)
 
     @property
-    def shapes(self) -> tuple[Parameter, ...]:
-        """The other numbers."""
+    def shape_parameters(self) -> tuple[Parameter, ...]:
+        """The parameters that have no neutral value."""
         return tuple(p for p in self.parameters if p.neutral is None)

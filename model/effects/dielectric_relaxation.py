@@ -27,7 +27,7 @@ EFFECT = Effect(
     name="dielectric relaxation",
     family="dielectric_relaxation",
     acts_on="dielectric",
-    words="a part of the force follows the voltage with a delay of its own, whatever the stretch",
+    summary="a part of the force follows the voltage with a delay of its own, whatever the stretch",
     parameters=(
         Parameter(
             "strength", "", (-0.5, 2.0), "slow part of the permittivity over the fast", 0.01, 0.0

@@ -24,7 +24,7 @@ EFFECT = Effect(
     name="distributed hysteresis",
     family="rate_independent_hysteresis",
     acts_on="film stress",
-    words="loops that do not depend on the speed, narrow for small strokes and wide for large ones",
+    summary="hysteresis loops at any speed, narrow for small strokes and wide for large ones",
     parameters=(
         Parameter(
             "stiffness", "Pa", (0.0, 1e6), "of all elements together before any slips", 3e3, 0.0

@@ -22,7 +22,7 @@ EFFECT = Effect(
     name="dry friction",
     family="friction",
     acts_on="load",
-    words="a force of one size against the motion: the film stays behind at every turning point",
+    summary="a force of one size against the motion: the film stays behind at every turning point",
     parameters=(
         Parameter("friction", "Pa", (0.0, 2e4), "nominal stress while sliding", 50.0, 0.0),
         Parameter(
@@ -45,7 +45,7 @@ EFFECT = Effect(
         ),
     ),
     memory=1,
-    turns=True,
+    is_hysteretic=True,
 )
 
 

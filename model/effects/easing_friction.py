@@ -24,7 +24,7 @@ _FRICTION, _PRESLIDING, _DAMPING = DRY.parameters
 EFFECT = replace(
     DRY,
     name="easing friction",
-    words="a force against the motion that is greater when slow: the film sticks, and slips",
+    summary="a force against the motion that is greater when slow: the film sticks, and slips",
     parameters=(
         replace(_FRICTION, meaning="nominal stress while sliding fast"),
         replace(_PRESLIDING, starts=(1e-4, 5e-4)),

@@ -23,7 +23,7 @@ __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 EFFECT = replace(
     EASING,
     name="elastoplastic friction",
-    words="a force against the motion, greater when slow, that a small swing does not overcome",
+    summary="a force against the motion, greater when slow, that a small swing does not overcome",
     parameters=(
         *EASING.parameters,
         Parameter(

@@ -18,7 +18,7 @@ EFFECT = Effect(
     name="elastoplastic hysteresis",
     family="rate_independent_hysteresis",
     acts_on="film stress",
-    words="loops that do not depend on the speed, opening over a part of the stroke",
+    summary="loops that do not depend on the speed, opening over a part of the stroke",
     parameters=(
         Parameter(
             "yield_stress", "Pa", (0.0, 2e5), "stress far from the last reversal", 200.0, 0.0
@@ -45,7 +45,7 @@ EFFECT = Effect(
         ),
     ),
     memory=2,
-    turns=True,
+    is_hysteretic=True,
     drives=("voltage", "stretch"),
 )
 

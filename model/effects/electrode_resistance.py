@@ -19,7 +19,7 @@ EFFECT = Effect(
     name="electrode resistance",
     family="electrode_resistance",
     acts_on="electrode",
-    words="the film charges through a resistance: a delay of the force that grows with stretch",
+    summary="the film charges through a resistance: a delay of the force that grows with stretch",
     parameters=(
         Parameter("resistance", "ohm", (0.0, 5e9), "between amplifier and film", 1e7, 0.0),
     ),

@@ -18,7 +18,7 @@ EFFECT = Effect(
     name="stress beyond a displacement",
     family="unknown",
     acts_on="load",
-    words="a stress that sets in at one displacement and grows from there, at any speed",
+    summary="a stress that sets in at one displacement and grows from there, at any speed",
     parameters=(
         Parameter("stiffness", "Pa", (0.0, 5e7), "stress per stretch, 0.5 mm beyond", 2e4, 0.0),
         Parameter(
@@ -28,7 +28,7 @@ EFFECT = Effect(
             "displacement at which it sets in",
             1e-3,
             starts=(0.5, 0.3, 0.7, 0.85),
-            part_of="displacement",
+            relative_to="displacement",
             logarithmic=True,
         ),
         Parameter(

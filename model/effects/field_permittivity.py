@@ -16,7 +16,7 @@ EFFECT = Effect(
     name="field-dependent permittivity",
     family="permittivity",
     acts_on="dielectric",
-    words="the force of the field does not grow with its square",
+    summary="the force of the field does not grow with its square",
     parameters=(
         Parameter("field_coefficient", "", (-2.0, 0.5), "relative change at 8 MV/m", 0.03, 0.0),
     ),

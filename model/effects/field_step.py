@@ -15,14 +15,20 @@ EFFECT = Effect(
     name="sudden loss of field",
     family="unknown",
     acts_on="electrode",
-    words="the voltage pulls less from one moment on",
+    summary="the voltage pulls less from one moment on",
     parameters=(
         Parameter("loss", "", (-0.5, 0.5), "part of the voltage that is lost", 5e-3, 0.0),
         Parameter(
-            "moment", "s", (0.0, 1e5), "at which it comes", 0.5, starts=(0.5,), part_of="duration"
+            "moment",
+            "s",
+            (0.0, 1e5),
+            "at which it comes",
+            0.5,
+            starts=(0.5,),
+            relative_to="duration",
         ),
     ),
-    recurs=False,
+    is_reproducible=False,
 )
 
 

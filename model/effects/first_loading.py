@@ -20,7 +20,7 @@ EFFECT = Effect(
     name="first-loading damage",
     family="softening",
     acts_on="film stress",
-    words="softer at every stretch once it has been stretched: the first lobe is unlike repeats",
+    summary="softer at every stretch once it has been stretched: the first lobe is unlike repeats",
     parameters=(
         Parameter(
             "softening",
@@ -29,7 +29,7 @@ EFFECT = Effect(
             "part of the stress lost in the end",
             3e-3,
             0.0,
-            sought=(0.0, 0.9),
+            fit_within=(0.0, 0.9),
         ),
         Parameter(
             "reach",

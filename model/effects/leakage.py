@@ -17,7 +17,7 @@ EFFECT = Effect(
     name="leakage",
     family="leakage",
     acts_on="electrode",
-    words="the film sees less than the amplifier gives, the more the higher the voltage",
+    summary="the film sees less than the amplifier gives, the more the higher the voltage",
     parameters=(
         Parameter(
             "loss",

@@ -11,7 +11,7 @@ EFFECT = Effect(
     name="linear drift",
     family="drift",
     acts_on="sensor",
-    words="the reading runs away with time, whatever the film does",
+    summary="the reading runs away with time, whatever the film does",
     parameters=(Parameter("drift", "m/s", (-1e-4, 1e-4), "rate of the zero", 1e-7, 0.0),),
 )
 

@@ -17,7 +17,7 @@ EFFECT = Effect(
     name="load inertia",
     family="load_inertia",
     acts_on="inertia",
-    words="mass moves with the film's lower edge: ringing after edges, force against acceleration",
+    summary="a mass moves with the film: it rings after every edge of the voltage",
     parameters=(
         Parameter(
             "moving_mass",

@@ -15,14 +15,20 @@ EFFECT = Effect(
     name="sudden change of force",
     family="unknown",
     acts_on="load",
-    words="a stress that is there from one moment on",
+    summary="a stress that is there from one moment on",
     parameters=(
         Parameter("stress", "Pa", (-2e4, 2e4), "taken from the load", 30.0, 0.0),
         Parameter(
-            "moment", "s", (0.0, 1e5), "at which it comes", 0.5, starts=(0.5,), part_of="duration"
+            "moment",
+            "s",
+            (0.0, 1e5),
+            "at which it comes",
+            0.5,
+            starts=(0.5,),
+            relative_to="duration",
         ),
     ),
-    recurs=False,
+    is_reproducible=False,
 )
 
 

@@ -19,7 +19,7 @@ EFFECT = Effect(
     name="logarithmic ageing",
     family="softening",
     acts_on="film stress",
-    words="softer with every cycle, by the logarithm of their number",
+    summary="softer with every cycle, by the logarithm of their number",
     parameters=(
         Parameter(
             "softening",
@@ -28,7 +28,7 @@ EFFECT = Effect(
             "part of the stress lost per factor e",
             1e-3,
             0.0,
-            sought=(0.0, 0.2),
+            fit_within=(0.0, 0.2),
         ),
         Parameter(
             "path",
@@ -41,7 +41,7 @@ EFFECT = Effect(
         ),
     ),
     memory=1,
-    turns=True,
+    is_hysteretic=True,
     drives=("voltage", "stretch"),
 )
 

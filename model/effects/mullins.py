@@ -21,7 +21,7 @@ EFFECT = Effect(
     name="Mullins softening",
     family="softening",
     acts_on="film stress",
-    words="softer wherever it has been stretched further before: the first lobe is unlike repeats",
+    summary="the film is softer below its largest stretch so far: the first lobe differs",
     parameters=(
         Parameter(
             "softening",
@@ -30,7 +30,7 @@ EFFECT = Effect(
             "part of the stress that is lost",
             2e-3,
             0.0,
-            sought=(0.0, 0.9),
+            fit_within=(0.0, 0.9),
         ),
         Parameter(
             "width",
@@ -43,7 +43,7 @@ EFFECT = Effect(
         ),
     ),
     memory=1,
-    turns=True,
+    is_hysteretic=True,
     drives=("voltage", "stretch"),
 )
 

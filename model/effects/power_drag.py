@@ -17,7 +17,7 @@ EFFECT = Effect(
     name="power-law drag",
     family="drag",
     acts_on="load",
-    words="a force against the motion that grows with a power of its rate",
+    summary="a force against the motion that grows with a power of its rate",
     parameters=(
         Parameter("drag", "Pa", (0.0, 1e4), "nominal stress at a rate of 0.1/s", 50.0, 0.0),
         Parameter("exponent", "", (1.0, 3.0), "of the rate", 0.3, starts=(2.0, 1.5)),

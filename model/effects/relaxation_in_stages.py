@@ -18,7 +18,7 @@ EFFECT = Effect(
     name="dielectric relaxation in stages",
     family="dielectric_relaxation",
     acts_on="dielectric",
-    words="parts of the force follow the voltage, one later than the other, whatever the stretch",
+    summary="parts of the force follow the voltage, one later than the other, whatever the stretch",
     parameters=(
         Parameter(
             "strength", "", _STRENGTH, "part at T of the permittivity over the fast", 0.01, 0.0

@@ -16,7 +16,7 @@ EFFECT = Effect(
     name="saturating permittivity",
     family="permittivity",
     acts_on="dielectric",
-    words="the force of the field changes with the stretch at first, and then no more",
+    summary="the force of the field changes with the stretch at first, and then no more",
     parameters=(
         Parameter("strain_coefficient", "", (-100.0, 100.0), "slope at rest", 1.0, 0.0),
         Parameter(

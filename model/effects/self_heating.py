@@ -17,7 +17,7 @@ EFFECT = Effect(
     name="self-heating",
     family="thermal",
     acts_on="environment",
-    words="the stiffness follows the square of the voltage, seconds and minutes late",
+    summary="the stiffness follows the square of the voltage, seconds and minutes late",
     parameters=(
         Parameter("stiffening", "", (-0.5, 0.5), "relative change under 5 kV, later", 3e-3, 0.0),
         Parameter(

@@ -16,7 +16,7 @@ EFFECT = Effect(
     name="self-heating in stages",
     family="thermal",
     acts_on="environment",
-    words="the stiffness follows the square of the voltage, first in seconds, then in minutes",
+    summary="the stiffness follows the square of the voltage, first in seconds, then in minutes",
     parameters=(
         Parameter("stiffening", "", (-0.5, 0.5), "relative change under 5 kV, first", 3e-3, 0.0),
         Parameter("later", "", (-0.5, 0.5), "relative change under 5 kV, later", 3e-3, 0.0),

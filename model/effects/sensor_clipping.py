@@ -14,7 +14,7 @@ EFFECT = Effect(
     name="sensor clipping",
     family="sensor_nonlinearity",
     acts_on="sensor",
-    words="the reading flattens beyond one displacement, at any speed",
+    summary="the reading flattens beyond one displacement, at any speed",
     parameters=(
         Parameter("flattening", "", (0.0, 1.0), "part of the slope lost beyond the knee", 0.1, 0.0),
         Parameter(
@@ -24,7 +24,7 @@ EFFECT = Effect(
             "displacement beyond which it flattens",
             1e-3,
             starts=(0.5, 0.3, 0.7, 0.85),
-            part_of="displacement",
+            relative_to="displacement",
             logarithmic=True,
         ),
     ),

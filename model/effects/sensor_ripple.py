@@ -16,7 +16,7 @@ EFFECT = Effect(
     name="sensor ripple",
     family="sensor_nonlinearity",
     acts_on="sensor",
-    words="the reading is off by the same again every so many micrometres of travel",
+    summary="the reading is off by the same again every so many micrometres of travel",
     parameters=(
         Parameter("sine", "m", (-5e-4, 5e-4), "of the error", 5e-6, 0.0),
         Parameter("cosine", "m", (-5e-4, 5e-4), "of the error", 5e-6, 0.0),
@@ -29,7 +29,7 @@ EFFECT = Effect(
             5e-4,
             # near enough to each other to be told apart over the travel
             starts=tuple(1.0 / (1.0 + 0.4 * n) for n in range(24)),
-            part_of="displacement",
+            relative_to="displacement",
             logarithmic=True,
         ),
     ),

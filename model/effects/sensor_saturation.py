@@ -14,7 +14,7 @@ EFFECT = Effect(
     name="sensor saturation",
     family="sensor_nonlinearity",
     acts_on="sensor",
-    words="beyond one displacement the reading falls behind, ever more, at any speed",
+    summary="beyond one displacement the reading falls behind, ever more, at any speed",
     parameters=(
         Parameter(
             "inverse_range",
@@ -31,7 +31,7 @@ EFFECT = Effect(
             "displacement beyond which it falls behind",
             5e-4,
             starts=(0.3, 0.05, 0.5, 0.7),
-            part_of="displacement",
+            relative_to="displacement",
             logarithmic=True,
         ),
     ),

@@ -15,14 +15,20 @@ EFFECT = Effect(
     name="sudden change of reading",
     family="unknown",
     acts_on="sensor",
-    words="the reading jumps at one moment and stays there",
+    summary="the reading jumps at one moment and stays there",
     parameters=(
         Parameter("jump", "m", (-5e-3, 5e-3), "of the reading", 3e-6, 0.0),
         Parameter(
-            "moment", "s", (0.0, 1e5), "at which it comes", 0.5, starts=(0.5,), part_of="duration"
+            "moment",
+            "s",
+            (0.0, 1e5),
+            "at which it comes",
+            0.5,
+            starts=(0.5,),
+            relative_to="duration",
         ),
     ),
-    recurs=False,
+    is_reproducible=False,
 )
 
 

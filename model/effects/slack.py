@@ -10,13 +10,13 @@ from __future__ import annotations
 from dearig.model.effects.description import Effect, Parameter
 from dearig.model.jit import jit
 
-__all__ = ["EFFECT", "felt"]
+__all__ = ["EFFECT", "measured_stress"]
 
 EFFECT = Effect(
     name="slack",
     family="slack",
     acts_on="film stress",
-    words="the strip buckles where the springs would push: no stress on the way back",
+    summary="the strip buckles where the springs would push: no stress on the way back",
     parameters=(
         Parameter("looseness", "", (0.0, 1.0), "part of a push that is not felt", 0.5, 0.0),
     ),
@@ -25,5 +25,5 @@ EFFECT = Effect(
 
 
 @jit
-def felt(c, k, m, j, sigma):
+def measured_stress(c, k, m, j, sigma):
     return sigma if sigma > 0.0 else (1.0 - c[k]) * sigma

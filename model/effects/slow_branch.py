@@ -12,7 +12,7 @@ EFFECT = Effect(
     name="slow branch",
     family="creep",
     acts_on="film stress",
-    words="the film goes on creeping after everything else has relaxed",
+    summary="the film goes on creeping after everything else has relaxed",
     parameters=(
         Parameter("modulus", "Pa", (0.0, 1e7), "of the branch", 2e3, 0.0),
         Parameter(
@@ -27,7 +27,7 @@ EFFECT = Effect(
     ),
     memory=1,
     drives=("voltage", "stretch"),
-    relaxes=True,
+    is_viscoelastic=True,
 )
 
 

@@ -15,7 +15,7 @@ EFFECT = Effect(
     name="slowing drift",
     family="drift",
     acts_on="sensor",
-    words="the reading runs away with time, ever slower, whatever the film does",
+    summary="the reading runs away with time, ever slower, whatever the film does",
     parameters=(
         Parameter("drift", "m", (-5e-3, 5e-3), "of the zero within 30 s", 3e-6, 0.0),
         Parameter(

@@ -21,7 +21,7 @@ _STIFFENING, _TIME_CONSTANT = WARM_UP.parameters
 EFFECT = replace(
     WARM_UP,
     name="slowing warm-up",
-    words="the stiffness goes on changing, by a power of time, whatever the film does",
+    summary="the stiffness goes on changing, by a power of time, whatever the film does",
     parameters=(
         _STIFFENING,
         replace(_TIME_CONSTANT, meaning="from which on it slows down", starts=(5.0, 20.0)),

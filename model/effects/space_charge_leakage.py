@@ -21,7 +21,7 @@ _LOSS, _GROWTH, _ = BY_TRAPS.parameters
 EFFECT = replace(
     BY_TRAPS,
     name="space-charge leakage",
-    words="the film takes a current that goes with a power of the voltage",
+    summary="the film takes a current that goes with a power of the voltage",
     parameters=(
         _LOSS,
         replace(

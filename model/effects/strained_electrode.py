@@ -20,7 +20,7 @@ EFFECT = Effect(
     name="strained electrode",
     family="electrode_resistance",
     acts_on="electrode",
-    words="the film charges through a resistance that changes as the electrode is stretched",
+    summary="the film charges through a resistance that changes as the electrode is stretched",
     parameters=(
         Parameter("resistance", "ohm", (0.0, 5e9), "between amplifier and film", 1e7, 0.0),
         Parameter("gauge", "", (-60.0, 60.0), "by which stretch changes it", 5.0, starts=(10.0,)),

@@ -49,7 +49,7 @@ EFFECT = Effect(
     name="wandering drift",
     family="drift",
     acts_on="sensor",
-    words="the reading wanders with time, whatever the film does",
+    summary="the reading wanders with time, whatever the film does",
     parameters=(
         Parameter("linear", "m", WALK, "half of its part in 30 s", 3e-6, 0.0),
         Parameter("quadratic", "m", WALK, "half of its part there and back", 3e-6, 0.0),
@@ -57,13 +57,13 @@ EFFECT = Effect(
         Parameter("quartic", "m", WALK, "half of its part with three turns", 3e-6, 0.0),
         Parameter("quintic", "m", WALK, "half of its part with four turns", 3e-6, 0.0),
     ),
-    recurs=False,
-    ways=partial(ways, terms=5),
+    is_reproducible=False,
+    drift_basis=partial(ways, terms=5),
 )
 
 
-def finer(coarse: Effect, name: str, words: str, more: Mapping[str, str]) -> Effect:
-    """A walk that refines ``coarse``, with ``more`` numbers: their names, and the turns of each."""
+def finer(coarse: Effect, name: str, summary: str, more: Mapping[str, str]) -> Effect:
+    """Return a drift that adds ``more`` parameters (name: number of turns) to ``coarse``."""
     added = (
         Parameter(number, "m", WALK, f"half of its part with {turns} turns", 3e-6, 0.0)
         for number, turns in more.items()
@@ -71,7 +71,12 @@ def finer(coarse: Effect, name: str, words: str, more: Mapping[str, str]) -> Eff
     parameters = (*coarse.parameters, *added)
     follows = partial(ways, terms=len(parameters))
     return replace(
-        coarse, name=name, words=words, parameters=parameters, refines=coarse.name, ways=follows
+        coarse,
+        name=name,
+        summary=summary,
+        parameters=parameters,
+        generalises=coarse.name,
+        drift_basis=follows,
     )
 
 

@@ -16,7 +16,7 @@ EFFECT = Effect(
     name="warm-up",
     family="thermal",
     acts_on="environment",
-    words="the stiffness goes to another value as time passes, whatever the film does",
+    summary="the stiffness goes to another value as time passes, whatever the film does",
     parameters=(
         Parameter("stiffening", "", (-0.5, 0.5), "relative change of stress in the end", 1e-3, 0.0),
         Parameter(

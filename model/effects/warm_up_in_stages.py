@@ -17,7 +17,7 @@ EFFECT = Effect(
     name="warm-up in stages",
     family="thermal",
     acts_on="environment",
-    words="the stiffness goes on changing as time passes, ever more slowly, whatever the film does",
+    summary="the stiffness changes with time, ever more slowly, whatever the film does",
     parameters=(
         Parameter("stiffening", "", (-0.5, 0.5), "relative change of stress, first", 1e-3, 0.0),
         Parameter("later", "", (-0.5, 0.5), "relative change of stress, later", 1e-3, 0.0),

@@ -102,13 +102,13 @@ def walks_of(records: Sequence[Record], effects: EffectValues) -> Walks | None:
 
     Of a single record a walk's sizes are numbers of the model like any other.
     """
-    walking = [name for name, _ in effects if EFFECTS[name].ways is not None]
+    walking = [name for name, _ in effects if EFFECTS[name].drift_basis is not None]
     rigs = [r for r in records if isinstance(r, ActuatorRecord)]
     return Walks(rigs, walking) if walking and len(rigs) > 1 else None
 
 
 def _ways_in(record: ActuatorRecord, effects: Sequence[str]) -> np.ndarray:
     """What each size of ``effects`` does to the readings of ``record``: (N, n), m."""
-    ways = [EFFECTS[name].ways for name in effects]
+    ways = [EFFECTS[name].drift_basis for name in effects]
     columns = np.concatenate([way(record.time) for way in ways if way is not None], axis=1)
     return record.seen(columns.T).T

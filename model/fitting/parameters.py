@@ -9,7 +9,7 @@ import numpy as np
 
 from dearig.model.actuator import Actuator
 from dearig.model.coefficients import FORCE, HELD, KIND, LIMIT, LOCKING, MODULUS, RATE, WIDTH
-from dearig.model.effects import EFFECTS, PLACES, EffectValues, Parameter, follows_path
+from dearig.model.effects import EFFECTS, PLACES, EffectValues, Parameter, any_hysteretic
 from dearig.model.errors import ModelError
 from dearig.model.film import Strip
 from dearig.model.material import Branch, Network, Spring
@@ -60,7 +60,7 @@ class Quantity:
     def bounds(self) -> tuple[float, float]:
         """Range in which it is sought."""
         if self.kind == "effect":
-            return self.parameter.fitted
+            return self.parameter.fit_bounds
         return _FLOOR[self.kind], THESIS_RANGES[self.kind][1]
 
     @property
@@ -173,12 +173,12 @@ class Layout:
         # effects have kinks, and a model with one has them everywhere: wide enough to look across;
         # a film that turns elsewhere, by as little as it may, has rung otherwise since
         springs = 1e-3 if self.base.effects else 1e-4
-        if follows_path(self.base.effects):
+        if any_hysteretic(self.base.effects):
             springs = 3e-3
         moduli = springs * np.maximum(np.abs(x), 1e-3 * self.reach(x))
         # but not past a moment or a line
         placed = [
-            q.kind == "effect" and q.parameter.part_of in ("duration", "spectrum")
+            q.kind == "effect" and q.parameter.relative_to in ("duration", "spectrum")
             for q in self.quantities
         ]
         sizes = np.maximum(np.where(placed, 0.0, 1e-3 * np.abs(x)), 0.02 * self._typical)

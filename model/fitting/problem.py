@@ -9,7 +9,7 @@ import numpy as np
 
 from dearig.model import kernel
 from dearig.model.actuator import Actuator, readings_of
-from dearig.model.effects import EFFECTS, SENSED
+from dearig.model.effects import EFFECTS, SENSOR_COLUMNS
 from dearig.model.errors import ModelError
 from dearig.model.film import Strip, stress_of
 from dearig.model.fitting.drift import Walking, walks_of
@@ -133,7 +133,7 @@ class Problem:
         if len(c) < 2 or not sensors:
             return [[member] for member in range(len(c))]
         films: dict[tuple[bytes, bool], list[int]] = {}
-        moving = np.delete(c, SENSED, axis=1)
+        moving = np.delete(c, SENSOR_COLUMNS, axis=1)
         for member, (row, sketched) in enumerate(zip(moving, by_sketch, strict=True)):
             films.setdefault((row.tobytes(), bool(sketched)), []).append(member)
         return list(films.values())

@@ -104,7 +104,7 @@ def followed(c: np.ndarray, drive: Drive, fidelity: int = kernel.CAREFUL) -> np.
 
 def at_neutral(name: str) -> EffectValues:
     """The effect with its sizes neutral, and its shapes typical."""
-    neutral = {p.name: p.neutral for p in EFFECTS[name].sizes}
+    neutral = {p.name: p.neutral for p in EFFECTS[name].amplitudes}
     return ((name, tuple((n, neutral.get(n, value)) for n, value in typical(name)[1])),)
 
 

@@ -16,7 +16,15 @@ from scipy.integrate import solve_ivp
 from dearig.config.sequencefile import load_sequence
 from dearig.model import kernel
 from dearig.model.actuator import Actuator, Drive, at_rest, initial_state
-from dearig.model.effects import EFFECTS, MEMORY, NEUTRAL, PLACES, SENSOR_MEMORY, SLOTS, assembly
+from dearig.model.effects import (
+    EFFECTS,
+    MEMORY,
+    NEUTRAL,
+    PARAMETER_COUNT,
+    PLACES,
+    SENSOR_MEMORY,
+    assembly,
+)
 from dearig.model.effects.description import ACTS_ON, FAMILIES
 from dearig.model.errors import ModelError
 from dearig.model.excitation import Sequence
@@ -47,7 +55,7 @@ def numbers(name, size=1.0, **given):
     values = {}
     for p in EFFECTS[name].parameters:
         value = p.typical if p.neutral is None else p.neutral + size * p.typical
-        if p.starts and p.neutral is None and p.part_of in ("", "spectrum"):
+        if p.starts and p.neutral is None and p.relative_to in ("", "spectrum"):
             value = p.starts[0]
         elif p.name == "moment":
             value = MOMENT
@@ -128,27 +136,27 @@ def test_the_description_can_be_relied_on(name):
     assert effect.name == name
     assert effect.family in FAMILIES
     assert effect.acts_on in ACTS_ON
-    assert effect.words
+    assert effect.summary
     assert effect.drives
     assert set(effect.drives) <= {"voltage", "stretch"}
     names = [p.name for p in effect.parameters]
     assert len(set(names)) == len(names)
     # the sizes come first
-    assert effect.sizes
-    assert effect.parameters == effect.sizes + effect.shapes
+    assert effect.amplitudes
+    assert effect.parameters == effect.amplitudes + effect.shape_parameters
     for p in effect.parameters:
         low, high = p.bounds
         assert -math.inf < low < high < math.inf
         assert p.meaning
         assert 0.0 < p.typical <= high - low
-        assert p.part_of in ("", "voltage", "displacement", "duration", "spectrum", "slope")
+        assert p.relative_to in ("", "voltage", "displacement", "duration", "spectrum", "slope")
         if p.neutral is None:
             assert p.starts
-            span = p.bounds if p.part_of in ("", "spectrum") else (0.0, 1.0)
+            span = p.bounds if p.relative_to in ("", "spectrum") else (0.0, 1.0)
             assert all(span[0] <= s <= span[1] for s in p.starts)
         else:
             assert low <= p.neutral <= high
-            assert p.part_of == "slope" or all(low <= s <= high for s in p.starts)
+            assert p.relative_to == "slope" or all(low <= s <= high for s in p.starts)
             assert low <= p.neutral + p.typical <= high
         if p.logarithmic:
             assert low > 0.0
@@ -159,8 +167,8 @@ def test_the_description_can_be_relied_on(name):
 
 def test_places_do_not_overlap():
     columns = [PLACES[n].column(e, p.name) for n, e in EFFECTS.items() for p in e.parameters]
-    assert columns == list(range(columns[0], columns[0] + SLOTS))
-    assert NEUTRAL.shape == (SLOTS,)
+    assert columns == list(range(columns[0], columns[0] + PARAMETER_COUNT))
+    assert NEUTRAL.shape == (PARAMETER_COUNT,)
     for of_sensor, size in ((False, MEMORY), (True, SENSOR_MEMORY)):
         places = [(PLACES[n], e) for n, e in EFFECTS.items()]
         there = [(p, e) for p, e in places if hasattr(p.module, "sense") == of_sensor]
@@ -170,15 +178,15 @@ def test_places_do_not_overlap():
 @pytest.mark.parametrize("name", [n for n, e in EFFECTS.items() if "voltage" in e.drives])
 def test_each_effect_is_one_bit_of_who_acts(name):
     c = with_effect(THESIS, name, numbers(name)).coefficients()
-    on, of_sensor = assembly.acting(c), assembly.sensing(c)
+    on, of_sensor = assembly.active(c), assembly.active_sensors(c)
     sensed = hasattr(PLACES[name].module, "sense")
     assert (of_sensor if sensed else on).bit_count() == 1
     assert (on if sensed else of_sensor) == 0
-    for hook, mask in assembly.BITS.items():
+    for hook, mask in assembly.HOOK_BITS.items():
         assert bool((of_sensor if hook == "sense" else on) & mask) == hasattr(
             PLACES[name].module, hook
         )
-    assert bool(on & assembly.TURNS) == EFFECTS[name].turns
+    assert bool(on & assembly.HYSTERETIC) == EFFECTS[name].is_hysteretic
 
 
 def test_no_more_effects_than_bits(monkeypatch):
@@ -218,9 +226,9 @@ def test_values_that_no_effect_has():
 @pytest.mark.parametrize(("name", "driven"), BOTH)
 def test_neutral_is_the_baseline_bit_for_bit(name, driven):
     effect = EFFECTS[name]
-    neutral = {p.name: p.neutral for p in effect.sizes}
+    neutral = {p.name: p.neutral for p in effect.amplitudes}
     for end in (0, 1):
-        shapes = {p.name: p.bounds[end] for p in effect.shapes}
+        shapes = {p.name: p.bounds[end] for p in effect.shape_parameters}
         model = with_effect(base_of(driven), name, neutral | shapes)
         np.testing.assert_array_equal(measured(model), baseline(driven))
 
@@ -791,7 +799,7 @@ from dearig.model.jit import jit
 __all__ = ["EFFECT", "stress"]
 
 EFFECT = Effect(
-    name="constant pull", family="unknown", acts_on="load", words="pulls, always",
+    name="constant pull", family="unknown", acts_on="load", summary="pulls, always",
     parameters=(Parameter("pull", "Pa", (-1e4, 1e4), "taken from the load", 10.0, 0.0),),
     drives=("voltage", "stretch"),
 )
@@ -815,7 +823,7 @@ pulled = Strip(network, effects=(("constant pull", (("pull", 250.0),)),))
 more = pulled.simulate(time, 1.0 + time).stress - Strip(network).simulate(time, 1.0 + time).stress
 print(more.tolist())
 c = pulled.coefficients()
-print(assembly.stress(assembly.acting(c), c, np.zeros(500), 1.1, 0.0, 1.1, 0.0, 0.0))
+print(assembly.stress(assembly.active(c), c, np.zeros(500), 1.1, 0.0, 1.1, 0.0, 0.0))
 """
 
 

@@ -310,7 +310,7 @@ def test_the_exponential_method_is_the_plain_one(effects):
     c = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, effects).coefficients()
     _, rest = at_rest(c)
     springs = kernel._spring_table(c)
-    acting = assembly.acting(c)
+    acting = assembly.active(c)
     assert (acting > 0) == bool(effects)
     plain, lean = initial_state(c, rest), initial_state(c, rest)
     traces = np.zeros((2, 5))
@@ -460,7 +460,7 @@ def test_drags_that_grow_are_followed_as_closely_as_the_film_moves():
     assert taken < 210 * time.size
 
 
-TURNING = [e.name for e in EFFECTS.values() if e.turns]
+TURNING = [e.name for e in EFFECTS.values() if e.is_hysteretic]
 SOFTENING = [name for name in TURNING if EFFECTS[name].family == "softening"]
 
 

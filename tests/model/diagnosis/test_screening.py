@@ -123,8 +123,8 @@ def test_of_noise_little_is_promised():
             promises = screen.promises(e)
             assert promises, e.name
             # by chance a size takes one of the readings; the best of so many shapes takes more
-            least = 25.0 if e.shapes else 12.0
-            assert promises[0].share < least * len(e.sizes) / readings, e.name
+            least = 25.0 if e.shape_parameters else 12.0
+            assert promises[0].share < least * len(e.amplitudes) / readings, e.name
 
 
 def test_what_the_baseline_can_imitate_promises_nothing():
@@ -223,7 +223,7 @@ def test_the_right_one_promises_most():
         shares = {
             e.name: screen.promises(e)[0].share
             for e in EFFECTS.values()
-            if "voltage" in e.drives and not e.shapes
+            if "voltage" in e.drives and not e.shape_parameters
         }
         # a drift that wanders may also go straight
         assert EFFECTS[max(shares, key=shares.get)].family == EFFECTS[name].family
@@ -281,7 +281,7 @@ def test_what_shows_on_the_way_back_is_not_asked_of_a_film_that_is_only_held():
 def test_no_film_grows_stiffer_by_use():
     for effect_of_use in (e for e in EFFECTS.values() if e.family == "softening"):
         # by a fit: a model may
-        assert all(size.fitted[0] == 0.0 > size.bounds[0] for size in effect_of_use.sizes)
+        assert all(size.fit_bounds[0] == 0.0 > size.bounds[0] for size in effect_of_use.amplitudes)
 
 
 def test_far_from_the_noise_a_film_that_sticks_is_screened_in_rough_simulations():

@@ -147,5 +147,5 @@ def test_a_step_of_the_unknown_family_is_told_by_its_own_numbers():
     unnamed = describe_unnamed([made(lambda _: 0.0)], looks(), [step])
     assert unnamed.expression == f"{name} (stiffness = 2.123e+04 Pa, onset = 0.00105 m)"
     assert unnamed.acts_on == "load"
-    assert EFFECTS[name].words in unnamed.signature
+    assert EFFECTS[name].summary in unnamed.signature
     assert "noise is all that is left" in unnamed.signature

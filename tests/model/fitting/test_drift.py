@@ -17,7 +17,7 @@ from dearig.model.fitting.problem import Problem
 from dearig.model.records import ActuatorRecord
 from tests.tools.engine import NOISE, PLAIN, effect, masked, record_of, typical
 
-WALKING = [name for name, e in EFFECTS.items() if e.ways is not None]
+WALKING = [name for name, e in EFFECTS.items() if e.drift_basis is not None]
 WALK = replace(PLAIN, effects=(typical("wandering drift"),))
 SIZES = ("linear", "quadratic", "cubic", "quartic", "quintic")
 WALKS = np.array([[2e-5, -8e-6, 3e-6, 1e-6, -2e-6], [-1e-5, 6e-6, -5e-6, 2e-6, 1e-6]])
@@ -59,12 +59,12 @@ def off(problem: Problem, sizes: np.ndarray, others: np.ndarray) -> float:
 def test_ways_are_what_each_size_adds_to_a_reading(name):
     time = np.linspace(0.0, 41.0, 57)
     e, sense = EFFECTS[name], PLACES[name].module.sense
-    ways = e.ways(time)
-    assert ways.shape == (time.size, len(e.sizes)) == (time.size, len(e.parameters))
-    for column, one in zip(ways.T, np.eye(len(e.sizes)), strict=True):
+    ways = e.drift_basis(time)
+    assert ways.shape == (time.size, len(e.amplitudes)) == (time.size, len(e.parameters))
+    for column, one in zip(ways.T, np.eye(len(e.amplitudes)), strict=True):
         shown = [sense(one, 0, np.zeros(1), 0, t, 0.1, 1e-3, 0.0) - 1e-3 for t in time]
         np.testing.assert_allclose(column, shown, rtol=1e-9, atol=1e-12)
-    assert not e.recurs
+    assert not e.is_reproducible
     assert e.acts_on == "sensor"
 
 
