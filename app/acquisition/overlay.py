@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -15,9 +17,23 @@ from dearig.model.effects import SENSOR_MEMORY
 from dearig.model.errors import ModelError
 from dearig.model.sensor import at_sensor
 
-__all__ = ["Overlay"]
+__all__ = ["Overlay", "OverlayModel"]
 
 _WARM = 1.0  # s over which a temperature is the mean, as a fit takes it
+
+
+@dataclass(frozen=True)
+class OverlayModel:
+    """A model that runs in step with a measurement.
+
+    ``path`` is that of its model file, None for a model that is in no file; ``toml`` is the text
+    that a recording keeps.
+    """
+
+    name: str
+    actuator: Actuator
+    path: Path | None = None
+    toml: str = ""
 
 
 class Overlay:

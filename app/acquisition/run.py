@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from dearig.acquisition.interrupts import Interrupts
-from dearig.acquisition.overlay import Overlay
+from dearig.acquisition.overlay import Overlay, OverlayModel
 from dearig.acquisition.plan import Plan, plan
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
@@ -38,7 +38,7 @@ from dearig.recording.writer import RecordingWriter
 from dearig.sim_backend.factory import is_simulated, open_simulated_rig
 from dearig.sim_backend.faults import FaultPlan
 
-__all__ = ["Beside", "Onlooker", "RunResult", "open_rig", "record"]
+__all__ = ["RunObserver", "RunOptions", "RunResult", "open_rig", "record"]
 
 log = logging.getLogger(__name__)
 
@@ -46,11 +46,30 @@ _DISK_INTERVAL = 1.0  # s between two looks at the room on the disk
 
 
 @dataclass(frozen=True)
-class Beside:
-    """A model that runs beside the measurement: ``actuator``, and its ``toml`` to be kept."""
+class RunOptions:
+    """How a run is made, and what its recording says of it.
 
-    actuator: Actuator
-    toml: str
+    ``configuration`` is the text of the rig file, kept with the recording. ``operator``,
+    ``film_id`` (by default the rig file's film) and ``notes`` are kept too. With ``overwrite`` an
+    existing file is replaced; with ``fsync`` flushed data survive a power cut.
+
+    Only for a simulated rig: ``seed`` of its noise, ``paced`` for real time, ``actuator`` in place
+    of the film that ``sim`` has by default, and the ``faults`` that occur in it.
+    """
+
+    configuration: str = ""
+    operator: str = ""
+    film_id: str = ""
+    notes: str = ""
+    overwrite: bool = False
+    fsync: bool = False
+    seed: int = 0
+    paced: bool = False
+    actuator: Actuator | None = None
+    faults: FaultPlan | None = None
+
+
+_DEFAULT = RunOptions()
 
 
 @dataclass(frozen=True)
@@ -68,11 +87,11 @@ class RunResult:
     margins: tuple[Margin, ...]
 
 
-class Onlooker:
-    """Is told of a run while it goes on; this one does not care.
+class RunObserver:
+    """Receives a run's samples and events while it goes on; the methods here do nothing.
 
-    Called from the thread that runs the rig, which waits: whoever draws or computes must take the
-    samples elsewhere and return at once.
+    They are called from the thread that runs the rig, which waits for them: an observer that draws
+    or computes must copy the samples and return at once.
     """
 
     def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:
@@ -85,33 +104,27 @@ class Onlooker:
         """Something happened; it is in the recording."""
 
 
-def open_rig(
-    address: str,
-    rig_file: RigFile,
-    *,
-    seed: int,
-    paced: bool,
-    actuator: Actuator | None = None,
-    faults: FaultPlan | None = None,
-) -> Rig:
-    """The rig at ``address``. Raises ``InputError`` for an address that names none.
+def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) -> Rig:
+    """Return the rig at ``address``, opened.
 
-    ``actuator`` takes the place of the film that ``sim`` has by default, ``faults`` go wrong in a
-    simulated rig. Raises ``InstrumentFault`` where the instruments are not there.
+    Of ``options`` those for a simulated rig are used. Raises ``InputError`` for an address that
+    names no rig and for options that it does not take, ``InstrumentFault`` where the instruments
+    are not there.
     """
-    if actuator is not None and address != "sim":
+    if options.actuator is not None and address != "sim":
         raise InputError(f"rig {address!r} has a film of its own; only sim takes a model")
+    faults = options.faults or FaultPlan()
     try:
         if is_simulated(address):
             return open_simulated_rig(
-                address, rig_file, rig_file.as_film(), rig_file.as_load(), seed=seed, paced=paced,
-                actuator=actuator, faults=faults or FaultPlan(),
+                address, rig_file, rig_file.as_film(), rig_file.as_load(), seed=options.seed,
+                paced=options.paced, actuator=options.actuator, faults=faults,
             )  # fmt: skip
     except AddressError as error:
         raise InputError(str(error)) from error
     except ValueError as error:  # a film that cannot hang at rest
         raise InputError(f"rig {address!r} with this rig file: {error}") from error
-    if faults is not None and faults.faults:
+    if faults.faults:
         raise InputError(f"rig {address!r} is not simulated; faults are for simulated rigs")
     if not address.startswith("daqmx:"):
         raise InputError(
@@ -123,7 +136,7 @@ def open_rig(
             f"rig {address!r}: no film is declared; give a --rig-file whose [film] has a name, so "
             f"that its limits are those of the film that hangs there"
         )
-    # not everybody who simulates has what a card needs
+    # nidaqmx is an optional dependency: a simulated rig must not import it
     from dearig.acquisition.check import check_rig
     from dearig.drivers.daqmx import open_daqmx_rig
 
@@ -138,40 +151,29 @@ def record(
     loaded: LoadedSequence,
     address: str,
     rig_file: RigFile,
-    configuration: str,
     out: str | Path,
+    options: RunOptions = _DEFAULT,
     *,
-    seed: int = 0,
-    paced: bool = False,
-    actuator: Actuator | None = None,
-    faults: FaultPlan | None = None,
-    operator: str = "",
-    film_id: str = "",
-    notes: str = "",
-    overwrite: bool = False,
-    progress: Progress = quiet,
-    beside: Beside | None = None,
-    fsync: bool = False,
-    onlooker: Onlooker | None = None,
+    overlay: OverlayModel | None = None,
+    observer: RunObserver | None = None,
     interrupts: Interrupts | None = None,
+    progress: Progress = quiet,
     clock: Callable[[], float] = time.monotonic,
 ) -> RunResult:
     """Play ``loaded`` on the rig at ``address`` and record it to ``out``.
 
-    ``configuration`` is the text of the rig file, kept with the recording; ``actuator`` is what the
-    simulated rig ``sim`` is made of, where it is not Table 3's film. ``beside`` is a model that
-    runs in step with the data and is recorded with them. With ``fsync``, what is flushed outlives a
-    power cut. ``interrupts`` is how another thread ends the run; by default ctrl-C does.
+    ``overlay`` is a model that runs in step with the data and is recorded with them; ``observer``
+    receives them. ``interrupts`` lets another thread end the run; by default ctrl-C does.
 
     Raises ``InputError`` before anything is touched; after the rig was made safe and the recording
     was closed, ``SafetyStop`` where an interlock ended it, ``InstrumentFault`` or ``DiskFault`` for
     what failed, and ``Interrupted`` where the operator ended it: the first ctrl-C ramps down in the
     set time, the second is 0 V at once.
     """
-    out = check_output(out, overwrite)
-    planned = plan(loaded, rig_file, actuator, film_id)
+    out = check_output(out, options.overwrite)
+    planned = plan(loaded, rig_file, options.actuator, options.film_id)
     waveform = planned.admitted()
-    rig = open_rig(address, rig_file, seed=seed, paced=paced, actuator=actuator, faults=faults)
+    rig = open_rig(address, rig_file, options)
     try:
         with interrupts or Interrupts() as interrupts:
             try:
@@ -184,23 +186,24 @@ def record(
             check_room(out, len(identity.channels), rate, waveform.voltage.size)
             writer = RecordingWriter(
                 out, identity, rate, waveform.voltage.size, loaded.toml, rig_file.as_film(),
-                rig_file.as_load(), configuration, operator=operator,
-                film_id=film_id or rig_file.film.name, notes=notes,
-                seed=seed if is_simulated(address) else None, overwrite=overwrite, fsync=fsync,
+                rig_file.as_load(), options.configuration, operator=options.operator,
+                film_id=options.film_id or rig_file.film.name, notes=options.notes,
+                seed=options.seed if is_simulated(address) else None,
+                overwrite=options.overwrite, fsync=options.fsync,
             )  # fmt: skip
-            onlooker = onlooker or Onlooker()
-            onlooker.started(planned, identity, rate)
+            observer = observer or RunObserver()
+            observer.started(planned, identity, rate)
             interlocks = Interlocks(
                 rig_file, identity.channels, rate, planned.displacement_of_samples, planned.voltage
             )
-            overlay = None
-            if beside is not None:
+            stepped = None
+            if overlay is not None:
                 try:
-                    overlay = Overlay(beside.actuator, identity.channels, rate)
+                    stepped = Overlay(overlay.actuator, identity.channels, rate)
                 except ModelError as error:
-                    raise InputError(f"the model beside the run: {error}") from error
-            model = beside.toml if beside is not None else ""
-            run = _Run(rig, writer, interlocks, interrupts, onlooker, clock, overlay, model)
+                    raise InputError(f"the overlay model: {error}") from error
+            model_toml = overlay.toml if overlay is not None else ""
+            run = _Run(rig, writer, interlocks, interrupts, observer, clock, stepped, model_toml)
             events = run.follow(waveform.voltage.size, progress)
         return RunResult(out, writer.samples, rate, "finished", events, waveform.margins)
     finally:
@@ -216,7 +219,7 @@ class _Run:
         writer: RecordingWriter,
         interlocks: Interlocks,
         interrupts: Interrupts,
-        onlooker: Onlooker,
+        observer: RunObserver,
         clock: Callable[[], float],
         overlay: Overlay | None,
         model_toml: str,
@@ -225,13 +228,13 @@ class _Run:
         self._writer = writer
         self._interlocks = interlocks
         self._interrupts = interrupts
-        self._onlooker = onlooker
+        self._observer = observer
         self._clock = clock
         self._looked = clock()  # at the disk
         self._events: list[str] = []
         self._overlay = overlay
         self._model_toml = model_toml
-        self._beside: list[np.ndarray] = []  # what the overlay gave, in single precision
+        self._modelled: list[np.ndarray] = []  # m, of the overlay, in single precision
         self._trip: Trip | None = None  # the first one: what came after it follows from it
 
     def follow(self, samples: int, progress: Progress) -> tuple[str, ...]:
@@ -312,8 +315,8 @@ class _Run:
     def _take(self, block: Block) -> None:
         self._writer.append(block)
         if self._overlay is not None:
-            self._beside.append(self._overlay.advance(block).astype(np.float32))
-        self._onlooker.block(block)
+            self._modelled.append(self._overlay.advance(block).astype(np.float32))
+        self._observer.block(block)
         for event in block.events:
             self._tell(event)
 
@@ -373,10 +376,10 @@ class _Run:
         return f"{where}; {trouble}" if trouble else where
 
     def _close_file(self, outcome: str) -> None:
-        """Finish the recording, with what the model beside it gave."""
+        """Finish the recording, with what the overlay model gave."""
         modelled = None
-        if self._overlay is not None and self._beside:
-            modelled = np.concatenate(self._beside)[: self._writer.samples]
+        if self._overlay is not None and self._modelled:
+            modelled = np.concatenate(self._modelled)[: self._writer.samples]
         if modelled is not None and modelled.size < self._writer.samples:
             modelled = None  # the model failed in a block that was written
         model = "" if modelled is None else self._model_toml
@@ -385,7 +388,7 @@ class _Run:
     def _tell(self, event: Event) -> None:
         self._events.append(f"{event.level}: {event.message}")
         log.log(_LEVELS.get(event.level, logging.INFO), "%s", event.message)
-        self._onlooker.event(event)
+        self._observer.event(event)
 
 
 def _ramp_down(rig: Rig) -> None:

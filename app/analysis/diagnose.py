@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dearig.acquisition.interrupts import Interrupts
-from dearig.acquisition.run import record
+from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.compatibility import (
     base_model,
     check_apart,
@@ -138,10 +138,10 @@ def diagnose_rig(
         path = out / f"{name}.h5"
         loaded = load_sequence(name) if not sequence else parse_sequence(sequence, name, Path())
         report = part(1.0 / runs)
+        # each run has its own seed, so that its noise is independent of the others'
+        options = RunOptions(configuration, seed=seed * 1000 + len(made), overwrite=overwrite)
         record(
-            loaded, address, settings, configuration, path,
-            # another seed a run: the noise of two runs has nothing in common
-            seed=seed * 1000 + len(made), overwrite=overwrite,
+            loaded, address, settings, path, options,
             progress=lambda _, fraction: report(f"recording {name}", fraction),
         )  # fmt: skip
         made.append(path)

@@ -1,4 +1,4 @@
-"""What a browser of recordings shows of them: a glance, curves, and how conditions differ."""
+"""What a browser of recordings shows of them: a summary, curves, and how conditions differ."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ __all__ = [
     "SUFFIXES",
     "Curves",
     "Difference",
-    "Glance",
+    "RecordingSummary",
     "curves",
     "differences",
-    "glance",
-    "hand_on",
-    "mend",
+    "export_file",
     "recordings_in",
+    "recover_file",
+    "summarise",
 ]
 
 SUFFIXES = (".h5", ".hdf5", ".nxs")  #: of files that may be recordings
@@ -47,7 +47,7 @@ _COLUMNS = 20_000  # of a plot that can be zoomed into
 
 
 @dataclass(frozen=True)
-class Glance:
+class RecordingSummary:
     """One file of a folder. ``trouble`` says why it cannot be read; then most else is empty.
 
     ``started`` is ISO time, ``duration`` in s. ``thumbnail`` are ``(time, signal)`` of a few points
@@ -124,9 +124,9 @@ def recordings_in(folder: Path) -> dict[Path, tuple[float, int]]:
     return found
 
 
-def glance(
+def summarise(
     path: Path, model: Path | None, drive: str = "command", progress: Progress = quiet
-) -> Glance:
+) -> RecordingSummary:
     """Look at the file at ``path`` beside ``model`` (None is the thesis's); it never raises.
 
     A file that cannot be read is a part of the folder like any other.
@@ -134,7 +134,7 @@ def glance(
     try:
         recording = open_recording(path)
     except DearigError as error:
-        return Glance(path, trouble=str(error))
+        return RecordingSummary(path, trouble=str(error))
     errors, fitted, unfit = None, False, ""
     try:
         chosen, of_these = _model(model, recording)
@@ -144,7 +144,7 @@ def glance(
         unfit = str(error)
     progress(recording.name, 1.0)
     about = recording.provenance
-    return Glance(
+    return RecordingSummary(
         path=path,
         kind=recording.kind,
         title=recording.title,
@@ -218,7 +218,7 @@ def differences(paths: Sequence[Path], progress: Progress = quiet) -> tuple[Diff
     return tuple(row for row in rows if len(set(row.values)) > 1)
 
 
-def mend(path: Path, progress: Progress = quiet) -> str:
+def recover_file(path: Path, progress: Progress = quiet) -> str:
     """Recover the recording at ``path``; what was done, in words. Raises ``InputError``."""
     done = recover(path)
     progress(path.stem, 1.0)
@@ -228,7 +228,7 @@ def mend(path: Path, progress: Progress = quiet) -> str:
     return f"{path.name} needs no recovery: its {samples} samples can be read as they are"
 
 
-def hand_on(path: Path, to: str, out: Path, progress: Progress = quiet) -> Path:
+def export_file(path: Path, to: str, out: Path, progress: Progress = quiet) -> Path:
     """Export the recording at ``path`` as ``to`` to ``out``, which is replaced if it exists."""
     written = export_recording(path, to, out, overwrite=True)
     progress(written.name, 1.0)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from dearig.acquisition.run import record
+from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.diagnose import VALIDATION, diagnose_recordings
 from dearig.analysis.identify import identify_recordings
 from dearig.analysis.outcomes import DiagnoseOutcome, IdentifyOutcome, ValidateOutcome
@@ -61,8 +61,8 @@ def run_demo(
     for n, (preset, path) in enumerate(files.items()):
         # another seed a run: the noise of two runs has nothing in common
         record(
-            load_sequence(preset), "sim", rig_file, "", path,
-            seed=seed * len(presets) + n, overwrite=overwrite,
+            load_sequence(preset), "sim", rig_file, path,
+            RunOptions(seed=seed * len(presets) + n, overwrite=overwrite),
         )  # fmt: skip
         progress("recording 11 runs", (n + 1) / len(presets))
     identified = identify_recordings(
@@ -85,8 +85,8 @@ def run_demo(
     hidden = {preset: out / f"hidden-{preset}.h5" for preset in ("thesis", *VALIDATION)}
     for n, (preset, path) in enumerate(hidden.items()):
         record(
-            load_sequence(preset), HIDDEN, rig_file, "", path,
-            seed=seed * len(hidden) + n, overwrite=overwrite,
+            load_sequence(preset), HIDDEN, rig_file, path,
+            RunOptions(seed=seed * len(hidden) + n, overwrite=overwrite),
         )  # fmt: skip
         progress("recording another rig", (n + 1) / len(hidden))
     diagnosed = diagnose_recordings(

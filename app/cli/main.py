@@ -228,8 +228,9 @@ def record(
     force: Force = False,
 ) -> None:
     """Play a sequence on a rig and record it; ctrl-C ramps down to 0 V and keeps the recording."""
+    from dearig.acquisition.overlay import OverlayModel
     from dearig.acquisition.replay import original_of
-    from dearig.acquisition.run import Beside
+    from dearig.acquisition.run import RunOptions
     from dearig.acquisition.run import record as run
     from dearig.analysis.compatibility import of_rig
     from dearig.cli.terminal import write_json
@@ -264,15 +265,17 @@ def record(
         faults = FaultPlan.parse(fault or ())
     except ValueError as error:
         raise InputError(str(error)) from error
-    beside = None
+    in_step = None
     if overlay is not None:
-        beside = Beside(load_actuator(overlay), read_text(overlay, "model file"))
+        in_step = OverlayModel(
+            overlay.stem, load_actuator(overlay), overlay, read_text(overlay, "model file")
+        )
     with _working(json) as (console, progress):
-        result = run(
-            loaded, rig, settings, text, out, seed=seed, paced=paced,
-            actuator=actuator, faults=faults, operator=operator, film_id=film, notes=notes,
-            overwrite=force, progress=progress, beside=beside, fsync=fsync,
+        options = RunOptions(
+            text, operator, film, notes, overwrite=force, fsync=fsync,
+            seed=seed, paced=paced, actuator=actuator, faults=faults,
         )  # fmt: skip
+        result = run(loaded, rig, settings, out, options, overlay=in_step, progress=progress)
     seconds = result.samples / result.rate_Hz
     _print(
         console,

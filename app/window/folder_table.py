@@ -21,18 +21,18 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
-from dearig.analysis.summary import Glance
+from dearig.analysis.summary import RecordingSummary
 from dearig.report.numbers import NOTHING, significant
 from dearig.units import SHOWN
 from dearig.window.session import Session
 
-__all__ = ["COLUMNS", "GLANCE", "PATH", "SORT", "FolderModel", "ThumbnailDelegate"]
+__all__ = ["COLUMNS", "PATH", "SORT", "SUMMARY", "FolderModel", "ThumbnailDelegate"]
 
 _Index = QModelIndex | QPersistentModelIndex
 
-GLANCE = int(Qt.ItemDataRole.UserRole)
-PATH = GLANCE + 1
-SORT = GLANCE + 2
+SUMMARY = int(Qt.ItemDataRole.UserRole)
+PATH = SUMMARY + 1
+SORT = SUMMARY + 2
 _ROOT = QModelIndex()
 
 #: Heads of the columns, each with what it means.
@@ -60,15 +60,17 @@ class FolderModel(QAbstractTableModel):
         self._paths: list[Path] = []
         self._row: dict[Path, int] = {}
         self._changed: dict[Path, float] = {}
-        self._glances: dict[Path, Glance] = {}
+        self._summaries: dict[Path, RecordingSummary] = {}
         session.theme_changed.connect(self._redraw)
 
-    def set_files(self, files: dict[Path, tuple[float, int]], glances: dict[Path, Glance]) -> None:
-        """Show ``files`` (path to time of change and size), with the ``glances`` there are."""
+    def set_files(
+        self, files: dict[Path, tuple[float, int]], summaries: dict[Path, RecordingSummary]
+    ) -> None:
+        """Show ``files`` (path to time of change and size), with the ``summaries`` there are."""
         paths = sorted(files, key=lambda path: (-files[path][0], path.name))
         changed = {path: about[0] for path, about in files.items()}
         if paths == self._paths:
-            self._glances, self._changed = dict(glances), changed
+            self._summaries, self._changed = dict(summaries), changed
             self._redraw()
             return
         # only what came and went: a selection stays
@@ -77,7 +79,7 @@ class FolderModel(QAbstractTableModel):
                 self.beginRemoveRows(_ROOT, row, row)
                 del self._paths[row]
                 self.endRemoveRows()
-        self._glances, self._changed = dict(glances), changed
+        self._summaries, self._changed = dict(summaries), changed
         known = set(self._paths)
         fresh = [path for path in paths if path not in known]
         if fresh:
@@ -86,18 +88,18 @@ class FolderModel(QAbstractTableModel):
             self.endInsertRows()
         self._row = {path: i for i, path in enumerate(self._paths)}
 
-    def set_glance(self, glance: Glance) -> None:
+    def set_summary(self, summary: RecordingSummary) -> None:
         """What was found in one of the files."""
-        row = self._row.get(glance.path)
+        row = self._row.get(summary.path)
         if row is not None:
-            self._glances[glance.path] = glance
+            self._summaries[summary.path] = summary
             self.dataChanged.emit(self.index(row, 0), self.index(row, len(COLUMNS) - 1))
 
     def forget_errors(self) -> None:
         """Another model was chosen: the errors are no longer those of the one that is named."""
-        self._glances = {
+        self._summaries = {
             path: replace(g, errors=None, unfit="", fitted=False)
-            for path, g in self._glances.items()
+            for path, g in self._summaries.items()
         }
         self._redraw()
 
@@ -122,62 +124,62 @@ class FolderModel(QAbstractTableModel):
         if not index.isValid():
             return None
         path = self._paths[index.row()]
-        glance, column = self._glances.get(path), index.column()
+        summary, column = self._summaries.get(path), index.column()
         if role == PATH:
             return path
-        if role == GLANCE:
-            return glance
+        if role == SUMMARY:
+            return summary
         if role == SORT:
-            return self._sort_key(path, glance, column)
+            return self._sort_key(path, summary, column)
         if role == Qt.ItemDataRole.DisplayRole:
-            return self._text(path, glance, column)
+            return self._text(path, summary, column)
         if role == Qt.ItemDataRole.ToolTipRole:
-            return _tip(path, glance, column)
+            return _tip(path, summary, column)
         if role == Qt.ItemDataRole.TextAlignmentRole and _LENGTH <= column <= _NOISE:
             return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        if role == Qt.ItemDataRole.ForegroundRole and column == _STATE and glance is not None:
-            theme, level = self._session.theme, _level(glance)
+        if role == Qt.ItemDataRole.ForegroundRole and column == _STATE and summary is not None:
+            theme, level = self._session.theme, _level(summary)
             colour = {"fault": theme.bad, "warning": theme.warn}.get(level)
             return None if colour is None else QColor(colour)
         return None
 
-    def _text(self, path: Path, glance: Glance | None, column: int) -> str:
+    def _text(self, path: Path, summary: RecordingSummary | None, column: int) -> str:
         if column == _NAME:
             return path.stem
         if column == 0:
             return ""
-        if glance is None:
+        if summary is None:
             return "…" if column == _STATE else ""
         if column == _STATE:
-            return _state(glance)
+            return _state(summary)
         if column == _MADE:
-            return _when(glance.started, self._changed.get(path, 0.0))
-        if glance.trouble:
+            return _when(summary.started, self._changed.get(path, 0.0))
+        if summary.trouble:
             return ""
         if column == _SEQUENCE:
-            return glance.title
+            return summary.title
         if column == _FILM:
-            return glance.film
+            return summary.film
         if column == _LENGTH:
-            return f"{significant(glance.duration)} s"
-        return _error(glance, column)
+            return f"{significant(summary.duration)} s"
+        return _error(summary, column)
 
-    def _sort_key(self, path: Path, glance: Glance | None, column: int) -> Any:
+    def _sort_key(self, path: Path, summary: RecordingSummary | None, column: int) -> Any:
         if column == _MADE:
             return self._changed.get(path, 0.0)
-        if glance is None or glance.trouble:
+        if summary is None or summary.trouble:
             return path.stem if column in (0, _NAME) else (-1.0 if column >= _LENGTH else "")
         if column == _LENGTH:
-            return glance.duration
+            return summary.duration
         if _RMS <= column <= _NOISE:
-            e = glance.errors
+            e = summary.errors
             if e is None:
                 return -1.0
-            over = e.rms / glance.noise if glance.noise else -1.0
+            over = e.rms / summary.noise if summary.noise else -1.0
             return {_RMS: e.rms, _NRMSE: e.nrmse_pct, _NOISE: over}[column]
         if column == _STATE:
-            return float(("", "info", "warning", "fault").index(_level(glance)))
-        return {_SEQUENCE: glance.title, _FILM: glance.film}.get(column, path.stem)
+            return float(("", "info", "warning", "fault").index(_level(summary)))
+        return {_SEQUENCE: summary.title, _FILM: summary.film}.get(column, path.stem)
 
     @Slot()
     def _redraw(self) -> None:
@@ -186,57 +188,57 @@ class FolderModel(QAbstractTableModel):
             self.dataChanged.emit(self.index(0, 0), last)
 
 
-def _level(glance: Glance) -> str:
-    if glance.trouble:
+def _level(summary: RecordingSummary) -> str:
+    if summary.trouble:
         return "fault"
-    levels = {event.level for event in glance.events}
+    levels = {event.level for event in summary.events}
     if "fault" in levels:
         return "fault"
-    if "warning" in levels or not glance.complete:
+    if "warning" in levels or not summary.complete:
         return "warning"
     return "info" if levels else ""
 
 
-def _state(glance: Glance) -> str:
+def _state(summary: RecordingSummary) -> str:
     # a sign besides the colour
-    sign = {"fault": "\N{MULTIPLICATION X} ", "warning": "! "}.get(_level(glance), "")
-    if glance.trouble:
+    sign = {"fault": "\N{MULTIPLICATION X} ", "warning": "! "}.get(_level(summary), "")
+    if summary.trouble:
         return f"{sign}cannot be read"
-    said = [] if glance.complete else ["incomplete"]
-    count = sum(event.level != "info" for event in glance.events)
+    said = [] if summary.complete else ["incomplete"]
+    count = sum(event.level != "info" for event in summary.events)
     if count:
         said.append(f"{count} event{'' if count == 1 else 's'}")
     return f"{sign}{', '.join(said)}" if said else "\N{CHECK MARK} finished"
 
 
-def _error(glance: Glance, column: int) -> str:
-    if glance.errors is None:
-        return NOTHING if glance.unfit else ""
-    shown, e = SHOWN[glance.kind], glance.errors
+def _error(summary: RecordingSummary, column: int) -> str:
+    if summary.errors is None:
+        return NOTHING if summary.unfit else ""
+    shown, e = SHOWN[summary.kind], summary.errors
     if column == _RMS:
-        mark = "*" if glance.fitted else ""
+        mark = "*" if summary.fitted else ""
         return f"{significant(e.rms * shown.error_factor)} {shown.error_unit}{mark}"
     if column == _NRMSE:
         return f"{significant(e.nrmse_pct)} %"
-    return significant(e.rms / glance.noise) if glance.noise else NOTHING
+    return significant(e.rms / summary.noise) if summary.noise else NOTHING
 
 
-def _tip(path: Path, glance: Glance | None, column: int) -> str:
-    if glance is None:
+def _tip(path: Path, summary: RecordingSummary | None, column: int) -> str:
+    if summary is None:
         return f"{path}: not looked at yet"
-    if glance.trouble:
-        return glance.trouble
+    if summary.trouble:
+        return summary.trouble
     if _RMS <= column <= _NOISE:
-        if glance.unfit:
-            return glance.unfit
-        if glance.fitted:
+        if summary.unfit:
+            return summary.unfit
+        if summary.fitted:
             return "The model was fitted to this very recording: its error here proves nothing"
         return COLUMNS[column][1]
     if column == _STATE:
-        told = [f"{event.time:.4g} s, {event.level}: {event.message}" for event in glance.events]
-        return "\n".join([glance.outcome, *told[:12]])
-    notes = f"\nNotes: {glance.notes}" if glance.notes else ""
-    by = f"\nOperator: {glance.operator}" if glance.operator else ""
+        told = [f"{event.time:.4g} s, {event.level}: {event.message}" for event in summary.events]
+        return "\n".join([summary.outcome, *told[:12]])
+    notes = f"\nNotes: {summary.notes}" if summary.notes else ""
+    by = f"\nOperator: {summary.operator}" if summary.operator else ""
     return f"{path}{by}{notes}"
 
 
@@ -261,11 +263,11 @@ class ThumbnailDelegate(QStyledItemDelegate):
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: _Index) -> None:
         super().paint(painter, option, index)
-        glance = index.data(GLANCE)
+        summary = index.data(SUMMARY)
         area = QRectF(option.rect).adjusted(4, 4, -4, -4)
-        if not isinstance(glance, Glance) or glance.thumbnail[0].size < 2:
+        if not isinstance(summary, RecordingSummary) or summary.thumbnail[0].size < 2:
             return
-        time, values = glance.thumbnail
+        time, values = summary.thumbnail
         span, height = np.ptp(time) or 1.0, np.ptp(values) or 1.0
         x = area.left() + (time - time[0]) / span * area.width()
         y = area.bottom() - (values - values.min()) / height * area.height()

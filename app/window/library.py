@@ -8,7 +8,7 @@ from typing import Any
 
 from PySide6.QtCore import QFileSystemWatcher, QObject, QTimer, Signal, Slot
 
-from dearig.analysis.summary import Glance, glance, recordings_in
+from dearig.analysis.summary import RecordingSummary, recordings_in, summarise
 from dearig.window.background import Background
 from dearig.window.session import Session
 from dearig.window.worker import Job, Worker
@@ -19,11 +19,11 @@ _SETTLE_MS = 300  # after which a folder that changes is looked at; several file
 
 
 class Library(QObject):
-    """``files`` in the folder, and ``glances`` of those that were looked at until now.
+    """``files`` in the folder, and ``summaries`` of those that were looked at until now.
 
-    ``listed``: other files; ``looked``: a glance is there; ``trouble``: the folder cannot be read;
-    ``busy``: how many files are still to be looked at. All are compared with ``model``. While a run
-    goes on no file is opened: it may be the one that is being written.
+    ``listed``: other files; ``looked``: its summary is there; ``trouble``: the folder cannot be
+    read; ``busy``: how many files are still to be looked at. All are compared with ``model``. While
+    a run goes on no file is opened: it may be the one that is being written.
     """
 
     listed = Signal()
@@ -44,7 +44,7 @@ class Library(QObject):
         self._round = 0  # of looks: a late answer of an earlier one is not shown
         self.model: Path | None = None
         self.files: dict[Path, tuple[float, int]] = {}
-        self.glances: dict[Path, Glance] = {}
+        self.summaries: dict[Path, RecordingSummary] = {}
         self._settle.timeout.connect(self.refresh)
         self._watcher.directoryChanged.connect(self._changed)
         session.folder_changed.connect(self._moved)
@@ -100,7 +100,7 @@ class Library(QObject):
             self._watcher.addPath(str(self.folder))
         self._worker.clear()
         self._round += 1
-        self.files, self.glances = {}, {}
+        self.files, self.summaries = {}, {}
         self._pending.clear()
         self.listed.emit()
         self.refresh()
@@ -110,11 +110,11 @@ class Library(QObject):
         if any(path.parent != self.folder for path in files):
             return  # of the folder that was left meanwhile
         before, self.files = self.files, files
-        self.glances = {path: g for path, g in self.glances.items() if path in files}
+        self.summaries = {path: g for path, g in self.summaries.items() if path in files}
         fresh = [
             path for path in files
             if before.get(path) != files[path]
-            or (path not in self.glances and path not in self._pending)
+            or (path not in self.summaries and path not in self._pending)
         ]  # fmt: skip
         self.listed.emit()
         self._look(sorted(fresh, key=lambda path: -files[path][0]))
@@ -122,20 +122,22 @@ class Library(QObject):
     def _look(self, paths: list[Path]) -> None:
         drive, round_ = self._session.overlay_drive, self._round
         for path in paths:
-            job = self._worker.submit(glance, path, self.model, drive)
+            job = self._worker.submit(summarise, path, self.model, drive)
             job.finished.connect(lambda found, of=round_: self._took(found, of))
             job.failed.connect(
-                lambda words, of=round_, path=path: self._took(Glance(path, trouble=words), of)
+                lambda words, of=round_, path=path: self._took(
+                    RecordingSummary(path, trouble=words), of
+                )
             )
         self._pending.update(paths)
         self.busy.emit(len(self._pending))
 
-    def _took(self, found: Glance, of: int) -> None:
+    def _took(self, found: RecordingSummary, of: int) -> None:
         if of != self._round:
             return
         self._pending.discard(found.path)
         if found.path in self.files:
-            self.glances[found.path] = found
+            self.summaries[found.path] = found
             self.looked.emit(found.path)
         self.busy.emit(len(self._pending))
 

@@ -13,14 +13,13 @@ from queue import SimpleQueue
 
 import numpy as np
 
-from dearig.acquisition.overlay import Overlay
+from dearig.acquisition.overlay import Overlay, OverlayModel
 from dearig.acquisition.plan import Plan
-from dearig.acquisition.run import Onlooker
+from dearig.acquisition.run import RunObserver
 from dearig.drivers.channels import Channel
 from dearig.drivers.rig import Block, Event, RigIdentity
 from dearig.model.errors import ModelError
 from dearig.recording.rest_noise import lead_in
-from dearig.window.session import OverlayModel
 from dearig.window.traces import ErrorsSoFar, Pyramid, RunningErrors
 
 __all__ = ["Live", "Now"]
@@ -53,7 +52,7 @@ class Now:
     revision: int = 0
 
 
-class Live(Onlooker):
+class Live(RunObserver):
     """Looks on at one run. ``close`` ends its thread, after everything that came was taken in."""
 
     def __init__(self, overlays: Sequence[OverlayModel] = (), drive: str = "command") -> None:

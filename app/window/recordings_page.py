@@ -32,7 +32,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dearig.analysis.summary import Curves, Difference, curves, differences, hand_on, mend
+from dearig.analysis.summary import (
+    Curves,
+    Difference,
+    curves,
+    differences,
+    export_file,
+    recover_file,
+)
 from dearig.recording.exporters import EXPORTS
 from dearig.report.numbers import significant
 from dearig.report.tables import Row, Table
@@ -265,12 +272,12 @@ class RecordingsPage(QWidget):
             )
 
     def _trouble(self, path: Path) -> str:
-        glance = self._library.glances.get(path)
-        return "" if glance is None else glance.trouble
+        summary = self._library.summaries.get(path)
+        return "" if summary is None else summary.trouble
 
     def _broken(self, path: Path) -> bool:
-        glance = self._library.glances.get(path)
-        return glance is not None and not glance.complete
+        summary = self._library.summaries.get(path)
+        return summary is not None and not summary.complete
 
     def _took(self, found: Curves, of: int) -> None:
         if of != self._round:
@@ -330,7 +337,7 @@ class RecordingsPage(QWidget):
     def export(self, path: Path, form: str, out: Path) -> None:
         """Write the recording at ``path`` as ``form`` to ``out``, in the other process."""
         self.saying.say(f"Writing {out.name}", "muted")
-        job = self._library.submit(hand_on, path, form, out)
+        job = self._library.submit(export_file, path, form, out)
         job.finished.connect(lambda written: self.saying.say(f"{written} was written", "good"))
         job.failed.connect(self.saying.say)
 
@@ -354,7 +361,7 @@ class RecordingsPage(QWidget):
     def recover(self) -> None:
         """Mend those of the chosen recordings whose run was killed."""
         for path in filter(self._broken, self.chosen()):
-            job = self._library.submit(mend, path)
+            job = self._library.submit(recover_file, path)
             job.finished.connect(self._recovered)
             job.failed.connect(self.saying.say)
 
@@ -417,7 +424,7 @@ class RecordingsPage(QWidget):
 
     @Slot()
     def _listed(self) -> None:
-        self.files.set_files(self._library.files, self._library.glances)
+        self.files.set_files(self._library.files, self._library.summaries)
         if self._waited and all(path in self._library.files for path in self._waited):
             self.choose(self._waited)
         if not self._library.files:
@@ -425,7 +432,7 @@ class RecordingsPage(QWidget):
 
     @Slot(Path)
     def _looked(self, path: Path) -> None:
-        self.files.set_glance(self._library.glances[path])
+        self.files.set_summary(self._library.summaries[path])
         if not self.chosen() and self._sorted.rowCount():
             # something to see: the newest, or whatever stands first
             self.choose([self._sorted.index(0, 0).data(PATH)])

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dearig.acquisition.run import Beside
+from dearig.acquisition.overlay import OverlayModel
 from dearig.config.modelfile import load_actuator, load_model
 from dearig.config.toml_input import read_text
 from dearig.sim_backend.faults import FaultPlan
@@ -29,7 +29,7 @@ from dearig.window.hv import HighVoltage, HighVoltageBadge
 from dearig.window.live import Live, Now
 from dearig.window.run_plots import RunPlots
 from dearig.window.running import RunEnd, Runner, RunOrder, simulated
-from dearig.window.session import OverlayModel, Session
+from dearig.window.session import Session
 from dearig.window.theme import SPACE, digits
 from dearig.window.widgets import Readout, Sentence, button, card, label
 
@@ -113,7 +113,7 @@ class RunPage(QWidget):
             preview.loaded, session.address, session.rig_file, session.rig_text, session.folder,
             operator=session.operator, film=session.film, notes=session.notes,
             seed=self._seed(), paced=self.paced.isChecked(), faults=self.faults,
-            beside=self._kept(),
+            overlay=self._kept(),
         )  # fmt: skip
         if not self.runner.start(order, live):
             return
@@ -388,12 +388,12 @@ class RunPage(QWidget):
         if self._last is not None:
             self.show_recording.emit(self._last)
 
-    def _kept(self) -> Beside | None:
+    def _kept(self) -> OverlayModel | None:
         """What the recording keeps of the models: the first one, where the command drives it."""
         first = next(iter(self.session.overlays), None)
         if first is None or self.session.overlay_drive != "command":
             return None
-        return Beside(first.actuator, first.toml)
+        return first
 
     def _seed(self) -> int:
         """Of the simulated noise: another one each time, as on the bench."""

@@ -10,7 +10,8 @@ from pathlib import Path
 from PySide6.QtCore import QObject, QThread, Signal, Slot
 
 from dearig.acquisition.interrupts import Interrupts
-from dearig.acquisition.run import Beside, RunResult, record
+from dearig.acquisition.overlay import OverlayModel
+from dearig.acquisition.run import RunOptions, RunResult, record
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
 from dearig.errors import (
@@ -47,7 +48,7 @@ class RunOrder:
     """Everything that a run needs; ``folder`` gets the recording, in a file named by the sequence.
 
     ``seed`` is of the simulated noise, ``paced`` lets a simulated rig take its time, and ``faults``
-    go wrong in it. ``beside`` is the model whose displacement the recording keeps.
+    go wrong in it. ``overlay`` is the model whose displacement the recording keeps.
     """
 
     loaded: LoadedSequence
@@ -61,7 +62,7 @@ class RunOrder:
     seed: int = 0
     paced: bool = True
     faults: FaultPlan | None = None
-    beside: Beside | None = None
+    overlay: OverlayModel | None = None
 
 
 @dataclass(frozen=True)
@@ -182,11 +183,13 @@ class _RunThread(QThread):
             )
             return
         try:
+            options = RunOptions(
+                order.configuration, order.operator, order.film, order.notes,
+                seed=order.seed, paced=order.paced, faults=order.faults,
+            )  # fmt: skip
             result = record(
-                order.loaded, order.address, order.rig_file, order.configuration, out,
-                seed=order.seed, paced=order.paced, faults=order.faults, operator=order.operator,
-                film_id=order.film, notes=order.notes, onlooker=self._live,
-                interrupts=self.interrupts, beside=order.beside, clock=time.monotonic,
+                order.loaded, order.address, order.rig_file, out, options, overlay=order.overlay,
+                observer=self._live, interrupts=self.interrupts, clock=time.monotonic,
             )  # fmt: skip
         except DearigError as error:
             played = self._live.now() is not None

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from PySide6.QtCore import QObject, QSettings, Signal
 
+from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.plan import Plan
 from dearig.config.modelfile import model_toml
 from dearig.config.presets import PRESETS
@@ -18,23 +19,10 @@ from dearig.model.actuator import Actuator
 from dearig.model.material import TABLE_3
 from dearig.window.theme import LIGHT, Theme
 
-__all__ = ["Breach", "OverlayModel", "Preview", "Session"]
+__all__ = ["Breach", "Preview", "Session"]
 
 _RECENT_MAX = 8
 FIRST_SEQUENCE = "thesis"
-
-
-@dataclass(frozen=True)
-class OverlayModel:
-    """A model that runs beside the measurement; ``path`` is None for the thesis's own.
-
-    ``toml`` is the text of its file, which a recording keeps.
-    """
-
-    name: str
-    actuator: Actuator
-    path: Path | None = None
-    toml: str = ""
 
 
 @dataclass(frozen=True)

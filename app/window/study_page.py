@@ -267,20 +267,20 @@ class StudyPage(QWidget):
             self._describe(paths.index(path), path)
 
     def _describe(self, row: int, path: Path) -> None:
-        glance = self._library.glances.get(path)
-        if glance is None:
+        summary = self._library.summaries.get(path)
+        if summary is None:
             return
         item = self._item(row, _NAME)
-        told = f"{glance.title}, {seconds(glance.duration)}"
-        film = f", {glance.film}" if glance.film else ""
-        item.setToolTip(glance.trouble or f"{path}\n{told}{film}")
-        if glance.trouble:
+        told = f"{summary.title}, {seconds(summary.duration)}"
+        film = f", {summary.film}" if summary.film else ""
+        item.setToolTip(summary.trouble or f"{path}\n{told}{film}")
+        if summary.trouble:
             self.recordings.blockSignals(True)
             for column in (_FIT, _CHECK):
                 box = self._item(row, column)
                 box.setFlags(Qt.ItemFlag.NoItemFlags)
                 box.setCheckState(Qt.CheckState.Unchecked)
-                box.setToolTip(glance.trouble)
+                box.setToolTip(summary.trouble)
             item.setFlags(Qt.ItemFlag.NoItemFlags)
             self.recordings.blockSignals(False)
 

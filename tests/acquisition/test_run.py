@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from dearig.acquisition.interrupts import Interrupts
+from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.plan import Plan, plan
-from dearig.acquisition.run import Beside, Onlooker, open_rig, record
+from dearig.acquisition.run import RunObserver, RunOptions, open_rig, record
 from dearig.config.modelfile import save_model
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
@@ -52,7 +53,7 @@ class Troubled:
         self._trouble = trouble
         self._block = block
         self._blocks = 0
-        rig = open_rig("sim", RIG_FILE, seed=0, paced=False, faults=FaultPlan.parse(faults))
+        rig = open_rig("sim", RIG_FILE, RunOptions(faults=FaultPlan.parse(faults)))
         assert isinstance(rig, SimulatedRig)
         self.inner = rig
 
@@ -292,14 +293,14 @@ def test_a_disk_that_gets_full_ends_the_run_before_it_is(
     rig = Troubled("", lambda: None)
     monkeypatch.setattr("dearig.acquisition.run.open_rig", lambda *_, **__: rig)
     with pytest.raises(SafetyStop, match=r"free.*ramped down to 0 V"):
-        record(LOADED, "sim", RIG_FILE, "", tmp_path / "run.h5", clock=lambda: next(ticks))
+        record(LOADED, "sim", RIG_FILE, tmp_path / "run.h5", clock=lambda: next(ticks))
     assert closed_at_zero(rig)
     assert any(line.startswith("stop at") for line in rig.diary)
     assert open_recording(tmp_path / "run.h5").samples > 400
 
 
-def test_whoever_looks_on_is_told_of_every_sample_and_event(tmp_path: Path) -> None:
-    class Diary(Onlooker):
+def test_an_observer_receives_every_sample_and_event(tmp_path: Path) -> None:
+    class Diary(RunObserver):
         def __init__(self) -> None:
             self.samples = 0
             self.events: list[str] = []
@@ -318,10 +319,10 @@ def test_whoever_looks_on_is_told_of_every_sample_and_event(tmp_path: Path) -> N
     diary, interrupts = Diary(), Interrupts()
     interrupts.ask()
     with pytest.raises(Interrupted):
-        record(LOADED, "sim", RIG_FILE, "", tmp_path / "a.h5", interrupts=interrupts)
+        record(LOADED, "sim", RIG_FILE, tmp_path / "a.h5", interrupts=interrupts)
     result = record(
-        LOADED, "sim:3", RIG_FILE, "", tmp_path / "b.h5", onlooker=diary,
-        faults=FaultPlan.parse(["late-reply@0.2+0.1"]),
+        LOADED, "sim:3", RIG_FILE, tmp_path / "b.h5",
+        RunOptions(faults=FaultPlan.parse(["late-reply@0.2+0.1"])), observer=diary,
     )  # fmt: skip
     assert diary.samples == result.samples
     assert tuple(diary.events) == result.events
@@ -329,9 +330,9 @@ def test_whoever_looks_on_is_told_of_every_sample_and_event(tmp_path: Path) -> N
     assert diary.planned.voltage.size == result.samples
 
 
-def test_a_model_runs_beside_the_measurement_and_is_kept(tmp_path: Path) -> None:
+def test_an_overlay_model_runs_in_step_and_is_kept(tmp_path: Path) -> None:
     model = Actuator(RIG_FILE.as_film(), RIG_FILE.as_load(), TABLE_3)
-    save_model(tmp_path / "m.toml", "beside", model, {})
+    save_model(tmp_path / "m.toml", "overlay", model, {})
     answer = dearig(
         "record", write(tmp_path / "s.toml", LOBE), "--out", tmp_path / "run.h5",
         "--overlay", tmp_path / "m.toml", "--fsync",
@@ -339,29 +340,30 @@ def test_a_model_runs_beside_the_measurement_and_is_kept(tmp_path: Path) -> None
     assert answer.code == 0
     run = open_recording(tmp_path / "run.h5")
     with h5py.File(tmp_path / "run.h5") as file:
-        beside = file["entry/data/displacement_model"][:]
+        modelled = file["entry/data/displacement_model"][:]
         kept = file["entry/model"][()].decode()
     assert kept == (tmp_path / "m.toml").read_text(encoding="utf-8")
     # the simulated film is the model: what is left is the laser's noise
     assert run.displacement is not None
-    residual = run.displacement - beside
+    residual = run.displacement - modelled
     assert 0.5e-6 < residual.std() < 1.5e-6
-    assert np.ptp(beside) > 1e-4
+    assert np.ptp(modelled) > 1e-4
 
 
 def test_an_interrupted_run_keeps_what_the_model_gave_until_then(tmp_path: Path) -> None:
-    beside = Beside(Actuator(RIG_FILE.as_film(), RIG_FILE.as_load(), TABLE_3), "name = 'x'")
+    actuator = Actuator(RIG_FILE.as_film(), RIG_FILE.as_load(), TABLE_3)
+    overlay = OverlayModel("x", actuator, toml="name = 'x'")
     interrupts = Interrupts()
 
-    class Hasty(Onlooker):
+    class Hasty(RunObserver):
         def block(self, block: Block) -> None:
             if block.start > 500:
                 interrupts.ask()
 
     with pytest.raises(Interrupted):
         record(
-            LOADED, "sim", RIG_FILE, "", tmp_path / "run.h5", beside=beside,
-            interrupts=interrupts, onlooker=Hasty(),
+            LOADED, "sim", RIG_FILE, tmp_path / "run.h5", overlay=overlay,
+            interrupts=interrupts, observer=Hasty(),
         )  # fmt: skip
     run = open_recording(tmp_path / "run.h5")
     with h5py.File(tmp_path / "run.h5") as file:
@@ -426,7 +428,7 @@ def test_a_fault_of_the_program_itself_ends_at_0_volts_too(
     rig = Troubled("read", lambda: {}["nobody foresaw this"])
     monkeypatch.setattr("dearig.acquisition.run.open_rig", lambda *_, **__: rig)
     with pytest.raises(KeyError):
-        record(LOADED, "sim", RIG_FILE, "", tmp_path / "run.h5")
+        record(LOADED, "sim", RIG_FILE, tmp_path / "run.h5")
     assert closed_at_zero(rig)
     assert any(line.startswith("stop at") for line in rig.diary)
     assert open_recording(tmp_path / "run.h5").outcome == "ended early by a fault of the program"
@@ -447,7 +449,7 @@ def test_the_output_is_looked_at_before_the_rig_is_opened(
     monkeypatch.setattr("dearig.acquisition.run.open_rig", opened)
     write(tmp_path / "run.h5", "a treasure")
     with pytest.raises(InputError, match="exists already"):
-        record(LOADED, "sim", RIG_FILE, "", tmp_path / "run.h5")
+        record(LOADED, "sim", RIG_FILE, tmp_path / "run.h5")
     assert (tmp_path / "run.h5").read_text(encoding="utf-8") == "a treasure"
 
 
@@ -466,7 +468,7 @@ def test_a_rig_that_cannot_hang_is_refused(tmp_path: Path) -> None:
         {"film": {"thickness_mm": 0.0001}, "card": {"sample_rate_Hz": 200.0}}
     )
     with pytest.raises(InputError, match="is refused"):
-        record(LOADED, "sim:3", rig, "", tmp_path / "run.h5")
+        record(LOADED, "sim:3", rig, tmp_path / "run.h5")
     assert names(tmp_path) == set()
 
 

@@ -9,7 +9,14 @@ import h5py
 import numpy as np
 import pytest
 
-from dearig.analysis.summary import curves, differences, glance, hand_on, mend, recordings_in
+from dearig.analysis.summary import (
+    curves,
+    differences,
+    export_file,
+    recordings_in,
+    recover_file,
+    summarise,
+)
 from dearig.config.modelfile import save_model
 from dearig.errors import InputError
 from dearig.model.actuator import Actuator
@@ -38,8 +45,8 @@ def test_a_folder_lists_what_may_be_recordings(folder):
         recordings_in(folder / "gone")
 
 
-def test_a_glance_tells_what_a_recording_is_and_how_the_thesis_s_model_does(folder):
-    found, recording = glance(folder / "low.h5", None), open_recording(folder / "low.h5")
+def test_a_summary_tells_what_a_recording_is_and_how_the_thesis_s_model_does(folder):
+    found, recording = summarise(folder / "low.h5", None), open_recording(folder / "low.h5")
     assert (found.title, found.film, found.operator) == ("lobes of 4.0 kV", "film 1", "Ada")
     assert (found.samples, found.duration) == (recording.samples, recording.duration)
     # the rig is the thesis's model, seen through a laser: only noise is left
@@ -50,16 +57,16 @@ def test_a_glance_tells_what_a_recording_is_and_how_the_thesis_s_model_does(fold
     assert signal.min() == recording.displacement.min()
 
 
-def test_a_glance_never_raises(folder):
-    assert "is not an HDF5 file" in glance(folder / "text.h5", None).trouble
-    assert "gone.h5 is not there" in glance(folder / "gone.h5", None).trouble
-    torn = glance(folder / "torn.h5", None)
+def test_a_summary_never_raises(folder):
+    assert "is not an HDF5 file" in summarise(folder / "text.h5", None).trouble
+    assert "gone.h5 is not there" in summarise(folder / "gone.h5", None).trouble
+    torn = summarise(folder / "torn.h5", None)
     assert (torn.trouble, torn.complete) == ("", False)
     assert torn.samples > 0
 
 
-def test_a_glance_says_why_a_model_does_not_go_with_a_recording(folder, tmp_path):
-    found = glance(folder / "low.h5", tmp_path / "gone.toml")
+def test_a_summary_says_why_a_model_does_not_go_with_a_recording(folder, tmp_path):
+    found = summarise(folder / "low.h5", tmp_path / "gone.toml")
     assert found.errors is None
     assert "gone.toml" in found.unfit
     assert found.trouble == ""
@@ -70,8 +77,8 @@ def test_the_error_of_what_a_model_was_fitted_to_is_marked(folder, tmp_path):
     model = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
     history = {"train": [{"name": "low", "sha256": recording.sha256}]}
     path = save_model(tmp_path / "model.toml", "fitted", model, history)
-    assert glance(folder / "low.h5", path).fitted
-    assert not glance(folder / "high.h5", path).fitted
+    assert summarise(folder / "low.h5", path).fitted
+    assert not summarise(folder / "high.h5", path).fitted
 
 
 def test_curves_are_the_recording_and_the_model(folder, tmp_path):
@@ -114,15 +121,15 @@ def test_a_moment_is_in_words_that_a_narrow_column_can_break(folder, tmp_path):
 
 def test_a_torn_recording_is_mended_and_a_whole_one_left_alone(folder, tmp_path):
     path = killed(tmp_path, "again")
-    assert mend(path) == "again.h5 was recovered: 2000 samples can be read by any program"
-    assert "needs no recovery" in mend(path)
-    assert "needs no recovery" in mend(folder / "low.h5")
+    assert recover_file(path) == "again.h5 was recovered: 2000 samples can be read by any program"
+    assert "needs no recovery" in recover_file(path)
+    assert "needs no recovery" in recover_file(folder / "low.h5")
 
 
 def test_exports_replace_what_the_operator_said_may_be_replaced(folder, tmp_path):
     out = tmp_path / "low.csv"
     out.write_text("old")
-    assert hand_on(folder / "low.h5", "csv", out) == out
+    assert export_file(folder / "low.h5", "csv", out) == out
     assert out.read_text().startswith("time_s,displacement_m")
 
 

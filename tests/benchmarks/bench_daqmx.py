@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from dearig.acquisition.run import record
+from dearig.acquisition.run import RunOptions, record
 from dearig.config.rigfile import load_rig_file
 from dearig.config.sequencefile import parse_sequence
 from dearig.recording import open_recording
@@ -76,7 +76,7 @@ def run(minutes: float, rate: float, pace: str, timing: tuple[float, float]) -> 
         loaded = parse_sequence(sequence, "bench", Path())
         with served(rig_file, pace) as rig:
             cpu, wall = time.process_time(), time.perf_counter()
-            result = record(loaded, rig, load_rig_file(rig_file), text, out)
+            result = record(loaded, rig, load_rig_file(rig_file), out, RunOptions(text))
             cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
         recording = open_recording(out)
         size = out.stat().st_size

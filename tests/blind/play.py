@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from dearig.acquisition.run import record
+from dearig.acquisition.run import RunOptions, record
 from dearig.config.rigfile import load_rig_file
 from dearig.config.sequencefile import load_sequence
 from dearig.config.toml_input import read_text
@@ -175,7 +175,7 @@ class Bench:
 
     def _record(self, sequence: str, rig: str, out: Path, seed: int) -> None:
         text = read_text(self.rig_path, "rig file")
-        record(load_sequence(sequence), rig, self._rig, text, out, seed=seed)
+        record(load_sequence(sequence), rig, self._rig, out, RunOptions(text, seed=seed))
 
 
 def diagnose(

@@ -365,9 +365,9 @@ class TestRig:
         """Have the run whose recording is named ``at`` end with ``error``."""
         record = app_diagnose.record
 
-        def ending(loaded, address, settings, configuration, path, **more):
+        def ending(loaded, address, settings, path, options, **more):
             if path.stem == at:
                 raise error
-            return record(loaded, address, settings, configuration, path, **more)
+            return record(loaded, address, settings, path, options, **more)
 
         monkeypatch.setattr(app_diagnose, "record", ending)

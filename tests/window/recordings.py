@@ -6,7 +6,7 @@ import os
 import shutil
 from pathlib import Path
 
-from dearig.acquisition.run import record
+from dearig.acquisition.run import RunOptions, record
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence, parse_sequence
 from dearig.drivers.rig import Block
@@ -29,14 +29,14 @@ def made(folder: Path, name: str, top: float = 6.0, **said: str) -> Path:
     """Two lobes up to ``top`` kV on the rig of the thesis."""
     loaded = parse_sequence(LOBES.format(top=top), name, Path())
     out = folder / f"{name}.h5"
-    record(loaded, "sim", SLOW_RIG, f"[load]\nmass_g = {200}\n", out, **said)  # type: ignore[arg-type]
+    record(loaded, "sim", SLOW_RIG, out, RunOptions(f"[load]\nmass_g = {200}\n", **said))  # type: ignore[arg-type]
     return out
 
 
 def of_rig(folder: Path, name: str, address: str, preset: str = "thesis") -> Path:
     """A preset on the rig at ``address``."""
     out = folder / f"{name}.h5"
-    record(load_sequence(preset), address, SLOW_RIG, "", out)
+    record(load_sequence(preset), address, SLOW_RIG, out)
     return out
 
 

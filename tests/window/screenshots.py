@@ -20,7 +20,7 @@ from PySide6.QtCore import QEventLoop, QSettings, QTimer
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QApplication
 
-from dearig.acquisition.run import record
+from dearig.acquisition.run import RunOptions, record
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence
@@ -95,8 +95,8 @@ def make_recordings(folder: Path) -> None:
     )
     for seed, (address, preset, name, operator, film) in enumerate(runs):
         record(
-            load_sequence(preset), address, rig_file, "", folder / f"{name}.h5", seed=seed,
-            operator=operator, film_id=film,
+            load_sequence(preset), address, rig_file, folder / f"{name}.h5",
+            RunOptions(operator=operator, film_id=film, seed=seed),
         )  # fmt: skip
 
 
@@ -133,7 +133,7 @@ def views(window: MainWindow) -> Iterator[str]:
     until(
         lambda: (
             len(recordings._library.files) == 7
-            and set(recordings._library.glances) == set(recordings._library.files)
+            and set(recordings._library.summaries) == set(recordings._library.files)
         ),
         "the recordings",
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.plan import plan
 from dearig.acquisition.run import record
 from dearig.config.rigfile import RigFile
@@ -18,7 +19,6 @@ from dearig.model.actuator import Actuator, Drive
 from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.recording import open_recording
 from dearig.window.live import Live
-from dearig.window.session import OverlayModel
 from tests.window.conftest import SHORT
 
 THESIS = OverlayModel("thesis", Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3))
@@ -49,7 +49,7 @@ def blocks(voltage: np.ndarray, size: int) -> list[Block]:
 
 def test_a_run_that_nobody_looked_at_is_all_there_afterwards(tmp_path: Path) -> None:
     live = Live([THESIS])
-    result = record(LOADED, "sim", RigFile(), "", tmp_path / "run.h5", onlooker=live)
+    result = record(LOADED, "sim", RigFile(), tmp_path / "run.h5", observer=live)
     live.close()
     recording = open_recording(result.path)
     now = live.now()

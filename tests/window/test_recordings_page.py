@@ -39,7 +39,7 @@ def open_page(session: Session, keep: Keep, qtbot: QtBot) -> RecordingsPage:
 def looked_at(page: RecordingsPage, qtbot: QtBot) -> None:
     library = page._library
     qtbot.waitUntil(
-        lambda: bool(library.files) and set(library.glances) == set(library.files),
+        lambda: bool(library.files) and set(library.summaries) == set(library.files),
         timeout=_PATIENCE,
     )
 
