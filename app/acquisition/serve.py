@@ -71,8 +71,8 @@ def serve(
         from dearig.sim_backend.daqmx.server import DaqmxServer
     except ImportError as error:
         raise InstrumentFault(
-            f"the server needs nidaqmx with its extra 'grpc' ({error}): install dearig with its "
-            f"extra 'rig'"
+            f"the simulated card is built on one version of nidaqmx, which is not installed "
+            f"({error}): pip install 'dearig[simulated-card]'"
         ) from error
     try:
         plan = FaultPlan.parse(faults)

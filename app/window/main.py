@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from dearig.drivers.processes import child_environment
 from dearig.errors import InputError
 
 __all__ = ["run_window"]
@@ -107,6 +108,7 @@ def _require_screen() -> None:
     try:
         tried = subprocess.run(  # noqa: S603
             [sys.executable, "-P", "-c", _TRY],
+            env=child_environment(),
             capture_output=True,
             text=True,
             errors="replace",

@@ -13,6 +13,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Qt, Signal, Slot
 
+from dearig.drivers.processes import isolated_spawn
 from dearig.window.workbench import Answer, Ask, Stop, serve
 
 __all__ = ["Estimate", "Job", "Worker"]
@@ -152,7 +153,8 @@ class Worker(QObject):
         self._process = context.Process(
             target=serve, args=(theirs,), name="dearig worker", daemon=True
         )
-        self._process.start()
+        with isolated_spawn():
+            self._process.start()
         theirs.close()  # so that the end of the process is the end of the connection
         self._connection = ours
         self._reader = threading.Thread(

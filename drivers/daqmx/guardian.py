@@ -13,16 +13,26 @@ import queue
 import subprocess
 import sys
 import threading
+from collections import deque
 from typing import Protocol
 
 from dearig.drivers.daqmx.address import Address
 from dearig.drivers.errors import RigError
+from dearig.drivers.processes import child_environment
 from dearig.drivers.settings import RigSettings
 
-__all__ = ["Guardian", "GuardianProcess"]
+__all__ = ["WORD", "Guardian", "GuardianProcess"]
+
+#: What a line of the guardian's begins with that is meant for the run. Everything else on its
+#: error stream comes from Python or from a library.
+WORD = "guardian> "
 
 _STARTS_WITHIN = 60.0  # s: an interpreter, the driver's library, a connection
 _TAKES_OVER_WITHIN = 5.0  # s; it goes on trying after that, but the person must be told
+_ENDS_WITHIN = 5.0  # s
+_EXPLAINS_WITHIN = 0.5  # s: one that has ended has; the message must not wait for another one
+_LINES_KEPT = 20  # of its error stream: the last one of a traceback says what went wrong
+_LINE_MAX = 2000  # characters of one of them
 
 
 class Guardian(Protocol):
@@ -34,6 +44,10 @@ class Guardian(Protocol):
 
     def beat(self) -> bool:
         """Say that the run is alive; False when the guardian is not."""
+        ...
+
+    def last_error(self) -> str:
+        """Return why a guardian that is not alive has ended, as far as that is known."""
         ...
 
     def disarm(self) -> None:
@@ -52,12 +66,14 @@ class Guardian(Protocol):
 class GuardianProcess:
     """A guardian for the card at ``address``, started at once.
 
-    Raises ``RigError`` when it cannot be started or does not reach the card.
+    Raises ``RigError`` when it cannot be started or does not reach the card, with the last line
+    of its error stream.
     """
 
     def __init__(self, address: Address, settings: RigSettings) -> None:
         self._guards = self._trying = False
-        self._said: queue.Queue[str] = queue.Queue()
+        self._said: queue.Queue[str | None] = queue.Queue()  # None: it has ended
+        self._errors: deque[str] = deque(maxlen=_LINES_KEPT)
         config = {
             "device": address.device,
             "server": address.server,
@@ -70,20 +86,31 @@ class GuardianProcess:
             [
                 sys.executable,
                 "-P",
+                "-X",
+                "utf8",
                 "-m",
                 "dearig.drivers.daqmx.guardian_process",
                 json.dumps(config),
             ],
             stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
+            # its standard output is the terminal's error stream, which outlives a run that dies:
+            # what it tells the person must not go through this process
+            stdout=_terminal(),
+            stderr=subprocess.PIPE,
             encoding="utf-8",
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
+            errors="replace",
+            env=child_environment(),
             # a ctrl-C at the terminal is for the run: the guardian must outlive it
             start_new_session=os.name == "posix",
             creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
         )
-        threading.Thread(target=self._listen, name="guardian", daemon=True).start()
-        self._expect_word("ready", _STARTS_WITHIN)
+        self._listener = threading.Thread(target=self._listen, name="guardian", daemon=True)
+        self._listener.start()
+        try:
+            self._expect_word("ready", _STARTS_WITHIN)
+        except RigError:
+            self.close()
+            raise
 
     @property
     def pid(self) -> int:
@@ -94,14 +121,22 @@ class GuardianProcess:
         """From now on, silence means trouble. Raises ``RigError`` where nobody guards."""
         if not self._tell("arm"):
             raise RigError(
-                "the guardian process is gone: nobody would take the output to 0 V if this program "
-                "died; start the run again"
+                f"the guardian process has ended ({self.last_error()}): nobody would take the "
+                f"output to 0 V if this program died; start the run again"
             )
         self._guards = True
 
     def beat(self) -> bool:
         """Say that the run is alive; False when the guardian is not."""
         return self._tell("beat")
+
+    def last_error(self) -> str:
+        """Return why a guardian that is not alive has ended, as far as that is known."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(_EXPLAINS_WITHIN)
+        self._listener.join(_EXPLAINS_WITHIN)
+        lines = [line for line in self._errors if line]
+        return f"exit code {self._process.returncode}" + (f", {lines[-1]}" if lines else "")
 
     def disarm(self) -> None:
         """The output is at 0 V: nothing to guard."""
@@ -114,7 +149,7 @@ class GuardianProcess:
         if self._trying:
             raise RigError("the guardian process is still trying to reach the card")
         if not self._tell("take over"):
-            raise RigError("the guardian process is gone too")
+            raise RigError(f"the guardian process has ended too ({self.last_error()})")
         self._trying = True
         self._expect_word("safe", _TAKES_OVER_WITHIN)
         self._trying = False
@@ -128,12 +163,13 @@ class GuardianProcess:
         if self._trying:
             return
         try:
-            self._process.wait(5.0)
+            self._process.wait(_ENDS_WITHIN)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        if self._process.stdout is not None:
-            self._process.stdout.close()
+        self._listener.join(_ENDS_WITHIN)
+        if self._process.stderr is not None and not self._listener.is_alive():
+            self._process.stderr.close()
 
     def _tell(self, word: str) -> bool:
         if self._process.poll() is not None or self._process.stdin is None:
@@ -150,11 +186,26 @@ class GuardianProcess:
             said = self._said.get(timeout=within)
         except queue.Empty:
             said = f"it did not answer within {within:g} s"
+        if said is None:
+            raise RigError(f"the guardian process has ended ({self.last_error()})")
         if said != word:
             raise RigError(f"the guardian process cannot do its work: {said}")
 
     def _listen(self) -> None:
-        if self._process.stdout is not None:
-            for line in self._process.stdout:
-                self._said.put(line.strip())
-        self._said.put("it has ended")
+        """Take what comes as it comes, so that the guardian never waits for this process."""
+        stream = self._process.stderr
+        while stream is not None and (line := stream.readline(_LINE_MAX)):
+            if line.startswith(WORD):
+                self._said.put(line.removeprefix(WORD).strip())
+            else:
+                self._errors.append(line.strip())
+        self._said.put(None)
+
+
+def _terminal() -> int:
+    """Return the file descriptor of this program's error stream, or of nowhere."""
+    try:
+        os.fstat(2)
+    except OSError:  # a program with a window and no console has none
+        return subprocess.DEVNULL
+    return 2

@@ -1,7 +1,8 @@
 """The guardian's own process: beats come in on standard input, and when they do not, 0 V goes out.
 
-Words in, one a line: ``arm``, ``beat``, ``disarm``, ``take over``, ``bye``. Words out: ``ready``,
-``safe`` after a take-over, or a sentence that says what does not work.
+Words in, one a line: ``arm``, ``beat``, ``disarm``, ``take over``, ``bye``. Words out, on the error
+stream with ``WORD`` before each: ``ready``, ``safe`` after a take-over, or a sentence that says
+what does not work. Standard output is the terminal's, for the person.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from dearig.drivers.daqmx.guardian import WORD
 from dearig.drivers.daqmx.link import Link
 from dearig.drivers.daqmx.outputs import Outputs
 from dearig.drivers.errors import RigError
@@ -124,12 +126,12 @@ def _listen(words: queue.SimpleQueue[str | None]) -> None:
 
 def _say(word: str) -> None:
     with contextlib.suppress(OSError):  # the run that would read it is gone
-        print(" ".join(word.split()), flush=True)
+        print(WORD + " ".join(word.split()), file=sys.stderr, flush=True)
 
 
 def _tell(sentence: str) -> None:
     with contextlib.suppress(OSError):  # nobody is at the terminal any more
-        print(sentence, file=sys.stderr, flush=True)
+        print(sentence, flush=True)
 
 
 if __name__ == "__main__":

@@ -268,8 +268,8 @@ class DaqmxRig:
         self._state = RigState.DONE
         if run.unguarded:
             raise RigError(
-                "the guardian process died during the run, which was therefore ramped to 0 V; see "
-                "what ended it before the next run"
+                f"the guardian process died during the run ({self._guardian.last_error()}), which "
+                f"was therefore ramped to 0 V; find out what ended it before the next run"
             )
 
     def _loaded(self) -> tuple[ClockedTasks, _Run]:

@@ -1,0 +1,64 @@
+"""Child processes that import nothing from the folder in which the operator works.
+
+Python puts the working folder on the path of ``python -c`` and ``python -m``. A file ``queue.py``
+or ``numbers.py`` there would take the place of the standard library's module in a child process.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import dearig
+
+__all__ = ["child_environment", "child_path", "isolated_spawn"]
+
+
+def child_path() -> list[str]:
+    """Return ``sys.path`` without the working folder, however that is written there.
+
+    A working folder from which this program itself was imported stays: without it a child process
+    could not start.
+    """
+    try:
+        working = Path.cwd().resolve()
+    except OSError:  # the working folder was deleted
+        return [entry for entry in sys.path if Path(entry).is_absolute()]
+    own = (Path(dearig.__path__[0]) / "__init__.py").resolve()
+    serves = (working / "dearig" / "__init__.py").resolve() == own
+    return [entry for entry in sys.path if entry and (serves or Path(entry).resolve() != working)]
+
+
+def child_environment() -> dict[str, str]:
+    """Return the environment for a child process: ``child_path`` and nothing put before it."""
+    return {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(child_path()),
+        "PYTHONSAFEPATH": "1",  # as the option -P
+    }
+
+
+@contextmanager
+def isolated_spawn() -> Iterator[None]:
+    """Within the body, a process that ``multiprocessing`` spawns gets ``child_environment``.
+
+    ``multiprocessing`` has no parameters for these: it hands on ``sys.path`` and the environment
+    as they are when a process starts. Both are as before after the body.
+    """
+    path, names = sys.path.copy(), ("PYTHONPATH", "PYTHONSAFEPATH")
+    before = {name: os.environ.get(name) for name in names}
+    wanted = child_environment()
+    os.environ.update({name: wanted[name] for name in names})
+    sys.path[:] = child_path()
+    try:
+        yield
+    finally:
+        sys.path[:] = path
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

@@ -1,0 +1,107 @@
+"""Child processes in a folder whose files have the names of modules."""
+
+import multiprocessing
+import os
+import sys
+
+import pytest
+
+from dearig.config.rigfile import RigFile
+from dearig.drivers.daqmx.address import Address
+from dearig.drivers.daqmx.guardian import GuardianProcess
+from dearig.drivers.errors import RigError
+from dearig.drivers.processes import child_environment, child_path, isolated_spawn
+from tests.tools.daqmx import served
+
+NAMES = ("queue", "numbers", "struct", "selectors", "socket", "drivers", "app", "model", "pydantic")
+
+
+@pytest.fixture
+def decoys(tmp_path, monkeypatch):
+    """The working folder, first on the path, with files that no program of ours may import."""
+    for name in NAMES:
+        (tmp_path / f"{name}.py").write_text(f'raise ImportError("the decoy {name}")\n')
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    return tmp_path
+
+
+@pytest.mark.parametrize("entry", ["", ".", "{folder}", "{folder}/"])
+def test_path_of_a_child_lacks_the_working_folder(tmp_path, monkeypatch, entry):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [entry.format(folder=tmp_path), "/elsewhere"])
+    assert child_path() == ["/elsewhere"]
+
+
+def test_working_folder_that_holds_the_program_stays_on_the_path(tmp_path, monkeypatch):
+    import dearig
+
+    try:
+        (tmp_path / "dearig").symlink_to(dearig.__path__[0], target_is_directory=True)
+    except OSError:
+        pytest.skip("this account may not make links")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [str(tmp_path), "/elsewhere"])
+    assert child_path() == [str(tmp_path), "/elsewhere"]
+
+
+def test_deleted_working_folder_is_no_error(tmp_path, monkeypatch):
+    folder = tmp_path / "deleted"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    try:
+        folder.rmdir()
+    except OSError:
+        pytest.skip("this system keeps a folder in which somebody works")
+    monkeypatch.setattr(sys, "path", ["", ".", "/elsewhere"])
+    assert child_path() == ["/elsewhere"]
+    assert child_environment()["PYTHONPATH"] == "/elsewhere"
+
+
+@pytest.mark.parametrize("listed", ["", "."])
+def test_guardian_starts_beside_decoys(decoys, monkeypatch, listed):
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join((listed, str(decoys))))
+    with served() as bench:
+        guardian = GuardianProcess(Address("Dev1", f"127.0.0.1:{bench.server.port}"), RigFile())
+        guardian.arm()
+        assert guardian.beat()
+        guardian.disarm()
+        guardian.close()
+
+
+def test_spawned_worker_starts_beside_decoys(decoys, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(decoys))
+    before = sys.path.copy(), dict(os.environ)
+    process = multiprocessing.get_context("spawn").Process(target=sys.exit, args=(7,))
+    with isolated_spawn():
+        process.start()
+    process.join()
+    assert process.exitcode == 7
+    assert (sys.path, dict(os.environ)) == before
+
+
+def test_guardian_that_cannot_import_says_why(tmp_path, monkeypatch):
+    (tmp_path / "pydantic.py").write_text('raise ImportError("pydantic is broken")\n')
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    with pytest.raises(RigError, match=r"has ended \(exit code 1, ImportError: pydantic is bro"):
+        GuardianProcess(Address("Dev1"), RigFile())
+
+
+def _beat_until_it_is_dead(guardian):
+    while guardian.beat():
+        pass
+    guardian.arm()
+
+
+def test_guardian_that_was_killed_is_not_armed_and_says_so():
+    with served() as bench:
+        guardian = GuardianProcess(Address("Dev1", f"127.0.0.1:{bench.server.port}"), RigFile())
+        os.kill(guardian.pid, 9)
+        with pytest.raises(RigError, match=r"the guardian process has ended \(exit code -?\d+"):
+            _beat_until_it_is_dead(guardian)
+        guardian.close()
+
+
+def test_guardian_without_a_card_says_what_it_lacks():
+    with pytest.raises(RigError, match="cannot do its work: card Dev1: NI-DAQmx"):
+        GuardianProcess(Address("Dev1"), RigFile())
