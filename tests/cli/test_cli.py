@@ -82,7 +82,7 @@ def run(code: str, *arguments: str, **options: object) -> subprocess.CompletedPr
     )  # type: ignore[call-overload,no-any-return]  # fmt: skip
 
 
-COMMAND = "from app.cli import main; main()"
+COMMAND = "from dearig.cli.main import main; main()"
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ COMMAND = "from app.cli import main; main()"
 def test_help_answers_without_anything_heavy(arguments: list[str]) -> None:
     ended = run(
         "import sys\n"
-        "from app.cli import main\n"
+        "from dearig.cli.main import main\n"
         "try:\n"
         "    main()\n"
         "except SystemExit as end:\n"
@@ -156,9 +156,9 @@ def test_verbose_tells_of_events_on_standard_error(tmp_path: Path) -> None:
     write(tmp_path / "s.toml", LOBE)
     ended = run(
         "import logging\n"
-        "from app import run\n"
-        "from drivers.rig import Event\n"
-        "from sim_backend.rig import SimulatedRig\n"
+        "from dearig.acquisition import run\n"
+        "from dearig.drivers.rig import Event\n"
+        "from dearig.sim_backend.rig import SimulatedRig\n"
         "deliver = SimulatedRig._deliver\n"
         "def told(self, run, end):\n"
         "    run.events.append(Event(end - 1, 'info', 'all is well'))\n"
@@ -524,7 +524,7 @@ def test_ctrl_c_in_real_time_ramps_down(tmp_path: Path, name: str) -> None:
         "import signal\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "signal.signal(signal.SIGTERM, signal.SIG_DFL)\n"
-        "from sim_backend.rig import SimulatedRig\n"
+        "from dearig.sim_backend.rig import SimulatedRig\n"
         "read = SimulatedRig.read\n"
         "def told(self):\n"
         "    block = read(self)\n"

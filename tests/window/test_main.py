@@ -16,7 +16,7 @@ def gui(*arguments: object, code: str = "", **environment: str) -> subprocess.Co
     """Run the command with ``code`` before it, in a process of its own."""
     base = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     base.pop("QT_QPA_PLATFORM", None)
-    script = f"{code}\nimport sys\nfrom app.cli import main\nsys.exit(main())"
+    script = f"{code}\nimport sys\nfrom dearig.cli.main import main\nsys.exit(main())"
     return subprocess.run(
         [sys.executable, "-c", script, "gui", *map(str, arguments)],
         env={**base, **environment},
