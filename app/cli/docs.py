@@ -15,14 +15,17 @@ def docs(
         str,
         typer.Argument(
             metavar="PAGE",
-            help="A page, such as tutorial, commands, rig-pc or drivers. [default: the first page]",
-            show_default=False,
+            help="A page, such as tutorial, commands, rig-pc or drivers.",
+            show_default="the first page",
         ),
     ] = "",
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", metavar="DIR", help="Folder for the pages. [default: the user's cache folder]"
+            "--out",
+            metavar="DIR",
+            help="Folder for the pages.",
+            show_default="the user's cache folder",
         ),
     ] = None,
     browser: Annotated[

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE_HEAD, Box
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.measure import Measurement
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from dearig.report.as_json import diagnosis_json, outcome_json, write_json
 from dearig.report.diagnosis import (
     before_after,
     effect_table,
@@ -48,22 +44,15 @@ if TYPE_CHECKING:
 
 __all__ = [
     "branch_table",
-    "diagnosis_json",
     "diagnosis_tables",
     "identify_table",
-    "outcome_json",
-    "progress",
     "validate_tables",
-    "write_json",
 ]
 
 _NAME_MAX = 28  # of a row; longer names are cut in the middle, where they differ least
 _GAP = 2  # between columns
 # rich's own substitute on such terminals is full of vertical bars
 _ASCII_HEAD = Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
-
-
-# ---------------------------------------------------------------- tables
 
 
 def identify_table(outcome: IdentifyOutcome) -> RenderableType:
@@ -247,57 +236,3 @@ def _cut(name: str) -> str:
         return name
     half = (_NAME_MAX - 1) // 2
     return f"{name[:half]}\N{HORIZONTAL ELLIPSIS}{name[len(name) - (_NAME_MAX - 1 - half) :]}"
-
-
-# ---------------------------------------------------------------- progress
-
-
-@contextmanager
-def progress(
-    description: str, console: Console | None = None, whole: bool = False
-) -> Iterator[Callable[[str, float], None]]:
-    """A progress bar on standard error while the body runs.
-
-    Gives a callback ``(stage, fraction)`` with the fraction of that stage that is done; the bar
-    starts anew with every stage, the time elapsed does not. With ``whole`` the fraction is of all
-    the work, and the bar only changes its words. Where standard error is no terminal, nothing is
-    written.
-    """
-    console = Console(stderr=True) if console is None else console
-    if not console.is_terminal:
-        yield _unseen
-        return
-    bar = Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(bar_width=None),
-        TextColumn("{task.percentage:>3.0f} %", markup=False),
-        TimeElapsedColumn(),
-        TextColumn("left", markup=False),
-        TimeRemainingColumn(),
-        console=console,
-        transient=True,
-        expand=True,
-    )
-    task = bar.add_task(description, total=1.0)
-    current = ""
-
-    def report(stage: str, fraction: float) -> None:
-        nonlocal current
-        done = min(max(fraction, 0.0), 1.0) if math.isfinite(fraction) else 0.0
-        if stage != current and whole:
-            current = stage
-            bar.update(task, description=f"{description}: {stage}")
-        elif stage != current:
-            # a new stage has another speed, by which the remaining time is reckoned
-            current = stage
-            began = bar.tasks[0].start_time
-            bar.reset(task, total=1.0, description=f"{description}: {stage}")
-            bar.tasks[0].start_time = began
-        bar.update(task, completed=done)
-
-    with bar:
-        yield report
-
-
-def _unseen(stage: str, fraction: float) -> None:
-    """Progress that nobody watches."""

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import math
-import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dearig.analysis.outcomes import pooled_noise
-from dearig.errors import InputError
 from dearig.report.words import warnings_of
 from dearig.units import SHOWN
 
@@ -26,7 +22,7 @@ if TYPE_CHECKING:
     from dearig.model.diagnosis.results import Candidate, Signature, Stage, Step
     from dearig.model.fitting import Estimate
 
-__all__ = ["diagnosis_json", "outcome_json", "write_json"]
+__all__ = ["diagnosis_json", "outcome_json"]
 
 
 def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
@@ -321,28 +317,3 @@ def _candidate_json(candidate: Candidate, kind: str) -> dict[str, Any]:
         "behind": _number(candidate.behind),
         "note": candidate.note,
     }
-
-
-# ---------------------------------------------------------------- writing
-
-
-def write_json(obj: dict[str, Any], target: str | Path) -> None:
-    """Write ``obj`` as JSON to the file ``target``, or to standard output if that is ``-``.
-
-    A file appears as a whole or not at all. Raises ``InputError`` if it cannot be written, and
-    ``ValueError`` for numbers that JSON does not have.
-    """
-    # the escapes of JSON: any terminal and any reader can take them, whatever a file is called
-    text = json.dumps(obj, indent=2, allow_nan=False) + "\n"
-    if str(target) == "-":
-        try:
-            sys.stdout.write(text)
-            sys.stdout.flush()
-        except OSError as error:
-            raise InputError(f"the JSON cannot be written to standard output: {error}") from error
-        return
-    from dearig.recording.files import check_output, replaced_when_done
-
-    path = check_output(target, overwrite=True)
-    with replaced_when_done(path) as partial:
-        partial.write_text(text, encoding="utf-8", newline="\n")

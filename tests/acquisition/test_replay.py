@@ -71,9 +71,9 @@ def test_what_cannot_be_repeated(tmp_path: Path) -> None:
         file["entry/provenance/configuration"] = "[card]\nspeed = 3\n"
     for line, words in (
         (("--like", film), "holds no sequence: only a run"),
-        (("--like", run, lobe), "one of them"),
+        (("--like", run, lobe), "give one of them"),
         ((), "give a sequence to play, or a recording"),
-        (("--like", run, "--rig-file", rig), "brings its own rig file"),
+        (("--like", run, "--rig-file", rig), "has its own rig file"),
         (("--like", bad), "is not of this version: card.speed"),
         (("--like", tmp_path / "none.h5"), "none.h5 is not there"),
     ):

@@ -156,7 +156,6 @@ def test_verbose_tells_of_events_on_standard_error(tmp_path: Path) -> None:
     write(tmp_path / "s.toml", LOBE)
     ended = run(
         "import logging\n"
-        "from dearig.acquisition import run\n"
         "from dearig.drivers.rig import Event\n"
         "from dearig.sim_backend.rig import SimulatedRig\n"
         "deliver = SimulatedRig._deliver\n"

@@ -7,15 +7,11 @@ import math
 import pytest
 from rich.console import Console
 
-from dearig.cli.terminal import (
-    branch_table,
-    identify_table,
-    outcome_json,
-    progress,
-    validate_tables,
-    write_json,
-)
+from dearig.cli.progress_bar import progress
+from dearig.cli.terminal import branch_table, identify_table, validate_tables
 from dearig.errors import InputError
+from dearig.recording.json_file import write_json
+from dearig.report.as_json import outcome_json
 from dearig.report.numbers import significant
 from tests.tools.reports import (
     actuator_comparison,

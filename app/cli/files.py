@@ -1,0 +1,258 @@
+"""Commands on recordings: import, info, export, recover, index."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dearig.cli.options import (
+    ExportFormat,
+    FilmName,
+    Force,
+    Json,
+    Kinematics,
+    Notes,
+    Recording,
+    RigFileOption,
+)
+from dearig.cli.output import (
+    check_files,
+    console_for,
+    optional,
+    print_line,
+    working,
+    write_result,
+)
+from dearig.errors import InputError
+
+__all__ = ["commands"]
+
+commands = typer.Typer()
+_PANEL = "Recordings"
+
+
+@commands.command("import", rich_help_panel=_PANEL)
+def import_(
+    source: Annotated[
+        Path,
+        typer.Argument(metavar="IN.csv|IN.mat|IN.tdms|IN.parquet", help="The measured data."),
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE.h5", help="Write the recording to this file.")
+    ],
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=SOURCE",
+            help="Read the column NAME, such as voltage_kV, from the column that the file calls "
+            "SOURCE. Can be repeated.",
+        ),
+    ] = None,
+    gauge_length_mm: Annotated[
+        float | None,
+        typer.Option(help="Gauge length of a film, to convert its displacement to stretch."),
+    ] = None,
+    area_mm2: Annotated[
+        float | None,
+        typer.Option(help="Cross-section of a film, to convert its force to nominal stress."),
+    ] = None,
+    kinematics: Annotated[
+        Kinematics | None, typer.Option(help="How the film was held.", show_default="uniaxial")
+    ] = None,
+    rig_file: RigFileOption = None,
+    film: FilmName = "",
+    notes: Notes = "",
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Convert measured data (CSV, MAT, TDMS, Parquet) to a recording."""
+    from dearig.config.rigfile import load_rig_file
+    from dearig.config.toml_input import read_text
+    from dearig.recording.importers import import_file
+    from dearig.recording.reader import open_recording
+    from dearig.recording.summary import describe
+
+    columns = _columns(column or [])
+    check_files(force, (source, rig_file), out, json=json, recording=out)
+    settings = None if rig_file is None else load_rig_file(rig_file)
+    with working(json, computes=False) as (console, _):
+        doubts = import_file(
+            source,
+            out,
+            columns,
+            gauge_length_mm=gauge_length_mm,
+            area_mm2=area_mm2,
+            kinematics=None if kinematics is None else kinematics.value,
+            film=None if settings is None else settings.as_film(),
+            load=None if settings is None else settings.as_load(),
+            configuration="" if rig_file is None else read_text(rig_file, "rig file"),
+            film_id=film,
+            notes=notes,
+            overwrite=force,
+        )
+    recording = open_recording(out)
+    print_line(
+        console,
+        f"{out}: {recording.samples} samples, {recording.duration:.1f} s of {recording.kind} data",
+    )
+    for doubt in doubts:
+        print_line(console, f"Check this: {doubt}", style="yellow")
+    write_result({**describe(recording), "doubts": doubts}, json)
+
+
+def _columns(pairs: list[str]) -> dict[str, str]:
+    """Return the source of every column of ``--column NAME=SOURCE``."""
+    columns: dict[str, str] = {}
+    for pair in pairs:
+        name, _, source = pair.partition("=")
+        if not (name and source):
+            raise InputError(
+                f"--column {pair} is not of the form NAME=SOURCE, such as voltage_kV=Voltage"
+            )
+        if name in columns:
+            raise InputError(f"--column {name} is given twice, as {columns[name]} and as {source}")
+        columns[name] = source
+    return columns
+
+
+@commands.command(rich_help_panel=_PANEL)
+def info(
+    path: Recording,
+    verify: Annotated[
+        bool,
+        typer.Option(
+            "--verify",
+            help="Check the file against its own checksums and claims; exit code 4 if one fails.",
+        ),
+    ] = False,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Show what a recording contains."""
+    from rich.table import Table
+    from rich.text import Text
+
+    from dearig.recording.reader import open_recording
+    from dearig.recording.summary import describe, describe_rows
+
+    check_files(force, (path,), json=json)
+    if verify:
+        _verify(path, json)
+        return
+    recording = open_recording(path)
+    table = Table(show_header=False, box=None, pad_edge=False)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in describe_rows(recording):
+        table.add_row(name, Text(value))
+    if json != "-":
+        console_for().print(table, highlight=False)
+    write_result(describe(recording), json)
+
+
+def _verify(path: Path, json: str | None) -> None:
+    from dearig.errors import InstrumentFault
+    from dearig.recording.verify import verify
+
+    found, console = verify(path), console_for(json)
+    for what in found.checked:
+        print_line(console, f"checked: {what}")
+    for note in found.notes:
+        print_line(console, f"note: {note}", style="yellow")
+    for fault in found.faults:
+        print_line(console, f"WRONG: {fault}", style="red")
+    print_line(
+        console,
+        f"{path}: {'every check passed' if found.sound else 'some checks failed (see WRONG)'}",
+    )
+    write_result(
+        {
+            "format": "dearig-verification/1",
+            "recording": str(path),
+            "sound": found.sound,
+            "faults": found.faults,
+            "notes": found.notes,
+            "checked": found.checked,
+        },
+        json,
+    )
+    if not found.sound:
+        raise typer.Exit(InstrumentFault.exit_code)
+
+
+@commands.command(rich_help_panel=_PANEL)
+def export(
+    path: Recording,
+    to: Annotated[ExportFormat, typer.Option(help="File format.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE", help="Write to this file.", show_default="beside the recording"
+        ),
+    ] = None,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Convert a recording to CSV, MAT or Parquet."""
+    from dearig.recording.exporters import export_recording
+
+    check_files(force, (path,), *optional(out), json=json)
+    written = export_recording(path, to.value, out, force)
+    print_line(console_for(json), str(written))
+    write_result(
+        {
+            "format": "dearig-export/1",
+            "recording": str(path),
+            "to": to.value,
+            "out": str(written),
+        },
+        json,
+    )
+
+
+@commands.command(rich_help_panel=_PANEL)
+def recover(
+    path: Annotated[
+        Path, typer.Argument(metavar="FILE.h5", help="The recording of a run that was killed.")
+    ],
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Repair the recording of a run that was killed, so that any program can read it."""
+    from dearig.recording.reader import open_recording
+    from dearig.recording.recover import recover as repair
+    from dearig.recording.summary import describe
+
+    check_files(force, (path,), json=json)
+    repaired = repair(path)
+    recording = open_recording(path)
+    what = "recovered" if repaired else "nothing to recover"
+    print_line(
+        console_for(json),
+        f"{path}: {what}; {recording.samples} samples, {recording.duration:.1f} s",
+    )
+    write_result({**describe(recording), "recovered": repaired}, json)
+
+
+@commands.command("index", rich_help_panel=_PANEL)
+def index_(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Folder to search, with its subfolders.")
+    ],
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """List the recordings in a folder and its subfolders, oldest first."""
+    from dearig.recording.index import index_folder, lines
+
+    check_files(force, (), json=json)
+    with working(json, computes=False) as (_, progress):
+        found = index_folder(folder, lambda part: progress("reading", part))
+    found.sort(key=lambda entry: (entry.start_time, entry.path))
+    if json != "-":
+        print_line(console_for(), "\n".join(lines(found)))
+    listed = [asdict(entry) for entry in found]
+    write_result({"format": "dearig-index/1", "folder": str(folder), "recordings": listed}, json)

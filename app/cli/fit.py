@@ -1,0 +1,351 @@
+"""Commands on models: demo, identify, validate, diagnose, simulate."""
+
+from __future__ import annotations
+
+import re
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dearig.cli.options import (
+    Branches,
+    Drive,
+    DriveChannel,
+    Force,
+    Json,
+    ManyToValidate,
+    Method,
+    Report,
+    RigFileOption,
+    Seed,
+    SpringKind,
+    Validation,
+)
+from dearig.cli.output import check_files, optional, print_line, working, write_result
+from dearig.errors import InputError, Interrupted
+
+__all__ = ["commands"]
+
+commands = typer.Typer()
+_PANEL = "Models"
+
+Train = Annotated[
+    list[Path], typer.Argument(metavar="TRAIN.h5...", help="Recordings to fit.", show_default=False)
+]
+ModelFile = Annotated[Path, typer.Argument(metavar="MODEL.toml", help="A model file.")]
+
+
+@commands.command(rich_help_panel=_PANEL)
+def demo(
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for results.")] = Path(
+        "demo"
+    ),
+    seed: Seed = 0,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Run the whole job on simulated rigs.
+
+    Records the thesis's experiment, identifies and validates the model; then diagnoses a second
+    rig, which has a hidden effect. Writes recordings, models and reports.
+    """
+    from dearig.cli.demo import run_demo
+    from dearig.cli.terminal import diagnosis_tables, identify_table, validate_tables
+    from dearig.report.as_json import diagnosis_json, outcome_json
+
+    check_files(force, (), json=json)
+    with working(json) as (console, progress):
+        result = run_demo(out, seed=seed, overwrite=force, clock=time.monotonic, progress=progress)
+    console.print(identify_table(result.identified))
+    console.print(validate_tables(result.validated))
+    console.print(diagnosis_tables(result.diagnosed))
+    print_line(console, f"Recordings, models and reports are in {out}")
+    print_line(console, f"Report: {result.report}")
+    print_line(console, f"Diagnosis: {result.diagnosis_report}")
+    write_result(
+        {
+            "format": "dearig-demo/1",
+            "report": str(result.report),
+            "identification": outcome_json(result.identified),
+            "validation": outcome_json(result.validated),
+            "diagnosis_report": str(result.diagnosis_report),
+            "diagnosis": diagnosis_json(result.diagnosed),
+            "seconds": result.seconds,
+        },
+        json,
+    )
+
+
+@commands.command(cls=ManyToValidate, rich_help_panel=_PANEL)
+def identify(
+    train: Train,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="MODEL.toml", help="Write the model to this file.")
+    ],
+    method: Annotated[
+        Method,
+        typer.Option(help="hybrid, or de for the thesis's Algorithm 1 as printed."),
+    ] = Method.hybrid,
+    validate_: Validation = None,
+    branches: Branches = "3",
+    spring: Annotated[SpringKind, typer.Option(help="Strain energy.")] = SpringKind.gent,
+    drive: Drive = DriveChannel.command,
+    rest_length_mm: Annotated[
+        float | None,
+        typer.Option(
+            help="Measured length of the film under the load, such as 82.",
+            show_default="computed from mu_0",
+        ),
+    ] = None,
+    rig_file: RigFileOption = None,
+    seed: Annotated[
+        int, typer.Option(min=0, max=10**15, help="Seed of Algorithm 1's random numbers.")
+    ] = 0,
+    intervals: Annotated[bool, typer.Option(help="Compute 95 % confidence intervals.")] = True,
+    report: Report = None,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Fit the model to recordings.
+
+    Gives the parameters with 95 % confidence intervals, and says which parameters the data do not
+    determine.
+    """
+    from dearig.analysis.identify import identify_recordings
+    from dearig.cli.terminal import branch_table, identify_table
+    from dearig.config.rigfile import load_rig_file
+    from dearig.report.as_json import outcome_json
+
+    numbers = _branches(branches)
+    check_files(force, (*train, *(validate_ or []), rig_file), out, *optional(report), json=json)
+    with working(json) as (console, progress):
+        outcome = identify_recordings(
+            train,
+            out,
+            validation=validate_ or [],
+            method=method.value,
+            branches=numbers,
+            spring=spring.value,
+            drive=drive.value,
+            rest_length_mm=rest_length_mm,
+            rig_file=None if rig_file is None else load_rig_file(rig_file),
+            seed=seed,
+            intervals=intervals,
+            overwrite=force,
+            clock=time.monotonic,
+            progress=progress,
+        )
+        if report is not None:
+            from dearig.report.html import write_identify_report
+
+            write_identify_report(outcome, report)
+    if outcome.trials:
+        console.print(branch_table(outcome))
+    console.print(identify_table(outcome))
+    print_line(console, f"Model: {out}")
+    if report is not None:
+        print_line(console, f"Report: {report}")
+    write_result(outcome_json(outcome), json)
+
+
+def _branches(text: str) -> list[int]:
+    """Return the numbers that ``3`` or ``1-4`` stands for."""
+    from dearig.analysis.compatibility import BRANCHES_MAX
+
+    found = re.fullmatch(r"\s*([0-9]{1,9})\s*(?:-\s*([0-9]{1,9}))?\s*", text)
+    if not found:
+        raise InputError(f"--branches {text!r} is neither a number nor a range such as 1-4")
+    low, high = int(found[1]), int(found[2] or found[1])
+    if low > high:
+        raise InputError(f"--branches {text} goes from more to fewer; write {high}-{low}")
+    if not (low >= 1 and high <= BRANCHES_MAX):
+        raise InputError(
+            f"--branches {text}: a model has from 1 to {BRANCHES_MAX} branches; write such a "
+            f"number, or a range such as 1-4"
+        )
+    return list(range(low, high + 1))
+
+
+@commands.command(rich_help_panel=_PANEL)
+def validate(
+    model: ModelFile,
+    paths: Annotated[
+        list[Path], typer.Argument(metavar="FILE.h5...", help="Recordings to compare with.")
+    ],
+    drive: Drive = DriveChannel.command,
+    report: Report = None,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Compare a model with recordings: error tables like the thesis's Tables 4 and 5."""
+    from dearig.analysis.validate import validate_model
+    from dearig.cli.terminal import validate_tables
+    from dearig.report.as_json import outcome_json
+
+    check_files(force, (model, *paths), *optional(report), json=json)
+    with working(json) as (console, progress):
+        outcome = validate_model(model, paths, drive=drive.value, progress=progress)
+        if report is not None:
+            from dearig.report.html import write_validate_report
+
+            write_validate_report(outcome, report)
+    console.print(validate_tables(outcome))
+    if report is not None:
+        print_line(console, f"Report: {report}")
+    write_result(outcome_json(outcome), json)
+
+
+@commands.command(cls=ManyToValidate, rich_help_panel=_PANEL)
+def diagnose(
+    train: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="TRAIN.h5...", help="Recordings to fit.", show_default=False),
+    ] = None,
+    validate_: Validation = None,
+    report: Report = None,
+    model_out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="MODEL.toml", help="Write the model with the effects found to this file."
+        ),
+    ] = None,
+    branches: Annotated[
+        int, typer.Option(help="Number of Maxwell branches of the baseline model.")
+    ] = 3,
+    drive: Drive = DriveChannel.command,
+    rig_file: RigFileOption = None,
+    rig: Annotated[
+        str | None,
+        typer.Option(
+            help="Record on this rig, such as sim:7, and run experiments that separate the "
+            "remaining candidates."
+        ),
+    ] = None,
+    experiments: Annotated[
+        int,
+        typer.Option(min=0, max=20, help="Largest number of such experiments; needs --rig."),
+    ] = 1,
+    out: Annotated[
+        Path,
+        typer.Option("--out", metavar="DIR", help="Folder for recordings and results of --rig."),
+    ] = Path("diagnosis"),
+    thorough: Annotated[
+        bool,
+        typer.Option(
+            "--thorough",
+            help="Search without a time budget (the default is about a minute). Use it when the "
+            "report says that the search was ended early.",
+        ),
+    ] = False,
+    seed: Seed = 0,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Find effects that the model lacks.
+
+    Adds the effects found to the model and compares the errors before and after.
+    """
+    from dearig.analysis.diagnose import diagnose_recordings, diagnose_rig
+    from dearig.cli.terminal import diagnosis_tables
+    from dearig.config.rigfile import load_rig_file
+    from dearig.config.toml_input import read_text
+    from dearig.recording.result_folder import result_folder
+    from dearig.report.as_json import diagnosis_json
+    from dearig.report.diagnosis_page import write_diagnosis_report
+
+    given, others = train or [], validate_ or []
+    if rig is None and not given:
+        raise InputError(
+            "give recordings to diagnose, or a rig to record on with --rig; dearig diagnose --help "
+            "shows both"
+        )
+    check_files(
+        force, (*given, *others, rig_file), *optional(report), *optional(model_out), json=json
+    )
+    settings = None if rig_file is None else load_rig_file(rig_file)
+    if rig is not None:
+        result_folder(out, force)
+        report, model_out = report or out / "report.html", model_out or out / "model.toml"
+    with working(json, whole=True) as (console, progress):
+        if rig is None:
+            outcome = diagnose_recordings(
+                given, validation=others, model_out=model_out, branches=branches,
+                drive=drive.value, rig_file=settings, thorough=thorough, overwrite=force,
+                clock=time.monotonic, progress=progress,
+            )  # fmt: skip
+        else:
+            outcome = diagnose_rig(
+                rig, out, experiments=experiments, train=given, validation=others,
+                model_out=model_out, branches=branches, drive=drive.value, rig_file=settings,
+                configuration="" if rig_file is None else read_text(rig_file, "rig file"),
+                seed=seed, thorough=thorough, overwrite=force, clock=time.monotonic,
+                progress=progress,
+            )  # fmt: skip
+        if report is not None:
+            progress("report", 1.0)
+            write_diagnosis_report(outcome, report)
+    console.print(diagnosis_tables(outcome))
+    for label, path in (("Model", model_out), ("Report", report)):
+        if path is not None:
+            print_line(console, f"{label}: {path}")
+    write_result(diagnosis_json(outcome), json)
+    if outcome.ended is not None and not isinstance(outcome.ended, Interrupted):
+        raise type(outcome.ended)(f"{outcome.ended}; the results found before that were kept")
+    if outcome.finding.interrupted:
+        raise Interrupted("interrupted: the results found before that were kept")
+
+
+@commands.command(rich_help_panel=_PANEL)
+def simulate(
+    model: ModelFile,
+    drive: Annotated[
+        str,
+        typer.Option(
+            metavar="FILE.h5|SEQUENCE.toml", help="A recording, a sequence file or a preset."
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option("--out", metavar="OUT.h5|OUT.csv", help="Write the prediction to this file."),
+    ],
+    voltage: Annotated[
+        DriveChannel,
+        typer.Option(help="Voltage of a recording that drives the model."),
+    ] = DriveChannel.command,
+    rig_file: RigFileOption = None,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Compute what a model predicts under a recorded or planned drive."""
+    from dearig.analysis.simulate import simulate_model
+    from dearig.config.rigfile import load_rig_file
+
+    check_files(force, (model, drive, rig_file), out, json=json)
+    with working(json) as (console, _):
+        prediction = simulate_model(
+            model,
+            drive,
+            out,
+            rig_file=load_rig_file(rig_file),
+            voltage=voltage.value,
+            overwrite=force,
+        )
+    print_line(console, str(prediction.path))
+    if prediction.field_max is not None:
+        limit = "no static pull-in: the springs stiffen first"
+        if prediction.pull_in is not None:
+            limit = f"static pull-in at {prediction.pull_in * 1e-3:.3g} kV"
+        print_line(console, f"true field up to {prediction.field_max * 1e-6:.3g} MV/m; {limit}")
+    write_result(
+        {
+            "format": "dearig-simulation/1",
+            "model": str(model),
+            "drive": drive,
+            "out": str(prediction.path),
+            "true_field_max_V_per_m": prediction.field_max,
+            "pull_in_voltage_V": prediction.pull_in,
+        },
+        json,
+    )

@@ -1,0 +1,95 @@
+"""What every command does with its output files and its terminal."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dearig.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from dearig.progress import Progress
+
+__all__ = ["check_files", "console_for", "optional", "print_line", "working", "write_result"]
+
+
+def optional(path: Path | None) -> list[Path]:
+    """Return ``path`` in a list, or an empty list where it is None."""
+    return [] if path is None else [path]
+
+
+def check_files(
+    force: bool,
+    sources: Iterable[str | Path | None],
+    *outputs: Path,
+    json: str | None,
+    recording: Path | None = None,
+) -> None:
+    """Raise ``InputError`` for an output that cannot be written, before any work is done.
+
+    ``sources`` are the files that are read; they are never overwritten, even with ``force`` (the
+    name of a preset is no file and does no harm here). ``recording`` is the output that will be a
+    recording.
+    """
+    from dearig.recording.files import check_output
+
+    read = [source for source in sources if source is not None]
+    written = [*outputs, *([] if json in (None, "-") else [Path(str(json))])]
+    for i, path in enumerate(written):
+        check_output(path, force, *read)
+        if any(path.resolve() == other.resolve() for other in written[:i]):
+            raise InputError(f"{path} is named for two outputs; give each output its own name")
+    if recording is not None and recording.suffix.lower() not in (".h5", ".hdf5", ".nxs"):
+        raise InputError(
+            f"{recording} would be a recording, which is an HDF5 file; end its name in .h5 "
+            f"(dearig export converts a recording to CSV, MAT or Parquet)"
+        )
+
+
+def console_for(json: str | None = None) -> Console:
+    """Return the console for text: standard error while JSON goes to standard output."""
+    from rich.console import Console
+
+    return Console(stderr=json == "-")
+
+
+def print_line(console: Console, text: str, style: str | None = None) -> None:
+    """Print ``text`` unchanged: [brackets] in names are no markup, and lines are not wrapped."""
+    console.print(text, style=style, markup=False, highlight=False, emoji=False, soft_wrap=True)
+
+
+@contextmanager
+def working(
+    json: str | None, computes: bool = True, whole: bool = False
+) -> Iterator[tuple[Console, Progress]]:
+    """Give a console for results, and show a progress bar on standard error while the body works.
+
+    ``computes``: the body uses the compiled kernels. ``whole``: its fractions are of all its work,
+    not of one stage.
+    """
+    from dearig.cli.progress_bar import progress
+
+    if computes:
+        _announce_compilation()
+    with progress("dearig", whole=whole) as report:
+        yield console_for(json), report
+
+
+def write_result(result: dict[str, Any], json: str | None) -> None:
+    """Write ``result`` to where ``--json`` says, if it was given."""
+    if json is not None:
+        from dearig.recording.json_file import write_json
+
+        write_json(result, json)
+
+
+def _announce_compilation() -> None:
+    from dearig.model.jit import is_compiled
+
+    if not is_compiled():
+        sys.stderr.write("Compiling the numerical kernels, once: this takes about 20 seconds.\n")

@@ -1,0 +1,63 @@
+"""The progress bar of a command."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+__all__ = ["progress"]
+
+
+@contextmanager
+def progress(
+    description: str, console: Console | None = None, whole: bool = False
+) -> Iterator[Callable[[str, float], None]]:
+    """A progress bar on standard error while the body runs.
+
+    Gives a callback ``(stage, fraction)`` with the fraction of that stage that is done; the bar
+    starts anew with every stage, the time elapsed does not. With ``whole`` the fraction is of all
+    the work, and the bar only changes its words. Where standard error is no terminal, nothing is
+    written.
+    """
+    console = Console(stderr=True) if console is None else console
+    if not console.is_terminal:
+        yield _unseen
+        return
+    bar = Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=None),
+        TextColumn("{task.percentage:>3.0f} %", markup=False),
+        TimeElapsedColumn(),
+        TextColumn("left", markup=False),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+        expand=True,
+    )
+    task = bar.add_task(description, total=1.0)
+    current = ""
+
+    def report(stage: str, fraction: float) -> None:
+        nonlocal current
+        done = min(max(fraction, 0.0), 1.0) if math.isfinite(fraction) else 0.0
+        if stage != current and whole:
+            current = stage
+            bar.update(task, description=f"{description}: {stage}")
+        elif stage != current:
+            # a new stage has another speed, by which the remaining time is reckoned
+            current = stage
+            began = bar.tasks[0].start_time
+            bar.reset(task, total=1.0, description=f"{description}: {stage}")
+            bar.tasks[0].start_time = began
+        bar.update(task, completed=done)
+
+    with bar:
+        yield report
+
+
+def _unseen(stage: str, fraction: float) -> None:
+    """Progress that nobody watches."""

@@ -1,0 +1,301 @@
+"""Commands that use a rig: record, check, gui, serve-daqmx."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from dearig.cli.options import Faults, FilmName, Force, Json, Notes, Rig, RigFileOption, Seed
+from dearig.cli.output import check_files, print_line, working, write_result
+from dearig.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from dearig.acquisition.replay import Original
+    from dearig.acquisition.run import RunResult
+
+__all__ = ["commands"]
+
+commands = typer.Typer()
+_PANEL = "Rig"
+
+
+@commands.command(rich_help_panel=_PANEL)
+def record(
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE.h5", help="Write the recording to this file.")
+    ],
+    sequence: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="SEQUENCE",
+            help="A sequence file (TOML) or the name of a preset.",
+            show_default=False,
+        ),
+    ] = None,
+    like: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.h5",
+            help="Repeat the run of this recording: its sequence, rig file and simulated rig, and "
+            "its seed unless --seed is given.",
+        ),
+    ] = None,
+    rig: Rig = "sim",
+    rig_file: RigFileOption = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(metavar="MODEL.toml", help="Simulate this model in place of the thesis's."),
+    ] = None,
+    overlay: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="MODEL.toml",
+            help="Compute this model's prediction during the run, and record it.",
+        ),
+    ] = None,
+    fsync: Annotated[
+        bool,
+        typer.Option(
+            "--fsync", help="Write every block through to the disk, so it survives a power cut."
+        ),
+    ] = False,
+    paced: Annotated[
+        bool,
+        typer.Option("--paced", help="Simulate in real time.", show_default="as fast as possible"),
+    ] = False,
+    fault: Faults = None,
+    seed: Seed = 0,
+    operator: Annotated[
+        str, typer.Option(help="Name of the operator, kept in the recording.")
+    ] = "",
+    film: FilmName = "",
+    notes: Notes = "",
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Run a sequence on a rig and record it.
+
+    Ctrl-C ramps the voltage down to 0 V and keeps what was recorded.
+    """
+    from dearig.acquisition.overlay import OverlayModel
+    from dearig.acquisition.run import RunOptions
+    from dearig.acquisition.run import record as run
+    from dearig.analysis.compatibility import of_rig
+    from dearig.config.modelfile import load_actuator
+    from dearig.config.rigfile import load_rig_file
+    from dearig.config.sequencefile import load_sequence
+    from dearig.config.toml_input import read_text
+    from dearig.sim_backend.faults import FaultPlan
+
+    check_files(force, (sequence, rig_file, model, overlay, like), out, json=json, recording=out)
+    original = _original(sequence, like, rig_file)
+    if original is None:
+        settings = load_rig_file(rig_file)
+        text = "" if rig_file is None else read_text(rig_file, "rig file")
+        loaded = load_sequence(str(sequence))
+    else:
+        settings, text, loaded = original.rig_file, original.configuration, original.sequence
+        rig, seed = original.on(rig), seed or original.seed
+    actuator = None
+    if model is not None:
+        actuator = load_actuator(model)
+        settings = of_rig(settings, actuator.film, actuator.load)
+    if original is not None:
+        original.check_film(settings)
+    try:
+        faults = FaultPlan.parse(fault or ())
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    overlaid = None
+    if overlay is not None:
+        overlaid = OverlayModel(
+            overlay.stem, load_actuator(overlay), overlay, read_text(overlay, "model file")
+        )
+    options = RunOptions(
+        text, operator, film, notes, overwrite=force, fsync=fsync,
+        seed=seed, paced=paced, actuator=actuator, faults=faults,
+    )  # fmt: skip
+    with working(json) as (console, progress):
+        result = run(loaded, rig, settings, out, options, overlay=overlaid, progress=progress)
+    _show_run(console, result)
+    write_result(_run_json(result), json)
+
+
+def _original(sequence: str | None, like: Path | None, rig_file: Path | None) -> Original | None:
+    """Return the run to repeat, or None where a sequence was given instead."""
+    from dearig.acquisition.replay import original_of
+
+    if sequence is None and like is None:
+        raise InputError("give a sequence to play, or a recording to repeat with --like FILE.h5")
+    if sequence is not None and like is not None:
+        raise InputError(
+            f"both a sequence ({sequence}) and a recording to repeat (--like {like}) are given; "
+            f"give one of them"
+        )
+    if like is not None and rig_file is not None:
+        raise InputError(
+            f"--rig-file {rig_file} cannot be used with --like {like}, which has its own rig "
+            f"file; leave --rig-file out"
+        )
+    return None if like is None else original_of(like)
+
+
+def _show_run(console: Console, result: RunResult) -> None:
+    seconds = result.samples / result.rate_Hz
+    print_line(
+        console,
+        f"{result.path}: {result.samples} samples, {seconds:.1f} s at {result.rate_Hz:g} Hz, "
+        f"{result.outcome}",
+    )
+    for margin in result.margins:
+        print_line(
+            console,
+            f"  {margin.quantity}: {margin.reached:.4g} of {margin.allowed:.4g} {margin.unit}",
+        )
+    for event in result.events:
+        print_line(console, f"  {event}")
+
+
+def _run_json(result: RunResult) -> dict[str, Any]:
+    return {
+        "format": "dearig-run/1",
+        "recording": str(result.path),
+        "samples": result.samples,
+        "rate_Hz": result.rate_Hz,
+        "outcome": result.outcome,
+        "events": list(result.events),
+        "margins": [asdict(margin) for margin in result.margins],
+    }
+
+
+@commands.command(rich_help_panel=_PANEL)
+def check(
+    rig: Rig = "sim",
+    rig_file: RigFileOption = None,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Check the instruments and limits of a rig at 0 V.
+
+    Says what is connected, what is wrong and which limits apply. The output stays at 0 V.
+    """
+    from dearig.acquisition.check import check_json, check_rig, check_table
+    from dearig.config.rigfile import load_rig_file
+    from dearig.sim_backend.factory import is_simulated
+
+    check_files(force, (rig_file,), json=json)
+    settings = load_rig_file(rig_file)
+    with working(json, computes=is_simulated(rig)) as (console, _):
+        outcome = check_rig(rig, settings)
+    console.print(check_table(outcome))
+    write_result(check_json(outcome), json)
+    outcome.refuse()
+
+
+@commands.command(rich_help_panel=_PANEL)
+def gui(
+    rig: Rig = "sim",
+    rig_file: RigFileOption = None,
+    folder: Annotated[
+        Path,
+        typer.Option(
+            metavar="DIR", help="Folder for recordings.", show_default="the current folder"
+        ),
+    ] = Path(),
+) -> None:
+    """Open the operator's window."""
+    from dearig.window.main import run_window
+
+    raise typer.Exit(run_window(rig, rig_file, folder))
+
+
+@commands.command("serve-daqmx", rich_help_panel=_PANEL)
+def serve_daqmx(
+    rig: Annotated[
+        str,
+        typer.Option(
+            help="sim for the simulated rig, sim:SEED for a simulated rig with a hidden effect."
+        ),
+    ] = "sim",
+    rig_file: RigFileOption = None,
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port to listen on; 0 chooses a free one.")
+    ] = 0,
+    anywhere: Annotated[
+        bool,
+        typer.Option("--anywhere", help="Allow a --host that other computers can reach."),
+    ] = False,
+    paced: Annotated[
+        bool,
+        typer.Option(
+            "--paced/--fast", help="Simulate in real time, or as fast as samples are read."
+        ),
+    ] = True,
+    fault: Faults = None,
+    client_timeout: Annotated[
+        float,
+        typer.Option(
+            min=0.1,
+            max=3600.0,
+            metavar="SECONDS",
+            help="Set the output to 0 V when a client with a voltage at the film makes no call "
+            "for this long.",
+        ),
+    ] = 1.0,
+    link_timeout: Annotated[
+        float,
+        typer.Option(
+            min=0.2,
+            max=3600.0,
+            metavar="SECONDS",
+            help="Set the output to 0 V when the network connection is silent for this long; a "
+            "busy computer may need more than 0.5.",
+        ),
+    ] = 1.0,
+    client_tracking: Annotated[
+        bool,
+        typer.Option(
+            "--client-tracking/--no-client-tracking",
+            help="Set the output to 0 V when the client is gone; NI's own server does not.",
+        ),
+    ] = True,
+    laser: Annotated[
+        bool,
+        typer.Option("--laser", help="Serve the laser's controller too, at a serial port."),
+    ] = False,
+    seed: Seed = 0,
+) -> None:
+    """Serve a simulated card over NI's network protocol until ctrl-C.
+
+    NI's Python library (nidaqmx) reaches it as it reaches a real card behind NI's gRPC device
+    server.
+    """
+    import sys
+
+    from dearig.acquisition.serve import Serving, serve
+    from dearig.config.rigfile import load_rig_file
+
+    settings = load_rig_file(rig_file)
+
+    def announce(serving: Serving) -> None:
+        # flushed: a program that started the server reads the port from a pipe
+        sys.stdout.write(
+            f"simulated card at {serving.host}:{serving.port}; use it with --rig {serving.rig}; "
+            f"ctrl-C ends it\n"
+        )
+        if serving.laser:
+            sys.stdout.write(f'laser controller: port = "{serving.laser}" in [laser]\n')
+        sys.stdout.flush()
+
+    serve(
+        rig, settings, told=announce, host=host, port=port, anywhere=anywhere, paced=paced,
+        faults=fault or (), client_timeout=client_timeout if client_tracking else None,
+        link_timeout=link_timeout, seed=seed,
+        laser=laser,
+    )  # fmt: skip

@@ -1,0 +1,49 @@
+"""Commands that help to set up: rig-file, presets, docs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dearig.cli.docs import docs
+from dearig.cli.options import Force, Json
+from dearig.cli.output import check_files, console_for, print_line, write_result
+
+__all__ = ["commands"]
+
+commands = typer.Typer()
+_PANEL = "Set-up and help"
+
+
+@commands.command("rig-file", rich_help_panel=_PANEL)
+def rig_file_command(
+    out: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.")],
+) -> None:
+    """Write a rig file with every key, its default and its meaning."""
+    from dearig.config.rigfile import write_default
+
+    write_default(out)
+    print_line(console_for(), f"{out}: edit it, then give it to commands with --rig-file {out}")
+
+
+@commands.command(rich_help_panel=_PANEL)
+def presets(json: Json = None, force: Force = False) -> None:
+    """List the sequences that commands know by name."""
+    from dearig.config.presets import PRESETS
+    from dearig.config.sequencefile import load_sequence
+
+    check_files(force, (), json=json)
+    console = console_for(json)
+    found = {name: load_sequence(name).sequence for name in PRESETS}
+    for name, sequence in found.items():
+        print_line(console, f"{name:18s} {sequence.duration:6.1f} s  {sequence.name}")
+    listed = [
+        {"name": name, "title": s.name, "duration_s": s.duration, "sequence": PRESETS[name]}
+        for name, s in found.items()
+    ]
+    write_result({"format": "dearig-presets/1", "presets": listed}, json)
+
+
+commands.command("docs", rich_help_panel=_PANEL)(docs)
