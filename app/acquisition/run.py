@@ -34,6 +34,7 @@ from dearig.model.errors import ModelError
 from dearig.progress import Progress, quiet
 from dearig.recording.disk_space import check_room
 from dearig.recording.files import check_output
+from dearig.recording.metadata import RunMetadata
 from dearig.recording.writer import RecordingWriter
 from dearig.sim_backend.factory import is_simulated, open_simulated_rig
 from dearig.sim_backend.faults import FaultPlan
@@ -184,11 +185,18 @@ def record(
             except RigError as error:
                 raise InstrumentFault(str(error)) from error
             check_room(out, len(identity.channels), rate, waveform.voltage.size)
-            writer = RecordingWriter(
-                out, identity, rate, waveform.voltage.size, loaded.toml, rig_file.as_film(),
-                rig_file.as_load(), options.configuration, operator=options.operator,
-                film_id=options.film_id or rig_file.film.name, notes=options.notes,
+            metadata = RunMetadata(
+                film=rig_file.as_film(),
+                load=rig_file.as_load(),
+                film_id=options.film_id or rig_file.film.name,
+                notes=options.notes,
+                operator=options.operator,
+                sequence_toml=loaded.toml,
+                configuration=options.configuration,
                 seed=options.seed if is_simulated(address) else None,
+            )
+            writer = RecordingWriter(
+                out, identity, rate, waveform.voltage.size, metadata,
                 overwrite=options.overwrite, fsync=options.fsync,
             )  # fmt: skip
             observer = observer or RunObserver()

@@ -16,6 +16,7 @@ from dearig.model.actuator import Actuator, Drive
 from dearig.model.film import Strip
 from dearig.model.stability import pull_in_voltage
 from dearig.recording.files import check_output, replaced_when_done
+from dearig.recording.metadata import RunMetadata
 from dearig.recording.reader import open_recording
 from dearig.recording.save import save_recording
 
@@ -82,14 +83,16 @@ def simulate_model(
         target,
         "film" if "stretch" in values else "actuator",
         values,
-        title=title,
+        RunMetadata(
+            title=title,
+            film=actuator.film if actuator and "stretch" not in values else None,
+            load=actuator.load if actuator and "stretch" not in values else None,
+            sequence_toml=sequence_toml,
+            model_toml=model_toml(loaded.name, loaded.model, {}),
+            notes="a prediction of a model, not a measurement",
+        ),
         hold=hold,
         kinematics=kinematics,
-        film=actuator.film if actuator and "stretch" not in values else None,
-        load=actuator.load if actuator and "stretch" not in values else None,
-        sequence_toml=sequence_toml,
-        model_toml=model_toml(loaded.name, loaded.model, {}),
-        notes="a prediction of a model, not a measurement",
         overwrite=overwrite,
     )
     return Prediction(target, field_max, pull_in)

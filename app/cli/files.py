@@ -72,6 +72,7 @@ def import_(
     from dearig.config.rigfile import load_rig_file
     from dearig.config.toml_input import read_text
     from dearig.recording.importers import import_file
+    from dearig.recording.metadata import RunMetadata
     from dearig.recording.reader import open_recording
     from dearig.recording.summary import describe
 
@@ -86,11 +87,13 @@ def import_(
             gauge_length_mm=gauge_length_mm,
             area_mm2=area_mm2,
             kinematics=None if kinematics is None else kinematics.value,
-            film=None if settings is None else settings.as_film(),
-            load=None if settings is None else settings.as_load(),
-            configuration="" if rig_file is None else read_text(rig_file, "rig file"),
-            film_id=film,
-            notes=notes,
+            metadata=RunMetadata(
+                film=None if settings is None else settings.as_film(),
+                load=None if settings is None else settings.as_load(),
+                film_id=film,
+                notes=notes,
+                configuration="" if rig_file is None else read_text(rig_file, "rig file"),
+            ),
             overwrite=force,
         )
     recording = open_recording(out)

@@ -6,6 +6,7 @@ from dearig.recording.disk_space import check_room, estimate_bytes, free_bytes
 from dearig.recording.exporters import EXPORTS, export_recording
 from dearig.recording.follow import Follower
 from dearig.recording.importers import import_file
+from dearig.recording.metadata import RunMetadata
 from dearig.recording.reader import open_recording
 from dearig.recording.recording import RecordedEvent, Recording
 from dearig.recording.recover import recover
@@ -20,6 +21,7 @@ __all__ = [
     "RecordedEvent",
     "Recording",
     "RecordingWriter",
+    "RunMetadata",
     "Verification",
     "check_room",
     "describe",

@@ -7,13 +7,14 @@ import platform
 import shutil
 import subprocess
 from collections.abc import Mapping
-from importlib import metadata
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import h5py
 import numpy as np
 
 from dearig.recording.layout import iso_time
+from dearig.recording.metadata import RunMetadata
 from dearig.recording.text import fixed, put_text, text_of
 
 __all__ = ["gather", "git_revision", "read_provenance", "write_provenance"]
@@ -41,31 +42,29 @@ def git_revision(root: Path = ROOT) -> str:
     return answer.stdout.strip() if answer.returncode == 0 else ""
 
 
-def gather(
-    started: float, configuration: str = "", operator: str = "", seed: int | None = None
-) -> dict[str, object]:
-    """What every recording says about its making; ``started`` is a Unix time in s."""
+def gather(started: float, metadata: RunMetadata) -> dict[str, object]:
+    """Return the provenance of a recording that was started at the Unix time ``started`` in s."""
     try:
-        version = metadata.version("dearig")
-    except metadata.PackageNotFoundError:
-        version = "unknown"
+        installed = version("dearig")
+    except PackageNotFoundError:
+        installed = "unknown"
     found: dict[str, object] = {
         "start_time": iso_time(started),
-        "operator": operator,
+        "operator": metadata.operator,
         "host": platform.node(),
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
-        "dearig_version": version,
+        "dearig_version": installed,
         "git_revision": git_revision(),
         "python_version": platform.python_version(),
         "numpy_version": np.__version__,
         "h5py_version": h5py.__version__,
         "hdf5_version": h5py.version.hdf5_version,
-        "configuration": configuration,
-        "configuration_sha256": hashlib.sha256(configuration.encode("utf-8")).hexdigest(),
+        "configuration": metadata.configuration,
+        "configuration_sha256": hashlib.sha256(metadata.configuration.encode("utf-8")).hexdigest(),
     }
-    if seed is not None:
-        found["seed"] = seed
-    return found
+    if metadata.seed is not None:
+        found["seed"] = metadata.seed
+    return found | dict(metadata.provenance)
 
 
 def write_provenance(entry: h5py.Group, provenance: Mapping[str, object]) -> None:

@@ -8,6 +8,7 @@ from types import MappingProxyType
 import h5py
 
 from dearig.model.material import Film, Load
+from dearig.recording.metadata import RunMetadata
 from dearig.recording.safe import dataset, group
 from dearig.recording.text import fixed, put_text, text_of
 
@@ -26,15 +27,13 @@ UNITS = MappingProxyType(
 )
 
 
-def write_sample(
-    entry: h5py.Group, film: Film | None, load: Load | None, film_id: str = "", notes: str = ""
-) -> None:
+def write_sample(entry: h5py.Group, metadata: RunMetadata) -> None:
     """Write what is known of the film and its load; what is not known is absent."""
     sample = entry.create_group("sample")
     sample.attrs["NX_class"] = fixed("NXsample")
-    put_text(sample, "name", film_id)
-    put_text(sample, "notes", notes)
-    for name, owner in (("film", film), ("load", load)):
+    put_text(sample, "name", metadata.film_id)
+    put_text(sample, "notes", metadata.notes)
+    for name, owner in (("film", metadata.film), ("load", metadata.load)):
         if owner is None:
             continue
         part = sample.create_group(name)

@@ -10,7 +10,6 @@ import h5py
 import numpy as np
 
 from dearig.drivers.rig import Event
-from dearig.model.material import Film, Load
 from dearig.recording.files import check_output, replaced_when_done
 from dearig.recording.layout import (
     EVENT_TYPE,
@@ -24,6 +23,7 @@ from dearig.recording.layout import (
     create_field,
     lay_out,
 )
+from dearig.recording.metadata import RunMetadata
 from dearig.recording.provenance import gather, write_provenance
 from dearig.recording.sample import write_sample
 from dearig.recording.text import clip_text, fixed, put_text
@@ -35,29 +35,22 @@ def save_recording(
     path: str | Path,
     kind: str,
     values: Mapping[str, np.ndarray],
+    metadata: RunMetadata,
     *,
-    title: str,
     hold: bool = False,
     kinematics: str | None = None,
-    film: Film | None = None,
-    load: Load | None = None,
-    film_id: str = "",
-    notes: str = "",
-    sequence_toml: str = "",
-    model_toml: str = "",
     rest_reading: float = 0.0,
     events: Iterable[Event] = (),
-    configuration: str = "",
-    provenance: Mapping[str, object] | None = None,
     overwrite: bool = False,
     now: Callable[[], float] = time.time,
 ) -> Path:
-    """Write ``values`` ((N,) each, by their names in ``layout.UNITS`` and in those units).
+    """Write arrays as a recording.
 
-    ``kind`` is actuator or film, ``hold`` as in ``Recording``, ``rest_reading`` m what has been
-    subtracted from the displacement, ``provenance`` anything to note besides the usual. The file
-    appears as a whole or not at all. Raises ``InputError`` if it may not be written, and
-    ``ValueError`` for values that no recording of that kind has.
+    ``values`` are (N,) each, by their names in ``layout.UNITS`` and in those units. ``kind`` is
+    actuator or film, ``hold`` and ``kinematics`` are as in ``Recording``, ``rest_reading`` in m has
+    been subtracted from the displacement. The file appears as a whole or not at all. Raises
+    ``InputError`` if it may not be written, and ``ValueError`` for values that no recording of
+    that kind has.
     """
     if kind not in KINDS:
         raise ValueError(f"kind {kind!r} is not one of {', '.join(KINDS)}")
@@ -72,9 +65,9 @@ def save_recording(
     path = check_output(path, overwrite)
 
     started = now()
-    noted = gather(started, configuration) | dict(provenance or {})
+    noted = gather(started, metadata)
     with replaced_when_done(path) as partial, h5py.File(partial, "w", libver=LIBVER) as file:
-        entry = lay_out(file, kind, title, started)
+        entry = lay_out(file, kind, metadata.title, started)
         data = entry["data"]
         for name, array in values.items():
             create_field(data, name, size)[...] = np.asarray(array, dtype=np.float64)
@@ -83,8 +76,8 @@ def save_recording(
         if kind == "actuator":
             data["voltage_command"].attrs["hold"] = fixed(ZERO_ORDER if hold else LINEAR)
             data["displacement"].attrs["rest_reading"] = rest_reading
-        write_sample(entry, film, load, film_id, notes)
-        for name, text in (("sequence", sequence_toml), ("model", model_toml)):
+        write_sample(entry, metadata)
+        for name, text in (("sequence", metadata.sequence_toml), ("model", metadata.model_toml)):
             if text:
                 put_text(entry, name, text)
         _write_events(entry, tuple(events), np.asarray(values["time"], dtype=np.float64))

@@ -17,6 +17,7 @@ import time
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 
@@ -26,7 +27,6 @@ import numpy as np
 from dearig.drivers.channels import CHANNEL_NAMES, Channel
 from dearig.drivers.rig import Block, Event, RigIdentity
 from dearig.errors import DearigError, DiskFault, InputError, InstrumentFault
-from dearig.model.material import Film, Load
 from dearig.recording.checksums import ChecksumWriter
 from dearig.recording.disk_space import advice
 from dearig.recording.files import check_output, in_words, put_back, set_aside
@@ -42,6 +42,7 @@ from dearig.recording.layout import (
     counts_name,
     lay_out,
 )
+from dearig.recording.metadata import RunMetadata
 from dearig.recording.physical import TEMPERATURE_UNITS, write_channel
 from dearig.recording.provenance import gather, write_provenance
 from dearig.recording.pyramid import PyramidWriter
@@ -63,7 +64,8 @@ class RecordingWriter:
 
     ``identity`` names the channels, in the order in which blocks hold them; ``rate_Hz`` is the
     sample clock's, ``samples_expected`` sizes nothing and is kept so that a reader sees what is
-    missing. ``configuration`` is the text of the rig file in force. ``now`` gives Unix time in s.
+    missing. Without a title in ``metadata`` the run takes the name of its sequence, without a seed
+    that of the identity. ``now`` gives Unix time in s.
     ``fsync``: what is flushed is on the disk, so that not even a power cut takes it. A recording
     that is overwritten stays until the first flush of samples, as ``FILE.h5.old``.
 
@@ -77,15 +79,8 @@ class RecordingWriter:
         identity: RigIdentity,
         rate_Hz: float,
         samples_expected: int,
-        sequence_toml: str,
-        film: Film,
-        load: Load,
-        configuration: str,
+        metadata: RunMetadata,
         *,
-        operator: str = "",
-        film_id: str = "",
-        notes: str = "",
-        seed: int | None = None,
         overwrite: bool = False,
         fsync: bool = False,
         now: Callable[[], float] = time.time,
@@ -93,7 +88,7 @@ class RecordingWriter:
         if not (math.isfinite(rate_Hz) and rate_Hz > 0.0):
             raise ValueError(f"rate_Hz = {rate_Hz!r} must be a finite number above 0")
         _check_channels(identity.channels)
-        title = _title(sequence_toml)
+        name = _sequence_name(metadata.sequence_toml)
         self._path = check_output(path, overwrite)
         self._channels = identity.channels
         self._rate = float(rate_Hz)
@@ -106,9 +101,9 @@ class RecordingWriter:
         self._failure: DiskFault | None = None
 
         started = now()
-        provenance = gather(
-            started, configuration, operator, identity.seed if seed is None else seed
-        )
+        if metadata.seed is None:
+            metadata = replace(metadata, seed=identity.seed)
+        provenance = gather(started, metadata)
         provenance["rig"] = identity.address
         provenance["simulated"] = identity.simulated
         with _disk_errors(self._path, InputError):
@@ -119,9 +114,9 @@ class RecordingWriter:
                 self._file = h5py.File(self._path, "x", libver=LIBVER)
             try:
                 with _disk_errors(self._path, InputError):
-                    entry = lay_out(self._file, "actuator", title, started)
-                    put_text(entry, "sequence", sequence_toml)
-                    write_sample(entry, film, load, film_id, notes)
+                    entry = lay_out(self._file, "actuator", metadata.title or name, started)
+                    put_text(entry, "sequence", metadata.sequence_toml)
+                    write_sample(entry, metadata)
                     write_provenance(entry, provenance)
                     self._lay_out_run(entry, identity, samples_expected)
                     self._note_wall_clock(started)
@@ -434,7 +429,7 @@ def _check_channels(channels: tuple[Channel, ...]) -> None:
             raise ValueError(f"channel {channel.name} is in {channel.unit!r}, not in {units[0]}")
 
 
-def _title(sequence_toml: str) -> str:
+def _sequence_name(sequence_toml: str) -> str:
     try:
         sequence = tomllib.loads(sequence_toml)
     except tomllib.TOMLDecodeError as error:

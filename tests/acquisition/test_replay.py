@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from dearig.recording import open_recording, save_recording
+from dearig.recording import RunMetadata, open_recording, save_recording
 from tests.tools.command import LOBE, SLOW_RIG, dearig, done, thesis_model, write
 from tests.tools.recordings import Clock
 
@@ -61,7 +61,7 @@ def test_a_run_of_a_model_file_needs_it_again(tmp_path: Path) -> None:
 def test_what_cannot_be_repeated(tmp_path: Path) -> None:
     time = np.arange(10.0)
     values = {"time": time, "stretch": 1 + time, "nominal_stress": time}
-    film = save_recording(tmp_path / "film.h5", "film", values, title="x", now=Clock())
+    film = save_recording(tmp_path / "film.h5", "film", values, RunMetadata(title="x"), now=Clock())
     run, bad, out = (tmp_path / f"{n}.h5" for n in ("run", "bad", "out"))
     lobe, rig = write(tmp_path / "lobe.toml", LOBE), write(tmp_path / "rig.toml", SLOW_RIG)
     done("record", lobe, "--rig-file", rig, "--out", run)

@@ -16,6 +16,7 @@ from dearig.errors import InputError
 from dearig.model.actuator import Actuator
 from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.recording import open_recording
+from dearig.recording.metadata import RunMetadata
 from dearig.recording.recording import Recording
 from dearig.recording.save import save_recording
 from tests.tools.command import dearig, done
@@ -55,8 +56,8 @@ def saved(path: Path, values: Values) -> Recording:
     film, load = (None, None) if kind == "film" else (THESIS_FILM, THESIS_LOAD)
     kinematics = "uniaxial" if kind == "film" else None
     save_recording(
-        path, kind, values, title=path.stem, film=film, load=load, kinematics=kinematics,
-        overwrite=True,
+        path, kind, values, RunMetadata(title=path.stem, film=film, load=load),
+        kinematics=kinematics, overwrite=True,
     )  # fmt: skip
     return open_recording(path)
 

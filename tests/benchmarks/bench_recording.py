@@ -21,7 +21,7 @@ import numpy as np
 
 from dearig.drivers.rig import Block, RigIdentity
 from dearig.model.material import THESIS_FILM, THESIS_LOAD
-from dearig.recording import RecordingWriter, open_recording
+from dearig.recording import RecordingWriter, RunMetadata, open_recording
 from dearig.recording import writer as writer_module
 from dearig.recording.layout import LIBVER
 from tests.tools.recordings import CHANNELS, SEQUENCE, Clock
@@ -55,7 +55,8 @@ def ours(path: Path, seconds: float, fsync: bool) -> dict[str, float]:
     identity = RigIdentity("sim", True, (), THREE)
     run = blocks(seconds)
     recorder = RecordingWriter(
-        path, identity, RATE, BLOCK * len(run), SEQUENCE, THESIS_FILM, THESIS_LOAD, "",
+        path, identity, RATE, BLOCK * len(run),
+        RunMetadata(sequence_toml=SEQUENCE, film=THESIS_FILM, load=THESIS_LOAD),
         overwrite=True, fsync=fsync, now=clock,
     )  # fmt: skip
     wall, cpu = time.perf_counter(), time.process_time()

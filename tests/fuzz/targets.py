@@ -17,7 +17,7 @@ from dearig.config.presets import PRESETS
 from dearig.config.rigfile import load_rig_file, write_default
 from dearig.config.sequencefile import load_sequence
 from dearig.drivers.rig import Block
-from dearig.recording import export_recording, open_recording, save_recording
+from dearig.recording import RunMetadata, export_recording, open_recording, save_recording
 from dearig.recording.importers.chosen import Chosen
 from dearig.recording.importers.importing import source_at
 from tests.fuzz.mutate import mutated_bytes, mutated_hdf5, mutated_text
@@ -69,7 +69,7 @@ def recordings(folder: Path) -> list[bytes]:
     time = np.linspace(0.0, 1.0, 50)
     film = save_recording(
         folder / "film.h5", "film", {"time": time, "stretch": 1 + time, "nominal_stress": time},
-        title="film", now=Clock(),
+        RunMetadata(title="film"), now=Clock(),
     )  # fmt: skip
     return [path.read_bytes() for path in (run, killed, film)]
 

@@ -17,6 +17,7 @@ from dearig.model.material import THESIS_FILM, Load
 from dearig.recording import (
     EXPORTS,
     Recording,
+    RunMetadata,
     describe,
     describe_rows,
     export_recording,
@@ -57,7 +58,8 @@ def test_what_is_given_counts_more_than_what_was_exported(
 ) -> None:
     out = export_recording(run, to, tmp_path / f"run.{to}")
     film, load = replace(THESIS_FILM, thickness=2e-3), Load(0.1)
-    import_file(out, tmp_path / "again.h5", film=film, load=load, now=Clock())
+    metadata = RunMetadata(film=film, load=load)
+    import_file(out, tmp_path / "again.h5", metadata=metadata, now=Clock())
     again = open_recording(tmp_path / "again.h5")
     assert (again.film, again.load) == (film, load)
 

@@ -14,7 +14,7 @@ from scipy.io import loadmat, savemat
 
 from dearig.errors import InputError
 from dearig.model.material import THESIS_FILM, THESIS_LOAD
-from dearig.recording import Recording, export_recording, import_file, open_recording
+from dearig.recording import Recording, RunMetadata, export_recording, import_file, open_recording
 from tests.tools.recordings import Clock, measured_data
 
 
@@ -34,7 +34,8 @@ ACTUATOR = "time_s,voltage_kV,displacement_mm\n0,0,0\n0.5,1,0.25\n0.75,2,1\n"
 
 
 def test_an_actuators_csv(tmp_path: Path) -> None:
-    run = taken(csv(tmp_path, ACTUATOR), film=THESIS_FILM, load=THESIS_LOAD, film_id="film 3")
+    metadata = RunMetadata(film=THESIS_FILM, load=THESIS_LOAD, film_id="film 3")
+    run = taken(csv(tmp_path, ACTUATOR), metadata=metadata)
     assert (run.kind, run.name, run.title, run.hold) == ("actuator", "out", "in", False)
     np.testing.assert_array_equal(run.time, [0.0, 0.5, 0.75])
     np.testing.assert_array_equal(run.voltage_command, [0.0, 1000.0, 2000.0])
@@ -245,7 +246,7 @@ def test_a_mean_within_the_noise_is_left_alone(tmp_path: Path) -> None:
     [
         (
             ACTUATOR.replace("_mm", "_m"),
-            {"film": THESIS_FILM},
+            {"metadata": RunMetadata(film=THESIS_FILM)},
             "spans 1000 mm and the film is 75 mm",
         ),
         (ACTUATOR.replace("_mm", "_m"), {}, "spans 1000 mm and a film is hardly 500 mm"),
@@ -283,7 +284,8 @@ def test_what_looks_wrong_is_told(
 
 def test_good_data_raise_no_doubts(tmp_path: Path) -> None:
     path = csv(tmp_path, lead_in(0.0))
-    assert import_file(path, tmp_path / "out.h5", film=THESIS_FILM, now=Clock()) == []
+    metadata = RunMetadata(film=THESIS_FILM)
+    assert import_file(path, tmp_path / "out.h5", metadata=metadata, now=Clock()) == []
 
 
 def test_mat_variables_fields_and_columns(tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ import pytest
 
 from dearig.drivers.rig import Block
 from dearig.errors import InputError
+from dearig.recording import RunMetadata, save_recording
 from dearig.recording import index as index_module
-from dearig.recording import save_recording
 from dearig.recording.index import Entry, index_folder, lines
 from tests.recording.test_reader import film_values
 from tests.tools.command import dearig
@@ -23,7 +23,9 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("shelf")
     (folder / "day 1").mkdir()
     write_run(folder / "day 1" / "run.h5")
-    save_recording(folder / "film.h5", "film", film_values(), title="pull", now=Clock(1.7e9))
+    save_recording(
+        folder / "film.h5", "film", film_values(), RunMetadata(title="pull"), now=Clock(1.7e9)
+    )
     recorder = writer(folder / "other.h5")
     recorder.append(Block(0, run_counts(500)))
     recorder._flush_all(1.8e9)

@@ -12,6 +12,7 @@ from dearig.drivers.rig import Block, Event
 from dearig.recording import open_recording
 from dearig.recording.arrays import Arrays
 from dearig.recording.follow import Follower
+from dearig.recording.metadata import RunMetadata
 from dearig.recording.pyramid import BINS
 from dearig.recording.save import save_recording
 from dearig.recording.summary import describe
@@ -139,7 +140,7 @@ def test_a_viewer_shows_the_envelope_of_a_long_run(long: Path) -> None:
 def test_imported_data_have_overviews_too(tmp_path: Path) -> None:
     time = np.sort(np.random.default_rng(0).uniform(0.0, 10.0, 5000))
     values = {"time": time, "stretch": 1.0 + time, "nominal_stress": time**2}
-    path = save_recording(tmp_path / "x.h5", "film", values, title="x", now=Clock())
+    path = save_recording(tmp_path / "x.h5", "film", values, RunMetadata(title="x"), now=Clock())
     found = open_recording(path).overview("nominal_stress", 100)
     assert found.low.size == 100
     assert found.high.max() == values["nominal_stress"].max()

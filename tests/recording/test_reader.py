@@ -12,7 +12,7 @@ import pytest
 
 from dearig.drivers.rig import Block
 from dearig.errors import InputError
-from dearig.recording import open_recording, save_recording
+from dearig.recording import RunMetadata, open_recording, save_recording
 from tests.tools.recordings import Clock, run_counts, write_run, writer
 
 N = 200
@@ -34,7 +34,7 @@ def film_values() -> dict[str, np.ndarray]:
 def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("good") / "film.h5"
     return save_recording(
-        path, "film", film_values(), title="pull", kinematics="uniaxial", now=Clock()
+        path, "film", film_values(), RunMetadata(title="pull"), kinematics="uniaxial", now=Clock()
     )
 
 
@@ -234,7 +234,7 @@ def test_arrays_that_are_no_recording(
 ) -> None:
     values = {n: v for n, v in (film_values() | change).items() if v is not None}
     with pytest.raises(ValueError, match=match):
-        save_recording(tmp_path / "x.h5", kind, values, title="x")
+        save_recording(tmp_path / "x.h5", kind, values, RunMetadata(title="x"))
     assert not list(tmp_path.iterdir())
 
 
@@ -245,11 +245,13 @@ def test_predictions_are_saved_with_their_sequence(tmp_path: Path) -> None:
         tmp_path / "x.h5",
         "actuator",
         values,
-        title="predicted",
+        RunMetadata(
+            title="predicted",
+            sequence_toml='name = "x"\n',
+            model_toml="mu = 1\n",
+            provenance={"model": "model.toml"},
+        ),
         hold=True,
-        sequence_toml='name = "x"\n',
-        model_toml="mu = 1\n",
-        provenance={"model": "model.toml"},
         now=Clock(),
     )
     read = open_recording(path)
@@ -257,4 +259,4 @@ def test_predictions_are_saved_with_their_sequence(tmp_path: Path) -> None:
     assert (read.sequence_toml, read.model_toml) == ('name = "x"\n', "mu = 1\n")
     assert read.provenance["model"] == "model.toml"
     with pytest.raises(InputError, match="exists already"):
-        save_recording(path, "actuator", values, title="again")
+        save_recording(path, "actuator", values, RunMetadata(title="again"))

@@ -12,7 +12,7 @@ import h5py
 import pytest
 
 from dearig.drivers.rig import Block
-from dearig.recording import save_recording
+from dearig.recording import RunMetadata, save_recording
 from dearig.recording.text import fixed
 from dearig.recording.verify import verify
 from tests.recording.test_reader import attribute, film_values, removed, value
@@ -36,7 +36,9 @@ def test_a_sound_run(run: Path) -> None:
 
 
 def test_sound_imported_data(tmp_path: Path) -> None:
-    path = save_recording(tmp_path / "x.h5", "film", film_values(), title="x", now=Clock())
+    path = save_recording(
+        tmp_path / "x.h5", "film", film_values(), RunMetadata(title="x"), now=Clock()
+    )
     assert (verify(path).faults, verify(path).notes) == ([], [])
 
 

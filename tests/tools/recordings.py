@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from dearig.drivers.channels import Channel, Scaling
 from dearig.drivers.rig import Block, Event, Instrument, RigIdentity
 from dearig.model.material import THESIS_FILM, THESIS_LOAD
-from dearig.recording import RecordingWriter
+from dearig.recording import RecordingWriter, RunMetadata
 
 VOLTS_PER_COUNT = 10.0 / 32768
 CHANNELS = (
@@ -52,17 +53,21 @@ class Clock:
 
 
 def writer(path: Path, **changes: object) -> RecordingWriter:
+    metadata = RunMetadata(
+        sequence_toml=SEQUENCE,
+        film=THESIS_FILM,
+        load=THESIS_LOAD,
+        configuration="[film]\nlength_mm = 75.0\n",
+        operator="Ada",
+        film_id="film 3",
+        notes="second day",
+    )
+    told = {name: changes.pop(name) for name in tuple(changes) if hasattr(metadata, name)}
     given: dict = {
         "identity": IDENTITY,
         "rate_Hz": RATE,
         "samples_expected": 3000,
-        "sequence_toml": SEQUENCE,
-        "film": THESIS_FILM,
-        "load": THESIS_LOAD,
-        "configuration": "[film]\nlength_mm = 75.0\n",
-        "operator": "Ada",
-        "film_id": "film 3",
-        "notes": "second day",
+        "metadata": replace(metadata, **told),
         "now": Clock(),
     } | changes
     return RecordingWriter(path, **given)

@@ -12,7 +12,6 @@ import numpy as np
 from dearig.drivers.rig import Event
 from dearig.errors import InputError
 from dearig.model.kinematics import KINEMATICS
-from dearig.model.material import Film, Load
 from dearig.recording.files import check_output, file_sha256, in_words
 from dearig.recording.importers.chosen import Chosen
 from dearig.recording.importers.csv_file import CsvFile
@@ -22,6 +21,7 @@ from dearig.recording.importers.parquet_file import ParquetFile
 from dearig.recording.importers.plausible import doubts
 from dearig.recording.importers.source import Source
 from dearig.recording.importers.tdms_file import TdmsChannels
+from dearig.recording.metadata import RunMetadata
 from dearig.recording.rest_noise import lead_in, mean_beyond_noise
 from dearig.recording.save import save_recording
 
@@ -36,11 +36,7 @@ def import_file(
     gauge_length_mm: float | None = None,
     area_mm2: float | None = None,
     kinematics: str | None = None,
-    film: Film | None = None,
-    load: Load | None = None,
-    film_id: str = "",
-    notes: str = "",
-    configuration: str = "",
+    metadata: RunMetadata | None = None,
     overwrite: bool = False,
     now: Callable[[], float] = time.time,
 ) -> list[str]:
@@ -52,7 +48,8 @@ def import_file(
     and are uniaxial unless ``kinematics`` says otherwise. Time is kept as it is, even or not.
     Displacement of an actuator is counted from the mean of its lead-in at 0 V, if it has one. A
     recording that was exported to MAT or Parquet comes back with what it said of itself there:
-    film, load, kinematics, sequence, and how its voltage was held.
+    film, load, kinematics, sequence, and how its voltage was held. What ``metadata`` gives comes
+    before that; its title is the file's name by default.
 
     Returns sentences about values that are possible and look wrong. Raises ``InputError``, with
     nothing written, for everything that cannot be a recording.
@@ -70,7 +67,8 @@ def import_file(
     warnings: list[str] = []
     kind = chosen.kind(warnings)
     kinematics = kinematics or was.kinematics
-    film, load = film or was.film, load or was.load
+    metadata = metadata or RunMetadata()
+    film = metadata.film or was.film
     if kind == "actuator":
         values = chosen.actuator()
         if gauge_length_mm is not None or area_mm2 is not None:
@@ -88,24 +86,25 @@ def import_file(
         out,
         kind,
         values,
-        title=path.stem,
+        replace(
+            metadata,
+            title=metadata.title or path.stem,
+            film=film,
+            load=metadata.load or was.load,
+            sequence_toml=metadata.sequence_toml or was.sequence,
+            provenance={
+                "source": path.name,
+                "source_sha256": file_sha256(path),
+                "columns": ", ".join(f"{n}={where}" for n, where, _ in chosen.picked.values()),
+                **({} if gauge_length_mm is None else {"gauge_length_mm": float(gauge_length_mm)}),
+                **({} if area_mm2 is None else {"area_mm2": float(area_mm2)}),
+                **metadata.provenance,
+            },
+        ),
         hold=was.hold and kind == "actuator",
         kinematics=kinematics,
-        film=film,
-        load=load,
-        film_id=film_id,
-        notes=notes,
-        sequence_toml=was.sequence,
         rest_reading=rest,
         events=(*events, *(Event(0, "warning", sentence) for sentence in warnings)),
-        configuration=configuration,
-        provenance={
-            "source": path.name,
-            "source_sha256": file_sha256(path),
-            "columns": ", ".join(f"{name}={where}" for name, where, _ in chosen.picked.values()),
-            **({} if gauge_length_mm is None else {"gauge_length_mm": float(gauge_length_mm)}),
-            **({} if area_mm2 is None else {"area_mm2": float(area_mm2)}),
-        },
         overwrite=overwrite,
         now=now,
     )
