@@ -17,7 +17,8 @@ from dearig.config.sequencefile import load_sequence
 from dearig.progress import Progress, quiet
 from dearig.recording.result_folder import result_folder
 from dearig.report.diagnosis_page import write_diagnosis_report
-from dearig.report.figures import overview_figure, save_png
+from dearig.report.figure_export import save_png
+from dearig.report.figures import overview_figure
 from dearig.report.html import write_demo_report
 
 __all__ = ["HIDDEN", "DemoResult", "run_demo"]

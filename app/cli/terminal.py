@@ -12,17 +12,18 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from dearig.report.diagnosis import (
-    before_after,
+    before_after_table,
     effect_table,
     experiment_table,
     headline,
-    ranking,
-    road,
+    ranking_table,
+    step_table,
     summary,
-    thesis_before_after,
+    thesis_before_after_table,
     warnings,
 )
-from dearig.report.numbers import plain
+from dearig.report.numbers import to_ascii
+from dearig.report.sentences import identify_summary, listed, validate_summary, warnings_of
 from dearig.report.tables import (
     Table,
     branch_trials,
@@ -31,7 +32,6 @@ from dearig.report.tables import (
     parameter_table,
     thesis_error_table,
 )
-from dearig.report.words import identify_summary, listed, validate_summary, warnings_of
 
 if TYPE_CHECKING:
     from dearig.analysis.outcomes import (
@@ -99,14 +99,14 @@ def diagnosis_tables(outcome: DiagnoseOutcome) -> RenderableType:
         ("Training recordings", outcome.before.train, outcome.after.train),
     ):
         if before and after:
-            pieces.append(before_after(heading, before, after, outcome.kind))
+            pieces.append(before_after_table(heading, before, after, outcome.kind))
             theirs = f"{heading}, by the thesis's formulas"
-            pieces.append(thesis_before_after(theirs, before, after, outcome.kind))
-    pieces.append(road(outcome))
+            pieces.append(thesis_before_after_table(theirs, before, after, outcome.kind))
+    pieces.append(step_table(outcome))
     if finding.steps:
         pieces.append(effect_table(outcome))
     for found in finding.rounds:
-        table = ranking(found, _RANKED)
+        table = ranking_table(found, _RANKED)
         pieces.append(table if table.rows else f"{table.title}: {table.note}")
     experiments = experiment_table(outcome)
     if experiments is not None:
@@ -144,7 +144,7 @@ class _Fitted:
         return Measurement(min(20, options.max_width), options.max_width)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        show = plain if options.ascii_only else str
+        show = to_ascii if options.ascii_only else str
         width = options.max_width
         for i, piece in enumerate(self._pieces):
             if isinstance(piece, str):
@@ -181,7 +181,7 @@ def _laid_out(table: Table, show: Callable[[str], str], width: int) -> Iterator[
         yield from _listed(table, show)
     else:
         grid = RichTable(
-            box=_ASCII_HEAD if show is plain else SIMPLE_HEAD,
+            box=_ASCII_HEAD if show is to_ascii else SIMPLE_HEAD,
             show_edge=False, pad_edge=False, padding=(0, _GAP - 1, 0, 0), header_style="",
         )  # fmt: skip
         for i, (name, unit) in enumerate(table.head):

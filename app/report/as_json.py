@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from dearig.analysis.outcomes import pooled_noise
-from dearig.report.words import warnings_of
+from dearig.report.sentences import warnings_of
 from dearig.units import SHOWN
 
 if TYPE_CHECKING:
@@ -231,9 +231,9 @@ def _stand_json(stand: Stand) -> dict[str, Any]:
 
 def _measures_json(comparisons: tuple[Comparison, ...], kind: str) -> dict[str, Any] | None:
     """Errors pooled over recordings (see ``dearig.report.diagnosis.pooled``); None without any."""
-    from dearig.report.diagnosis import pooled
+    from dearig.report.diagnosis import pooled_errors
 
-    errors = pooled(comparisons)
+    errors = pooled_errors(comparisons)
     if errors is None:
         return None
     shown = SHOWN[kind]
@@ -248,9 +248,9 @@ def _measures_json(comparisons: tuple[Comparison, ...], kind: str) -> dict[str, 
 
 def _selection_json(stage: Stage, train: tuple[Comparison, ...], kind: str) -> dict[str, Any]:
     """Of a cross-validation: its errors, relative to the ranges of the training recordings."""
-    from dearig.report.diagnosis import pooled
+    from dearig.report.diagnosis import pooled_errors
 
-    shown, errors = SHOWN[kind], pooled(train)
+    shown, errors = SHOWN[kind], pooled_errors(train)
 
     def relative(of: float, known: float, value: float) -> float | None:
         return _number(of * value / known) if known > 0.0 else None

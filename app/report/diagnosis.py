@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dearig.analysis.outcomes import pooled_rms
-from dearig.report.numbers import NOTHING, interval, quoted, seconds, significant, symbol
+from dearig.report.numbers import NO_VALUE, interval, quoted, seconds, significant, symbol
+from dearig.report.sentences import listed
 from dearig.report.tables import Row, Table
-from dearig.report.words import listed
 from dearig.units import SHOWN, parameter_unit, readable
 
 if TYPE_CHECKING:
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 
 __all__ = [
     "HEADLINES",
-    "before_after",
-    "called",
-    "dropped",
+    "before_after_table",
+    "dropped_effects",
     "effect_table",
     "estimate_table",
     "experiment_table",
+    "family_label",
     "headline",
-    "kin",
-    "pooled",
-    "ranking",
-    "road",
+    "pooled_errors",
+    "ranking_table",
+    "step_label",
+    "step_table",
     "summary",
-    "thesis_before_after",
+    "thesis_before_after_table",
     "warnings",
 ]
 
@@ -47,7 +47,7 @@ HEADLINES = {
 }
 
 
-def pooled(comparisons: Sequence[Comparison]) -> Errors | None:
+def pooled_errors(comparisons: Sequence[Comparison]) -> Errors | None:
     """Errors over all samples of all recordings: None where there are none.
 
     The RMS is over all samples, the largest error is that of any; what is relative is relative to
@@ -89,14 +89,14 @@ def headline(finding: Diagnosis) -> str:
     return HEADLINES[finding.verdict]
 
 
-def kin(family: str) -> str:
+def family_label(family: str) -> str:
     """A family as words."""
     return "of no known family" if family == "unknown" else family.replace("_", " ")
 
 
-def called(step: Step) -> str:
+def step_label(step: Step) -> str:
     """A step's effect, its family and where it acts, in words."""
-    family = "" if kin(step.family) == step.effect else f"{kin(step.family)}, "
+    family = "" if family_label(step.family) == step.effect else f"{family_label(step.family)}, "
     return f"{step.effect} ({family}acting on the {step.acts_on})"
 
 
@@ -110,12 +110,12 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
         ("the training recordings", outcome.before.train, outcome.after.train),
     ):  # fmt: skip
         if before and after:
-            said.append(_brought(role, before, after, outcome, bool(finding.steps)))
+            said.append(_error_change(role, before, after, outcome, bool(finding.steps)))
     if not outcome.after.validation:
         said.append(
             "No untouched recordings were given, so nothing here says how well the model predicts."
         )
-    said += [_doubt(step) for step in finding.steps if step.indistinguishable_from]
+    said += [_rivals_sentence(step) for step in finding.steps if step.indistinguishable_from]
     if finding.unnamed is not None:
         said.append(_unnamed(outcome))
     said += outcome.performed
@@ -141,13 +141,13 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
     if finding.verdict == "nothing_missing":
         return (
             f"Nothing is missing: the thesis's model explains these recordings down to the noise"
-            f"{_or_so_little(outcome) or ','} and no other effect improves on it by more than "
+            f"{_film_tolerance(outcome) or ','} and no other effect improves on it by more than "
             f"chance would."
         )
-    names = [called(s) for s in finding.steps]
+    names = [step_label(s) for s in finding.steps]
     effects = f"the model lacks {listed(names)}"
     if finding.verdict == "explained":
-        left = f"only noise{_or_so_little(outcome)} is left"
+        left = f"only noise{_film_tolerance(outcome)} is left"
         return f"{effects[0].upper()}{effects[1:]}; with that, {left}."
     if finding.verdict == "partly_explained":
         return (
@@ -158,7 +158,7 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
     return f"Something is missing that none of the known effects explains{tried}."
 
 
-def _or_so_little(outcome: DiagnoseOutcome) -> str:
+def _film_tolerance(outcome: DiagnoseOutcome) -> str:
     """What may be left besides noise where everything is explained."""
     from dearig.model.diagnosis.bench import FILM_MODEL_ERROR
 
@@ -166,7 +166,7 @@ def _or_so_little(outcome: DiagnoseOutcome) -> str:
     return f", or {100.0 * FILM_MODEL_ERROR:g} % of the largest stress," if film else ""
 
 
-def _brought(
+def _error_change(
     role: str,
     before: Sequence[Comparison],
     after: Sequence[Comparison],
@@ -190,10 +190,11 @@ def _brought(
     )
 
 
-def _doubt(step: Step) -> str:
+def _rivals_sentence(step: Step) -> str:
     return (
         f"These data cannot tell {step.effect} from "
-        f"{listed(kin(f) for f in step.indistinguishable_from)}: each explains them as well."
+        f"{listed(family_label(f) for f in step.indistinguishable_from)}: each explains them as "
+        f"well."
     )
 
 
@@ -227,7 +228,7 @@ def _pairs(
     first = {c.name: c for c in before}
     rows = [(c.name, first[c.name].errors, c.errors, c.noise) for c in after if c.name in first]
     if len(rows) > 1:
-        one, two = pooled(before), pooled(after)
+        one, two = pooled_errors(before), pooled_errors(after)
         floors = [c.noise for c in after if c.noise]
         noise = math.sqrt(sum(n * n for n in floors) / len(floors)) if floors else None
         if one is not None and two is not None:
@@ -235,7 +236,7 @@ def _pairs(
     return rows
 
 
-def before_after(
+def before_after_table(
     title: str, before: Sequence[Comparison], after: Sequence[Comparison], kind: str
 ) -> Table:
     """RMS, NRMSE and RMS over noise of every recording, with the thesis's model and after."""
@@ -247,7 +248,7 @@ def before_after(
             name,
             *(significant(e.rms * shown.error_factor) for e in both),
             *(significant(e.peak_pct if film else e.nrmse_pct) for e in both),
-            *(significant(e.rms / noise) if noise else NOTHING for e in both),
+            *(significant(e.rms / noise) if noise else NO_VALUE for e in both),
         ]
         rows.append(Row(tuple(cells), mark=name == "all"))
     relative = "RMS %" if film else "NRMSE %"
@@ -260,7 +261,7 @@ def before_after(
     return Table(title, head, tuple(rows))
 
 
-def thesis_before_after(
+def thesis_before_after_table(
     title: str, before: Sequence[Comparison], after: Sequence[Comparison], kind: str
 ) -> Table:
     """The largest error and the thesis's measures of every recording, before and after."""
@@ -281,7 +282,7 @@ def thesis_before_after(
     return Table(title, tuple(head), tuple(rows))
 
 
-def road(outcome: DiagnoseOutcome) -> Table:
+def step_table(outcome: DiagnoseOutcome) -> Table:
     """The model step by step: error where it was fitted, where it was chosen, and untouched."""
     shown, finding = SHOWN[outcome.kind], outcome.finding
     stages = [finding.baseline, *(s.stage for s in finding.steps)]
@@ -291,15 +292,15 @@ def road(outcome: DiagnoseOutcome) -> Table:
         stand = outcome.stands[i] if i < len(stages) - 1 else outcome.after
         if i == 0:
             stand = outcome.before
-        errors = pooled(stand.validation)
+        errors = pooled_errors(stand.validation)
         rows.append(
             Row(
                 (
                     name,
                     significant(stage.train_rms * shown.error_factor),
                     significant(stage.selection_rms * shown.error_factor),
-                    NOTHING if errors is None else significant(errors.rms * shown.error_factor),
-                    NOTHING if errors is None else significant(errors.rms / outcome.noise),
+                    NO_VALUE if errors is None else significant(errors.rms * shown.error_factor),
+                    NO_VALUE if errors is None else significant(errors.rms / outcome.noise),
                 ),
                 mark=i == len(stages) - 1 and i > 0,
             )
@@ -325,7 +326,7 @@ _WORDS = {
 }
 
 
-def ranking(found: Round, longest: int | None = None) -> Table:
+def ranking_table(found: Round, longest: int | None = None) -> Table:
     """The candidates of one round, best first.
 
     With ``longest`` only so many, and without what a terminal has no room for.
@@ -336,7 +337,7 @@ def ranking(found: Round, longest: int | None = None) -> Table:
     for c in found.candidates[:longest]:
         cells = [c.effect]
         if not brief:
-            cells.append(kin(c.family))
+            cells.append(family_label(c.family))
         cells.append(_share(c.gained))
         if not brief:
             cells += [_share(c.promised), significant(c.gain, 3)]
@@ -359,7 +360,7 @@ def _share(of_one: float) -> str:
     return f"{100.0 * max(of_one, 0.0):.1f}"
 
 
-def dropped(outcome: DiagnoseOutcome) -> str:
+def dropped_effects(outcome: DiagnoseOutcome) -> str:
     """A sentence on what was chosen on the way and is not in the final model; empty without."""
     finding = outcome.finding
     kept = {s.effect for s in finding.steps}
@@ -405,7 +406,7 @@ def _estimate(e: Estimate, name: str, detail: str) -> Row:
     value = quoted(e.value * factor, low, high)
     within = interval(low, high) if e.free else "follows"
     if e.free and e.low == e.high == e.value:
-        within = NOTHING
+        within = NO_VALUE
     return Row(
         (name, value if e.determined else f"({value})", unit, within),
         detail,

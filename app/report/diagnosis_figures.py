@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dearig.analysis.decimate import decimate
-from dearig.report import figures as base
+from dearig.report import figure_style as base
 from dearig.report.numbers import significant
 from dearig.units import SHOWN, Shown
 

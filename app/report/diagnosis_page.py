@@ -11,26 +11,27 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from dearig.report import diagnosis_figures as drawn
-from dearig.report import figures
 from dearig.report.diagnosis import (
-    before_after,
-    called,
-    dropped,
+    before_after_table,
+    dropped_effects,
     effect_table,
     estimate_table,
     experiment_table,
+    family_label,
     headline,
-    kin,
-    ranking,
-    road,
+    ranking_table,
+    step_label,
+    step_table,
     summary,
-    thesis_before_after,
+    thesis_before_after_table,
     warnings,
 )
+from dearig.report.figures import comparison_figure
 from dearig.report.html import Picture, picture, prefixes, write_page
 from dearig.report.numbers import seconds, significant
+from dearig.report.residual_figures import residual_panels
+from dearig.report.sentences import describe_model
 from dearig.report.tables import Table
-from dearig.report.words import describe_model
 from dearig.units import SHOWN, readable
 
 if TYPE_CHECKING:
@@ -75,14 +76,14 @@ class DiagnosisPage:
     warnings: tuple[str, ...]
     errors: tuple[tuple[str, tuple[Table, ...]], ...]
     bars: tuple[Picture, ...]
-    road: Table
+    step_table: Table
     steps: tuple[FoundEffect, ...]
     effects: Table
     unnamed: tuple[str, ...]
     residuals: tuple[Group, ...]
     missing: tuple[Group, ...]
     rankings: tuple[Table, ...]
-    dropped: str
+    dropped_effects: str
     pictures: tuple[Picture, ...]
     after: tuple[tuple[str, tuple[str, ...]], ...]
     after_pictures: tuple[Picture, ...]
@@ -109,8 +110,8 @@ def _page(outcome: DiagnoseOutcome, title: str, names: Iterator[str]) -> Diagnos
         ("Training recordings", outcome.before.train, outcome.after.train),
     ):
         if before and after:
-            ours = before_after("Measured less model", before, after, kind)
-            theirs = thesis_before_after("By the thesis's formulas", before, after, kind)
+            ours = before_after_table("Measured less model", before, after, kind)
+            theirs = thesis_before_after_table("By the thesis's formulas", before, after, kind)
             errors.append((heading, (ours, theirs)))
     pairs = [
         *_paired(outcome.before.validation, outcome.after.validation),
@@ -135,7 +136,7 @@ def _page(outcome: DiagnoseOutcome, title: str, names: Iterator[str]) -> Diagnos
         warnings=warnings(outcome),
         errors=tuple(errors),
         bars=bars,
-        road=road(outcome),
+        step_table=step_table(outcome),
         steps=_steps(outcome),
         effects=effect_table(outcome),
         unnamed=_unnamed(outcome),
@@ -145,14 +146,15 @@ def _page(outcome: DiagnoseOutcome, title: str, names: Iterator[str]) -> Diagnos
             for m in finding.missing_before
             if any(m.record == s.record for s in worst)
         ),
-        rankings=tuple(ranking(r) for r in finding.rounds),
-        dropped=_capital(dropped(outcome)),
+        rankings=tuple(ranking_table(r) for r in finding.rounds),
+        dropped_effects=_capitalised(dropped_effects(outcome)),
         pictures=_untouched(outcome, changed, names),
         after=tuple(
-            (s.record, tuple(readable(_ended(_capital(w))) for w in s.words)) for s in finding.after
+            (s.record, tuple(readable(_with_full_stop(_capitalised(w))) for w in s.words))
+            for s in finding.after
         ),
         after_pictures=_after_pictures(outcome, worst, names),
-        experiment_words=readable(_ended(outcome.experiment_words)),
+        experiment_words=readable(_with_full_stop(outcome.experiment_words)),
         experiments=() if experiments is None else (experiments,),
         sequence="" if outcome.experiment is None else outcome.experiment.sequence.strip(),
         parameters=estimate_table(finding.final.estimates),
@@ -173,16 +175,16 @@ def _steps(outcome: DiagnoseOutcome) -> tuple[FoundEffect, ...]:
 
     found = []
     for step in outcome.finding.steps:
-        about = _ended(EFFECTS[step.effect].summary)
+        about = _with_full_stop(EFFECTS[step.effect].summary)
         against: tuple[str, ...] = ()
         if step.indistinguishable_from:
-            others = ", ".join(kin(f) for f in step.indistinguishable_from)
+            others = ", ".join(family_label(f) for f in step.indistinguishable_from)
             against = (f"Against it: these data are explained as well by {others}.",)
         found.append(
             FoundEffect(
-                _capital(called(step)),
-                _capital(about),
-                (*(readable(_ended(_capital(w))) for w in step.evidence), *against),
+                _capitalised(step_label(step)),
+                _capitalised(about),
+                (*(readable(_with_full_stop(_capitalised(w))) for w in step.evidence), *against),
             )
         )
     return tuple(found)
@@ -194,7 +196,7 @@ def _unnamed(outcome: DiagnoseOutcome) -> tuple[str, ...]:
         return ()
     said = [f"It acts on the {unnamed.acts_on}."]
     if unnamed.signature:
-        said.append(_ended(_capital(unnamed.signature)))
+        said.append(_with_full_stop(_capitalised(unnamed.signature)))
     if unnamed.expression:
         said.append(f"As a formula: {unnamed.expression}")
     return tuple(readable(s) for s in said)
@@ -235,7 +237,9 @@ def _residual(
         )
         for d in before.dependences
     )
-    return Group(before.record, tuple(readable(_ended(_capital(w))) for w in words), wide, small)
+    return Group(
+        before.record, tuple(readable(_with_full_stop(_capitalised(w))) for w in words), wide, small
+    )
 
 
 def _missing(
@@ -277,7 +281,7 @@ def _untouched(
         label = f"{after.name} ({after.row})" if after.row else after.name
         last = f"{significant(after.errors.rms * shown.error_factor)} {shown.error_unit} RMS"
         if not changed:
-            found.append(picture(figures.comparison_figure(after), names, f"{label}: {last}."))
+            found.append(picture(comparison_figure(after), names, f"{label}: {last}."))
             continue
         first = f"{significant(before.errors.rms * shown.error_factor)}"
         found.append(
@@ -306,7 +310,7 @@ def _after_pictures(
     )
     return tuple(
         picture(figure, names, f"{chosen[0].name}, after: {caption}")
-        for figure, caption in zip(figures.residual_panels(chosen[0]), captions, strict=True)
+        for figure, caption in zip(residual_panels(chosen[0]), captions, strict=True)
     )
 
 
@@ -341,9 +345,9 @@ def _probability(p: float) -> str:
     return "below 0.001" if p < 1e-3 else significant(p, 2)
 
 
-def _capital(text: str) -> str:
+def _capitalised(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _ended(text: str) -> str:
+def _with_full_stop(text: str) -> str:
     return text if text.endswith((".", "!", "?")) else f"{text}."

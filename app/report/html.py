@@ -9,8 +9,17 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dearig.report import figures
+from dearig.report.figure_export import svg
+from dearig.report.figures import comparison_figure, loop_figure
 from dearig.report.numbers import seconds, significant
+from dearig.report.parameter_figures import branches_figure, parameters_figure
+from dearig.report.residual_figures import residual_panels
+from dearig.report.sentences import (
+    describe_model,
+    identify_summary,
+    validate_summary,
+    warnings_of,
+)
 from dearig.report.tables import (
     Table,
     branch_trials,
@@ -18,12 +27,6 @@ from dearig.report.tables import (
     error_table,
     parameter_table,
     thesis_error_table,
-)
-from dearig.report.words import (
-    describe_model,
-    identify_summary,
-    validate_summary,
-    warnings_of,
 )
 from dearig.units import SHOWN
 
@@ -140,11 +143,11 @@ def _render(template: str, contents: dict[str, Any]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["glued"] = _glued
+    environment.filters["non_breaking"] = _non_breaking
     return environment.get_template(template).render(contents)
 
 
-def _glued(sentence: str) -> str:
+def _non_breaking(sentence: str) -> str:
     """``sentence`` in which no line ends between a number and its unit."""
     return re.sub(
         r"(?<=\d) (?=%|\N{MICRO SIGN}m\b|kPa\b|s\b|min\b|h\b)", "\N{NO-BREAK SPACE}", sentence
@@ -173,7 +176,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
         branch_tables = (branch_trials(outcome.trials, outcome.kind),)
         branch_pictures = (
             picture(
-                figures.branches_figure(outcome.trials, outcome.kind),
+                branches_figure(outcome.trials, outcome.kind),
                 prefixes,
                 "Error on training and validation data, and the information criterion (BIC) of "
                 "the training data, against number of branches.",
@@ -189,7 +192,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
         parameters=(parameter_table(fit),),
         parameter_pictures=(
             picture(
-                figures.parameters_figure(fit),
+                parameters_figure(fit),
                 prefixes,
                 "Parameters with their 95 % intervals. An arrow is an end that the data leave "
                 "open; grey is what they do not determine."
@@ -265,7 +268,7 @@ def picture(figure: Figure, prefixes: Iterator[str], caption: str) -> Picture:
     from markupsafe import Markup
 
     # matplotlib has escaped all text in the drawing, and the label is an escaped attribute
-    return Picture(Markup(figures.svg(figure, next(prefixes), caption)), caption)  # noqa: S704
+    return Picture(Markup(svg(figure, next(prefixes), caption)), caption)  # noqa: S704
 
 
 def _comparison_pictures(
@@ -278,7 +281,7 @@ def _comparison_pictures(
         error = f"{significant(c.errors.rms * shown.error_factor)} {shown.error_unit} RMS"
         pictures.append(
             picture(
-                figures.comparison_figure(c),
+                comparison_figure(c),
                 prefixes,
                 f"{name}: {shown.drive.lower()}, {shown.quantity.lower()} measured and by the "
                 f"model, and measured less model ({error}).",
@@ -286,7 +289,7 @@ def _comparison_pictures(
         )
         if c.kind == "film":
             caption = f"{name}: nominal stress against stretch."
-            pictures.append(picture(figures.loop_figure(c), prefixes, caption))
+            pictures.append(picture(loop_figure(c), prefixes, caption))
     return tuple(pictures)
 
 
@@ -298,5 +301,5 @@ def _residual_pictures(comparison: Comparison, prefixes: Iterator[str]) -> tuple
     )
     return tuple(
         picture(figure, prefixes, caption)
-        for figure, caption in zip(figures.residual_panels(comparison), captions, strict=True)
+        for figure, caption in zip(residual_panels(comparison), captions, strict=True)
     )

@@ -6,18 +6,18 @@ import math
 import re
 
 __all__ = [
-    "NOTHING",
+    "NO_VALUE",
     "interval",
-    "plain",
     "power_of_ten",
     "quoted",
     "seconds",
     "significant",
     "symbol",
+    "to_ascii",
 ]
 
 #: Stands where there is no number.
-NOTHING = "\N{EN DASH}"
+NO_VALUE = "\N{EN DASH}"
 
 _TIMES = "\N{MULTIPLICATION SIGN}"
 _RAISED = (
@@ -33,7 +33,7 @@ _PLAIN = str.maketrans(
         "\N{MICRO SIGN}": "u",
         "\N{GREEK SMALL LETTER MU}": "mu",
         _TIMES: "x",
-        NOTHING: "-",
+        NO_VALUE: "-",
         "\N{INFINITY}": "inf",
         "\N{HORIZONTAL ELLIPSIS}": "...",
         "\N{NO-BREAK SPACE}": " ",
@@ -59,7 +59,7 @@ def _fixed(value: float, decimals: int) -> str:
 def significant(value: float, digits: int = 3) -> str:
     """``value`` with ``digits`` significant digits; very large and very small ones as powers."""
     if math.isnan(value):
-        return NOTHING
+        return NO_VALUE
     if math.isinf(value):
         return "\N{INFINITY}" if value > 0.0 else "-\N{INFINITY}"
     if value == 0.0:
@@ -129,7 +129,7 @@ def symbol(name: str) -> str:
     return letter + match[2].translate(_SUBSCRIPT)
 
 
-def plain(text: str) -> str:
+def to_ascii(text: str) -> str:
     """``text`` in ASCII: ``um`` and ``mu_0`` for what has a name there, escapes for the rest."""
     for shape, sign in ((_RAISED, "^"), (_LOWERED, "_")):
         back = str.maketrans(shape, "-0123456789"[-len(shape) :])

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dearig.report.numbers import NOTHING, interval, quoted, significant, symbol
+from dearig.report.numbers import NO_VALUE, interval, quoted, significant, symbol
 from dearig.report.thesis import table_3
 from dearig.units import SHOWN, parameter_unit
 
@@ -92,7 +92,7 @@ def error_table(title: str, comparisons: Sequence[Comparison]) -> Table:
     rows = []
     for c in comparisons:
         e = c.errors
-        noise = NOTHING if not c.noise else significant(e.rms / c.noise)
+        noise = NO_VALUE if not c.noise else significant(e.rms / c.noise)
         rows.append(
             Row(
                 (
@@ -131,9 +131,9 @@ def thesis_error_table(
                 (
                     _label(c),
                     significant(c.errors.e_rms_thesis_pct),
-                    NOTHING if theirs is None else significant(theirs.e_rms_pct),
+                    NO_VALUE if theirs is None else significant(theirs.e_rms_pct),
                     significant(c.errors.e_m_thesis_pct),
-                    NOTHING if theirs is None else significant(theirs.e_m_pct),
+                    NO_VALUE if theirs is None else significant(theirs.e_m_pct),
                 )
             )
         )
@@ -158,7 +158,7 @@ def parameter_table(fit: Identification) -> Table:
             value = quoted(e.value * factor, e.low * factor, e.high * factor)
             within = interval(e.low * factor, e.high * factor) if e.free else "follows"
         else:
-            value, within = significant(e.value * factor, 4), NOTHING
+            value, within = significant(e.value * factor, 4), NO_VALUE
         cells = [symbol(e.name), value if e.determined or not known else f"({value})", unit, within]
         if published:
             theirs = published.get(e.name, math.nan)
@@ -187,8 +187,8 @@ def branch_trials(trials: Sequence[BranchTrial], kind: str) -> Table:
             f"{t.branches}{' *' if t.chosen else ''}",
             significant(t.train_rms * shown.error_factor),
             significant(t.train_peak_pct),
-            NOTHING if validation[0] is None else significant(validation[0] * shown.error_factor),
-            NOTHING if validation[1] is None else significant(validation[1]),
+            NO_VALUE if validation[0] is None else significant(validation[0] * shown.error_factor),
+            NO_VALUE if validation[1] is None else significant(validation[1]),
             significant(t.bic - best),
         )
         rows.append(Row(cells, mark=t.chosen))

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QVBoxLayout, QWidg
 from dearig.analysis.outcomes import Comparison
 from dearig.report.numbers import significant
 from dearig.units import SHOWN
-from dearig.window.plotting import add_curve, add_legend, add_noise, emptied, stacked
+from dearig.window.plotting import add_curve, add_legend, add_noise, clear_plot, stacked_plots
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
 from dearig.window.widgets import label
@@ -30,12 +30,12 @@ class BeforeAfterPlot(QWidget):
         self.record.setToolTip("Untouched recordings come first: no fit and no choice saw them")
         of = QLabel("Recor&ding")
         of.setBuddy(self.record)
-        self.says = label("", "muted")
+        self.error_summary = label("", "muted")
         top = QHBoxLayout()
         top.addWidget(of)
         top.addWidget(self.record)
-        top.addWidget(self.says, 1)
-        self.area, self.plots = stacked((2, 4, 3))
+        top.addWidget(self.error_summary, 1)
+        self.area, self.plots = stacked_plots((2, 4, 3))
         self.area.setAccessibleName("Measurement beside the models, and their errors")
         outer = QVBoxLayout(self)
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
@@ -60,10 +60,10 @@ class BeforeAfterPlot(QWidget):
         theme = self._session.theme
         self.area.setBackground(QColor(theme.surface))
         for plot in self.plots:
-            emptied(plot, theme)
+            clear_plot(plot, theme)
         index = self.record.currentIndex()
         if not 0 <= index < len(self._pairs):
-            self.says.setText("")
+            self.error_summary.setText("")
             return
         before, after = self._pairs[index]
         shown = SHOWN[before.kind]
@@ -92,7 +92,7 @@ class BeforeAfterPlot(QWidget):
             level = before.noise * shown.error_factor
             add_noise(error, theme, -level, level)
             said.append(f"noise {significant(level)} {shown.error_unit}")
-        self.says.setText("   ".join(said))
+        self.error_summary.setText("   ".join(said))
         self.plots[0].setXRange(time[0], time[-1], padding=0.0)
         for plot in self.plots:
             plot.enableAutoRange(axis="y")

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from dearig.analysis.summary import Curves
 from dearig.units import SHOWN
-from dearig.window.plotting import add_curve, emptied, key_of, stacked
+from dearig.window.plotting import add_curve, clear_plot, legend_html, stacked_plots
 from dearig.window.session import Session
 from dearig.window.theme import pen
 from dearig.window.widgets import label
@@ -28,7 +28,7 @@ class CurvesPlot(QWidget):
         self._shown: tuple[Curves, ...] = ()
         self._with_model = True
         # the measurement matters most
-        self._area, self.plots = stacked((3, 5, 4))
+        self._area, self.plots = stacked_plots((3, 5, 4))
         self._area.setAccessibleName("Curves of the chosen recordings")
         # above the plots and wrapped: names of six recordings would cover half of a plot
         self.key = label("")
@@ -70,7 +70,7 @@ class CurvesPlot(QWidget):
         theme = self._session.theme
         self._area.setBackground(QColor(theme.surface))
         for plot in self.plots:
-            emptied(plot, theme)
+            clear_plot(plot, theme)
         drive, both, residual = self.plots
         shown = SHOWN[self._shown[0].kind if self._shown else "actuator"]
         drive.setLabel("left", shown.drive_label)
@@ -103,7 +103,7 @@ class CurvesPlot(QWidget):
             add_curve(both, time, model * shown.factor, beside, dashed=not alone)
             time, left = curves.residual
             add_curve(residual, time, left * shown.error_factor, beside)
-        self.key.setText(key_of(*named))
+        self.key.setText(legend_html(*named))
         if alone:
             self._events(self._shown[0])
 

@@ -22,7 +22,7 @@ from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
 from dearig.analysis.summary import RecordingSummary
-from dearig.report.numbers import NOTHING, significant
+from dearig.report.numbers import NO_VALUE, significant
 from dearig.units import SHOWN
 from dearig.window.session import Session
 
@@ -95,7 +95,7 @@ class FolderModel(QAbstractTableModel):
             self._summaries[summary.path] = summary
             self.dataChanged.emit(self.index(row, 0), self.index(row, len(COLUMNS) - 1))
 
-    def forget_errors(self) -> None:
+    def clear_errors(self) -> None:
         """Another model was chosen: the errors are no longer those of the one that is named."""
         self._summaries = {
             path: replace(g, errors=None, unfit="", fitted=False)
@@ -213,14 +213,14 @@ def _state(summary: RecordingSummary) -> str:
 
 def _error(summary: RecordingSummary, column: int) -> str:
     if summary.errors is None:
-        return NOTHING if summary.unfit else ""
+        return NO_VALUE if summary.unfit else ""
     shown, e = SHOWN[summary.kind], summary.errors
     if column == _RMS:
         mark = "*" if summary.fitted else ""
         return f"{significant(e.rms * shown.error_factor)} {shown.error_unit}{mark}"
     if column == _NRMSE:
         return f"{significant(e.nrmse_pct)} %"
-    return significant(e.rms / summary.noise) if summary.noise else NOTHING
+    return significant(e.rms / summary.noise) if summary.noise else NO_VALUE
 
 
 def _tip(path: Path, summary: RecordingSummary | None, column: int) -> str:

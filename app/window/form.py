@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QComboBox, QGridLayout, QLineEdit, QWidget
 
 from dearig.window.fields import FormField, shown_value, typed_value
 from dearig.window.theme import SPACE
-from dearig.window.widgets import Sentence, label
+from dearig.window.widgets import Message, label
 
 __all__ = ["Form"]
 
@@ -31,7 +31,7 @@ class Form(QWidget):
         super().__init__(parent)
         self._fields = {field.key: field for field in fields}
         self._widgets: dict[str, QLineEdit | QComboBox] = {}
-        self._faults: dict[str, Sentence] = {}
+        self._faults: dict[str, Message] = {}
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(SPACE)
@@ -48,7 +48,7 @@ class Form(QWidget):
                 about = label(field.about, "muted", field.tip)
                 about.setWordWrap(True)
                 grid.addWidget(about, row, 3)
-            fault = Sentence()
+            fault = Message()
             grid.addWidget(fault, row + 1, 1, 1, 3)
             self._faults[key] = fault
             self._widgets[key] = widget
@@ -60,7 +60,7 @@ class Form(QWidget):
         """Say beside each field what is wrong with it, and nothing beside the others."""
         for key, sentence in self._faults.items():
             words = faults.get(key, "")
-            sentence.say(words)
+            sentence.show_text(words)
             widget = self._widgets[key]
             if bool(widget.property("wrong")) != bool(words):
                 widget.setProperty("wrong", bool(words))

@@ -35,11 +35,11 @@ from dearig.window.running import simulated
 from dearig.window.sequence_page import SequencePage
 from dearig.window.session import Session
 from dearig.window.study_page import StudyPage
-from dearig.window.theme import DARK, LIGHT, apply, of_system
+from dearig.window.theme import DARK, LIGHT, apply, system_theme
 
 __all__ = ["MainWindow"]
 
-_LOOKS = {"system": "As the system has it", "light": "Light", "dark": "Dark"}
+_COLOUR_SCHEMES = {"system": "As the system has it", "light": "Light", "dark": "Dark"}
 
 
 class Page(Protocol):
@@ -74,7 +74,7 @@ class MainWindow(QMainWindow):
         self._closing = False
         self._build()
         self._connect()
-        self._look_changed()
+        self._apply_colour_scheme()
         self._restore()
         self.planner.renew()
 
@@ -209,13 +209,13 @@ class MainWindow(QMainWindow):
         menu.addAction(guide)
         self.addAction(guide)
         looks = menu.addMenu("&Colours")
-        self._looks: dict[str, QAction] = {}
-        for name, words in _LOOKS.items():
+        self._scheme_actions: dict[str, QAction] = {}
+        for name, words in _COLOUR_SCHEMES.items():
             look = QAction(words, self)
             look.setCheckable(True)
-            look.triggered.connect(lambda _=False, name=name: self.set_look(name))
+            look.triggered.connect(lambda _=False, name=name: self.set_colour_scheme(name))
             looks.addAction(look)
-            self._looks[name] = look
+            self._scheme_actions[name] = look
         reset = QAction("&Reset the layout", self)
         reset.triggered.connect(self.reset_layout)
         menu.addAction(reset)
@@ -240,7 +240,7 @@ class MainWindow(QMainWindow):
         self.recordings_page.open_sequence.connect(self._read_sequence)
         self.study_page.open_sequence.connect(self._play_sequence)
         self.study_page.show_model.connect(self._show_model)
-        QGuiApplication.styleHints().colorSchemeChanged.connect(self._look_changed)
+        QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_colour_scheme)
         session.running_changed.connect(self._listen)
         self._where_changed()
 
@@ -290,19 +290,19 @@ class MainWindow(QMainWindow):
         self.run_page.show_model(path)
         self.show_page(self.run_page)
 
-    def set_look(self, name: str) -> None:
+    def set_colour_scheme(self, name: str) -> None:
         """``system``, ``light`` or ``dark``."""
         self.session.settings.setValue("look", name)
-        self._look_changed()
+        self._apply_colour_scheme()
 
     @Slot()
-    def _look_changed(self) -> None:
+    def _apply_colour_scheme(self) -> None:
         name = str(self.session.settings.value("look", "system"))
-        theme = {"light": LIGHT, "dark": DARK}.get(name) or of_system()
+        theme = {"light": LIGHT, "dark": DARK}.get(name) or system_theme()
         application = QApplication.instance()
         if isinstance(application, QApplication):
             apply(application, theme)
-        for key, look in self._looks.items():
+        for key, look in self._scheme_actions.items():
             look.setChecked(key == name)
         self.session.set_theme(theme)
 

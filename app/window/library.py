@@ -13,7 +13,7 @@ from dearig.window.background import Background
 from dearig.window.session import Session
 from dearig.window.worker import Job, Worker
 
-__all__ = ["Library", "library_of"]
+__all__ = ["Library", "shared_library"]
 
 _SETTLE_MS = 300  # after which a folder that changes is looked at; several files come at once
 
@@ -142,7 +142,7 @@ class Library(QObject):
         self.busy.emit(len(self._pending))
 
 
-def library_of(session: Session) -> Library:
+def shared_library(session: Session) -> Library:
     """The library of ``session``, which all its pages share."""
     found = session.findChild(Library)
     return found if isinstance(found, Library) else Library(session)

@@ -22,7 +22,7 @@ from dearig.model.errors import ModelError
 from dearig.recording.rest_noise import lead_in
 from dearig.window.traces import ErrorsSoFar, Pyramid, RunningErrors
 
-__all__ = ["Live", "Now"]
+__all__ = ["Live", "RunSnapshot"]
 
 _SIGNALS = {
     "voltage_command": "command",
@@ -35,7 +35,7 @@ _RECENT = 1.0  # s of the running error
 
 
 @dataclass(frozen=True)
-class Now:
+class RunSnapshot:
     """A moment of a run: ``samples`` of ``total`` at ``rate`` Hz, and the means of its last 10 ms.
 
     ``revision`` is another one whenever there is something else to draw. ``values`` in
@@ -94,7 +94,7 @@ class Live(RunObserver):
             taken, self._events = self._events, []
         return taken
 
-    def now(self) -> Now | None:
+    def now(self) -> RunSnapshot | None:
         """The present moment; None before the run has started."""
         if self._run is None:
             return None
@@ -129,18 +129,18 @@ class Live(RunObserver):
         run = self._run
         while run is not None and (item := self._inbox.get()) is not None:
             if isinstance(item, Block):
-                taken = run.digest(item)
+                taken = run.convert(item)
                 with self._lock:
                     run.show(taken)
                 continue
             # a model that comes late runs through what it has missed, on curves of its own
-            fresh = run.again(*item)
+            fresh = run.with_models(*item)
             with self._lock:
                 self._run = run = fresh
 
 
 @dataclass(frozen=True)
-class _Digested:
+class _Converted:
     values: dict[str, np.ndarray]
     models: tuple[np.ndarray, ...]
 
@@ -173,7 +173,7 @@ class _Run:
         self.curves = {_SIGNALS[c.name]: Pyramid(total) for c in channels if c.name in _SIGNALS}
         self._blocks: list[Block] = []
         self._models: tuple[_Model, ...] = ()
-        self._quiet = _Quiet()
+        self._rest = _RestReference()
         self._newest: dict[str, float] = {}
         self.revision = 0
 
@@ -190,16 +190,16 @@ class _Run:
                 self.curves[f"{name} {i}"] = Pyramid(self.total)
         self._models = tuple(models)
 
-    def again(self, overlays: tuple[OverlayModel, ...], drive: str) -> _Run:
+    def with_models(self, overlays: tuple[OverlayModel, ...], drive: str) -> _Run:
         """The same run so far, with other models."""
         fresh = _Run(self.total, self.channels, self.rate)
         fresh.follow(overlays, drive)
         fresh.revision = self.revision + 1
         for block in self._blocks:
-            fresh.show(fresh.digest(block))
+            fresh.show(fresh.convert(block))
         return fresh
 
-    def digest(self, block: Block) -> _Digested:
+    def convert(self, block: Block) -> _Converted:
         """The block in SI units, with what the models make of it; the slow part."""
         self._blocks.append(block)
         values = {
@@ -209,12 +209,12 @@ class _Run:
         }
         if "displacement" in values:
             step = abs(self.channels[0].scaling.gain * self.channels[0].scaling.coefficients[1])
-            values["displacement"] = self._quiet.from_rest(
+            values["displacement"] = self._rest.from_rest(
                 values["displacement"], lead_in(values["command"], step)
             )
-        return _Digested(values, tuple(model.advance(block) for model in self._models))
+        return _Converted(values, tuple(model.advance(block) for model in self._models))
 
-    def show(self, taken: _Digested) -> None:
+    def show(self, taken: _Converted) -> None:
         self.revision += 1
         for name, values in taken.values.items():
             self.curves[name].push(values)
@@ -230,8 +230,8 @@ class _Run:
             recent = model.running.now().recent
             self.curves[f"rms {i}"].push(np.full(moved.size, recent))
 
-    def now(self) -> Now:
-        return Now(
+    def now(self) -> RunSnapshot:
+        return RunSnapshot(
             self.curves["command"].samples,
             self.total,
             self.rate,
@@ -242,7 +242,7 @@ class _Run:
         )
 
 
-class _Quiet:
+class _RestReference:
     """Displacement from the mean reading over the lead-in, as far as it has come."""
 
     def __init__(self) -> None:

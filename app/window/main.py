@@ -43,7 +43,7 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     from dearig.window.collector import Collector
     from dearig.window.frame import MainWindow
     from dearig.window.session import Session
-    from dearig.window.theme import of_system, prepare_plots
+    from dearig.window.theme import prepare_plots, system_theme
 
     # before anything is shown: what is wrong with a file belongs in the terminal it was given in
     settings = load_rig_file(rig_file)
@@ -52,7 +52,7 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     application.setApplicationName("dearig")
     application.setOrganizationName("dearig")
     prepare_plots()
-    session = Session(folder.absolute(), QSettings(), address=rig, theme=of_system())
+    session = Session(folder.absolute(), QSettings(), address=rig, theme=system_theme())
     if rig_file is not None:
         session.set_rig_file(rig_file.absolute(), text, settings)
     window = MainWindow(session)

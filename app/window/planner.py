@@ -16,7 +16,7 @@ from dearig.window.background import Background
 from dearig.window.session import Breach, Preview, Session
 from dearig.window.traces import Pyramid
 
-__all__ = ["Planner", "foresee"]
+__all__ = ["Planner", "make_preview"]
 
 _BREACHES_MAX = 50  # stretches of time marked in one plot; more are drawn as one
 
@@ -38,7 +38,7 @@ class Planner(QObject):
         s = self._session
         s.preview = None
         toml, folder, rig_file, film = s.sequence_toml, s.sequence_folder, s.rig_file, s.film
-        self._background.start(lambda: foresee(toml, folder, rig_file, film))
+        self._background.start(lambda: make_preview(toml, folder, rig_file, film))
 
     def close(self) -> None:
         """Wait for the thread."""
@@ -49,7 +49,7 @@ class Planner(QObject):
         self._session.set_preview(preview)
 
 
-def foresee(toml: str, folder: Path, rig_file: RigFile, film: str = "") -> Preview:
+def make_preview(toml: str, folder: Path, rig_file: RigFile, film: str = "") -> Preview:
     """What becomes of the sequence ``toml``; faults in it are a sentence, not an exception."""
     try:
         loaded = parse_sequence(toml, "the sequence", folder)

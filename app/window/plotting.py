@@ -16,10 +16,10 @@ __all__ = [
     "add_curve",
     "add_legend",
     "add_noise",
-    "emptied",
-    "key_of",
-    "set_key",
-    "stacked",
+    "clear_plot",
+    "legend_html",
+    "set_legend_title",
+    "stacked_plots",
 ]
 
 
@@ -40,7 +40,7 @@ class DecadeAxis(pg.AxisItem):
         return [s if n in marked else "" for s, n in zip(strings, leading, strict=True)]
 
 
-def stacked(weights: tuple[int, ...]) -> tuple[pg.GraphicsLayoutWidget, list[pg.PlotItem]]:
+def stacked_plots(weights: tuple[int, ...]) -> tuple[pg.GraphicsLayoutWidget, list[pg.PlotItem]]:
     """Plots one below the other on one time axis, as high as ``weights`` say."""
     area = pg.GraphicsLayoutWidget()
     plots = [area.addPlot(row=row, col=0) for row in range(len(weights))]
@@ -54,7 +54,7 @@ def stacked(weights: tuple[int, ...]) -> tuple[pg.GraphicsLayoutWidget, list[pg.
     return area, plots
 
 
-def emptied(plot: pg.PlotItem, theme: Theme) -> None:
+def clear_plot(plot: pg.PlotItem, theme: Theme) -> None:
     """Take everything out of ``plot``, and give it the colours of ``theme``."""
     plot.clear()
     style_plot(plot, theme)
@@ -87,7 +87,7 @@ def add_legend(plot: pg.PlotItem, theme: Theme) -> None:
     )  # fmt: skip
 
 
-def key_of(*entries: tuple[str, str, str]) -> str:
+def legend_html(*entries: tuple[str, str, str]) -> str:
     """A legend as rich text: (sign, name, colour) of each curve, which no line breaks."""
     whole = str.maketrans({" ": "\N{NO-BREAK SPACE}", "-": "\N{NON-BREAKING HYPHEN}"})
     return " \N{NO-BREAK SPACE} ".join(
@@ -96,9 +96,9 @@ def key_of(*entries: tuple[str, str, str]) -> str:
     )
 
 
-def set_key(plot: pg.PlotItem, *entries: tuple[str, str, str]) -> None:
+def set_legend_title(plot: pg.PlotItem, *entries: tuple[str, str, str]) -> None:
     """A legend above the plot, for curves that leave no room."""
-    plot.setTitle(key_of(*entries), size="9pt")
+    plot.setTitle(legend_html(*entries), size="9pt")
 
 
 def add_noise(plot: pg.PlotItem, theme: Theme, *levels: float) -> None:

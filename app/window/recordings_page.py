@@ -47,11 +47,11 @@ from dearig.units import SHOWN
 from dearig.window.curves_plot import CurvesPlot
 from dearig.window.folder_table import COLUMNS, PATH, SORT, FolderModel, ThumbnailDelegate
 from dearig.window.layout_state import remember
-from dearig.window.library import library_of
+from dearig.window.library import shared_library
 from dearig.window.report_table import ReportTable, two_columns
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
-from dearig.window.widgets import Sentence, button, label
+from dearig.window.widgets import Message, button, label
 from dearig.window.worker import Job
 
 __all__ = ["RecordingsPage"]
@@ -74,7 +74,7 @@ class RecordingsPage(QWidget):
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
-        self._library = library_of(session)
+        self._library = shared_library(session)
         self._reading: list[Job] = []
         self._read: dict[Path, Curves] = {}
         self._wanted: list[Path] = []
@@ -121,7 +121,7 @@ class RecordingsPage(QWidget):
         self.model_shown.toggled.connect(self.plot.show_model)
         self.whole = button("&Whole run", "Show all of the time again after zooming")
         self.whole.clicked.connect(self._show_whole)
-        self.saying = Sentence()
+        self.message = Message()
 
         self.about, self.events, self.differences = (ReportTable(words=True) for _ in range(3))
         self.sides = QTabWidget()
@@ -152,12 +152,12 @@ class RecordingsPage(QWidget):
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
         outer.setSpacing(SPACE)
         outer.addLayout(top)
-        outer.addWidget(self.saying)
+        outer.addWidget(self.message)
         outer.addWidget(self.splitter, 1)
 
         self._library.listed.connect(self._listed)
         self._library.looked.connect(self._looked)
-        self._library.trouble.connect(self.saying.say)
+        self._library.trouble.connect(self.message.show_text)
         self._library.busy.connect(self._busy)
         session.folder_changed.connect(self._name_folder)
         session.overlays_changed.connect(self._list_models)
@@ -238,15 +238,15 @@ class RecordingsPage(QWidget):
         self._read.clear()
         self._wanted = chosen[:_TOGETHER_MAX]
         if len(chosen) > _TOGETHER_MAX:
-            self.saying.say(
+            self.message.show_text(
                 f"{len(chosen)} recordings are chosen; the first {_TOGETHER_MAX} of them are drawn",
                 "warn",
             )
         else:
-            self.saying.say("")
+            self.message.show_text("")
         readable = [path for path in self._wanted if not self._trouble(path)]
         for words in filter(None, map(self._trouble, self._wanted)):
-            self.saying.say(words)
+            self.message.show_text(words)
         self._wanted = readable
         if not readable:
             self.plot.show_curves(())
@@ -257,7 +257,7 @@ class RecordingsPage(QWidget):
                 curves, path, self._library.model, self._session.overlay_drive
             )
             job.finished.connect(lambda found, of=of: self._took(found, of))
-            job.failed.connect(self.saying.say)
+            job.failed.connect(self.message.show_text)
             self._reading.append(job)
         if self._differing is not None:
             self._differing.cancel()
@@ -290,7 +290,7 @@ class RecordingsPage(QWidget):
         if len(kinds) > 1:
             first = ready[0].kind
             ready = [c for c in ready if c.kind == first]
-            self.saying.say(
+            self.message.show_text(
                 "Recordings driven by voltage and by stretch have no axis in common: those like "
                 f"{ready[0].name} are drawn",
                 "warn",
@@ -299,7 +299,7 @@ class RecordingsPage(QWidget):
         self._show_about()
         unfit = next((c.unfit for c in ready if c.unfit), "")
         if unfit:
-            self.saying.say(f"No model is drawn: {unfit}", "warn")
+            self.message.show_text(f"No model is drawn: {unfit}", "warn")
         self.again_button.setEnabled(len(ready) == 1 and bool(ready[0].sequence_toml))
 
     def _show_about(self) -> None:
@@ -336,10 +336,12 @@ class RecordingsPage(QWidget):
 
     def export(self, path: Path, form: str, out: Path) -> None:
         """Write the recording at ``path`` as ``form`` to ``out``, in the other process."""
-        self.saying.say(f"Writing {out.name}", "muted")
+        self.message.show_text(f"Writing {out.name}", "muted")
         job = self._library.submit(export_file, path, form, out)
-        job.finished.connect(lambda written: self.saying.say(f"{written} was written", "good"))
-        job.failed.connect(self.saying.say)
+        job.finished.connect(
+            lambda written: self.message.show_text(f"{written} was written", "good")
+        )
+        job.failed.connect(self.message.show_text)
 
     def _ask_export(self, form: str) -> None:
         chosen = self.chosen()
@@ -363,12 +365,12 @@ class RecordingsPage(QWidget):
         for path in filter(self._broken, self.chosen()):
             job = self._library.submit(recover_file, path)
             job.finished.connect(self._recovered)
-            job.failed.connect(self.saying.say)
+            job.failed.connect(self.message.show_text)
 
     @Slot(object)
     def _recovered(self, words: str) -> None:
         self._library.refresh()
-        self.saying.say(words, "good")
+        self.message.show_text(words, "good")
 
     @Slot()
     def _play_again(self) -> None:
@@ -417,7 +419,7 @@ class RecordingsPage(QWidget):
     def compare_with(self, model: Path | None) -> None:
         """Set all recordings beside the model file ``model``; None is the thesis's."""
         if model != self._library.model:
-            self.files.forget_errors()
+            self.files.clear_errors()
             self._library.set_model(model)
             self._show_chosen()
         self._list_models()

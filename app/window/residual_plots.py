@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLabel, QVBox
 from dearig.analysis.study import Residual
 from dearig.model.diagnosis.results import Dependence, MissingStress
 from dearig.units import SHOWN, readable
-from dearig.window.plotting import DecadeAxis, add_curve, add_noise, emptied, set_key
+from dearig.window.plotting import DecadeAxis, add_curve, add_noise, clear_plot, set_legend_title
 from dearig.window.session import Session
 from dearig.window.theme import SPACE, pen
 from dearig.window.widgets import label
@@ -106,7 +106,7 @@ class ResidualPlots(QWidget):
         theme = self._session.theme
         for widget in (self.time, self.density, self.dependence, self.missing):
             widget.setBackground(QColor(theme.surface))
-            emptied(widget.getPlotItem(), theme)
+            clear_plot(widget.getPlotItem(), theme)
         found = self._found()
         self.dependence.setVisible(found is None or bool(found.dependences))
         self.missing.setVisible(found is None or bool(found.missing))
@@ -138,7 +138,7 @@ class ResidualPlots(QWidget):
         plot.setLabel("left", f"Residual ({shown.error_unit})")
         plot.setLabel("bottom", "Time (s)")
         stands = self._colours()[: len(found.over_time)]
-        set_key(plot, *self._key(len(found.over_time)))
+        set_legend_title(plot, *self._key(len(found.over_time)))
         for (_, colour), trace in zip(stands, found.over_time, strict=True):
             add_curve(plot, trace.x, trace.y * shown.error_factor, colour)
         if found.noise is not None:
@@ -151,7 +151,7 @@ class ResidualPlots(QWidget):
         plot.setLogMode(x=True, y=True)
         plot.setLabel("left", f"Density ({shown.error_unit}/\N{SQUARE ROOT}Hz)")
         plot.setLabel("bottom", "Frequency (Hz)")
-        set_key(plot, *self._key(len(found.density)), ("- -", "noise floor", theme.muted))
+        set_legend_title(plot, *self._key(len(found.density)), ("- -", "noise floor", theme.muted))
         for (_, colour), trace in zip(self._colours(), found.density, strict=False):
             good = (trace.x > 0.0) & (trace.y > 0.0)
             add_curve(plot, trace.x[good], trace.y[good] * shown.error_factor, colour)
@@ -168,7 +168,7 @@ class ResidualPlots(QWidget):
         found, scale = chosen[0], shown.error_factor
         unit = found.unit.replace("^2", "\N{SUPERSCRIPT TWO}")
         plot.setLabel("bottom", f"{found.quantity} ({unit})" if unit else found.quantity)
-        set_key(
+        set_legend_title(
             plot, ("\N{BLACK CIRCLE}", "rising", theme.command),
             ("\N{BLACK SQUARE}", "falling", theme.monitor),
             ("\N{FULL BLOCK}", "chance", theme.muted),
@@ -202,7 +202,7 @@ class ResidualPlots(QWidget):
             values, text = missing.time, "time (s)"
         plot.setLabel("left", "Missing stress (Pa)")
         plot.setLabel("bottom", text)
-        set_key(
+        set_legend_title(
             plot, ("\N{BLACK CIRCLE}", "loading", theme.command),
             ("\N{BLACK SQUARE}", "unloading", theme.monitor),
         )  # fmt: skip

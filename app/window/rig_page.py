@@ -37,7 +37,7 @@ from dearig.window.fields import form_fields
 from dearig.window.form import Form
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
-from dearig.window.widgets import Sentence, button, card, label
+from dearig.window.widgets import Message, button, card, label
 
 __all__ = ["RigPage"]
 
@@ -61,11 +61,11 @@ class RigPage(QWidget):
         self._saved = session.rig_text
         self._checks = Background(self)
         self._checks.done.connect(self._checked)
-        self._checks.failed.connect(lambda words: self.summary.say(words))
+        self._checks.failed.connect(lambda words: self.summary.show_text(words))
         self._checks.busy_changed.connect(self._checking)
         self._files = Background(self)
         self._files.done.connect(self._file_done)
-        self._files.failed.connect(lambda words: self.trouble.say(words))
+        self._files.failed.connect(lambda words: self.trouble.show_text(words))
         self.outcome: CheckOutcome | None = None
         self.setAcceptDrops(True)
         self._build()
@@ -115,7 +115,7 @@ class RigPage(QWidget):
     def _checking(self, busy: bool) -> None:
         self.check_button.setEnabled(not busy and not self.session.running)
         if busy:
-            self.summary.say(f"looking at {self.session.address} …", "muted")
+            self.summary.show_text(f"looking at {self.session.address} …", "muted")
 
     @Slot(bool)
     def _running_changed(self, running: bool) -> None:
@@ -162,7 +162,7 @@ class RigPage(QWidget):
     @Slot(object)
     def _file_done(self, answer: tuple[Path, str | None]) -> None:
         path, text = answer
-        self.trouble.say("")
+        self.trouble.show_text("")
         if text is None:
             self._saved = self.text
             self.session.set_rig_file(path, self.session.rig_text, self.session.rig_file)
@@ -176,7 +176,7 @@ class RigPage(QWidget):
         try:
             faults = faults_of(text)
         except InputError as error:
-            self.trouble.say(str(error))
+            self.trouble.show_text(str(error))
             return
         self.text = text
         if not faults:
@@ -200,7 +200,7 @@ class RigPage(QWidget):
         rest = [words for place, words in faults.items() if place not in said]
         many = f"{len(faults)} thing{'s' if len(faults) > 1 else ''} to mend; until then the rig "
         head = f"{many}file is used as it was before" if faults else ""
-        self.state.say("\n".join([head, *rest]).strip(), "bad")
+        self.state.show_text("\n".join([head, *rest]).strip(), "bad")
         path = self.session.rig_path
         unsaved = " (not saved)" if self.text != self._saved else ""
         self.file_name.setText(f"{path.name if path else 'the thesis rig, in no file'}{unsaved}")
@@ -224,7 +224,7 @@ class RigPage(QWidget):
         outcome, theme = self.outcome, self.session.theme
         self.findings.setRowCount(0 if outcome is None else len(outcome.findings))
         if outcome is None:
-            self.summary.say(
+            self.summary.show_text(
                 f"{self.session.address} was not looked at yet: Check looks at every instrument, "
                 f"and puts out nothing but 0 V",
                 "muted",
@@ -248,7 +248,7 @@ class RigPage(QWidget):
                     item.setForeground(QColor(colours[finding.verdict]))
                 self.findings.setItem(row, column, item)
         wrong = any(f.verdict == "wrong" for f in outcome.findings)
-        self.summary.say(outcome.summary, "bad" if wrong else "good")
+        self.summary.show_text(outcome.summary, "bad" if wrong else "good")
 
     def _show_address(self) -> None:
         address = self.session.address
@@ -331,7 +331,7 @@ class RigPage(QWidget):
         self.check_button.clicked.connect(self.check)
         row.addWidget(self.check_button)
         column.addLayout(row)
-        self.summary = Sentence()
+        self.summary = Message()
         column.addWidget(self.summary)
         self.findings = QTableWidget(0, 4)
         self.findings.setHorizontalHeaderLabels(("", "Instrument", "What", "Found"))
@@ -368,9 +368,9 @@ class RigPage(QWidget):
         for made in (open_button, self.save_button, defaults):
             row.addWidget(made)
         column.addLayout(row)
-        self.trouble = Sentence()
+        self.trouble = Message()
         column.addWidget(self.trouble)
-        self.state = Sentence()
+        self.state = Message()
         column.addWidget(self.state)
         self.tabs = QTabWidget()
         self.tabs.setUsesScrollButtons(True)

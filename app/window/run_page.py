@@ -26,12 +26,12 @@ from dearig.config.toml_input import read_text
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.background import Background
 from dearig.window.hv import HighVoltage, HighVoltageBadge
-from dearig.window.live import Live, Now
+from dearig.window.live import Live, RunSnapshot
 from dearig.window.run_plots import RunPlots
-from dearig.window.running import RunEnd, Runner, RunOrder, simulated
+from dearig.window.running import RunEnd, Runner, RunRequest, simulated
 from dearig.window.session import Session
 from dearig.window.theme import SPACE, digits
-from dearig.window.widgets import Readout, Sentence, button, card, label
+from dearig.window.widgets import Message, Readout, button, card, label
 
 __all__ = ["RunPage"]
 
@@ -109,7 +109,7 @@ class RunPage(QWidget):
         if preview is None or preview.loaded is None or not preview.playable:
             return
         live = Live(session.overlays, session.overlay_drive)
-        order = RunOrder(
+        order = RunRequest(
             preview.loaded, session.address, session.rig_file, session.rig_text, session.folder,
             operator=session.operator, film=session.film, notes=session.notes,
             seed=self._seed(), paced=self.paced.isChecked(), faults=self.faults,
@@ -120,10 +120,10 @@ class RunPage(QWidget):
         if self.live is not None:
             self.live.close()
         self.live, self._drawn, self._segments = live, (-1, None), preview.segments
-        self.plots.foresee(preview)
+        self.plots.show_prediction(preview)
         self.plots.start()
         self.log.clear()
-        self.result.say("")
+        self.result.show_text("")
         self.show_button.hide()
         self._frames.start()
         self._numbers.start()
@@ -135,7 +135,7 @@ class RunPage(QWidget):
     def stop(self) -> None:
         """Ramp down to 0 V, the second time at once; or take the first step back."""
         if self.runner.state is HighVoltage.RAMPING:
-            self.runner.stop_at_once()
+            self.runner.stop_without_ramp()
             return
         self.runner.stop()
         if not self.runner.running:
@@ -215,19 +215,21 @@ class RunPage(QWidget):
         if running:
             return
         if preview is None:
-            self.about.say("The sequence is being planned …", "muted")
+            self.about.show_text("The sequence is being planned …", "muted")
         elif preview.plan is None:
-            self.about.say(preview.sentence, "bad")
+            self.about.show_text(preview.sentence, "bad")
         elif preview.loaded is not None:
             name, seconds = preview.loaded.sequence.name, float(preview.plan.time[-1])
             if preview.playable:
                 rate = preview.plan.rate
-                self.about.say(f"{name}: {seconds:.1f} s at {rate:g} Hz on {session.address}", "")
+                self.about.show_text(
+                    f"{name}: {seconds:.1f} s at {rate:g} Hz on {session.address}", ""
+                )
             else:
-                self.about.say(f"{name} is refused: {'; '.join(preview.plan.reasons)}", "bad")
+                self.about.show_text(f"{name} is refused: {'; '.join(preview.plan.reasons)}", "bad")
         self.to_sequence.setVisible(preview is not None and not preview.playable)
         if preview is not None and self.live is None:
-            self.plots.foresee(preview)
+            self.plots.show_prediction(preview)
 
     @Slot()
     def _draw(self) -> None:
@@ -264,7 +266,7 @@ class RunPage(QWidget):
             kilovolts = now.values.get("monitor", float("nan")) * 1e-3
             self.badge.show_state(self.runner.state, f"{kilovolts:.2f} kV  {self._kind()}".rstrip())
 
-    def _show_numbers(self, now: Now) -> None:
+    def _show_numbers(self, now: RunSnapshot) -> None:
         for name, (scale, decimals) in _NUMBERS_SHOWN.items():
             self.numbers[name].show_number(now.values.get(name, float("nan")) * scale, decimals)
         for place in (0, 1):
@@ -281,7 +283,7 @@ class RunPage(QWidget):
             for model, why in zip(self.session.overlays, now.words, strict=False)
             if why
         ]
-        self.model_words.say("; ".join(words), "warn")
+        self.model_words.show_text("; ".join(words), "warn")
 
     @Slot(object)
     def _ended(self, end: RunEnd) -> None:
@@ -295,7 +297,7 @@ class RunPage(QWidget):
         where = f" · recorded in {end.path}" if end.path is not None else ""
         if end.path is not None and str(end.path) in end.sentence:
             where = ""
-        self.result.say(f"{end.headline}: {end.sentence}{where}", role)
+        self.result.show_text(f"{end.headline}: {end.sentence}{where}", role)
         self._last = end.path
         self.show_button.setVisible(end.path is not None)
         self.session.set_running(False)
@@ -368,14 +370,14 @@ class RunPage(QWidget):
     @Slot(object)
     def _model_loaded(self, model: OverlayModel) -> None:
         place, _ = self._asked.pop(0)
-        self.model_words.say("")
+        self.model_words.show_text("")
         self._place_model(place, model)
         self._load_next()
 
     @Slot(str)
     def _model_failed(self, sentence: str) -> None:
         self._asked.pop(0)
-        self.model_words.say(sentence, "bad")
+        self.model_words.show_text(sentence, "bad")
         self._load_next()
 
     @Slot()
@@ -411,7 +413,7 @@ class RunPage(QWidget):
         right.setSpacing(SPACE // 2)
         right.addLayout(self._asked_before())
         right.addLayout(self._overlay_row())
-        self.model_words = Sentence()
+        self.model_words = Message()
         right.addWidget(self.model_words)
         right.addWidget(self.plots, 1)
         right.addLayout(self._end_row())
@@ -537,14 +539,14 @@ class RunPage(QWidget):
         column = QVBoxLayout()
         column.setSpacing(SPACE // 2)
         row = QHBoxLayout()
-        self.about = Sentence()
+        self.about = Message()
         self.to_sequence = button("Mend the &sequence", "Go to the Sequence page")
         self.to_sequence.clicked.connect(self.show_sequence)
         row.addWidget(self.about, 1)
         row.addWidget(self.to_sequence)
         column.addLayout(row)
         row = QHBoxLayout()
-        self.result = Sentence()
+        self.result = Message()
         self.show_button = button("Show it among the &recordings", "Go to the Recordings page")
         self.show_button.clicked.connect(self._show_last)
         self.show_button.hide()

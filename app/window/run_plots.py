@@ -35,7 +35,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
         self._session = session
         self.window: float | None = 10.0
         self._duration = 1.0
-        self._foreseen: set[str] = set()
+        self._predicted: set[str] = set()
         self._low: dict[str, float] = {}
         self._high: dict[str, float] = {}
         self._plots: dict[str, pg.PlotItem] = {}
@@ -65,7 +65,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
         session.theme_changed.connect(self.restyle)
         session.overlays_changed.connect(self.restyle)
         self.restyle()
-        self.foresee(None)
+        self.show_prediction(None)
 
     def restyle(self) -> None:
         """Take the theme's colours, and the names of the models."""
@@ -101,15 +101,15 @@ class RunPlots(pg.GraphicsLayoutWidget):
             )
             legend.setParentItem(plot.getViewBox())
             self._legends.append(legend)
-            if name in self._foreseen:
+            if name in self._predicted:
                 legend.addItem(self._planned[name], "foreseen")
             for signal in _PLOTS[name][1]:
                 if words := self._words(signal):
                     legend.addItem(self._curves[signal], words)
 
-    def foresee(self, preview: Preview | None) -> None:
+    def show_prediction(self, preview: Preview | None) -> None:
         """Show what is foreseen, and forget what was drawn."""
-        self._foreseen.clear()
+        self._predicted.clear()
         nothing = np.empty(0)
         for curve in (*self._curves.values(), *self._planned.values()):
             curve.setData(nothing, nothing)
@@ -123,7 +123,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
                 self._include(name, y)
                 self._planned[name].setData(x, y * _SCALE[name], connect="finite")
                 if np.isfinite(y).any():
-                    self._foreseen.add(name)
+                    self._predicted.add(name)
         self._name()
         self._scale()
         self._show(0.0, self._duration)
@@ -132,7 +132,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
         """Room for the run that begins: what was foreseen is taken away, it would cost frames."""
         for curve in self._planned.values():
             curve.setData(np.empty(0), np.empty(0))
-        self._foreseen.clear()
+        self._predicted.clear()
         self._name()
         self._roll(0.0)
 

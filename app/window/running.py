@@ -28,7 +28,7 @@ from dearig.sim_backend.faults import FaultPlan
 from dearig.window.hv import HighVoltage
 from dearig.window.live import Live
 
-__all__ = ["RunEnd", "RunOrder", "Runner", "next_free"]
+__all__ = ["RunEnd", "RunRequest", "Runner", "next_recording_path"]
 
 _PROGRAM_FAULT = (
     "a fault of the program ended the run: see that the amplifier is at 0 V; what it was stands in "
@@ -44,7 +44,7 @@ _ENDS: dict[type[DearigError], str] = {
 
 
 @dataclass(frozen=True)
-class RunOrder:
+class RunRequest:
     """Everything that a run needs; ``folder`` gets the recording, in a file named by the sequence.
 
     ``seed`` is of the simulated noise, ``paced`` lets a simulated rig take its time, and ``faults``
@@ -114,7 +114,7 @@ class Runner(QObject):
             self._before = self._state
         self._set_state(HighVoltage.ARMED if armed else self._before)
 
-    def start(self, order: RunOrder, live: Live) -> bool:
+    def start(self, order: RunRequest, live: Live) -> bool:
         """The second step: begins a run that was armed; False where it was not."""
         if self.running or self._state is not HighVoltage.ARMED:
             return False
@@ -133,7 +133,7 @@ class Runner(QObject):
         self._thread.interrupts.ask()
         self._set_state(HighVoltage.RAMPING)
 
-    def stop_at_once(self) -> None:
+    def stop_without_ramp(self) -> None:
         """0 V without a ramp: for whoever pressed STOP and finds the ramp too slow."""
         if self._thread is not None:
             self._thread.interrupts.ask_at_once()
@@ -161,7 +161,7 @@ class Runner(QObject):
 
 
 class _RunThread(QThread):
-    def __init__(self, order: RunOrder, live: Live, parent: QObject) -> None:
+    def __init__(self, order: RunRequest, live: Live, parent: QObject) -> None:
         super().__init__(parent)
         self._order = order
         self._live = live
@@ -172,7 +172,7 @@ class _RunThread(QThread):
         order = self._order
         try:
             order.folder.mkdir(parents=True, exist_ok=True)
-            out = next_free(order.folder, order.loaded.sequence.name)
+            out = next_recording_path(order.folder, order.loaded.sequence.name)
         except OSError as error:
             self.end = RunEnd(
                 "Refused",
@@ -213,7 +213,7 @@ def _early_end(error: DearigError, out: Path, played: bool) -> RunEnd:
     return RunEnd(headline, sentence, out if out.exists() else None, safe)
 
 
-def next_free(folder: Path, name: str) -> Path:
+def next_recording_path(folder: Path, name: str) -> Path:
     """A file for a recording: the name of its sequence and the next number, ``thesis-007.h5``."""
     stem = re.sub(r"[^\w.]+", "-", name).strip("-.") or "run"
     stem = stem[:60]

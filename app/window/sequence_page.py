@@ -49,7 +49,7 @@ from dearig.window.layout_state import remember
 from dearig.window.preview_plots import PreviewPlots
 from dearig.window.session import Preview, Session
 from dearig.window.theme import SPACE
-from dearig.window.widgets import Sentence, button, card, label
+from dearig.window.widgets import Message, button, card, label
 
 __all__ = ["SequencePage"]
 
@@ -150,7 +150,7 @@ class SequencePage(QWidget):
         if text is None:
             self.session.sequence_path = path
             self.session.message.emit(f"saved {path}")
-            self.trouble.say("")
+            self.trouble.show_text("")
         elif not self._take(text, path.parent, path):
             return
         self.session.used(path)
@@ -158,16 +158,16 @@ class SequencePage(QWidget):
 
     @Slot(str)
     def _file_failed(self, sentence: str) -> None:
-        self.trouble.say(sentence)
+        self.trouble.show_text(sentence)
 
     def _take(self, toml: str, folder: Path, path: Path | None) -> bool:
         """Put another sequence in place of this one; False, with a word, where it is none."""
         try:
             self.draft.replace(toml)
         except InputError as error:
-            self.trouble.say(str(error))
+            self.trouble.show_text(str(error))
             return False
-        self.trouble.say("")
+        self.trouble.show_text("")
         self._sent = toml
         self.session.set_sequence(toml, folder, path)
         self._fill(0)
@@ -276,7 +276,7 @@ class SequencePage(QWidget):
 
     @Slot()
     def _planning(self) -> None:
-        self.state.say("planning …", "muted")
+        self.state.show_text("planning …", "muted")
         self._late.start()
 
     @Slot()
@@ -299,14 +299,14 @@ class SequencePage(QWidget):
         place = Place()
         if preview.playable and preview.plan is not None:
             seconds = float(preview.plan.time[-1])
-            self.state.say(
+            self.state.show_text(
                 f"✓ Passes the gate: {seconds:.2f} s, {preview.plan.voltage.size:,} samples", "good"
             )
         elif preview.plan is not None:
             reasons = "\n".join(f"✗ {reason}" for reason in preview.plan.reasons)
-            self.state.say(f"Refused, by the limits of the rig file:\n{reasons}", "bad")
+            self.state.show_text(f"Refused, by the limits of the rig file:\n{reasons}", "bad")
         else:
-            self.state.say(f"✗ {preview.sentence}", "bad")
+            self.state.show_text(f"✗ {preview.sentence}", "bad")
             place = place_of(preview.sentence)
         for row in range(self.table.rowCount()):
             item = self.table.item(row, 0)
@@ -452,7 +452,7 @@ class SequencePage(QWidget):
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
         outer.setSpacing(SPACE)
         outer.addWidget(self._tool_bar())
-        self.trouble = Sentence()
+        self.trouble = Message()
         outer.addWidget(self.trouble)
         self.split = QSplitter(Qt.Orientation.Horizontal)
         self.split.setChildrenCollapsible(False)
@@ -589,7 +589,7 @@ class SequencePage(QWidget):
         column.addWidget(self.plots, 1)
         below = QVBoxLayout()
         below.setSpacing(4)
-        self.state = Sentence()
+        self.state = Message()
         below.addWidget(self.state)
         grid = QGridLayout()
         grid.setHorizontalSpacing(2 * SPACE)

@@ -33,19 +33,19 @@ from dearig.analysis.compatibility import BRANCHES_MAX
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome
 from dearig.analysis.study import Study, Task, study
 from dearig.recording.files import in_words
-from dearig.report import diagnosis, tables, words
+from dearig.report import diagnosis, sentences, tables
 from dearig.report.numbers import seconds
 from dearig.report.page import write_report
 from dearig.report.tables import Table
 from dearig.units import readable
 from dearig.window.before_after_plot import BeforeAfterPlot
 from dearig.window.layout_state import remember
-from dearig.window.library import library_of
+from dearig.window.library import shared_library
 from dearig.window.report_table import ReportTable
 from dearig.window.residual_plots import ResidualPlots
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
-from dearig.window.widgets import Sentence, button, card, label
+from dearig.window.widgets import Message, button, card, label
 from dearig.window.worker import Job, Worker
 
 __all__ = ["StudyPage"]
@@ -73,7 +73,7 @@ class StudyPage(QWidget):
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
-        self._library = library_of(session)
+        self._library = shared_library(session)
         self._worker = Worker(self)
         self._job: Job | None = None
         self._shown: Study | None = None
@@ -180,7 +180,7 @@ class StudyPage(QWidget):
         return frame
 
     def _answering(self) -> QWidget:
-        self.saying = Sentence()
+        self.message = Message()
         self.headline = label("Nothing studied yet", "title")
         self.headline.setWordWrap(True)
         self.overlay_button = button(
@@ -225,7 +225,7 @@ class StudyPage(QWidget):
         outer = QVBoxLayout(side)
         outer.setContentsMargins(SPACE, 0, 0, 0)
         outer.addLayout(top)
-        outer.addWidget(self.saying)
+        outer.addWidget(self.message)
         outer.addWidget(self.tabs, 1)
         outer.addLayout(tools)
         return side
@@ -336,7 +336,7 @@ class StudyPage(QWidget):
         """Start the work on what is ticked."""
         if self._job is not None:
             return
-        self.saying.say("")
+        self.message.show_text("")
         task = self.task()
         self._job = self._worker.submit(
             study, task, self._session.folder, write_report, whole=task.diagnose
@@ -372,12 +372,12 @@ class StudyPage(QWidget):
     @Slot(str)
     def _failed(self, sentence: str) -> None:
         self._over()
-        self.saying.say(sentence)
+        self.message.show_text(sentence)
 
     @Slot()
     def _cancelled(self) -> None:
         self._over()
-        self.saying.say("Cancelled: nothing was kept.", "warn")
+        self.message.show_text("Cancelled: nothing was kept.", "warn")
 
     def _over(self) -> None:
         self._job = None
@@ -445,13 +445,13 @@ class StudyPage(QWidget):
             ("Training recordings", outcome.before.train, outcome.after.train),
         ):
             if before and after:
-                pieces.append(diagnosis.before_after(heading, before, after, outcome.kind))
-        pieces.append(diagnosis.road(outcome))
+                pieces.append(diagnosis.before_after_table(heading, before, after, outcome.kind))
+        pieces.append(diagnosis.step_table(outcome))
         if finding.steps:
             pieces.append(diagnosis.effect_table(outcome))
         self.verdict.show_pieces(pieces, diagnosis.warnings(outcome))
-        rounds: list[str | Table] = [diagnosis.ranking(found) for found in finding.rounds]
-        dropped = diagnosis.dropped(outcome)
+        rounds: list[str | Table] = [diagnosis.ranking_table(found) for found in finding.rounds]
+        dropped = diagnosis.dropped_effects(outcome)
         self.ranking.show_pieces(
             [*(rounds or ["No round of candidates was finished."]), *([dropped] if dropped else [])]
         )
@@ -471,7 +471,7 @@ class StudyPage(QWidget):
     def _show_fit(self, outcome: IdentifyOutcome) -> None:
         self.headline.setText(outcome.title)
         pieces: list[str | Table] = [
-            *words.identify_summary(outcome),
+            *sentences.identify_summary(outcome),
             tables.parameter_table(outcome.fit),
             tables.error_table("Training", outcome.train),
         ]
@@ -480,14 +480,14 @@ class StudyPage(QWidget):
                 tables.error_table(title, members)
                 for title, members in tables.by_thesis_table(outcome.validation, "Untouched")
             ]
-        self.verdict.show_pieces(pieces, words.warnings_of(outcome))
+        self.verdict.show_pieces(pieces, sentences.warnings_of(outcome))
         self.curves.show_pairs((*_pairs(outcome.validation, ()), *_pairs(outcome.train, ())))
 
     @Slot()
     def _use(self) -> None:
         if self._shown is not None:
             self.show_model.emit(self._shown.model)
-            self.saying.say("This model runs beside the next measurement.", "good")
+            self.message.show_text("This model runs beside the next measurement.", "good")
 
     @Slot()
     def _ask_save(self) -> None:
@@ -507,9 +507,9 @@ class StudyPage(QWidget):
         try:
             shutil.copyfile(self._shown.model, path)
         except OSError as error:
-            self.saying.say(f"{path} cannot be written: {in_words(error)}")
+            self.message.show_text(f"{path} cannot be written: {in_words(error)}")
         else:
-            self.saying.say(f"The model was saved as {path}.", "good")
+            self.message.show_text(f"The model was saved as {path}.", "good")
 
     @Slot()
     def _open_report(self) -> None:
@@ -517,7 +517,7 @@ class StudyPage(QWidget):
             return
         report = self._shown.report
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(report))):
-            self.saying.say(f"No program here opens pages; the report is {report}", "warn")
+            self.message.show_text(f"No program here opens pages; the report is {report}", "warn")
 
     @Slot()
     def _run(self) -> None:

@@ -21,10 +21,10 @@ __all__ = [
     "Theme",
     "apply",
     "digits",
-    "of_system",
     "pen",
     "prepare_plots",
     "style_plot",
+    "system_theme",
 ]
 
 SPACE = 8  #: px between things
@@ -103,7 +103,7 @@ DARK = Theme(
 )
 
 
-def of_system() -> Theme:
+def system_theme() -> Theme:
     """Light or dark, as the system has it; light where it does not say."""
     dark = QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
     return DARK if dark else LIGHT

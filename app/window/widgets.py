@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 
 from dearig.window.theme import SPACE, digits
 
-__all__ = ["Readout", "Sentence", "button", "card", "label", "set_role"]
+__all__ = ["Message", "Readout", "button", "card", "label", "set_role"]
 
 
 def label(text: str, role: str = "", tip: str = "") -> QLabel:
@@ -55,7 +55,7 @@ def card(layout: QLayout) -> QFrame:
     return frame
 
 
-class Sentence(QLabel):
+class Message(QLabel):
     """A message where it belongs: hidden while there is nothing to say."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -68,7 +68,7 @@ class Sentence(QLabel):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Minimum)
         self.hide()
 
-    def say(self, text: str, role: str = "bad") -> None:
+    def show_text(self, text: str, role: str = "bad") -> None:
         """Show ``text``; nothing, to hide."""
         set_role(self, role)
         self.setText(text)

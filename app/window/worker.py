@@ -14,7 +14,7 @@ from typing import Any
 from PySide6.QtCore import QObject, Qt, Signal, Slot
 
 from dearig.drivers.processes import isolated_spawn
-from dearig.window.workbench import Answer, Ask, Stop, serve
+from dearig.window.worker_process import Request, Response, StopRequest, serve
 
 __all__ = ["Estimate", "Job", "Worker"]
 
@@ -50,10 +50,10 @@ class Job(QObject):
     failed = Signal(str)
     cancelled = Signal()
 
-    def __init__(self, worker: Worker, ask: Ask, whole: bool) -> None:
+    def __init__(self, worker: Worker, ask: Request, whole: bool) -> None:
         super().__init__()  # no parent: it lives as long as somebody cares for it
         self._worker = worker
-        self.ask = ask
+        self.request = ask
         self.whole = whole
         self.asked_to_stop = False
 
@@ -97,7 +97,7 @@ class Worker(QObject):
         be pickled. A ``DearigError`` becomes ``failed`` with its sentence.
         """
         self._number += 1
-        job = Job(self, Ask(self._number, function, given), whole)
+        job = Job(self, Request(self._number, function, given), whole)
         (self._urgent if first else self._waiting).append(job)
         self._next()
         return job
@@ -121,7 +121,7 @@ class Worker(QObject):
                 self._next()
             else:
                 job.asked_to_stop = True
-                self._send(Stop(job.ask.number))
+                self._send(StopRequest(job.request.number))
 
     def clear(self) -> None:
         """Cancel everything that waits and is not urgent, not what is under way."""
@@ -145,7 +145,7 @@ class Worker(QObject):
         self._estimate = Estimate()
         if self._process is None:
             self._start()
-        self._send(self._current.ask)
+        self._send(self._current.request)
 
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
@@ -162,7 +162,7 @@ class Worker(QObject):
         )
         self._reader.start()
 
-    def _send(self, message: Ask | Stop) -> None:
+    def _send(self, message: Request | StopRequest) -> None:
         if self._connection is None:
             return
         try:
@@ -196,7 +196,7 @@ class Worker(QObject):
     # ------------------------------------------------------------ its answers
 
     @Slot(int, object)
-    def _take(self, life: int, answer: Answer | None) -> None:
+    def _take(self, life: int, answer: Response | None) -> None:
         if life != self._life:
             return
         job = self._current
@@ -209,7 +209,7 @@ class Worker(QObject):
                 self._end(job, "broken", f"{words}; start the work again")
             self._next()
             return
-        if job is None or answer.number != job.ask.number:
+        if job is None or answer.number != job.request.number:
             return
         if answer.kind == "progress":
             stage, fraction = answer.value

@@ -32,7 +32,7 @@ from dearig.drivers.channels import Channel, Scaling
 from dearig.drivers.rig import Block, RigIdentity
 from dearig.window.collector import Collector
 from dearig.window.live import Live
-from dearig.window.planner import foresee
+from dearig.window.planner import make_preview
 from dearig.window.run_plots import RunPlots
 from dearig.window.session import Session
 from dearig.window.theme import LIGHT, apply, prepare_plots
@@ -167,7 +167,7 @@ class Plain(pg.GraphicsLayoutWidget):
         self.frames += 1
 
 
-def go_on(seconds: float) -> None:
+def run_event_loop(seconds: float) -> None:
     loop = QEventLoop()
     QTimer.singleShot(round(1e3 * seconds), loop.quit)
     loop.exec()
@@ -191,10 +191,10 @@ def measure(
     timer.setTimerType(Qt.TimerType.PreciseTimer)
     timer.timeout.connect(draw)
     timer.start(FRAME)
-    go_on(WINDOW + 1.0)
+    run_event_loop(WINDOW + 1.0)
     listener, frames = Listener(), widget.frames
     began, worked = time.perf_counter(), time.thread_time()
-    go_on(seconds)
+    run_event_loop(seconds)
     drawn, worked = widget.frames - frames, time.thread_time() - worked
     rate = drawn / (time.perf_counter() - began)
     timer.stop()
@@ -217,7 +217,7 @@ def ours(models: int, window: float | None) -> tuple[Ours, Live, Source]:
     live.started(planned, RigIdentity("sim", True, (), CHANNELS), RATE)
     plots = Ours(session)
     plots.window = window
-    plots.foresee(foresee(SEQUENCE, Path(), RigFile()))
+    plots.show_prediction(make_preview(SEQUENCE, Path(), RigFile()))
     plots.start()
     return plots, live, Source(live.block)
 

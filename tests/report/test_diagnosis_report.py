@@ -14,13 +14,13 @@ from dearig.model.diagnosis import results as findings
 from dearig.report.as_json import diagnosis_json
 from dearig.report.diagnosis import (
     HEADLINES,
-    before_after,
-    dropped,
+    before_after_table,
+    dropped_effects,
     headline,
-    pooled,
-    ranking,
+    pooled_errors,
+    ranking_table,
     summary,
-    thesis_before_after,
+    thesis_before_after_table,
     warnings,
 )
 from dearig.report.diagnosis_figures import (
@@ -93,7 +93,7 @@ class TestPage:
                 if outcome.kind == "actuator":
                     assert significant(c.errors.e_rms_thesis_pct) in read.cells
 
-    def test_evidence_and_doubt(self, page):
+    def test_evidence_and_rivals(self, page):
         outcome, read = page
         for step in outcome.finding.steps:
             for sentence in step.evidence:
@@ -131,7 +131,10 @@ class TestWords:
 
     def test_the_numbers_of_the_summary(self):
         outcome = diagnose_outcome()
-        before, after = pooled(outcome.before.validation), pooled(outcome.after.validation)
+        before, after = (
+            pooled_errors(outcome.before.validation),
+            pooled_errors(outcome.after.validation),
+        )
         words = " ".join(summary(outcome))
         first, last = significant(before.rms * 1e6), significant(after.rms * 1e6)
         assert f"falls from {first} to {last}" in words
@@ -160,9 +163,9 @@ class TestWords:
         )  # fmt: skip
 
     def test_what_was_chosen_and_dropped(self):
-        assert dropped(diagnose_outcome()) == ""
+        assert dropped_effects(diagnose_outcome()) == ""
         other = replace(ROUND, chosen="load inertia")
-        said = dropped(diagnose_outcome(finding=finding(rounds=(other, ROUND))))
+        said = dropped_effects(diagnose_outcome(finding=finding(rounds=(other, ROUND))))
         assert said.startswith("load inertia was the best alone and is not in the final model")
 
 
@@ -170,7 +173,7 @@ class TestPooled:
     def test_over_all_samples(self):
         runs = [actuator_comparison(seed=1), actuator_comparison(seed=2, rate=40.0)]
         every = np.concatenate([c.measured - c.model for c in runs])
-        found = pooled(runs)
+        found = pooled_errors(runs)
         assert found.rms == pytest.approx(math.sqrt(np.mean(every**2)), rel=1e-12)
         assert found.max == np.abs(every).max()
         assert found.samples == every.size
@@ -182,32 +185,39 @@ class TestPooled:
 
     def test_of_one_it_is_that_ones(self):
         one = actuator_comparison()
-        found = pooled([one])
+        found = pooled_errors([one])
         assert found.rms == pytest.approx(one.errors.rms, rel=1e-12)
         assert found.nrmse_pct == pytest.approx(one.errors.nrmse_pct)
         assert found.peak_pct == pytest.approx(one.errors.peak_pct)
         assert found.e_m_thesis_pct == pytest.approx(one.errors.e_m_thesis_pct)
 
     def test_of_none_there_is_none(self):
-        assert pooled([]) is None
+        assert pooled_errors([]) is None
 
 
 class TestTables:
     def test_a_row_of_all_together(self):
         outcome = diagnose_outcome()
-        table = before_after("x", outcome.before.validation, outcome.after.validation, "actuator")
+        table = before_after_table(
+            "x", outcome.before.validation, outcome.after.validation, "actuator"
+        )
         assert [r.cells[0] for r in table.rows] == ["validation-0.h5", "validation-1.h5", "all"]
-        first, last = pooled(outcome.before.validation), pooled(outcome.after.validation)
+        first, last = (
+            pooled_errors(outcome.before.validation),
+            pooled_errors(outcome.after.validation),
+        )
         assert table.rows[-1].cells[1:3] == (
             significant(first.rms * 1e6), significant(last.rms * 1e6),
         )  # fmt: skip
         assert table.rows[-1].cells[5] == significant(first.rms / NOISE)
-        theirs = thesis_before_after("x", outcome.before.train, outcome.after.train, "actuator")
+        theirs = thesis_before_after_table(
+            "x", outcome.before.train, outcome.after.train, "actuator"
+        )
         assert len(theirs.rows) == 1
         assert {len(r.cells) for r in (*table.rows, *theirs.rows)} == {7}
 
     def test_ranking(self):
-        whole, brief = ranking(ROUND), ranking(ROUND, 3)
+        whole, brief = ranking_table(ROUND), ranking_table(ROUND, 3)
         assert len(whole.rows) == len(ROUND.candidates)
         assert [r.cells[-1] for r in brief.rows] == ["chosen", "not told apart", "helps, but less"]
         assert "9 more did worse" in brief.note
@@ -264,7 +274,7 @@ class TestJson:
     def test_its_numbers_are_those_of_the_outcome(self):
         outcome = diagnose_outcome()
         found = diagnosis_json(outcome)
-        last = pooled(outcome.after.validation)
+        last = pooled_errors(outcome.after.validation)
         assert found["final"]["validation"]["rms_um"] == pytest.approx(last.rms * 1e6)
         assert found["steps"][0]["validation"] == found["final"]["validation"]
         assert found["steps"][0]["selection"]["rms_um"] == pytest.approx(1.1 * 1.02)

@@ -13,7 +13,10 @@ from hypothesis.extra import numpy as hnp
 from dearig.analysis.decimate import decimate, decimate_path
 from dearig.analysis.residual import autocorrelation, even, spectrum
 from dearig.errors import InputError
-from dearig.report import figures
+from dearig.report import figure_style, figures
+from dearig.report.figure_export import save_png, svg
+from dearig.report.parameter_figures import branches_figure, parameters_figure
+from dearig.report.residual_figures import residual_figure, residual_panels
 from tests.tools.reports import (
     TRIALS,
     actuator_comparison,
@@ -177,13 +180,13 @@ class TestComparison:
         model = comparison.model.copy()
         model[600:] = np.nan
         broken = actuator_comparison(model=model)
-        figures.svg(figures.comparison_figure(broken), "f1", "broken")
-        figures.svg(figures.residual_figure(broken), "f2", "broken")
+        svg(figures.comparison_figure(broken), "f1", "broken")
+        svg(residual_figure(broken), "f2", "broken")
 
 
 class TestResidualFigure:
     def test_row(self):
-        histogram, correlation, density = figures.residual_figure(actuator_comparison()).axes
+        histogram, correlation, density = residual_figure(actuator_comparison()).axes
         assert histogram.get_xlabel() == "Error (µm)"
         area = sum(p.get_width() * p.get_height() for p in histogram.patches)
         assert area == pytest.approx(1.0, abs=0.01)
@@ -195,7 +198,7 @@ class TestResidualFigure:
         assert level == pytest.approx(math.sqrt(2.0 * 0.01))
 
     def test_panels_are_the_same_axes(self):
-        panels = figures.residual_panels(film_comparison())
+        panels = residual_panels(film_comparison())
         assert [f.axes[0].get_xlabel() for f in panels] == [
             "Error (kPa)",
             "Lag (s)",
@@ -206,8 +209,8 @@ class TestResidualFigure:
     def test_perfect_models_and_odd_noise(self, noise):
         comparison = actuator_comparison(noise=noise)
         for model in (comparison.measured, comparison.model):
-            drawn = figures.residual_figure(actuator_comparison(noise=noise, model=model))
-            figures.svg(drawn, "f1", "odd")
+            drawn = residual_figure(actuator_comparison(noise=noise, model=model))
+            svg(drawn, "f1", "odd")
 
     @pytest.mark.parametrize("size", [2, 3, 10])
     def test_few_samples(self, size):
@@ -217,12 +220,12 @@ class TestResidualFigure:
             for name in ("time", "drive", "measured", "model")
         }
         for draw in (figures.comparison_figure, figures.residual_figure, figures.loop_figure):
-            figures.svg(draw(actuator_comparison(**short)), "f1", "short")
+            svg(draw(actuator_comparison(**short)), "f1", "short")
 
 
 class TestParameters:
     def test_intervals_arrows_and_grey(self):
-        figure = figures.parameters_figure(fit())
+        figure = parameters_figure(fit())
         moduli, limits, times = figure.axes
         assert moduli.get_xlabel() == "Modulus (kPa)"
         assert limits.get_xlabel() == "Locking limit"
@@ -236,22 +239,22 @@ class TestParameters:
         arrows = [f.get_marker() for f in limits.lines if f.get_marker() in "<>"]
         assert sorted(arrows) == ["<", ">", ">"]
         undetermined = line(limits, "not determined by these data")
-        assert undetermined.get_color() == figures.UNSURE
+        assert undetermined.get_color() == figure_style.UNSURE
         assert undetermined.get_markerfacecolor() == "white"
 
     def test_table_3_stands_beside_by_relaxation_time(self):
-        times = figures.parameters_figure(fit()).axes[2]
+        times = parameters_figure(fit()).axes[2]
         beside = [f.get_xdata()[0] for f in times.lines if f.get_label() == "thesis, Table 3"]
         assert beside == pytest.approx([0.33969, 0.39802, 8.3874])
 
     def test_without_intervals_no_arrow_pretends_there_are(self):
-        for ax in figures.parameters_figure(without_intervals()).axes:
+        for ax in parameters_figure(without_intervals()).axes:
             assert not [f for f in ax.lines if f.get_marker() in "<>|"]
 
 
 class TestOtherFigures:
     def test_branches(self):
-        upper, lower = figures.branches_figure(TRIALS, "film").axes
+        upper, lower = branches_figure(TRIALS, "film").axes
         assert upper.get_ylabel() == "RMS error (kPa)"
         assert lower.get_xlabel() == "Number of branches"
         np.testing.assert_allclose(line(upper, "training").get_ydata(), [5.66, 2.53, 2.24])
@@ -279,24 +282,24 @@ class TestOtherFigures:
         figure = figures.overview_figure(
             actuator_comparison(), (actuator_comparison(name, "validation"),)
         )
-        figures.save_png(figure, tmp_path / "overview.png", dpi=40)
-        drawing = figures.svg(figure, "f1", name)
+        save_png(figure, tmp_path / "overview.png", dpi=40)
+        drawing = svg(figure, "f1", name)
         assert "<script" not in drawing
 
 
 class TestOutput:
     def test_png_is_written_as_a_whole(self, tmp_path):
-        path = figures.save_png(figures.loop_figure(film_comparison()), tmp_path / "a.png", dpi=50)
+        path = save_png(figures.loop_figure(film_comparison()), tmp_path / "a.png", dpi=50)
         assert path.read_bytes().startswith(b"\x89PNG")
         assert list(tmp_path.iterdir()) == [path]
 
     def test_png_into_no_folder_is_refused(self, tmp_path):
         with pytest.raises(InputError, match="no folder"):
-            figures.save_png(figures.loop_figure(film_comparison()), tmp_path / "no" / "a.png")
+            save_png(figures.loop_figure(film_comparison()), tmp_path / "no" / "a.png")
 
     def test_svg_stands_alone_and_stays_small(self):
         comparison = actuator_comparison(rate=20_000.0)
-        drawing = figures.svg(figures.comparison_figure(comparison), "f7", 'a "run"')
+        drawing = svg(figures.comparison_figure(comparison), "f7", 'a "run"')
         assert len(drawing) < 120_000
         assert "http" not in drawing
         assert 'role="img"' in drawing
@@ -307,8 +310,7 @@ class TestOutput:
 
     def test_drawing_twice_gives_the_same(self):
         first, second = (
-            figures.svg(figures.comparison_figure(actuator_comparison()), "f1", "x")
-            for _ in range(2)
+            svg(figures.comparison_figure(actuator_comparison()), "f1", "x") for _ in range(2)
         )
         assert first == second
 
@@ -316,12 +318,12 @@ class TestOutput:
         import matplotlib as mpl
 
         before = dict(mpl.rcParams)
-        figures.svg(figures.loop_figure(film_comparison()), "f1", "x")
+        svg(figures.loop_figure(film_comparison()), "f1", "x")
         assert dict(mpl.rcParams) == before
 
     def test_matplotlib_waits_until_something_is_drawn(self):
         code = (
-            "import sys, app.terminal, app.report.html, app.report.figures;"
+            "import sys, dearig.cli.terminal, dearig.report.html, dearig.report.figures;"
             "sys.exit(bool({'matplotlib', 'jinja2', 'h5py', 'scipy', 'numba'} & set(sys.modules)))"
         )
         assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -10,9 +10,14 @@ import pytest
 from dearig.analysis.outcomes import pooled_rms
 from dearig.errors import InputError
 from dearig.report.html import write_demo_report, write_identify_report, write_validate_report
-from dearig.report.numbers import NOTHING, interval, plain, quoted, seconds, significant, symbol
+from dearig.report.numbers import NO_VALUE, interval, quoted, seconds, significant, symbol, to_ascii
+from dearig.report.sentences import (
+    identify_summary,
+    undetermined_sentence,
+    validate_summary,
+    warnings_of,
+)
 from dearig.report.tables import error_table, parameter_table, thesis_error_table
-from dearig.report.words import doubts, identify_summary, validate_summary, warnings_of
 from tests.tools.reports import (
     actuator_comparison,
     film_comparison,
@@ -197,7 +202,7 @@ class TestNumbers:
             (0.0, 3, "0"),
             (-2.5, 2, "-2.5"),
             (math.inf, 3, "∞"),
-            (math.nan, 3, NOTHING),
+            (math.nan, 3, NO_VALUE),
         ],
     )
     def test_significant(self, value, digits, text):
@@ -223,8 +228,8 @@ class TestNumbers:
     def test_symbols_and_their_plain_form(self):
         assert symbol("mu_10") == "μ₁₀"
         assert symbol("share") == "share"
-        assert plain(f"{symbol('mu_10')} = {significant(1.5e-7, 2)}") == "mu_10 = 1.5 x 10^-7"
-        assert plain(f"{NOTHING} ∞ µm é") == "- inf um \\xe9"
+        assert to_ascii(f"{symbol('mu_10')} = {significant(1.5e-7, 2)}") == "mu_10 = 1.5 x 10^-7"
+        assert to_ascii(f"{NO_VALUE} ∞ µm é") == "- inf um \\xe9"
 
     @pytest.mark.parametrize(
         ("duration", "text"), [(12.34, "12.3 s"), (600.0, "10.0 min"), (9000.0, "2.50 h")]
@@ -239,7 +244,7 @@ class TestTables:
         row = error_table("x", (comparison,)).rows[0]
         assert row.cells[0] == "train.h5"
         assert row.cells[-1] == significant(comparison.errors.rms / comparison.noise)
-        assert error_table("x", (actuator_comparison(noise=None),)).rows[0].cells[-1] == NOTHING
+        assert error_table("x", (actuator_comparison(noise=None),)).rows[0].cells[-1] == NO_VALUE
 
     def test_film_has_no_thesis_table(self):
         assert thesis_error_table("x", (film_comparison(),)) is None
@@ -290,7 +295,10 @@ class TestWords:
         assert "a was used to fit this model" in " ".join(validate_summary(outcome))
 
     def test_doubts(self):
-        assert doubts(fit(estimates=(fit().estimates[2],))) == "The data determine every parameter."
+        assert (
+            undetermined_sentence(fit(estimates=(fit().estimates[2],)))
+            == "The data determine every parameter."
+        )
 
     def test_warnings_come_once_with_their_recording(self):
         train = actuator_comparison(warnings=("the laser lost its target", "it was warm."))

@@ -153,9 +153,9 @@ def views(window: MainWindow) -> Iterator[str]:
     study.begin()
     until(lambda: study.bar.value() > 250, "the search")
     yield "study-searching"
-    until(lambda: study._shown is not None or bool(study.saying.text()), "the diagnosis")
-    if study.saying.text():
-        sys.exit(study.saying.text())
+    until(lambda: study._shown is not None or bool(study.message.text()), "the diagnosis")
+    if study.message.text():
+        sys.exit(study.message.text())
     for index in range(study.tabs.count()):
         study.tabs.setCurrentIndex(index)
         yield f"study-{study.tabs.tabText(index).lower()}"
@@ -207,7 +207,7 @@ def main() -> None:
             if not name.startswith(asked.only):
                 continue
             for look in LOOKS:
-                window.set_look(look)
+                window.set_colour_scheme(look)
                 for width, height in SIZES if asked.out else SIZES[:1]:
                     window.resize(width, height)
                     settled()

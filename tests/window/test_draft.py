@@ -13,7 +13,7 @@ from dearig.config.toml_input import parse_toml
 from dearig.errors import InputError
 from dearig.window.draft import NEW_SEGMENTS, Draft, Place, has_comments, place_of, relative_csv
 from dearig.window.fields import form_fields, shown_value, typed_value
-from dearig.window.planner import foresee
+from dearig.window.planner import make_preview
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -56,7 +56,7 @@ def test_a_new_segment_can_be_played_as_it_stands(kind: str) -> None:
         draft.set_value(0, "phase_deg", 0.0)
         draft.set_value(0, "amplitude_kV", 0.0)
     draft.add("ramp", len(draft.segments), to_kV=0.0)
-    preview = foresee(draft.toml, Path(), RigFile())
+    preview = make_preview(draft.toml, Path(), RigFile())
     assert preview.playable, preview.sentence or preview.plan
 
 
@@ -127,7 +127,7 @@ def test_a_fault_is_found_where_it_is(changes: dict[str, object], place: Place) 
     draft = Draft(PRESETS["rich"])
     for key, value in changes.items():
         draft.set_value(2, key, value)
-    preview = foresee(draft.toml, Path(), RigFile())
+    preview = make_preview(draft.toml, Path(), RigFile())
     assert preview.sentence
     assert place_of(preview.sentence) == place
 
@@ -136,7 +136,7 @@ def test_a_fault_is_found_where_it_is(changes: dict[str, object], place: Place) 
 def test_a_fault_in_the_head_is_found(key: str, value: object) -> None:
     draft = Draft(PRESETS["rich"])
     draft.set_head(key, value)
-    assert place_of(foresee(draft.toml, Path(), RigFile()).sentence) == Place(None, key)
+    assert place_of(make_preview(draft.toml, Path(), RigFile()).sentence) == Place(None, key)
 
 
 def test_fields_have_words_units_and_bounds() -> None:
@@ -175,7 +175,7 @@ def test_what_breaks_a_limit_is_marked_where_it_does() -> None:
         'name = "fast"\n[[segment]]\nkind = "ramp"\nto_kV = 8.0\nduration_s = 0.004\n'
         '[[segment]]\nkind = "ramp"\nto_kV = 0.0\nduration_s = 1.0\n'
     )
-    preview = foresee(toml, Path(), RigFile())
+    preview = make_preview(toml, Path(), RigFile())
     assert not preview.playable
     (breach,) = preview.breaches
     assert breach.quantity == "slew"

@@ -129,10 +129,10 @@ def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
 
     # export, with a word where it went or why not
     page.export(folder / "low.h5", "csv", folder / "low.csv")
-    qtbot.waitUntil(lambda: "was written" in page.saying.text(), timeout=_PATIENCE)
+    qtbot.waitUntil(lambda: "was written" in page.message.text(), timeout=_PATIENCE)
     assert (folder / "low.csv").read_text().startswith("time_s,")
     page.export(folder / "low.h5", "csv", folder / "gone" / "low.csv")
-    qtbot.waitUntil(lambda: "there is no folder" in page.saying.text(), timeout=_PATIENCE)
+    qtbot.waitUntil(lambda: "there is no folder" in page.message.text(), timeout=_PATIENCE)
 
     # the sequence of one of them, to be played again
     page.choose([folder / "low.h5"])
@@ -153,15 +153,15 @@ def test_what_is_broken_is_said_and_what_can_be_mended_is_mended(session, keep, 
     page = open_page(session, keep, qtbot)
     assert cells(page, "State") == {"torn": "! incomplete", "letter": "✕ cannot be read"}
     page.choose([session.folder / "letter.h5"])
-    qtbot.waitUntil(lambda: "is not an HDF5 file" in page.saying.text(), timeout=_PATIENCE)
+    qtbot.waitUntil(lambda: "is not an HDF5 file" in page.message.text(), timeout=_PATIENCE)
     assert page.plot.shown == ()
     assert not page.recover_button.isEnabled()
     page.choose([path])
     drawn(page, qtbot, "torn")
-    assert page.saying.text() == ""
+    assert page.message.text() == ""
     click(qtbot, page.recover_button)
-    qtbot.waitUntil(lambda: "recovered" in page.saying.text(), timeout=_PATIENCE)
-    assert "2000 samples" in page.saying.text()
+    qtbot.waitUntil(lambda: "recovered" in page.message.text(), timeout=_PATIENCE)
+    assert "2000 samples" in page.message.text()
     with h5py.File(path) as file:  # as any program opens it
         assert file["entry/data/time"].size == 2000
 
@@ -192,5 +192,5 @@ def test_the_list_follows_the_folder(session, folder, keep, qtbot, tmp_path):
     session.set_folder(other)
     qtbot.waitUntil(lambda: set(cells(page, "Sequence")) == {"elsewhere"}, timeout=_PATIENCE)
     session.set_folder(tmp_path / "gone")
-    qtbot.waitUntil(lambda: "gone cannot be read" in page.saying.text(), timeout=_PATIENCE)
+    qtbot.waitUntil(lambda: "gone cannot be read" in page.message.text(), timeout=_PATIENCE)
     assert cells(page, "Sequence") == {}

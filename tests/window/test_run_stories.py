@@ -436,8 +436,8 @@ def test_nothing_is_cut_in_the_smallest_window(
 
 def test_colours_follow_the_choice(qtbot: QtBot, window: MainWindow) -> None:
     with qtbot.waitSignal(window.session.theme_changed):
-        window.set_look("dark")
+        window.set_colour_scheme("dark")
     assert window.session.theme.dark
     with qtbot.waitSignal(window.session.theme_changed):
-        window.set_look("light")
+        window.set_colour_scheme("light")
     assert not window.session.theme.dark

@@ -78,19 +78,19 @@ def test_no_curve_of_another_sequence_stays(qtbot: QtBot, page: SequencePage) ->
 def test_what_is_long_in_planning_is_not_shown_as_planned(
     qtbot: QtBot, page: SequencePage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    go_on = threading.Event()
-    real = planner_module.foresee
+    resume = threading.Event()
+    real = planner_module.make_preview
 
     def slow(*given: Any) -> Preview:
-        assert go_on.wait(60.0)
+        assert resume.wait(60.0)
         return real(*given)
 
-    monkeypatch.setattr(planner_module, "foresee", slow)
+    monkeypatch.setattr(planner_module, "make_preview", slow)
     assert page.plots.drawn
     page.preset("rich")
     qtbot.waitUntil(lambda: page.plots.drawn == ())
     assert page.state.text() == "planning …"
-    go_on.set()
+    resume.set()
     settled(qtbot, page.session)
     assert page.plots.drawn == ("voltage", "displacement", "field")
 

@@ -86,7 +86,7 @@ def test_a_fit_with_its_check_from_ticks_to_files(session, keep, qtbot, tmp_path
     page.save(tmp_path / "mine.toml")
     assert load_model(tmp_path / "mine.toml").name == load_model(found.model).name
     page.save(tmp_path / "gone" / "mine.toml")
-    assert "cannot be written: No such file" in page.saying.text()
+    assert "cannot be written: No such file" in page.message.text()
     with qtbot.waitSignal(page.show_model) as told:
         click(qtbot, page.overlay_button)
     assert told.args == [found.model]
@@ -101,7 +101,7 @@ def test_what_cannot_be_studied_is_said_and_leaves_nothing(session, keep, qtbot)
     qtbot.waitUntil(lambda: page.recordings.rowCount() == 2, timeout=_PATIENCE)
     page.tick([path], [copy])
     click(qtbot, page.start)
-    qtbot.waitUntil(lambda: "is a copy of" in page.saying.text(), timeout=_PATIENCE)
+    qtbot.waitUntil(lambda: "is a copy of" in page.message.text(), timeout=_PATIENCE)
     assert not list(session.folder.glob("study-*"))
     # the page is ready for the next
     page.tick([path], [])
@@ -109,11 +109,11 @@ def test_what_cannot_be_studied_is_said_and_leaves_nothing(session, keep, qtbot)
 
     # a search that is cancelled at once leaves nothing either
     click(qtbot, page.start)
-    qtbot.waitUntil(lambda: page.bar.value() > 0 or page.saying.text() != "", timeout=_PATIENCE)
-    assert page.saying.text() == ""
+    qtbot.waitUntil(lambda: page.bar.value() > 0 or page.message.text() != "", timeout=_PATIENCE)
+    assert page.message.text() == ""
     click(qtbot, page.cancel)
     click(qtbot, page.cancel)
-    assert page.saying.text() == "Cancelled: nothing was kept."
+    assert page.message.text() == "Cancelled: nothing was kept."
     assert not list(session.folder.glob("study-*"))
     assert page.start.isEnabled()
 

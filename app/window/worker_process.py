@@ -15,14 +15,14 @@ from typing import Any
 
 from dearig.errors import DearigError
 
-__all__ = ["Answer", "Ask", "Stop", "serve"]
+__all__ = ["Request", "Response", "StopRequest", "serve"]
 
 #: Of a stage: what is less than this is not worth a message.
 _STEP = 1.0 / 256.0
 
 
 @dataclass(frozen=True)
-class Ask:
+class Request:
     """Call ``function(*given, progress=...)``; all of it can be pickled."""
 
     number: int
@@ -31,14 +31,14 @@ class Ask:
 
 
 @dataclass(frozen=True)
-class Stop:
+class StopRequest:
     """End the work ``number`` as ctrl-C would, and keep what it keeps then."""
 
     number: int
 
 
 @dataclass(frozen=True)
-class Answer:
+class Response:
     """What came of the work ``number``.
 
     ``kind`` is progress (``value`` a stage and its fraction), done (``value`` is the result),
@@ -53,7 +53,7 @@ class Answer:
 def serve(connection: Connection) -> None:
     """Do what comes through ``connection`` until its other end is closed or gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    work: queue.SimpleQueue[Ask] = queue.SimpleQueue()
+    work: queue.SimpleQueue[Request] = queue.SimpleQueue()
     current: list[int] = []
     listener = threading.Thread(target=_listen, args=(connection, work, current), daemon=True)
     listener.start()
@@ -65,7 +65,7 @@ def serve(connection: Connection) -> None:
         connection.send(answer)
 
 
-def _listen(connection: Connection, work: queue.SimpleQueue[Ask], current: list[int]) -> None:
+def _listen(connection: Connection, work: queue.SimpleQueue[Request], current: list[int]) -> None:
     """Take messages while the main thread works."""
     while True:
         try:
@@ -73,7 +73,7 @@ def _listen(connection: Connection, work: queue.SimpleQueue[Ask], current: list[
         except (EOFError, OSError):
             # nobody is left to work for; whatever is under way writes its files as a whole
             os._exit(0)
-        if isinstance(message, Ask):
+        if isinstance(message, Request):
             work.put(message)
         elif message.number in current:
             _interrupt()
@@ -88,14 +88,14 @@ def _interrupt() -> None:
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
 
 
-def _done(connection: Connection, ask: Ask) -> Answer:
+def _done(connection: Connection, ask: Request) -> Response:
     last = ("", -1.0)
 
     def report(stage: str, fraction: float) -> None:
         nonlocal last
         if stage != last[0] or fraction - last[1] >= _STEP:
             last = (stage, fraction)
-            connection.send(Answer(ask.number, "progress", last))
+            connection.send(Response(ask.number, "progress", last))
 
     try:
         try:
@@ -105,11 +105,11 @@ def _done(connection: Connection, ask: Ask) -> Answer:
             # no message is torn by a late one
             signal.signal(signal.SIGINT, signal.SIG_IGN)
     except KeyboardInterrupt:
-        return Answer(ask.number, "stopped", None)
+        return Response(ask.number, "stopped", None)
     except DearigError as error:
-        return Answer(ask.number, "refused", str(error))
+        return Response(ask.number, "refused", str(error))
     except Exception as error:  # noqa: BLE001  (a defect must reach the person who waits)
         traceback.print_exc(file=sys.stderr)
         words = f"a defect of the program ended this work ({type(error).__name__}: {error})"
-        return Answer(ask.number, "broken", words)
-    return Answer(ask.number, "done", value)
+        return Response(ask.number, "broken", words)
+    return Response(ask.number, "done", value)

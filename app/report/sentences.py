@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "describe_model",
-    "doubts",
     "identify_summary",
     "listed",
+    "undetermined_sentence",
     "validate_summary",
     "warnings_of",
 ]
@@ -92,7 +92,7 @@ def identify_summary(outcome: IdentifyOutcome) -> tuple[str, ...]:
             f"Of {tried} branches, {chosen[0].branches} were chosen, by the information criterion "
             f"of the training data alone."
         )
-    said.append(doubts(outcome.fit))
+    said.append(undetermined_sentence(outcome.fit))
     return tuple(said)
 
 
@@ -120,7 +120,7 @@ def validate_summary(outcome: ValidateOutcome) -> tuple[str, ...]:
     return tuple(said)
 
 
-def doubts(fit: Identification) -> str:
+def undetermined_sentence(fit: Identification) -> str:
     """One sentence on what the data leave open."""
     if fit.covariance.size == 0:
         return (
