@@ -219,7 +219,7 @@ class TestResidualFigure:
             name: getattr(comparison, name)[300 : 300 + size]
             for name in ("time", "drive", "measured", "model")
         }
-        for draw in (figures.comparison_figure, figures.residual_figure, figures.loop_figure):
+        for draw in (figures.comparison_figure, residual_figure, figures.loop_figure):
             svg(draw(actuator_comparison(**short)), "f1", "short")
 
 
