@@ -1,1 +1,1 @@
-"""The operator's window."""
+"""Operator's window."""

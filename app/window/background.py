@@ -1,4 +1,4 @@
-"""A function in a thread of its own, whose answer comes back to the interface thread."""
+"""Run a function in a thread and deliver its result in the interface thread."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class _Thread(QThread):
         super().__init__(parent)
         self._function = function
         self.answer: Any = None
-        self.error = "a fault of the program: what it was stands in the terminal"
+        self.error = "an error in the program; the terminal shows its details"
 
     def run(self) -> None:
         try:
@@ -29,10 +29,10 @@ class _Thread(QThread):
 
 
 class Background(QObject):
-    """Runs one function at a time; of those that came while it was busy, the newest.
+    """Runs one function at a time, and then the newest of those that came while it was busy.
 
-    ``done`` brings what the function returned, ``failed`` the sentence of its ``DearigError``. An
-    answer that something newer has overtaken is not told. ``close`` waits for the thread.
+    ``done`` carries the function's result, ``failed`` the message of its ``DearigError``. The result
+    of a function is dropped when a newer function waits. ``close`` waits for the thread.
     """
 
     done = Signal(object)
@@ -50,7 +50,7 @@ class Background(QObject):
         return self._thread is not None
 
     def start(self, function: Callable[[], Any]) -> None:
-        """Run ``function``, now or as soon as the present one has ended."""
+        """Run ``function`` now, or as soon as the running one has ended."""
         if self._thread is not None:
             self._next = function
             return
@@ -60,7 +60,7 @@ class Background(QObject):
         self.busy_changed.emit(True)
 
     def close(self) -> None:
-        """Wait for what runs, and tell nothing of it."""
+        """Wait for the running function, and signal nothing."""
         self._next = None
         if self._thread is not None:
             self._thread.finished.disconnect(self._finished)

@@ -1,4 +1,4 @@
-"""One recording beside the model before and after: measurement with both, and both errors."""
+"""Plot of one recording with the models before and after a diagnosis, and their residuals."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _Pair = tuple[Comparison, Comparison | None]
 
 
 class BeforeAfterPlot(QWidget):
-    """Shows one of several recordings; the second model of a pair may be missing."""
+    """Shows one of several recordings; the second model of a pair may be None."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
         self._pairs: tuple[_Pair, ...] = ()
         self.record = QComboBox()
-        self.record.setToolTip("Untouched recordings come first: no fit and no choice saw them")
+        self.record.setToolTip("Validation recordings come first; no fit and no selection used them")
         of = QLabel("Recor&ding")
         of.setBuddy(self.record)
         self.error_summary = label("", "muted")
@@ -36,7 +36,7 @@ class BeforeAfterPlot(QWidget):
         top.addWidget(self.record)
         top.addWidget(self.error_summary, 1)
         self.area, self.plots = stacked_plots((2, 4, 3))
-        self.area.setAccessibleName("Measurement beside the models, and their errors")
+        self.area.setAccessibleName("Measurement, models and residuals")
         outer = QVBoxLayout(self)
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
         outer.addLayout(top)
@@ -45,12 +45,12 @@ class BeforeAfterPlot(QWidget):
         session.theme_changed.connect(self._draw)
 
     def show_pairs(self, pairs: tuple[_Pair, ...]) -> None:
-        """Show these, the first of them first."""
+        """Show these pairs, starting with the first."""
         self._pairs = pairs
         self.record.blockSignals(True)
         self.record.clear()
         for one, _ in pairs:
-            role = "fitted" if one.role == "train" else "untouched"
+            role = "training" if one.role == "train" else "validation"
             self.record.addItem(f"{one.name} ({role})")
         self.record.blockSignals(False)
         self._draw()

@@ -1,8 +1,8 @@
-"""Garbage is collected in the interface thread, and nowhere else.
+"""Garbage collection in the interface thread only.
 
-What a window lets go of hangs together in circles, which only the collector undoes. By itself it
-runs in whatever thread happens to need memory, and a part of a window that is destroyed from
-another thread than its own takes the program with it: here, in the middle of a run.
+Widgets that are no longer used refer to each other in cycles, which only the garbage collector
+frees. Python runs it in whichever thread allocates memory. Qt crashes when a widget is destroyed in
+another thread than its own, and a crash during a run leaves the rig without its program.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ _INTERVAL = 1000  # ms
 
 
 class Collector(QObject):
-    """From its making to ``close``, the only one who collects."""
+    """Collects garbage from its creation to ``close``; Python's own collection is off meanwhile."""
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         gc.disable()
         gc.collect()
-        gc.freeze()  # what is there from the start stays, and need not be looked at again
+        gc.freeze()  # objects of the start stay alive; later collections skip them
         self._timer = QTimer(self)
         self._timer.timeout.connect(self.collect)
         self._timer.start(_INTERVAL)
 
     @Slot()
     def collect(self) -> None:
-        """Collect as much as is due, as the interpreter would."""
+        """Collect the generations that are due by Python's own thresholds."""
         counts, thresholds = gc.get_count(), gc.get_threshold()
         due = [
             generation
@@ -41,7 +41,7 @@ class Collector(QObject):
             gc.collect(due[-1])
 
     def close(self) -> None:
-        """Leave it to the interpreter again."""
+        """Turn Python's own collection on again."""
         self._timer.stop()
         gc.unfreeze()
         gc.enable()

@@ -1,4 +1,4 @@
-"""Recordings over time, one or several: drive, measurement beside the model, and the residual."""
+"""Plot of one or several recordings over time: drive, measurement and model, residual."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class CurvesPlot(QWidget):
         self._session = session
         self._shown: tuple[Curves, ...] = ()
         self._with_model = True
-        # the measurement matters most
+        # the measurement gets the most space
         self._area, self.plots = stacked_plots((3, 5, 4))
-        self._area.setAccessibleName("Curves of the chosen recordings")
-        # above the plots and wrapped: names of six recordings would cover half of a plot
+        self._area.setAccessibleName("Curves of the selected recordings")
+        # above the plots and wrapped: the names of six recordings would cover half of a plot
         self.key = label("")
         self.key.setTextFormat(Qt.TextFormat.RichText)
         self.key.setWordWrap(True)
@@ -45,11 +45,11 @@ class CurvesPlot(QWidget):
 
     @property
     def shown(self) -> tuple[Curves, ...]:
-        """What is drawn."""
+        """Recordings that are drawn."""
         return self._shown
 
     def show_curves(self, curves: Sequence[Curves]) -> None:
-        """Draw ``curves``, all of one kind, in place of what was there; all of the time is seen."""
+        """Draw ``curves``, all of one kind, over their whole time."""
         self._shown = tuple(curves)
         self._draw()
         if self._shown:
@@ -61,7 +61,7 @@ class CurvesPlot(QWidget):
 
     @Slot(bool)
     def show_model(self, shown: bool) -> None:
-        """With the model and the residual, or the measurement alone."""
+        """Show or hide the model and the residual."""
         self._with_model = shown
         self._draw()
 
@@ -99,7 +99,7 @@ class CurvesPlot(QWidget):
             if alone:
                 named.append(("—", "model", beside))
             elif i == len(self._shown) - 1:
-                named.append(("- -", "model of each", theme.muted))
+                named.append(("- -", "model of each recording", theme.muted))
             add_curve(both, time, model * shown.factor, beside, dashed=not alone)
             time, left = curves.residual
             add_curve(residual, time, left * shown.error_factor, beside)

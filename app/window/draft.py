@@ -1,4 +1,4 @@
-"""A sequence that is being written: its tables, with undo and redo."""
+"""Sequence that is being edited: its tables, with undo and redo."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ NEW_SEGMENTS: dict[str, dict[str, Any]] = {
 
 
 class Draft:
-    """The tables of a sequence file; every change can be taken back.
+    """Tables of a sequence file, with undo and redo.
 
-    ``name``, ``lead_in_s`` and ``tail_s`` stand in ``head``, the segments in ``segments``.
+    ``data`` holds ``name``, ``lead_in_s``, ``tail_s`` and the list ``segment``.
     """
 
     def __init__(self, toml: str) -> None:
@@ -46,68 +46,71 @@ class Draft:
 
     @property
     def data(self) -> dict[str, Any]:
-        """The tables as they stand; not to be changed but by the methods here."""
+        """Current tables; only the methods of this class change them."""
         return self._states[self._at][0]
 
     @property
     def segments(self) -> list[dict[str, Any]]:
-        """The tables [[segment]]."""
+        """Current tables [[segment]]."""
         found: list[dict[str, Any]] = self.data["segment"]
         return found
 
     @property
     def toml(self) -> str:
-        """The sequence as the text of a file: as it was given, or written anew once changed."""
+        """Text of the sequence file: as it was given, or written from the tables after a change."""
         return self._states[self._at][1]
 
     @property
     def can_undo(self) -> bool:
-        """True where there is something to take back."""
+        """True if there is a change to undo."""
         return self._at > 0
 
     @property
     def can_redo(self) -> bool:
-        """True where something was taken back."""
+        """True if there is a change to redo."""
         return self._at < len(self._states) - 1
 
     def undo(self) -> None:
-        """Take the last change back."""
+        """Undo the last change."""
         self._at = max(self._at - 1, 0)
         self._last = ()
 
     def redo(self) -> None:
-        """Make it again."""
+        """Redo the change that was undone last."""
         self._at = min(self._at + 1, len(self._states) - 1)
         self._last = ()
 
     def replace(self, toml: str) -> None:
-        """Another sequence altogether; raises ``InputError`` where it is not TOML."""
+        """Replace the whole sequence. Raises ``InputError`` if ``toml`` is not TOML."""
         self._push(_tables(toml), toml)
 
     def set_head(self, key: str, value: Any) -> None:
-        """``name``, ``lead_in_s`` or ``tail_s``; None leaves it out."""
+        """Set ``name``, ``lead_in_s`` or ``tail_s``; None leaves the key out."""
         self._change(("head", key), lambda data: _put(data, key, value))
 
     def set_value(self, row: int, key: str, value: Any) -> None:
-        """A key of a segment; None leaves it out. Typing on in one key is one change."""
+        """Set a key of a segment; None leaves it out.
+
+        Consecutive changes of one key are one change, so that typing is undone at once.
+        """
         self._change((row, key), lambda data: _put(data["segment"][row], key, value))
 
     def add(self, kind: str, row: int, **given: Any) -> None:
-        """A new segment of ``kind`` before ``row``."""
+        """Insert a new segment of ``kind`` at ``row``; ``given`` replaces default values."""
         table = {"kind": kind, **copy.deepcopy(NEW_SEGMENTS[kind]), **given}
         self._change((), lambda data: data["segment"].insert(row, table))
 
     def duplicate(self, row: int) -> None:
-        """The segment in ``row`` once more, after it."""
+        """Insert a copy of the segment in ``row`` after it."""
         table = copy.deepcopy(self.segments[row])
         self._change((), lambda data: data["segment"].insert(row + 1, table))
 
     def remove(self, row: int) -> None:
-        """Take the segment in ``row`` away."""
+        """Remove the segment in ``row``."""
         self._change((), lambda data: data["segment"].pop(row))
 
     def move(self, row: int, to: int) -> None:
-        """Take the segment in ``row`` to another place."""
+        """Move the segment in ``row`` to the row ``to``."""
         self._change((), lambda data: data["segment"].insert(to, data["segment"].pop(row)))
 
     def _change(self, what: tuple[object, ...], change: Any) -> None:
@@ -145,27 +148,28 @@ def _tables(toml: str) -> dict[str, Any]:
     return {"name": "", **{k: v for k, v in data.items() if k != "segment"}, "segment": segments}
 
 
-# texts first: a # in one of them begins no comment, nor does a quotation mark in a comment a text
+# strings are matched first: a # inside a string begins no comment, and a quotation mark inside a
+# comment begins no string
 _TEXT_OR_COMMENT = re.compile(
     r'''"""(?:\\.|[^\\])*?"""|"(?:\\.|[^"\\\n])*"''' r"|'''.*?'''|'[^'\n]*'|#[^\n]*", re.DOTALL
 )
 
 
 def has_comments(toml: str) -> bool:
-    """True where ``toml`` holds what its tables do not: a change writes these anew."""
+    """Return True if ``toml`` has comments; text written from the tables has none."""
     return any(found[0].startswith("#") for found in _TEXT_OR_COMMENT.finditer(toml))
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a fault is: ``row`` of the segment from 0, and ``key``; None where it is in none."""
+    """Place of a fault: ``row`` of the segment from 0, and ``key``; None outside of segments."""
 
     row: int | None = None
     key: str | None = None
 
 
 def place_of(sentence: str) -> Place:
-    """Where the fault is that ``sentence`` (of ``dearig.config.sequencefile``) tells of."""
+    """Return the place of the fault that ``sentence`` of ``dearig.config.sequencefile`` names."""
     kinds = "|".join(SEGMENT_KINDS)
     key = r"(?:: (\w+?)(?:\[\d+\])? (?:=|is))?"
     found = re.search(rf"segment (\d+)(?: \((?:{kinds})\))?{key}", sentence)
@@ -176,9 +180,10 @@ def place_of(sentence: str) -> Place:
 
 
 def relative_csv(path: Path, folder: Path) -> str:
-    """How a sequence in ``folder`` names the CSV file at ``path``; whole where it lies elsewhere.
+    """Return the name of the CSV file ``path`` in a sequence that lies in ``folder``.
 
-    A sequence reads nothing but what lies by it, and says so of a file elsewhere.
+    The whole path is returned for a file outside of ``folder``: a sequence reads only files of its
+    own folder, and its check says so.
     """
     inside = path.is_relative_to(folder)
     return (path.relative_to(folder) if inside else path).as_posix()

@@ -1,4 +1,4 @@
-"""What a form asks for: the keys of a file that people write, with words, units and bounds."""
+"""Fields of a form, made from the keys of a file: labels, units, defaults and bounds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dearig.config.toml_input import allowed
 
 __all__ = ["FormField", "form_fields", "shown_value", "typed_value"]
 
-# as they stand at the end of a key -> as a person writes them
+# unit at the end of a key -> unit as it is printed
 _UNITS = {
     "kV_per_s": "kV/s", "MV_per_m": "MV/m", "V_per_us": "V/µs", "V_per_kV": "V/kV",
     "V_per_mA": "V/mA", "V_per_V": "V/V", "mm_per_V": "mm/V", "celsius_per_V": "°C/V",
@@ -26,30 +26,30 @@ _UNITS = {
 
 @dataclass(frozen=True)
 class FormField:
-    """One key: its name in words, its unit, what it means and what it may hold.
+    """One key of a file: label, unit, description and allowed values.
 
-    ``kind`` is number, whole, text, numbers (a list) or choice (one of ``choices``); ``default`` is
-    what it holds where it is left out, None where it may stay empty or has to be given.
+    ``kind`` is number, whole, text, numbers (a list) or choice (one of ``choices``). ``default`` is
+    the value of an empty field; None if the field is required or may stay empty.
     """
 
     key: str
     label: str
     unit: str
-    about: str
-    may: str
+    description: str
+    allowed: str
     kind: str
     choices: tuple[Any, ...]
     default: Any
 
     @property
     def tip(self) -> str:
-        """Everything there is to know, for a tooltip."""
+        """Key, description, unit and allowed values, for a tooltip."""
         unit = f", in {self.unit}" if self.unit else ""
-        return f"{self.key}: {self.about}{unit} ({self.may})"
+        return f"{self.key}: {self.description}{unit} ({self.allowed})"
 
 
 def form_fields(table: type[BaseModel], leave_out: tuple[str, ...] = ()) -> Iterator[FormField]:
-    """The fields of a table, in its order."""
+    """Yield the fields of a table, in its order."""
     for key, info in table.model_fields.items():
         if key not in leave_out:
             yield _field(key, info)
@@ -84,7 +84,7 @@ def _bare(kind: Any) -> Any:
 
 
 def shown_value(value: Any) -> str:
-    """A value as it stands in a field of a form."""
+    """Return the text of a value in a form."""
     if value is None:
         return ""
     if isinstance(value, list):
@@ -93,9 +93,9 @@ def shown_value(value: Any) -> str:
 
 
 def typed_value(field: FormField, text: str) -> Any:
-    """The value that was typed; None for an empty field.
+    """Return the value of the typed ``text``; None for an empty field.
 
-    What is no number stays text, for the file's own check to refuse in its own words.
+    Text that is not a number stays text; the check of the file refuses it with a sentence.
     """
     text = text.strip()
     if not text:

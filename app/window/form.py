@@ -10,13 +10,13 @@ from PySide6.QtWidgets import QComboBox, QGridLayout, QLineEdit, QWidget
 
 from dearig.window.fields import FormField, shown_value, typed_value
 from dearig.window.theme import SPACE
-from dearig.window.widgets import Message, label
+from dearig.window.widgets import Message, label, set_wrong
 
 __all__ = ["Form"]
 
 
 class Form(QWidget):
-    """Asks for ``fields``; ``changed`` brings key and value as soon as something was typed."""
+    """Edits ``fields``; ``changed`` carries key and value after each key press."""
 
     changed = Signal(str, object)
 
@@ -45,7 +45,7 @@ class Form(QWidget):
             grid.addWidget(widget, row, 1)
             grid.addWidget(label(field.unit, "muted"), row, 2)
             if explain:
-                about = label(field.about, "muted", field.tip)
+                about = label(field.description, "muted", field.tip)
                 about.setWordWrap(True)
                 grid.addWidget(about, row, 3)
             fault = Message()
@@ -57,18 +57,14 @@ class Form(QWidget):
         grid.setRowStretch(2 * len(self._fields), 1)
 
     def show_faults(self, faults: Mapping[str, str]) -> None:
-        """Say beside each field what is wrong with it, and nothing beside the others."""
+        """Show each fault beside its field, and clear the others."""
         for key, sentence in self._faults.items():
             words = faults.get(key, "")
             sentence.show_text(words)
-            widget = self._widgets[key]
-            if bool(widget.property("wrong")) != bool(words):
-                widget.setProperty("wrong", bool(words))
-                widget.style().unpolish(widget)
-                widget.style().polish(widget)
+            set_wrong(self._widgets[key], bool(words))
 
     def show_values(self, values: Mapping[str, Any]) -> None:
-        """Show other values; what is being typed is left alone where it means the same."""
+        """Show other values; a field whose text already means its value keeps its text."""
         for key, widget in self._widgets.items():
             field, value = self._fields[key], values.get(key)
             if isinstance(widget, QComboBox):
@@ -77,11 +73,11 @@ class Form(QWidget):
                 widget.setText(shown_value(value))
 
     def field(self, key: str) -> QLineEdit | QComboBox:
-        """The widget that asks for ``key``."""
+        """Return the widget of ``key``."""
         return self._widgets[key]
 
     def fault(self, key: str) -> str:
-        """What is said beside ``key``."""
+        """Return the fault that is shown beside ``key``."""
         return self._faults[key].text()
 
     def _widget(self, field: FormField, value: Any) -> QLineEdit | QComboBox:
@@ -95,7 +91,7 @@ class Form(QWidget):
         line = QLineEdit(shown_value(value))
         line.setToolTip(field.tip)
         line.setAccessibleName(f"{field.label} {field.unit}".rstrip())
-        empty = "left out" if field.default is None else shown_value(field.default)
+        empty = "empty" if field.default is None else shown_value(field.default)
         line.setPlaceholderText(empty)
         line.textEdited.connect(lambda text: self._typed(field, text))
         return line

@@ -1,4 +1,4 @@
-"""The window's guide: the documents that ``dearig docs`` shows, from the operator's page on."""
+"""Guide of the window: the documents that ``dearig docs`` shows, opened at the operator's page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The state of the high voltage: a colour, a shape and words, readable at two metres."""
+"""State of the high voltage as a colour, a shape and a word, readable at two metres."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["HighVoltage", "HighVoltageBadge"]
 
 
 class HighVoltage(Enum):
-    """What may be on the electrodes, as far as this program knows."""
+    """Voltage that may be on the electrodes, as far as this program knows."""
 
     SAFE = "SAFE  0 V"
     ARMED = "ARMED"
@@ -24,15 +24,15 @@ class HighVoltage(Enum):
 
 
 _EXPLAINED = {
-    HighVoltage.SAFE: "The output of this program is at 0 V. Before you touch the film, see that "
-    "the amplifier shows 0 V too.",
-    HighVoltage.ARMED: "The next key starts the run. Keep away from the electrodes.",
-    HighVoltage.ON: "A sequence is playing: there may be 8 kV and more on the electrodes.",
-    HighVoltage.RAMPING: "The voltage is on its way to 0 V.",
-    HighVoltage.UNCONFIRMED: "It is not known whether the output is at 0 V: switch the amplifier's "
+    HighVoltage.SAFE: "The output of this program is at 0 V. Check that the amplifier also shows "
+    "0 V before you touch the film.",
+    HighVoltage.ARMED: "Start begins the run. Keep away from the electrodes.",
+    HighVoltage.ON: "A sequence is playing. The electrodes may carry 8 kV and more.",
+    HighVoltage.RAMPING: "The voltage is being ramped down to 0 V.",
+    HighVoltage.UNCONFIRMED: "It is not known whether the output is at 0 V. Switch the amplifier's "
     "high voltage off by hand.",
 }
-# white or black on these is readable, and they look the same by day and by night
+# background and text; the same in the light and the dark theme
 _COLOURS = {
     HighVoltage.SAFE: ("#00785a", "#ffffff"),
     HighVoltage.ARMED: ("#f0b429", "#16181d"),
@@ -43,7 +43,7 @@ _COLOURS = {
 
 
 class HighVoltageBadge(QWidget):
-    """Shows a ``HighVoltage``, with the voltage in kV beside it where that is known."""
+    """Shows a ``HighVoltage``, and the voltage in kV where it is known."""
 
     def __init__(self, session: Session, large: bool, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -56,11 +56,11 @@ class HighVoltageBadge(QWidget):
 
     @property
     def state(self) -> HighVoltage:
-        """What it shows."""
+        """State that is shown."""
         return self._state
 
     def show_state(self, state: HighVoltage, detail: str = "") -> None:
-        """Show ``state``, with ``detail`` such as 7.9 kV."""
+        """Show ``state``, and ``detail`` such as 7.9 kV beside it."""
         self._state, self._detail = state, detail
         self.setToolTip(_EXPLAINED[state])
         self.setAccessibleName(f"High voltage: {state.value} {detail}")
@@ -101,7 +101,7 @@ class HighVoltageBadge(QWidget):
 
 
 def _shape(painter: QPainter, state: HighVoltage, spot: QRectF, colour: QColor) -> None:
-    """A ring for safe, a triangle for armed, a bolt for voltage, an arrow down, a crossed box."""
+    """Draw a ring (safe), triangle (armed), bolt (on), arrow down (ramping) or crossed box."""
     painter.setPen(QPen(colour, max(2.0, spot.width() / 9)))
     painter.setBrush(Qt.BrushStyle.NoBrush)
 

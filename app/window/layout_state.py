@@ -1,4 +1,4 @@
-"""The room that the parts of a page have, kept from one start to the next."""
+"""Sizes of the parts of a page, kept from one start to the next."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from PySide6.QtWidgets import QSplitter
 
 __all__ = ["GROUP", "remember"]
 
-#: Of the settings: what is removed with it is as at the first start.
-GROUP = "room"
+#: Group of the settings with all sizes; without it the window has its default layout.
+GROUP = "layout"
 
 
 def remember(splitter: QSplitter, settings: QSettings, name: str) -> None:
-    """Give ``splitter`` the sizes that it was left with, and keep what is made of them."""
+    """Restore the sizes of ``splitter`` from ``settings``, and save them when they change."""
     key = f"{GROUP}/{name}"
     state = settings.value(key)
     if isinstance(state, QByteArray):

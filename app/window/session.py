@@ -182,7 +182,7 @@ class Session(QObject):
             found = [found]
         return [Path(str(name)) for name in found] if isinstance(found, list) else []
 
-    def used(self, path: Path) -> None:
+    def add_recent(self, path: Path) -> None:
         """Put ``path`` first among the recent sequence files."""
         names = [str(path), *(str(p) for p in self.recent if p != path)]
         self.settings.setValue("recent", names[:_RECENT_MAX])

@@ -1,6 +1,8 @@
-"""Small parts of which the pages are made."""
+"""Small widgets that the pages share."""
 
 from __future__ import annotations
+
+import math
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
@@ -8,18 +10,29 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QLayout,
+    QMenu,
     QPushButton,
     QSizePolicy,
+    QToolButton,
     QWidget,
 )
 
 from dearig.window.theme import SPACE, digits
 
-__all__ = ["Message", "Readout", "button", "card", "label", "set_role"]
+__all__ = [
+    "Message",
+    "Readout",
+    "button",
+    "card",
+    "label",
+    "menu_button",
+    "set_role",
+    "set_wrong",
+]
 
 
 def label(text: str, role: str = "", tip: str = "") -> QLabel:
-    """Words; ``role`` is one of the theme's: title, heading, muted, good, warn, bad."""
+    """Make a label; ``role`` is one of the theme's: title, heading, muted, good, warn, bad."""
     made = QLabel(text)
     if role:
         made.setProperty("role", role)
@@ -29,16 +42,26 @@ def label(text: str, role: str = "", tip: str = "") -> QLabel:
 
 
 def set_role(widget: QWidget, role: str) -> None:
-    """Let a widget that is shown already take another role."""
-    if widget.property("role") == role:
+    """Give a widget another role, also while it is shown."""
+    _set_property(widget, "role", role)
+
+
+def set_wrong(widget: QWidget, wrong: bool) -> None:
+    """Mark a field as holding a wrong value, or not."""
+    if bool(widget.property("wrong")) != wrong:
+        _set_property(widget, "wrong", wrong)
+
+
+def _set_property(widget: QWidget, name: str, value: object) -> None:
+    if widget.property(name) == value:
         return
-    widget.setProperty("role", role)
-    widget.style().unpolish(widget)
+    widget.setProperty(name, value)
+    widget.style().unpolish(widget)  # the style sheet looks at properties only here
     widget.style().polish(widget)
 
 
 def button(text: str, tip: str, primary: bool = False) -> QPushButton:
-    """A button that says in its tip what it does; & stands before the letter of its key."""
+    """Make a button with a tooltip; & stands before the letter of its key."""
     made = QPushButton(text)
     made.setToolTip(tip)
     if primary:
@@ -46,8 +69,19 @@ def button(text: str, tip: str, primary: bool = False) -> QPushButton:
     return made
 
 
+def menu_button(text: str, tip: str, menu: QMenu) -> QToolButton:
+    """Make a button that opens ``menu``."""
+    made = QToolButton()
+    made.setText(text)
+    made.setToolTip(tip)
+    made.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+    made.setMinimumHeight(28)
+    made.setMenu(menu)
+    return made
+
+
 def card(layout: QLayout) -> QFrame:
-    """A frame around ``layout``."""
+    """Make a frame around ``layout``."""
     frame = QFrame()
     frame.setProperty("role", "card")
     layout.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
@@ -56,7 +90,7 @@ def card(layout: QLayout) -> QFrame:
 
 
 class Message(QLabel):
-    """A message where it belongs: hidden while there is nothing to say."""
+    """A message beside what it is about; hidden while it is empty."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -69,7 +103,7 @@ class Message(QLabel):
         self.hide()
 
     def show_text(self, text: str, role: str = "bad") -> None:
-        """Show ``text``; nothing, to hide."""
+        """Show ``text`` in the colour of ``role``; an empty text hides the message."""
         set_role(self, role)
         self.setText(text)
         self.setVisible(bool(text))
@@ -95,14 +129,13 @@ class Readout(QWidget):
         self.setAccessibleName(name)
 
     def show_number(self, value: float, decimals: int) -> None:
-        """Show ``value``, or a dash where it is not a number."""
-        # a dash keeps the place of a number without being one
-        # + 0.0: what is rounded to nothing is not negative
-        text = f"{round(value, decimals) + 0.0:.{decimals}f}" if value == value else "—"
+        """Show ``value``, or a dash where it is NaN."""
+        # + 0.0 turns a negative zero, which a small negative value is rounded to, into zero
+        text = "—" if math.isnan(value) else f"{round(value, decimals) + 0.0:.{decimals}f}"
         if self._value.text() != text:
             self._value.setText(text)
 
     @property
     def text(self) -> str:
-        """What it shows."""
+        """Text that is shown."""
         return self._value.text()

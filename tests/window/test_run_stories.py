@@ -91,9 +91,9 @@ def test_from_the_first_start_to_the_first_recording(qtbot: QtBot, window: MainW
 def test_a_wrong_sequence_is_refused_marked_and_mended(qtbot: QtBot, window: MainWindow) -> None:
     page, session = window.sequence_page, window.session
     window.show_page(page)
-    qtbot.keyClick(page.table, Qt.Key.Key_Down)
-    assert page._form is not None
-    field = page._form.field("amplitudes_kV")
+    qtbot.keyClick(page.editor.table, Qt.Key.Key_Down)
+    assert page.editor.form is not None
+    field = page.editor.form.field("amplitudes_kV")
     assert isinstance(field, QLineEdit)
 
     def retype(text: str) -> None:
@@ -105,16 +105,16 @@ def test_a_wrong_sequence_is_refused_marked_and_mended(qtbot: QtBot, window: Mai
         )
 
     retype("6, 6.5, 7, 9, 8")
-    assert "voltage reaches 9 kV" in page.state.text()
-    assert "8.5 kV is allowed" in page.state.text()
-    assert page.plots.marks == 2  # both periods
+    assert "voltage reaches 9 kV" in page.preview.state.text()
+    assert "8.5 kV is allowed" in page.preview.state.text()
+    assert page.preview.plots.marks == 2  # both periods
     assert not window.run_page.arm_button.isEnabled()
     retype("6, 6.5, seven, 9, 8")
-    assert "takes a number" in page._form.fault("amplitudes_kV")
-    assert page.table.item(0, 0).text() == "✗ 1"
+    assert "takes a number" in page.editor.form.fault("amplitudes_kV")
+    assert page.editor.table.item(0, 0).text() == "✗ 1"
     retype("6, 6.5, 7, 7.5, 8")
-    assert "Passes the gate" in page.state.text()
-    assert page.plots.marks == 0
+    assert "Within all limits" in page.preview.state.text()
+    assert page.preview.plots.marks == 0
     assert window.run_page.arm_button.isEnabled()
 
 
@@ -157,7 +157,7 @@ def test_stop_ends_any_segment(
     qtbot.waitUntil(lambda: seconds(page) >= 0.6, timeout=RUN_MS)
     assert page.runner.state is HighVoltage.ON
     if kind != "lead-in":
-        assert kind in page.segment.text() or not page.segment.text()
+        assert kind in page.controls.segment.text() or not page.segment.text()
     with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
         click(qtbot, page.stop_button)
         assert page.runner.state is HighVoltage.RAMPING
@@ -288,7 +288,7 @@ def test_two_models_of_one_name_stay_apart(qtbot: QtBot, run_page: RunPage, tmp_
         run_page.show_model(path, place)
     qtbot.waitUntil(lambda: [m.path for m in run_page.session.overlays if m.path] != [])
     qtbot.waitUntil(lambda: len(run_page.session.overlays) == 2)
-    masses = [choice.currentData().actuator.load.mass for choice in run_page.models]
+    masses = [choice.currentData().actuator.load.mass for choice in run_page.overlays.models]
     assert masses == [0.15, 0.25]
 
 
@@ -350,8 +350,8 @@ def test_another_model_in_mid_run_starts_from_its_beginning(
     click(qtbot, page.arm_button)
     click(qtbot, page.start_button)
     qtbot.waitUntil(lambda: seconds(page) > 0.5, timeout=RUN_MS)
-    page.models[1].setCurrentIndex(1)
-    page.models[1].activated.emit(1)
+    page.overlays.models[1].setCurrentIndex(1)
+    page.overlays.models[1].activated.emit(1)
     assert len(session.overlays) == 2
     live = page.live
     assert live is not None
@@ -361,7 +361,7 @@ def test_another_model_in_mid_run_starts_from_its_beginning(
         return x.size > 300 and np.array_equal(x, again) and np.array_equal(one, two)
 
     qtbot.waitUntil(same, timeout=RUN_MS)
-    assert page.numbers["rms 1"].isVisible()
+    assert page.controls.numbers["rms 1"].isVisible()
     page.stop()
     qtbot.waitUntil(lambda: not page.runner.running, timeout=RUN_MS)
 
@@ -371,7 +371,7 @@ def test_a_model_file_that_is_none_is_told_where_it_was_asked(
 ) -> None:
     (tmp_path / "m.toml").write_text('format = "dearig-model/9"\n')
     run_page.show_model(tmp_path / "m.toml")
-    qtbot.waitUntil(lambda: "dearig-model/9" in run_page.model_words.text())
+    qtbot.waitUntil(lambda: "dearig-model/9" in run_page.overlays.message.text())
     assert len(run_page.session.overlays) == 1
 
 

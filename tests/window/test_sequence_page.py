@@ -21,6 +21,14 @@ from dearig.window.session import Preview, Session
 
 WAIT = 60_000
 
+TOO_HIGH = """\
+name = "too high"
+[[segment]]
+kind = "half_sine"
+amplitude_kV = 14.0
+frequency_Hz = 0.5
+"""
+
 
 @pytest.fixture
 def page(session: Session, keep: Callable[[QWidget], None], qtbot: QtBot):
@@ -47,11 +55,11 @@ def kinds(page: SequencePage) -> list[str]:
 def test_a_preset_is_taken_and_drawn(qtbot: QtBot, page: SequencePage) -> None:
     page.preset("rich")
     settled(qtbot, page.session)
-    assert page.table.rowCount() == 6
-    assert page.heads["name"].text() == "rich"
-    assert "Passes the gate: 40.92 s" in page.state.text()
-    assert page.table.item(0, 3).text() == "11.4"
-    voltage, bar = page.margins[0]
+    assert page.editor.table.rowCount() == 6
+    assert page.editor.heads["name"].text() == "rich"
+    assert "Within all limits: 40.92 s" in page.preview.state.text()
+    assert page.editor.table.item(0, 3).text() == "11.4"
+    voltage, bar = page.preview.margins[0]
     assert voltage.text() == "voltage: 8 of 8.5 kV"
     assert bar.value() == 94
 
@@ -59,20 +67,19 @@ def test_a_preset_is_taken_and_drawn(qtbot: QtBot, page: SequencePage) -> None:
 def test_no_curve_of_another_sequence_stays(qtbot: QtBot, page: SequencePage) -> None:
     page.preset("rich")
     settled(qtbot, page.session)
-    assert page.plots.drawn == ("voltage", "displacement", "field")
-    page.choose(1)
-    page._typed("repeats", 0)
+    assert page.preview.plots.drawn == ("voltage", "displacement", "field")
+    page.editor.choose(1)
+    page.editor.set_value("repeats", 0)
     settled(qtbot, page.session)
-    assert page.state.text().startswith("✗ ")
-    assert page.plots.drawn == ()
-    assert [bool(page.table.item(row, 3).text()) for row in range(3)] == [True, False, True]
-    page.undo()
+    assert page.preview.state.text().startswith("✗ ")
+    assert page.preview.plots.drawn == ()
+    assert [bool(page.editor.table.item(row, 3).text()) for row in range(3)] == [True, False, True]
+    page.editor.undo()
     settled(qtbot, page.session)
-    assert page.plots.drawn == ("voltage", "displacement", "field")
-    page.draft.add("half_sine", 0, amplitude_kV=14.0)  # of which the film is not foreseen
-    page._send()
+    assert page.preview.plots.drawn == ("voltage", "displacement", "field")
+    page.session.set_sequence(TOO_HIGH, Path())  # the film has no equilibrium there
     settled(qtbot, page.session)
-    assert page.plots.drawn == ("voltage",)
+    assert page.preview.plots.drawn == ("voltage",)
 
 
 def test_what_is_long_in_planning_is_not_shown_as_planned(
@@ -86,22 +93,22 @@ def test_what_is_long_in_planning_is_not_shown_as_planned(
         return real(*given)
 
     monkeypatch.setattr(planner_module, "make_preview", slow)
-    assert page.plots.drawn
+    assert page.preview.plots.drawn
     page.preset("rich")
-    qtbot.waitUntil(lambda: page.plots.drawn == ())
-    assert page.state.text() == "planning …"
+    qtbot.waitUntil(lambda: page.preview.plots.drawn == ())
+    assert page.preview.state.text() == "Planning …"
     resume.set()
     settled(qtbot, page.session)
-    assert page.plots.drawn == ("voltage", "displacement", "field")
+    assert page.preview.plots.drawn == ("voltage", "displacement", "field")
 
 
 def test_segments_are_added_moved_and_taken_back_by_keys(qtbot: QtBot, page: SequencePage) -> None:
     page.preset("rich")
     before = kinds(page)
-    page.choose(1)
-    page.add("hold")
+    page.editor.choose(1)
+    page.editor.add("hold")
     assert kinds(page) == [*before[:2], "hold", *before[2:]]
-    assert page.table.currentRow() == 2
+    assert page.editor.table.currentRow() == 2
     alt, ctrl = Qt.KeyboardModifier.AltModifier, Qt.KeyboardModifier.ControlModifier
 
     def press(key: Qt.Key, with_: Qt.KeyboardModifier, then: list[str]) -> None:
@@ -114,9 +121,9 @@ def test_segments_are_added_moved_and_taken_back_by_keys(qtbot: QtBot, page: Seq
     press(Qt.Key.Key_Delete, ctrl, lower)
     press(Qt.Key.Key_Up, alt, [*before[:2], "hold", *before[2:]])
     press(Qt.Key.Key_Z, ctrl, lower)
-    page.undo()
-    page.undo()
-    page.undo()
+    page.editor.undo()
+    page.editor.undo()
+    page.editor.undo()
     press(Qt.Key.Key_Z, ctrl, before)
     press(
         Qt.Key.Key_Z, ctrl | Qt.KeyboardModifier.ShiftModifier, [*before[:2], "hold", *before[2:]]
@@ -130,9 +137,9 @@ def test_a_file_is_saved_read_again_and_remembered(
     qtbot: QtBot, page: SequencePage, tmp_path: Path
 ) -> None:
     page.preset("rich")
-    page.draft.set_head("tail_s", 4.0)
-    page._fill(0)
-    page._send()
+    field = page.editor.heads["tail_s"]
+    field.clear()
+    qtbot.keyClicks(field, "4")
     text = page.session.sequence_toml
     with qtbot.waitSignal(page.session.message):
         page.save_file(tmp_path / "mine.toml")
@@ -153,11 +160,11 @@ def test_comments_are_not_lost_without_a_word(
     page.open_file(path)
     qtbot.waitUntil(lambda: page.session.sequence_path == path)
     with qtbot.waitSignal(page.session.message):
-        page._save()  # nothing was changed: it is the same file
+        page.save()  # nothing was changed: it is the same file
     assert path.read_text() == noted
-    page.choose(1)
-    page.remove()
-    page._save()
+    page.editor.choose(1)
+    page.editor.remove()
+    page.save()
     qtbot.waitUntil(lambda: "noted.toml has comments (#)" in page.trouble.text())
     assert path.read_text() == noted
     with qtbot.waitSignal(page.session.message):
@@ -168,7 +175,7 @@ def test_comments_are_not_lost_without_a_word(
     with qtbot.waitSignal(page.session.message):
         page.save_file(path)
     assert path.read_text() == page.session.sequence_toml == page.draft.toml
-    page.undo()  # and what is undone has them again
+    page.editor.undo()  # and what is undone has them again
     assert page.session.sequence_toml == noted
 
 
@@ -198,9 +205,9 @@ def drop(page: SequencePage, path: Path) -> None:
 def test_files_are_dropped(qtbot: QtBot, page: SequencePage, tmp_path: Path) -> None:
     (tmp_path / "rich.toml").write_text(PRESETS["rich"])
     drop(page, tmp_path / "rich.toml")
-    qtbot.waitUntil(lambda: page.table.rowCount() == 6)
+    qtbot.waitUntil(lambda: page.editor.table.rowCount() == 6)
     (tmp_path / "w.csv").write_text("time_s,voltage_kV\n0,0\n1,5\n2,0\n")
-    page.choose(5)
+    page.editor.choose(5)
     drop(page, tmp_path / "w.csv")
     settled(qtbot, page.session)
     assert page.draft.segments[6] == {"kind": "csv", "file": "w.csv"}  # beside rich.toml
@@ -214,13 +221,13 @@ def test_a_csv_that_is_none_is_told_at_its_segment(
     (tmp_path / "w.csv").write_text("t,v\n0,0\n1,5\n")
     page.add_csv(tmp_path / "w.csv")
     settled(qtbot, page.session)
-    assert "a waveform takes time_s" in page.state.text()
-    assert page.table.item(1, 0).text() == "✗ 2"
+    assert "a waveform takes time_s" in page.preview.state.text()
+    assert page.editor.table.item(1, 0).text() == "✗ 2"
 
 
 def test_what_another_page_proposes_is_shown(qtbot: QtBot, page: SequencePage) -> None:
     page.session.set_sequence(PRESETS["rich"], Path())
-    assert page.table.rowCount() == 6
-    page.undo()
+    assert page.editor.table.rowCount() == 6
+    page.editor.undo()
     assert page.session.sequence_toml == page.draft.toml
     assert kinds(page) == ["thesis"]

@@ -1,0 +1,93 @@
+"""Preview of a sequence: predicted curves, the verdict of the gate, and the margins to limits."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QTimer, Slot
+from PySide6.QtWidgets import QGridLayout, QLabel, QProgressBar, QVBoxLayout, QWidget
+
+from dearig.drivers.gate import Margin
+from dearig.window.preview_plots import PreviewPlots
+from dearig.window.session import Preview, Session
+from dearig.window.theme import SPACE
+from dearig.window.widgets import Message, card, label
+
+__all__ = ["PreviewPanel"]
+
+_MARGINS_MAX = 6
+#: Time in ms for which the last plan stays drawn, so that the plots do not flicker while one types.
+_CLEAR_AFTER = 300
+
+
+class PreviewPanel(QWidget):
+    """Shows the plan of a sequence while it is edited."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.plots = PreviewPlots(session)
+        self.state = Message()
+        self.margins: list[tuple[QLabel, QProgressBar]] = []
+        self._clear = QTimer(self, singleShot=True, interval=_CLEAR_AFTER)
+        self._clear.timeout.connect(self._clear_plots)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.plots, 1)
+        below = QVBoxLayout()
+        below.setSpacing(4)
+        below.addWidget(self.state)
+        below.addLayout(self._margin_bars())
+        column.addWidget(card(below))
+
+    def show_planning(self) -> None:
+        """Say that a plan is being made; the curves of the last one are removed after a while."""
+        self.state.show_text("Planning …", "muted")
+        self._clear.start()
+
+    def show_preview(self, preview: Preview) -> None:
+        """Show a plan, or why there is none."""
+        self._clear.stop()
+        self.plots.show_preview(preview)
+        if preview.playable and preview.plan is not None:
+            seconds = float(preview.plan.time[-1])
+            samples = preview.plan.voltage.size
+            self.state.show_text(
+                f"✓ Within all limits: {seconds:.2f} s, {samples:,} samples", "good"
+            )
+        elif preview.plan is not None:
+            reasons = "\n".join(f"✗ {reason}" for reason in preview.plan.reasons)
+            self.state.show_text(f"Refused by the limits of the rig file:\n{reasons}", "bad")
+        else:
+            self.state.show_text(f"✗ {preview.sentence}", "bad")
+        waveform = None if preview.plan is None else preview.plan.waveform
+        self._show_margins(() if waveform is None else waveform.margins)
+
+    @Slot()
+    def _clear_plots(self) -> None:
+        self.plots.show_preview(None)
+
+    def _show_margins(self, margins: tuple[Margin, ...]) -> None:
+        for row, (words, bar) in enumerate(self.margins):
+            there = row < len(margins)
+            words.setVisible(there)
+            bar.setVisible(there)
+            if there:
+                margin = margins[row]
+                words.setText(
+                    f"{margin.quantity}: {margin.reached:.4g} of {margin.allowed:.4g} {margin.unit}"
+                )
+                share = margin.reached / margin.allowed if margin.allowed > 0.0 else 0.0
+                bar.setValue(round(100 * min(max(share, 0.0), 1.0)))
+
+    def _margin_bars(self) -> QGridLayout:
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(2 * SPACE)
+        for i in range(_MARGINS_MAX):
+            words, bar = label(""), QProgressBar()
+            bar.setTextVisible(False)
+            bar.setFixedHeight(6)
+            bar.setToolTip("Share of the limit that is used")
+            grid.addWidget(words, 2 * (i // 2), i % 2)
+            grid.addWidget(bar, 2 * (i // 2) + 1, i % 2)
+            words.hide()
+            bar.hide()
+            self.margins.append((words, bar))
+        return grid

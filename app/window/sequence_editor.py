@@ -1,0 +1,311 @@
+"""Editor of a sequence: its name and rests, the table of segments, and one segment's fields."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from PySide6.QtCore import Qt, Signal, Slot
+from PySide6.QtGui import QKeySequence
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHBoxLayout,
+    QHeaderView,
+    QLineEdit,
+    QMenu,
+    QPushButton,
+    QScrollArea,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from dearig.config.sequencefile import SEGMENT_KINDS
+from dearig.window.draft import Draft, Place
+from dearig.window.fields import FormField, form_fields, shown_value
+from dearig.window.form import Form
+from dearig.window.theme import SPACE
+from dearig.window.widgets import button, label, menu_button, set_wrong
+
+__all__ = ["SequenceEditor"]
+
+_COLUMNS = ("", "Kind", "Settings", "Duration (s)")
+_DURATION = 3  # column
+_LEAST_WIDTH = 430  # px
+
+
+class SequenceEditor(QWidget):
+    """Shows and changes a ``Draft``.
+
+    ``edited``: the draft has changed; ``row_chosen``: another segment is chosen; ``file_wanted``: a
+    segment that reads a CSV file is to be added.
+    """
+
+    edited = Signal()
+    row_chosen = Signal()
+    file_wanted = Signal()
+
+    def __init__(self, toml: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.draft = Draft(toml)
+        self.form: Form | None = None
+        self._form_of: tuple[int, str] | None = None  # row and kind
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(SPACE)
+        column.addLayout(self._head_row())
+        column.addWidget(self._segment_table(), 3)
+        column.addLayout(self._row_buttons())
+        self._form_area = QScrollArea()
+        self._form_area.setWidgetResizable(True)
+        self._form_area.setFrameShape(QScrollArea.Shape.NoFrame)
+        column.addWidget(self._form_area, 3)
+        self.setMinimumWidth(_LEAST_WIDTH)
+
+    # changes
+
+    def replace(self, toml: str) -> None:
+        """Replace the draft by another sequence. Raises ``InputError`` where it is not TOML."""
+        self.draft.replace(toml)
+        self.fill(0)
+
+    def choose(self, row: int) -> None:
+        """Choose the segment in ``row``."""
+        self.table.setCurrentCell(row, 1)
+
+    def add(self, kind: str, **given: Any) -> None:
+        """Add a segment of ``kind`` after the chosen one, with ``given`` in place of defaults."""
+        row = self.table.currentRow() + 1 if self.draft.segments else 0
+        self._change(lambda: self.draft.add(kind, row, **given), row)
+
+    @Slot()
+    def duplicate(self) -> None:
+        """Add a copy of the chosen segment after it."""
+        row = self.table.currentRow()
+        if row >= 0:
+            self._change(lambda: self.draft.duplicate(row), row + 1)
+
+    @Slot()
+    def remove(self) -> None:
+        """Remove the chosen segment."""
+        row = self.table.currentRow()
+        if row >= 0:
+            self._change(lambda: self.draft.remove(row), max(row - 1, 0))
+
+    def shift(self, by: int) -> None:
+        """Move the chosen segment up (-1) or down (1)."""
+        row = self.table.currentRow()
+        if row >= 0 and 0 <= row + by < len(self.draft.segments):
+            self._change(lambda: self.draft.move(row, row + by), row + by)
+
+    @Slot()
+    def undo(self) -> None:
+        """Undo the last change."""
+        self._change(self.draft.undo, self.table.currentRow())
+
+    @Slot()
+    def redo(self) -> None:
+        """Redo the change that was undone last."""
+        self._change(self.draft.redo, self.table.currentRow())
+
+    def set_value(self, key: str, value: Any) -> None:
+        """Set ``key`` of the chosen segment; None leaves it out."""
+        row = self.table.currentRow()
+        if row >= 0:
+            self.draft.set_value(row, key, value)
+            self._fill_row(row)
+            self.edited.emit()
+
+    def _change(self, change: Callable[[], None], row: int) -> None:
+        change()
+        self.fill(row)
+        self.edited.emit()
+
+    def _head_typed(self, key: str, text: str) -> None:
+        value: Any = text
+        if key != "name":
+            try:
+                value = float(text) if text.strip() else None
+            except ValueError:
+                value = text  # the check of the file refuses it with a sentence
+        self.draft.set_head(key, value)
+        self.edited.emit()
+
+    # display
+
+    def fill(self, row: int) -> None:
+        """Show the draft, with the segment in ``row`` chosen."""
+        self._form_of = None
+        self.table.blockSignals(True)
+        self.table.setRowCount(len(self.draft.segments))
+        for i in range(len(self.draft.segments)):
+            self._fill_row(i)
+        self.table.blockSignals(False)
+        self.table.setCurrentCell(min(row, len(self.draft.segments) - 1), 1)
+        self._row_changed()
+        for key, field in self.heads.items():
+            text = shown_value(self.draft.data.get(key))
+            if field.text() != text:
+                field.setText(text)
+
+    def show_fault(self, place: Place, sentence: str) -> None:
+        """Mark ``place`` as wrong and say why beside its field; ``Place()`` marks nothing."""
+        for row in range(self.table.rowCount()):
+            item = self.table.item(row, 0)
+            if item is not None:
+                item.setText(f"✗ {row + 1}" if row == place.row else str(row + 1))
+        if self.form is not None:
+            here = place.key is not None and place.row == self.table.currentRow()
+            self.form.show_faults({str(place.key): sentence} if here else {})
+        for key, field in self.heads.items():
+            set_wrong(field, place.row is None and place.key == key)
+
+    def show_durations(self, durations: Iterable[float]) -> None:
+        """Show the durations in s of all segments as they are played, repeats one by one."""
+        played = iter(durations)
+        for row in range(len(self.draft.segments)):
+            total = sum(next(played) for _ in range(self._repeats(row)))
+            self._set_duration(row, f"{total:.3g}")
+
+    def clear_duration(self, row: int | None) -> None:
+        """Show no duration for the segment in ``row``, which cannot be played."""
+        if row is not None:
+            self._set_duration(row, "")
+
+    def chosen_segments(self) -> slice:
+        """Return the place of the chosen row among the segments as they are played."""
+        row = self.table.currentRow()
+        if row < 0:
+            return slice(0, 0)
+        before = sum(self._repeats(i) for i in range(row))
+        return slice(before, before + self._repeats(row))
+
+    def _repeats(self, row: int) -> int:
+        return int(self.draft.segments[row].get("repeats", 1))
+
+    def _set_duration(self, row: int, text: str) -> None:
+        item = self.table.item(row, _DURATION)
+        if item is not None:
+            item.setText(text)
+
+    @Slot()
+    def _row_changed(self) -> None:
+        row = self.table.currentRow()
+        self._show_form(row)
+        for made in self._needs_row:
+            made.setEnabled(row >= 0)
+        self.row_chosen.emit()
+
+    def _show_form(self, row: int) -> None:
+        segments = self.draft.segments
+        if not 0 <= row < len(segments) or segments[row].get("kind") not in SEGMENT_KINDS:
+            self._put_form(None, None)
+            return
+        table = segments[row]
+        kind = str(table["kind"])
+        if self._form_of == (row, kind) and self.form is not None:
+            self.form.show_values(table)
+            return
+        form = Form(_fields(kind), table, explain=True)
+        form.changed.connect(self.set_value)
+        self._put_form(form, (row, kind))
+
+    def _put_form(self, form: Form | None, of: tuple[int, str] | None) -> None:
+        self.form, self._form_of = form, of
+        self._form_area.setWidget(form if form is not None else label("", "muted"))
+
+    def _fill_row(self, row: int) -> None:
+        table = self.draft.segments[row]
+        kind = str(table.get("kind", "?"))
+        settings = ", ".join(
+            f"{field.label} {shown_value(table[field.key])} {field.unit}".rstrip()
+            for field in (_fields(kind) if kind in SEGMENT_KINDS else ())
+            if field.key in table and not (field.key == "repeats" and table[field.key] == 1)
+        )
+        kept = self.table.item(row, _DURATION)
+        for column, text in enumerate(
+            (str(row + 1), kind.replace("_", " "), settings, kept.text() if kept else "")
+        ):
+            item = QTableWidgetItem(text)
+            item.setFlags(Qt.ItemFlag.ItemIsSelectable | Qt.ItemFlag.ItemIsEnabled)
+            item.setToolTip(settings)
+            if column == _DURATION:
+                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            self.table.setItem(row, column, item)
+
+    # layout
+
+    def _head_row(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        self.heads: dict[str, QLineEdit] = {}
+        for key, words, tip, default, share in (
+            ("name", "&Name", "Name of the sequence and of its recordings", "", 4),
+            ("lead_in_s", "&Lead-in (s)", "Rest at 0 V before the first segment", "2", 1),
+            ("tail_s", "&Tail (s)", "Rest at 0 V after the last segment", "1", 1),
+        ):
+            field = QLineEdit()
+            field.setPlaceholderText(default)
+            tip = f"{tip}; {default} s if empty" if default else tip
+            field.setToolTip(tip)
+            field.textEdited.connect(lambda text, key=key: self._head_typed(key, text))
+            caption = label(words, tip=tip)
+            caption.setBuddy(field)
+            row.addWidget(caption)
+            row.addWidget(field, share)
+            self.heads[key] = field
+        return row
+
+    def _segment_table(self) -> QTableWidget:
+        self.table = QTableWidget(0, len(_COLUMNS))
+        self.table.setHorizontalHeaderLabels(_COLUMNS)
+        self.table.verticalHeader().hide()
+        self.table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.table.setTabKeyNavigation(False)
+        self.table.setShowGrid(False)
+        self.table.setAccessibleName("Segments")
+        header = self.table.horizontalHeader()
+        for column, mode in enumerate(
+            (QHeaderView.ResizeMode.ResizeToContents, QHeaderView.ResizeMode.ResizeToContents,
+             QHeaderView.ResizeMode.Stretch, QHeaderView.ResizeMode.ResizeToContents)
+        ):  # fmt: skip
+            header.setSectionResizeMode(column, mode)
+        self.table.itemSelectionChanged.connect(self._row_changed)
+        return self.table
+
+    def _row_buttons(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        kinds = QMenu(self)
+        for kind in SEGMENT_KINDS:
+            action = kinds.addAction(kind.replace("_", " "))
+            action.triggered.connect(lambda _=False, kind=kind: self._add_from_menu(kind))
+        self.add_button = menu_button("+ A&dd", "Add a segment after the chosen one", kinds)
+        row.addWidget(self.add_button)
+        self._needs_row: list[QPushButton] = []
+        for words, tip, key, done in (
+            ("Duplicate", "Duplicate the chosen segment", "Ctrl+D", self.duplicate),
+            ("Remove", "Remove the chosen segment", "Ctrl+Del", self.remove),
+            ("▲", "Move the chosen segment up", "Alt+Up", lambda: self.shift(-1)),
+            ("▼", "Move the chosen segment down", "Alt+Down", lambda: self.shift(1)),
+        ):
+            made = button(words, f"{tip} ({key})")
+            made.setAccessibleName(tip)
+            made.setShortcut(QKeySequence(key))
+            made.clicked.connect(done)
+            row.addWidget(made)
+            self._needs_row.append(made)
+        row.addStretch(1)
+        return row
+
+    def _add_from_menu(self, kind: str) -> None:
+        if kind == "csv":
+            self.file_wanted.emit()
+        else:
+            self.add(kind)
+
+
+def _fields(kind: str) -> list[FormField]:
+    """Return the fields of a segment kind, the number of repeats last."""
+    fields = list(form_fields(SEGMENT_KINDS[kind], ("kind",)))
+    return sorted(fields, key=lambda field: field.key == "repeats")
