@@ -27,7 +27,9 @@ class BeforeAfterPlot(QWidget):
         self._session = session
         self._pairs: tuple[_Pair, ...] = ()
         self.record = QComboBox()
-        self.record.setToolTip("Validation recordings come first; no fit and no selection used them")
+        self.record.setToolTip(
+            "Validation recordings come first; no fit and no selection used them"
+        )
         of = QLabel("Recor&ding")
         of.setBuddy(self.record)
         self.error_summary = label("", "muted")
