@@ -1,0 +1,136 @@
+"""Reference pages that are made from the code: ``python -m tests.docs.reference`` writes them all.
+
+They are kept under version control, so that they can be read without running anything; a test
+compares them with the code.
+"""
+
+from __future__ import annotations
+
+import enum
+import inspect
+import re
+import tempfile
+import typing
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from typer.main import get_command
+
+from dearig.cli.main import app
+from dearig.config.rigfile import write_default
+
+FOLDER = Path(__file__).parents[2] / "app" / "docs" / "reference"
+
+_COMMANDS = """\
+# Commands
+
+Made from the code by `python -m tests.docs.reference`.
+
+`RIG` is `sim` (a simulated rig that is the thesis's model), `sim:SEED` (one that hides an effect),
+`daqmx:Dev1` (the card in this computer) or `daqmx:Dev1@HOST:PORT` (a card behind NI's gRPC device
+server). `SEQUENCE` is a file or the name of a preset.
+
+Outputs are checked before the work. What exists is replaced with `--force` only. Bad input is
+answered with one sentence. Exit codes and the documents of `--json` are on the page
+[JSON](json.md).
+"""
+_RIG_FILE = """\
+# Rig file
+
+Made from the code by `python -m tests.docs.reference`; `dearig rig-file my-rig.toml` writes the
+same. A rig file needs only the keys that differ from these defaults, which are the thesis's rig.
+[Set up a rig PC](../how-to/rig-pc.md) says what to look at first.
+
+"""
+
+
+def commands() -> str:
+    """The page of all commands: usage, arguments and options of each."""
+    group: Any = get_command(app)
+    return "\n".join(
+        [_COMMANDS, *(_command(name, group.commands[name]) for name in group.commands)]
+    )
+
+
+def rig_file() -> str:
+    """The page of the rig file."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "rig.toml"
+        write_default(path)
+        return f"{_RIG_FILE}```toml\n{path.read_text(encoding='utf-8').rstrip()}\n```\n"
+
+
+PAGES: dict[str, Callable[[], str]] = {"commands.md": commands, "rig-file.md": rig_file}
+
+
+def main() -> None:
+    FOLDER.mkdir(exist_ok=True)
+    for name, page in PAGES.items():
+        (FOLDER / name).write_text(page(), encoding="utf-8", newline="\n")
+        print(FOLDER / name)
+
+
+def _command(name: str, command: Any) -> str:
+    arguments = [p for p in command.params if p.param_type_name == "argument"]
+    options = [p for p in command.params if p.param_type_name == "option" and not p.hidden]
+    kinds = typing.get_type_hints(inspect.unwrap(command.callback))
+    usage = " ".join(["dearig", name, *(_argument(p) for p in arguments)])
+    parts = [f"## {name}", _sentence(command.help), f"```text\n{usage} [OPTIONS]\n```"]
+    rows = [f"| `{p.metavar or p.name.upper()}` | {_cell(p)} |" for p in arguments]
+    rows += [f"| {_names(p, kinds)} | {_cell(p)} |" for p in options if "--help" not in p.opts]
+    if rows:
+        parts.append("\n".join(["| argument or option | meaning |", "|---|---|", *rows]))
+    return "\n\n".join(parts) + "\n"
+
+
+def _argument(parameter: Any) -> str:
+    name = parameter.metavar or parameter.name.upper()
+    return name if parameter.required else f"[{name}]"
+
+
+def _names(option: Any, kinds: dict[str, Any]) -> str:
+    names = ", ".join(f"`{name}`" for name in [*option.opts, *option.secondary_opts])
+    if option.is_flag or option.count:
+        return names
+    return f"{names} {_escaped(option.metavar or _kind(kinds[option.name]))}"
+
+
+def _kind(annotation: Any) -> str:
+    """What a value may be: the choices of an enumeration, or the kind of number or text."""
+    for part in typing.get_args(annotation):
+        if part is not type(None):
+            return _kind(part)
+    if issubclass(annotation, enum.Enum):
+        return "|".join(str(choice.value) for choice in annotation)
+    return {int: "INTEGER", float: "NUMBER", Path: "PATH"}.get(annotation, "TEXT")
+
+
+def _cell(parameter: Any) -> str:
+    text = _escaped(_sentence(parameter.help or ""))
+    notes = []
+    if parameter.required:
+        notes.append("required")
+    default = parameter.default
+    plain = not callable(default) and default not in (None, False, "", ()) and default is not ...
+    if plain and "[default" not in text and not parameter.required:
+        shown = getattr(default, "value", default)
+        if not getattr(parameter, "is_flag", False):
+            notes.append(
+                f"default `{Path(shown).as_posix() if isinstance(shown, Path) else shown}`"
+            )
+        elif parameter.secondary_opts:
+            notes.append(f"default `{parameter.opts[0]}`")
+    return f"{text} ({'; '.join(notes)})" if notes else text
+
+
+def _sentence(text: str) -> str:
+    return re.sub(r"\s+", " ", text).strip()
+
+
+def _escaped(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    main()

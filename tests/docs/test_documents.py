@@ -1,0 +1,153 @@
+"""The documents are true: links lead somewhere, commands exist and run, examples are accepted."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import pytest
+from typer.main import get_command
+
+from dearig.cli.main import app
+from dearig.config.modelfile import load_model
+from dearig.config.rigfile import load_rig_file
+from dearig.config.sequencefile import parse_sequence
+from dearig.docs import pages
+from dearig.docs.site import anchors
+from tests.docs import reference
+from tests.docs.markdown import ROOT, Block, blocks, documents, inline_commands, links
+from tests.tools.command import done, write
+
+#: Pages whose commands are run in the order shown, in one folder for each page.
+RUN = [p for p in documents() if p.startswith("app/docs/") or "/" not in p]
+COMMANDS: dict[str, Any] = get_command(app).commands  # type: ignore[attr-defined]
+
+
+def of_language(*names: str) -> list[Block]:
+    return [b for path in documents() for b in blocks(path) if b.language in names]
+
+
+@pytest.mark.parametrize("path", documents())
+def test_every_link_and_anchor_resolves(path: str) -> None:
+    broken = []
+    for link in links(path):
+        if re.match(r"[a-z][a-z0-9+.-]*:", link):
+            continue
+        where, _, anchor = unquote(link).partition("#")
+        file = (ROOT / path).parent / where if where else ROOT / path
+        if file.is_dir():
+            file /= "README.md"
+        if not file.exists() or (anchor and anchor not in anchors(file.read_text("utf-8"))):
+            broken.append(link)
+    assert broken == []
+
+
+@pytest.mark.parametrize("page", [page.path for page in pages()])
+def test_a_packaged_page_shows_no_picture_from_outside_the_package(page: str) -> None:
+    packaged = tuple(ROOT / name for name in ("app", "drivers", "model", "sim_backend"))
+    for link in links(page):
+        if link.endswith((".png", ".svg")):
+            picture = ((ROOT / page).parent / link).resolve()
+            assert any(picture.is_relative_to(folder) for folder in packaged), link
+
+
+@pytest.mark.parametrize("block", of_language("sh", "console"), ids=str)
+def test_every_command_shown_is_accepted(block: Block) -> None:
+    for words in block.commands:
+        accept(words)
+
+
+@pytest.mark.parametrize("path", documents())
+def test_every_command_within_a_line_exists(path: str) -> None:
+    for text in inline_commands(path):
+        name, *words = text.removeprefix("dearig ").split()
+        assert name in COMMANDS, text
+        known = {"--help", "-h"}
+        for parameter in COMMANDS[name].params:
+            known.update(parameter.opts, parameter.secondary_opts)
+        options = [w.split("=")[0] for w in words if re.match(r"--?[a-z]", w)]
+        assert [o for o in options if o not in known] == [], text
+
+
+def accept(words: list[str]) -> None:
+    """Fail unless the command exists and takes these arguments."""
+    shown = " ".join(words)
+    if words[0] == "dearig":
+        if words[1] == "--version":
+            return
+        assert words[1] in COMMANDS, f"{shown}: there is no such command"
+        COMMANDS[words[1]].make_context(words[1], words[2:])
+    elif words[:2] == ["python", "-m"] and words[2].startswith(("tests.", "dearig")):
+        assert importlib.util.find_spec(words[2]), f"{shown}: there is no such module"
+    elif words[0].startswith("python") and words[1].endswith(".py"):
+        assert (ROOT / words[1]).is_file(), f"{shown}: there is no such file"
+
+
+@pytest.mark.parametrize("block", of_language("toml"), ids=str)
+def test_every_toml_example_is_accepted(block: Block, tmp_path: Path) -> None:
+    accept_toml(block.text, tmp_path)
+
+
+def accept_toml(text: str, folder: Path) -> None:
+    """Fail unless the reader that such a file is for takes it."""
+    content = tomllib.loads(text)
+    if "segment" in content:
+        parse_sequence(text, "example", folder)
+    elif content.get("format", "").startswith("dearig-model/"):
+        load_model(write(folder / "model.toml", text))
+    elif not {"project", "tool"} & set(content):  # those are parts of a pyproject.toml
+        load_rig_file(write(folder / "rig.toml", text))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", [p for p in RUN if any(b.language == "sh" for b in blocks(p))])
+def test_commands_run_in_the_order_shown(
+    path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for block in blocks(path):
+        if block.language == "sh" and not block.reason:
+            for words in block.commands:
+                assert words[0] == "dearig", f"{block}: say why {words[0]} is not run"
+                done(*words[1:])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", [p for p in RUN if any(b.language == "python" for b in blocks(p))])
+def test_python_examples_run(path: str, tmp_path: Path) -> None:
+    code = "\n".join(b.text for b in blocks(path) if b.language == "python" and not b.reason)
+    ran = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert ran.returncode == 0, ran.stderr
+
+
+@pytest.mark.parametrize("name", reference.PAGES)
+def test_reference_pages_are_what_the_code_says(name: str) -> None:
+    page: Callable[[], str] = reference.PAGES[name]
+    kept = (reference.FOLDER / name).read_text(encoding="utf-8")
+    assert kept == page(), "run python -m tests.docs.reference"
+
+
+def test_every_json_format_is_on_the_page() -> None:
+    written = {
+        found
+        for source in (ROOT / "app").rglob("*.py")
+        for found in re.findall(r'"format": "(dearig-[a-z]+/\d+)"', source.read_text("utf-8"))
+    }
+    page = (reference.FOLDER / "json.md").read_text(encoding="utf-8")
+    assert written
+    assert [name for name in sorted(written) if f"`{name}`" not in page] == []
+
+
+def test_no_block_is_left_out_without_a_reason() -> None:
+    for path in RUN:
+        for block in blocks(path):
+            assert block.language, f"{block}: name the language of the block"
