@@ -7,18 +7,21 @@ from typing import Annotated
 
 import typer
 
+from dearig.cli.options import Force, Json
+from dearig.cli.output import check_files, console_for, print_line, write_result
+
 __all__ = ["docs"]
 
 
 def docs(
     page: Annotated[
-        str,
+        str | None,
         typer.Argument(
             metavar="PAGE",
-            help="A page, such as tutorial, commands, rig-pc or drivers.",
-            show_default="the first page",
+            help="Page to open, such as tutorial, commands, rig-pc or drivers.",
+            show_default="the list of documents",
         ),
-    ] = "",
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -31,21 +34,26 @@ def docs(
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
     ] = True,
-    force: Annotated[
-        bool, typer.Option("--force", help="Write into a folder that is not empty.")
-    ] = False,
+    json: Json = None,
+    force: Force = False,
 ) -> None:
-    """Build the documents as HTML pages and open them in the browser; works without a network."""
+    """Build the documents as HTML pages and open them in the browser, without a network."""
     import webbrowser
 
     from platformdirs import user_cache_path
 
-    from dearig.docs import HOME, build, page_named
+    from dearig.docs import HOME, build, page_named, pages
     from dearig.recording.result_folder import result_folder
 
-    wanted = page_named(page).path if page else HOME
+    check_files(force, (), json=json)
+    wanted = HOME if page is None else page_named(page).path
     folder = user_cache_path("dearig") / "docs" if out is None else result_folder(out, force)
-    opened = build(folder)[wanted].resolve()
-    typer.echo(str(opened))
-    if browser and not webbrowser.open(opened.as_uri()):
-        typer.echo(f"no browser was found; open {opened} yourself", err=True)
+    written = {path: file.resolve() for path, file in build(folder).items()}
+    print_line(console_for(json), str(written[wanted]))
+    listed = [
+        {"title": p.title, "section": p.section, "path": p.path, "html": str(written[p.path])}
+        for p in pages()
+    ]
+    write_result({"format": "dearig-docs/1", "page": str(written[wanted]), "pages": listed}, json)
+    if browser and not webbrowser.open(written[wanted].as_uri()):
+        print_line(console_for("-"), f"no browser was found; open {written[wanted]} in one")

@@ -40,7 +40,10 @@ class Block:
 @cache
 def documents() -> tuple[str, ...]:
     """Paths of all Markdown files of the repository."""
-    found = [*ROOT.glob("*.md"), *(file for name in FOLDERS for file in (ROOT / name).rglob("*.md"))]
+    found = [
+        *ROOT.glob("*.md"),
+        *(file for name in FOLDERS for file in (ROOT / name).rglob("*.md")),
+    ]
     return tuple(sorted(file.relative_to(ROOT).as_posix() for file in found))
 
 

@@ -107,21 +107,20 @@ def _kind(annotation: Any) -> str:
 
 
 def _cell(parameter: Any) -> str:
-    text = _escaped(_sentence(parameter.help or ""))
     notes = []
+    default = getattr(parameter.default, "value", parameter.default)
     if parameter.required:
         notes.append("required")
-    default = parameter.default
-    plain = not callable(default) and default not in (None, False, "", ()) and default is not ...
-    if plain and "[default" not in text and not parameter.required:
-        shown = getattr(default, "value", default)
-        if not getattr(parameter, "is_flag", False):
-            notes.append(
-                f"default `{Path(shown).as_posix() if isinstance(shown, Path) else shown}`"
-            )
-        elif parameter.secondary_opts:
-            notes.append(f"default `{parameter.opts[0]}`")
-    return f"{text} ({'; '.join(notes)})" if notes else text
+    elif isinstance(parameter.show_default, str):
+        notes.append(f"default: {parameter.show_default}")
+    elif isinstance(default, Path):
+        notes.append(f"default: `{default.as_posix()}`")
+    elif isinstance(default, str | int | float) and not isinstance(default, bool):
+        notes.append(f"default: `{default}`" if default != "" else "")
+    elif default is True:
+        notes.append(f"default: `{parameter.opts[0]}`")
+    text = _escaped(_sentence(parameter.help or ""))
+    return " ".join([text, *(f"({note})" for note in notes if note)])
 
 
 def _sentence(text: str) -> str:
