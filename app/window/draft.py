@@ -10,27 +10,13 @@ from typing import Any
 
 import tomli_w
 
-from dearig.config.sequencefile import SEGMENT_KINDS
+from dearig.config.segments import SEGMENT_KINDS
 from dearig.config.toml_input import parse_toml
 from dearig.errors import InputError
 
-__all__ = ["NEW_SEGMENTS", "Draft", "Place", "has_comments", "place_of", "relative_csv"]
+__all__ = ["Draft", "Place", "has_comments", "place_of", "relative_csv"]
 
 _STEPS_MAX = 200
-
-#: What a segment is when it is added; each can be played as it stands.
-NEW_SEGMENTS: dict[str, dict[str, Any]] = {
-    "half_sine": {"amplitude_kV": 6.0, "frequency_Hz": 0.5},
-    "thesis": {"periods": 1},
-    "ramp": {"to_kV": 0.0, "duration_s": 1.0},
-    "hold": {"duration_s": 1.0},
-    "steps": {"levels_kV": [3.0, 6.0, 0.0], "dwell_s": 1.0, "rise_s": 0.02},
-    "triangle": {"amplitude_kV": 6.0, "frequency_Hz": 0.5},
-    "sine": {"amplitude_kV": 2.0, "frequency_Hz": 0.5, "cycles": 2.0},
-    "chirp": {"amplitude_kV": 2.0, "from_Hz": 0.5, "to_Hz": 5.0, "duration_s": 10.0},
-    "multisine": {"amplitude_kV": 2.0, "frequencies_Hz": [0.5, 1.1, 2.3], "duration_s": 10.0},
-    "csv": {"file": "waveform.csv"},
-}
 
 
 class Draft:
@@ -97,7 +83,7 @@ class Draft:
 
     def add(self, kind: str, row: int, **given: Any) -> None:
         """Insert a new segment of ``kind`` at ``row``; ``given`` replaces default values."""
-        table = {"kind": kind, **copy.deepcopy(NEW_SEGMENTS[kind]), **given}
+        table = {"kind": kind, **copy.deepcopy(dict(SEGMENT_KINDS[kind].example)), **given}
         self._change((), lambda data: data["segment"].insert(row, table))
 
     def duplicate(self, row: int) -> None:

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dearig.config.sequencefile import SEGMENT_KINDS
+from dearig.config.segments import SEGMENT_KINDS
 from dearig.window.draft import Draft, Place
 from dearig.window.fields import FormField, form_fields, shown_value
 from dearig.window.form import Form

@@ -1,0 +1,48 @@
+"""Kinds of segment: one file for each kind or close family, one line here for each kind.
+
+Another distribution adds a kind through an entry point in the group ``dearig.segments``.
+``README.md`` beside this file shows how.
+"""
+
+from __future__ import annotations
+
+import inspect
+from types import MappingProxyType
+from typing import Any, Literal, get_args, get_origin
+
+from dearig.config.segments.base import Positive, SegmentTable, Voltage
+from dearig.plugins import Registry
+
+__all__ = ["SEGMENT_KINDS", "Positive", "SegmentTable", "Voltage"]
+
+_OWN = MappingProxyType(
+    {
+        "half_sine": "dearig.config.segments.lobes:HalfSine",
+        "sine": "dearig.config.segments.sine:Sine",
+        "triangle": "dearig.config.segments.lobes:Triangle",
+        "ramp": "dearig.config.segments.levels:Ramp",
+        "hold": "dearig.config.segments.levels:Hold",
+        "chirp": "dearig.config.segments.chirp:Chirp",
+        "steps": "dearig.config.segments.levels:Steps",
+        "multisine": "dearig.config.segments.multisine:Multisine",
+        "thesis": "dearig.config.segments.lobes:Thesis",
+        "csv": "dearig.config.segments.waveform:Csv",
+    }
+)
+
+
+def _check(name: str, kind: Any) -> None:
+    """Raise ``ValueError`` unless ``kind`` is the class of a segment of that name."""
+    if not (isinstance(kind, type) and issubclass(kind, SegmentTable)):
+        raise TypeError("it is not a subclass of dearig.config.segments.SegmentTable")
+    if inspect.isabstract(kind):
+        raise TypeError("it has no method build")
+    annotation = kind.model_fields["kind"].annotation
+    if get_origin(annotation) is not Literal or get_args(annotation) != (name,):
+        raise ValueError(f'its field kind must be of the type Literal["{name}"]')
+    if not isinstance(getattr(kind, "example", None), dict):
+        raise TypeError("it has no example, the keys of a new segment")
+
+
+#: Every kind of segment by name.
+SEGMENT_KINDS: Registry[type[SegmentTable]] = Registry("dearig.segments", _OWN, _check)

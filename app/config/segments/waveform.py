@@ -1,0 +1,66 @@
+"""The segment ``csv``: a waveform read from a file."""
+
+from __future__ import annotations
+
+from pathlib import Path, PurePath
+from typing import Any, ClassVar, Literal
+
+from pydantic import Field
+
+from dearig.config.segments.base import KV, SegmentTable
+from dearig.config.toml_input import shown
+from dearig.errors import InputError
+from dearig.model import excitation
+from dearig.model.excitation import Segment
+from dearig.recording.importers.csv_file import CsvFile
+from dearig.recording.importers.source import listing
+from dearig.recording.timestamps import not_forward
+
+__all__ = ["Csv"]
+
+
+class Csv(SegmentTable):
+    """A waveform from a CSV file beside the sequence; straight lines between its points."""
+
+    example: ClassVar[dict[str, Any]] = {"file": "waveform.csv"}
+
+    kind: Literal["csv"]
+    file: str = Field(
+        min_length=1, description="name of the file, with the columns time_s and voltage_kV"
+    )
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The CSV file."""
+        return (self.file,)
+
+    def build(self, folder: Path) -> Segment:
+        """Return the waveform. Raises ``InputError`` for a file that holds none."""
+        # a sequence may come from anyone, inside a recording too: it reads only from its own folder
+        place = PurePath(self.file)
+        if place.is_absolute() or place.drive or ".." in place.parts:
+            raise InputError(
+                f"file = {shown(self.file)} leads out of the sequence's folder; put the waveform "
+                f"beside the sequence, and name it without a path"
+            )
+        source = CsvFile(folder / place)
+        scale = next((k for k in ("voltage_kV", "voltage_V") if k in source.names), None)
+        if scale is None or "time_s" not in source.names:
+            raise InputError(
+                f"{source.path} has the columns {listing(source.names)}; a waveform takes time_s "
+                f"and voltage_kV or voltage_V"
+            )
+        for column in ("time_s", scale):
+            source.check(column)
+        columns = source.read(["time_s", scale])
+        time = columns["time_s"]
+        if time.size < 2:
+            raise InputError(f"{source.path} has one line of data; a waveform takes at least 2")
+        if (back := not_forward(time)) is not None:
+            at, how = back
+            raise InputError(
+                f"{source.path}, {source.row(at)}: time {how}, from {time[at - 1]:.9g} s to "
+                f"{time[at]:.9g} s; a step takes two lines with a little time between them"
+            )
+        voltages = columns[scale] * (KV if scale == "voltage_kV" else 1.0)
+        return excitation.Sampled(time, voltages)

@@ -1,0 +1,206 @@
+"""Kinds of segment: the contract, the generated example and page, kinds of other distributions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dearig.acquisition.plan import plan
+from dearig.config.rigfile import RigFile
+from dearig.config.segments import SEGMENT_KINDS, SegmentTable
+from dearig.config.segments.contract import check_segment
+from dearig.config.segments.levels import Hold
+from dearig.config.sequence_example import example, page
+from dearig.config.sequencefile import parse_sequence
+from dearig.model.excitation import Segment
+from dearig.plugins import ContractError
+from tests.tools.plugins import run_with_distribution
+
+WAVEFORM = "time_s,voltage_kV\n0,0\n1,3\n2,0\n"
+
+
+@pytest.mark.parametrize("kind", SEGMENT_KINDS)
+def test_every_kind_keeps_the_contract(tmp_path: Path, kind: str) -> None:
+    (tmp_path / "waveform.csv").write_text(WAVEFORM, encoding="utf-8")
+    check_segment(kind, SEGMENT_KINDS[kind], tmp_path)
+
+
+class Jumping(Hold):
+    """A hold that says it ends elsewhere than it does."""
+
+    def build(self, folder: Path) -> Segment:
+        built = super().build(folder)
+
+        class Wrong:
+            duration, start, voltage = built.duration, built.start, built.voltage
+            end = 1000.0
+
+            def after(self, end: float) -> Segment:  # noqa: ARG002
+                return self  # type: ignore[return-value]
+
+        return Wrong()
+
+
+class Undescribed(Hold):
+    """A kind with a key that nobody explains."""
+
+    level_kV: float = 0.0
+
+
+class Refused(Hold):
+    """A kind whose example lacks a key."""
+
+    example = {}  # noqa: RUF012
+
+
+@pytest.mark.parametrize(
+    ("kind", "match"),
+    [
+        (Jumping, "0 V at the end, and end is 1000 V"),
+        (Undescribed, "the key level_kV has no description"),
+        (Refused, "its example is refused"),
+    ],
+)
+def test_the_contract_finds_a_fault(tmp_path: Path, kind: type[SegmentTable], match: str) -> None:
+    with pytest.raises(ContractError, match=match):
+        check_segment("hold", kind, tmp_path)
+
+
+def test_the_example_plays_every_kind_within_the_default_limits() -> None:
+    text = example()
+    loaded = parse_sequence(text, "example", Path())
+    assert set(loaded.sequence.labels) == set(SEGMENT_KINDS) - {"csv"}
+    assert plan(loaded, RigFile(), None, "").admitted().voltage.size
+
+
+def test_the_example_with_its_comments_removed_is_the_same_sequence(tmp_path: Path) -> None:
+    (tmp_path / "waveform.csv").write_text(WAVEFORM, encoding="utf-8")
+    # keys with a default stand there as "# key = value  # meaning"; headers and hints do not parse
+    lines = [
+        line.removeprefix("# ") if _is_setting(line) or _is_csv(line) else line
+        for line in example().splitlines()
+    ]
+    full = parse_sequence("\n".join(lines), "example", tmp_path).sequence
+    short = parse_sequence(example(), "example", tmp_path).sequence
+    assert full.labels == (*short.labels, "csv")
+    assert full.segments[:-1] == short.segments
+
+
+def _is_setting(line: str) -> bool:
+    key, _, value = line.removeprefix("# ").partition(" = ")
+    return line.startswith("# ") and key.isidentifier() and not value.startswith(" #")
+
+
+def _is_csv(line: str) -> bool:
+    return line == "# [[segment]]"
+
+
+def test_the_page_explains_every_key_of_every_kind() -> None:
+    text = page()
+    for name, kind in SEGMENT_KINDS.items():
+        section = text.split(f"\n## {name}\n", 1)[1].split("\n## ", 1)[0]
+        for key, info in kind.model_fields.items():
+            if key != "kind":
+                assert f"| `{key}` | {info.description} |" in section
+
+
+SAWTOOTH = '''
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from dearig.config.segments import Positive, SegmentTable, Voltage
+
+
+class Sawtooth(SegmentTable):
+    """From 0 kV to the amplitude at one slope, and straight back."""
+
+    example = {"amplitude_kV": 3.0, "rise_s": 1.0}
+
+    kind: Literal["sawtooth"]
+    amplitude_kV: Voltage = Field(description="voltage at the tip")
+    rise_s: Positive = Field(description="duration of the rise")
+    fall_s: Positive = Field(default=0.05, description="duration of the fall")
+
+    def build(self, folder):
+        return Wave(self.amplitude_kV * 1e3, self.rise_s, self.fall_s)
+
+
+@dataclass(frozen=True)
+class Wave:
+    amplitude: float
+    rise: float
+    fall: float
+    start = end = 0.0
+
+    @property
+    def duration(self):
+        return self.rise + self.fall
+
+    def voltage(self, t):
+        up, down = t / self.rise, (self.duration - t) / self.fall
+        return self.amplitude * np.clip(np.minimum(up, down), 0.0, 1.0)
+
+    def after(self, end):
+        return self
+'''
+
+
+def test_a_kind_of_another_distribution_is_found_everywhere(tmp_path: Path) -> None:
+    found = run_with_distribution(
+        tmp_path,
+        {"sawtooth.py": SAWTOOTH},
+        {"dearig.segments": {"sawtooth": "sawtooth:Sawtooth"}},
+        """
+        from pathlib import Path
+        import sawtooth  # whoever imports the kind first must not break the registry
+        from dearig.config.segments import SEGMENT_KINDS
+        from dearig.config.segments.contract import check_segment
+        from dearig.config.sequence_example import example, page
+        from dearig.config.sequencefile import parse_sequence
+        check_segment("sawtooth", SEGMENT_KINDS["sawtooth"], Path())
+        print("## sawtooth" in page(), 'kind = "sawtooth"' in example(), SEGMENT_KINDS.left_out)
+        text = 'name = "x"\\nlead_in_s = 0\\n[[segment]]\\nkind = "sawtooth"\\n'
+        text += "amplitude_kV = 3.0\\nrise_s = 0.5\\n"
+        print(parse_sequence(text, "x", Path()).sample(1000.0)[1].max())
+        """,
+    )
+    assert found.splitlines() == ["True True ()", "3000.0"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "source", "words"),
+    [
+        ("hold", "bad:Thing", "Thing = 1", "the name 'hold' is already taken"),
+        ("other", "bad:Thing", "Thing = 1", "not a subclass of dearig.config.segments.Segment"),
+        ("other", "bad:Thing", "import no_such_module_at_all", "no_such_module_at_all"),
+        ("other", "bad:Thing", "raise SystemExit(3)", "3"),
+        ("other", "bad:Gone", "Thing = 1", "Gone"),
+        (
+            "other",
+            "bad:Thing",
+            "from dearig.config.segments.levels import Hold as Thing",
+            'must be of the type Literal["other"]',
+        ),
+    ],
+)
+def test_a_kind_that_cannot_be_used_is_left_out_with_a_sentence(
+    tmp_path: Path, name: str, value: str, source: str, words: str
+) -> None:
+    found = run_with_distribution(
+        tmp_path,
+        {"bad.py": source},
+        {"dearig.segments": {name: value}},
+        """
+        from dearig.config.segments import SEGMENT_KINDS
+        print(len(SEGMENT_KINDS), SEGMENT_KINDS["hold"].__module__)
+        print(*SEGMENT_KINDS.left_out)
+        """,
+    )
+    count, sentence = found.splitlines()
+    assert count == f"{len(SEGMENT_KINDS)} dearig.config.segments.levels"
+    assert sentence.startswith(f"the plug-in {name} (dearig.segments) of made is left out: ")
+    assert words in sentence
