@@ -18,6 +18,7 @@ from dearig.recording.layout import (
     MESSAGE_BYTES,
     SIGNALS,
     ZERO_ORDER,
+    attach_time,
     counts_name,
     create_field,
     iso_time,
@@ -64,6 +65,10 @@ def finish(
                     model = displacement_model[:samples]
                     _write_field(entry["data"], "displacement_model", samples, {})[:] = model
                     entry["data"].attrs["auxiliary_signals"] = fixed(["displacement_model"])
+                for plot in (entry["data"], entry.get("overview")):
+                    # a very long run has its physical values, and so its time, in counts only
+                    if plot is not None and "time" in plot:
+                        attach_time(plot)
                 if model_toml:
                     put_text(entry, "model", model_toml)
                 if ended is not None:

@@ -40,11 +40,14 @@ __all__ = [
     "UNITS",
     "WALL_CLOCK_TYPE",
     "ZERO_ORDER",
+    "attach_time",
     "counts_name",
     "create_field",
     "describe_field",
     "iso_time",
     "lay_out",
+    "make_own_scale",
+    "variable_attributes",
 ]
 
 FORMAT_NAME = "dearig-recording"
@@ -124,12 +127,20 @@ def iso_time(moment: float) -> str:
     return datetime.fromtimestamp(moment, tz=UTC).isoformat(timespec="milliseconds")
 
 
-def describe_field(dataset: h5py.Dataset, name: str) -> None:
-    """Give a physical dataset its ``units`` and, where its own does not do, a name for plots."""
-    dataset.attrs["units"] = fixed(UNITS[name])
+def variable_attributes(name: str) -> dict[str, str]:
+    """Return ``units`` of the physical values ``name`` and, where it says more, ``long_name``."""
+    found = {"units": UNITS[name]}
     if name in LONG_NAMES:
-        # viewers show this instead of name and unit
-        dataset.attrs["long_name"] = fixed(f"{LONG_NAMES[name]} ({UNITS[name]})")
+        found["long_name"] = LONG_NAMES[name]
+    return found
+
+
+def describe_field(dataset: h5py.Dataset, name: str) -> None:
+    """Give a physical dataset its ``units`` and, where it says more, a name for plots."""
+    for key, text in variable_attributes(name).items():
+        # viewers show a long name instead of name and unit
+        with_unit = f"{text} ({UNITS[name]})" if key == "long_name" else text
+        dataset.attrs[key] = fixed(with_unit)
 
 
 def create_field(data: h5py.Group, name: str, samples: int) -> h5py.Dataset:
@@ -144,6 +155,28 @@ def create_field(data: h5py.Group, name: str, samples: int) -> h5py.Dataset:
     )
     describe_field(dataset, name)
     return dataset
+
+
+def attach_time(data: h5py.Group) -> None:
+    """Make ``time`` the dimension scale of every row in ``data`` that has its length.
+
+    With it xarray finds the time coordinate. SWMR mode forbids the attributes that this writes, so
+    a run gets its scale when it is finished, which is also when it gets its ``time``.
+    """
+    time = data["time"]
+    time.make_scale("time")
+    for name, row in data.items():
+        if name != "time" and row.shape == time.shape:
+            row.dims[0].attach_scale(time)
+
+
+def make_own_scale(rows: h5py.Dataset) -> None:
+    """Make a table under /entry a dimension scale, so that it has no dimension without a name.
+
+    xarray warns of such dimensions in every group above the one that it opens. A table that grows
+    in SWMR mode has to get this when it is created.
+    """
+    rows.make_scale(rows.name.rpartition("/")[2])
 
 
 def lay_out(file: h5py.File, kind: str, title: str, started: float) -> h5py.Group:

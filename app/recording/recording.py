@@ -5,16 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dearig.drivers.channels import Channel
 from dearig.drivers.rig import Instrument
+from dearig.extras import import_extra
 from dearig.model.material import Film, Load
 from dearig.recording.arrays import Arrays, Overview
 from dearig.recording.files import file_sha256
-from dearig.recording.layout import SIGNALS
+from dearig.recording.layout import SIGNALS, UNITS, variable_attributes
 from dearig.recording.rest_noise import noise_floor
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 __all__ = ["RecordedEvent", "Recording"]
 
@@ -201,6 +207,39 @@ class Recording:
         quiet = min(self.quiet_samples, NOISE_MAX)
         time, readings = (self.arrays.window(n, 0, quiet) for n in ("time", "displacement"))
         return noise_floor(time, readings)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the values as an xarray ``Dataset`` over ``time``, in SI units.
+
+        Every variable has ``units`` (degC for a temperature) and where it needs one a
+        ``long_name``; the attributes of the data set say what was recorded. Raises ``InputError``
+        where xarray is not installed.
+        """
+        lib = import_extra("xarray", "notebook", "to_xarray")
+        about = {
+            "title": self.title, "name": self.name, "kind": self.kind, "film_id": self.film_id,
+            "outcome": self.outcome, "start_time": str(self.provenance.get("start_time", "")),
+        }  # fmt: skip
+        columns = {
+            name: ("time", values.copy(), variable_attributes(name))
+            for name, values in self.values.items()
+        }
+        coordinate = {"time": columns.pop("time")}
+        dataset: xarray.Dataset = lib.Dataset(columns, coords=coordinate, attrs=about)
+        return dataset
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the values as a pandas ``DataFrame`` whose index is ``time`` in s.
+
+        Columns are in SI units (degC for a temperature); ``.attrs["units"]`` has the unit of each,
+        and of ``time``. Raises ``InputError`` where pandas is not installed.
+        """
+        lib = import_extra("pandas", "notebook", "to_pandas")
+        columns = {name: values.copy() for name, values in self.values.items()}
+        index = lib.Index(columns.pop("time"), name="time")
+        frame: pandas.DataFrame = lib.DataFrame(columns, index=index)
+        frame.attrs["units"] = {name: UNITS[name] for name in self.arrays.names}
+        return frame
 
     @cached_property
     def sha256(self) -> str:

@@ -20,8 +20,10 @@ from dearig.recording.layout import (
     REQUIRED,
     UNITS,
     ZERO_ORDER,
+    attach_time,
     create_field,
     lay_out,
+    make_own_scale,
 )
 from dearig.recording.metadata import RunMetadata
 from dearig.recording.provenance import gather, write_provenance
@@ -71,6 +73,7 @@ def save_recording(
         data = entry["data"]
         for name, array in values.items():
             create_field(data, name, size)[...] = np.asarray(array, dtype=np.float64)
+        attach_time(data)
         if kinematics is not None:
             data.attrs["kinematics"] = fixed(kinematics)
         if kind == "actuator":
@@ -98,4 +101,4 @@ def _write_events(entry: h5py.Group, events: tuple[Event, ...], time_s: np.ndarr
             event.level.encode(),
             clip_text(event.message, MESSAGE_BYTES),
         )
-    entry.create_dataset("events", data=rows, dtype=EVENT_TYPE)
+    make_own_scale(entry.create_dataset("events", data=rows, dtype=EVENT_TYPE))

@@ -329,4 +329,18 @@ class _Check:
             self.fault(f"{plot.name} has no plot of {SIGNALS[self.recording.kind]} over time")
         elif plot[signal].shape != plot["time"].shape:
             self.fault(f"{plot.name}: {signal} and time have different lengths")
+        else:
+            self.dimension_scales()
         self.done("the default plot")
+
+    def dimension_scales(self) -> None:
+        """Every row over ``time`` has it as its dimension scale, or none has, in older files."""
+        for plot in (self.data, group(self.entry, "overview")):
+            if plot is None or "time" not in plot or not plot["time"].is_scale:
+                continue
+            for name, row in plot.items():
+                if name == "time" or row.shape != plot["time"].shape:
+                    continue
+                scales = row.dims[0].values()
+                if [scale.name for scale in scales] != [plot["time"].name]:
+                    self.fault(f"{row.name} has not time as its dimension scale")

@@ -41,6 +41,7 @@ from dearig.recording.layout import (
     ZERO_ORDER,
     counts_name,
     lay_out,
+    make_own_scale,
 )
 from dearig.recording.metadata import RunMetadata
 from dearig.recording.physical import TEMPERATURE_UNITS, write_channel
@@ -161,6 +162,9 @@ class RecordingWriter:
         self._wall_clock = entry.create_dataset(
             "wall_clock", shape=(0,), maxshape=(None,), chunks=(256,), dtype=WALL_CLOCK_TYPE
         )
+
+        for name in ("events", "checksums", "wall_clock"):
+            make_own_scale(entry[name])
 
         instruments = entry.create_group("instrument")
         instruments.attrs["NX_class"] = fixed("NXcollection")
