@@ -54,7 +54,7 @@ class ActuatorRecord:
     lead_in: int = 0
     means_of: int = 1
     lag_error: float = 0.0
-    sketch: Drive | None = None
+    coarse_drive: Drive | None = None
 
     def __post_init__(self) -> None:
         _check(self.name, self.measured, self.drive.time, self.noise)

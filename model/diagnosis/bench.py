@@ -21,17 +21,17 @@ from dearig.model.actuator import Actuator, at_rest
 from dearig.model.diagnosis.results import NOISE_RMS, NOT_BY_CHANCE, Stage
 from dearig.model.effects import any_hysteretic
 from dearig.model.film import Strip
-from dearig.model.fitting.broyden import descend_by_secants
-from dearig.model.fitting.coarse_drive import sketched
-from dearig.model.fitting.drift import Walking
+from dearig.model.fitting.broyden import descend_broyden
+from dearig.model.fitting.coarse_drive import coarse_drive_of
+from dearig.model.fitting.drift import DriftFit
 from dearig.model.fitting.identify import fit_globally, is_determined, is_worth_freeing
 from dearig.model.fitting.intervals import correlation_time, covariance, is_flat, unevenness
 from dearig.model.fitting.levenberg import LocalFit, descend
+from dearig.model.fitting.parallel import Job, Result, parallel_map
 from dearig.model.fitting.parameters import Estimate, Layout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import moving_starts, voltage_misfit, voltage_starts
 from dearig.model.fitting.thinning import thinned
-from dearig.model.fitting.threads import Job, Result, together
 from dearig.model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
 
 __all__ = [
@@ -133,24 +133,24 @@ class Trial:
     @property
     def models(self) -> tuple[Actuator | Strip, ...]:
         """The fitted model of each record, with the walk that each has of its own."""
-        if self.walking is None:
+        if self.drift is None:
             return (self.model,) * len(self.problem.records)
-        return tuple(self._walked(sizes) for sizes in self.walking.sizes)
+        return tuple(self._walked(sizes) for sizes in self.drift.amplitudes)
 
     @property
     def in_common(self) -> Actuator | Strip:
         """The fitted model with one walk for all records, which they may not show alike."""
-        return self.model if self.walking is None else self._walked(self.walking.in_common)
+        return self.model if self.drift is None else self._walked(self.drift.in_common)
 
     @property
     def residuals_in_common(self) -> np.ndarray:
         """What the model ``in_common`` leaves, (N,) over the noise."""
-        return self.residuals if self.walking is None else self.walking.residuals_in_common
+        return self.residuals if self.drift is None else self.drift.residuals_in_common
 
     @cached_property
-    def walking(self) -> Walking | None:
-        """The walks that each record has of its own; None where none has."""
-        return self.problem.walking(self.x)
+    def drift(self) -> DriftFit | None:
+        """Drift of each record by itself; None where no record has one."""
+        return self.problem.fit_drift(self.x)
 
     def _walked(self, sizes: np.ndarray) -> Actuator | Strip:
         layout = self.problem.layout
@@ -166,7 +166,7 @@ class Trial:
     @property
     def free(self) -> int:
         """How many numbers were fitted, those of each record's own among them."""
-        more = 0 if self.problem.walks is None else self.problem.walks.more
+        more = 0 if self.problem.drift is None else self.problem.drift.more
         return int(np.count_nonzero(~self.fixed)) + more
 
     @property
@@ -255,7 +255,7 @@ class Bench:
         # what a model of a rubber gets wrong no averaging takes away
         self.records = tuple(_with_model_error(_thinned(r, model)) for r in records)
         self.workers = workers
-        self._sketched: dict[tuple[str, ...], np.ndarray] = {}
+        self._coarse_columns: dict[tuple[str, ...], np.ndarray] = {}
         longest = max(float(r.time[-1] - r.time[0]) for r in records)
         self.times = (
             (FASTEST_BRANCH, _LONGER_THAN_RECORD * longest)
@@ -287,16 +287,16 @@ class Bench:
         records = self.full if fidelity == kernel.CAREFUL else self.records
         problem = Problem(records, layout, self.workers, fidelity, self._count)
         if fidelity != kernel.CAREFUL:
-            problem.sketched = self._sketched.get(layout.names)
+            problem.coarse_columns = self._coarse_columns.get(layout.names)
         return problem
 
     def _count(self, simulations: int, effort: float) -> None:
         self.work.add(simulations, effort)
         self.watched()
 
-    def together(self, work: Callable[[Job], Result], jobs: Sequence[Job]) -> list[Result]:
-        """``work(job)`` of each of ``jobs``, fits that know nothing of each other."""
-        return together(work, jobs, self.workers, "fit")
+    def parallel_map(self, work: Callable[[Job], Result], jobs: Sequence[Job]) -> list[Result]:
+        """Return ``work(job)`` for each of ``jobs``, which are independent fits."""
+        return parallel_map(work, jobs, self.workers, "fit")
 
     def baseline(self, base: Actuator | Strip, progress: Callable[[str, float], None]) -> Trial:
         """``base`` fitted from a global search.
@@ -315,18 +315,18 @@ class Bench:
         else:
             fixed = np.zeros(problem.layout.size, dtype=bool)
             fixed[problem.layout.column("J")] = True
-            fits = self.together(
-                lambda start: descend_by_secants(problem, start, fixed, iterations=8, sure=False),
+            fits = self.parallel_map(
+                lambda start: descend_broyden(problem, start, fixed, iterations=8, sure=False),
                 list(voltage_starts(problem, progress, _STARTS)),
             )
             progress("descents", 0.5)
-            fits = self.together(
+            fits = self.parallel_map(
                 lambda f: descend(problem, f.x, fixed, iterations=_BASELINE), _leaders(fits)
             )
             fit = min(fits, key=lambda f: f.cost)
             problem, fit = self._thinned_anew(problem, fit, fixed)
         progress("descents", 1.0)
-        return self._with_sketches(_trial(problem, fit, fixed))
+        return self._with_coarse_drives(_trial(problem, fit, fixed))
 
     def _thinned_anew(
         self, problem: Problem, fit: LocalFit, fixed: np.ndarray
@@ -341,16 +341,16 @@ class Bench:
         problem = self.problem(layout.base)
         return problem, descend(problem, fit.x, fixed, iterations=_BASELINE)
 
-    def _with_sketches(self, trial: Trial) -> Trial:
+    def _with_coarse_drives(self, trial: Trial) -> Trial:
         """The ``trial``, and those to come, with sketches as it foresees the records."""
         model = trial.model
         self.records = tuple(
-            replace(r, sketch=sketched(r, model))
+            replace(r, coarse_drive=coarse_drive_of(r, model))
             if isinstance(r, ActuatorRecord) and isinstance(model, Actuator)
             else r
             for r in self.records
         )
-        self._told_by_sketches(self.problem(model, kernel.ROUGH), trial.fixed)
+        self._find_coarse_columns(self.problem(model, kernel.ROUGH), trial.fixed)
         return replace(trial, problem=self.problem(trial.problem.layout.base))
 
     def fit(
@@ -373,14 +373,14 @@ class Bench:
         promises is believed.
         """
         scouted = self.problem(model, kernel.ROUGH)
-        scouted.sketched = self._told_by_sketches(scouted, fixed)
+        scouted.coarse_columns = self._find_coarse_columns(scouted, fixed)
         problem = self.problem(model)
         scouts = [
-            descend_by_secants(scouted, start, fixed, jacobian, _SCOUTING, sure=False)
+            descend_broyden(scouted, start, fixed, jacobian, _SCOUTING, sure=False)
             for start, jacobian in starts
         ]
         scouts += [
-            descend_by_secants(scouted, start, fixed, iterations=_SCOUTING + _RESTART, sure=False)
+            descend_broyden(scouted, start, fixed, iterations=_SCOUTING + _RESTART, sure=False)
             for start in anew
         ]
         best = min(scouts, key=lambda f: f.cost)
@@ -389,7 +389,7 @@ class Bench:
 
         def down(trial: Trial) -> Trial:
             behind = max(trial.cost - leader, 0.0) * problem.samples
-            fit = descend_by_secants(
+            fit = descend_broyden(
                 trial.problem,
                 trial.x,
                 fixed,
@@ -405,21 +405,21 @@ class Bench:
 
         return self._as_near(_trial(problem, best, fixed), down)
 
-    def _told_by_sketches(self, problem: Problem, fixed: np.ndarray) -> np.ndarray:
+    def _find_coarse_columns(self, problem: Problem, fixed: np.ndarray) -> np.ndarray:
         """Which numbers (d,) bool sketches tell; asked once of each combination of effects.
 
         Where springs are told without effects, they are beside all that leave a film its turns.
         """
         layout, effects = problem.layout, problem.layout.base.effects
-        if layout.names not in self._sketched:
+        if layout.names not in self._coarse_columns:
             springs: np.ndarray | None = None
             if effects and not any_hysteretic(effects):
                 plain = self.problem(replace(layout.base, effects=()), problem.fidelity)
-                springs = self._told_by_sketches(plain, fixed[: plain.layout.size])
+                springs = self._find_coarse_columns(plain, fixed[: plain.layout.size])
                 springs = springs if springs.any() else None
             x = layout.coordinates(layout.initial())
-            self._sketched[layout.names] = problem.told_by_sketches(x, ~fixed, springs)
-        return self._sketched[layout.names]
+            self._coarse_columns[layout.names] = problem.find_coarse_columns(x, ~fixed, springs)
+        return self._coarse_columns[layout.names]
 
     def settled(self, trial: Trial, leader: float = math.inf) -> Trial:
         """``trial`` followed towards the end of its valley, on the thinned records.
@@ -441,16 +441,16 @@ class Bench:
         if done.problem.fidelity != kernel.ROUGH or done.cost > _ROUGHLY:
             return done
         problem = self.problem(done.model)
-        here = descend_by_secants(problem, done.x, done.fixed, iterations=0)
+        here = descend_broyden(problem, done.x, done.fixed, iterations=0)
         return work(_trial(problem, here, done.fixed))
 
     def _down(self, trial: Trial, iterations: int, gain: float) -> Trial:
-        return self._further(self._by_secants(trial, iterations, gain), iterations, gain)
+        return self._further(self._broyden(trial, iterations, gain), iterations, gain)
 
     @staticmethod
-    def _by_secants(trial: Trial, iterations: int, gain: float) -> tuple[Trial, bool]:
+    def _broyden(trial: Trial, iterations: int, gain: float) -> tuple[Trial, bool]:
         """``trial`` as far down as secants lead, and whether that is the bottom."""
-        fit = descend_by_secants(
+        fit = descend_broyden(
             trial.problem, trial.x, trial.fixed, iterations=iterations, gain=_chi2(trial, gain)
         )
         return _trial(trial.problem, fit, trial.fixed), fit.converged
@@ -480,19 +480,19 @@ class Bench:
         def gain(trial: Trial) -> float:
             return _worth_going(trial, leader, _NO_RIVAL)
 
-        near, converged = self._by_secants(trial, _ENDING, gain(trial))
+        near, converged = self._broyden(trial, _ENDING, gain(trial))
         layout = near.problem.layout
         starts = [] if near.is_white else _reseeded(layout, near.x)
         if not starts:
             return self._further((near, converged), _ENDING, gain(near))
-        scouts = self.together(
-            lambda x: descend_by_secants(
+        scouts = self.parallel_map(
+            lambda x: descend_broyden(
                 near.problem, x, near.fixed, iterations=_SCOUTING, sure=False
             ),
             starts,
         )
-        fits = self.together(
-            lambda f: descend_by_secants(
+        fits = self.parallel_map(
+            lambda f: descend_broyden(
                 near.problem, f.x, near.fixed, f.jacobian, _RESTART, sure=False
             ),
             _leaders(scouts),
@@ -568,7 +568,7 @@ class Bench:
             leaders = [
                 _trial(problem, f, fixed) for f in _leaders(self._scouted(trial, xs, _SCOUTED))
             ]
-            found = min(self.together(down, leaders), key=lambda t: t.cost)
+            found = min(self.parallel_map(down, leaders), key=lambda t: t.cost)
             gained = found.cost < _AS_GOOD * trial.cost
             trial = min(trial, found, key=lambda t: t.cost)
             if not gained or trial.is_white:
@@ -613,8 +613,8 @@ class Bench:
     def _scouted(self, trial: Trial, xs: np.ndarray, many: int) -> list[LocalFit]:
         """First steps down from the best places ``xs`` (K, d) for the model of ``trial``."""
         problem, fixed = trial.problem, trial.fixed
-        return self.together(
-            lambda x: descend_by_secants(problem, x, fixed, iterations=_RESTART, sure=False),
+        return self.parallel_map(
+            lambda x: descend_broyden(problem, x, fixed, iterations=_RESTART, sure=False),
             list(xs[np.argsort(problem.costs(xs))[:many]]),
         )
 
@@ -665,17 +665,15 @@ class Bench:
             return trial
 
         scouted = self.problem(trial.model, kernel.ROUGH)
-        placed = self.together(
-            lambda x: descend_by_secants(scouted, x, held, iterations=_SETTING, sure=False), anew
+        placed = self.parallel_map(
+            lambda x: descend_broyden(scouted, x, held, iterations=_SETTING, sure=False), anew
         )
-        fits = self.together(
-            lambda f: descend_by_secants(
-                scouted, f.x, trial.fixed, iterations=_RESTART, sure=False
-            ),
+        fits = self.parallel_map(
+            lambda f: descend_broyden(scouted, f.x, trial.fixed, iterations=_RESTART, sure=False),
             _leaders(placed, _PLACED),
         )
         best = min(fits, key=lambda f: f.cost)
-        fit = descend_by_secants(trial.problem, best.x, trial.fixed, iterations=0)
+        fit = descend_broyden(trial.problem, best.x, trial.fixed, iterations=0)
         other = _trial(trial.problem, fit, trial.fixed)
         # who comes to where it was finds nothing on from there
         if other.cost < _AS_GOOD * trial.cost:
@@ -847,16 +845,16 @@ class Bench:
     @staticmethod
     def _own_estimates(trial: Trial) -> Iterator[Estimate]:
         """The same of the walks that each record has of its own."""
-        problem, walking = trial.problem, trial.walking
-        if problem.walks is None or walking is None:
+        problem, drift = trial.problem, trial.drift
+        if problem.drift is None or drift is None:
             return
         shared = ~trial.fixed & ~problem.own
-        jac = problem.without_walks().jacobian(trial.x, shared)
-        jac = np.hstack([jac, problem.own_jacobian()])
+        jac = problem.without_drift().jacobian(trial.x, shared)
+        jac = np.hstack([jac, problem.drift_jacobian()])
         inflation = max(1.0, trial.cost) * max(1.0, trial.correlation)
-        sizes = walking.sizes.ravel()
+        sizes = drift.amplitudes.ravel()
         spread = 1.96 * np.sqrt(np.diag(covariance(jac.T @ jac, inflation)))[-sizes.size :]
-        whose = product(problem.records, problem.walks.names)
+        whose = product(problem.records, problem.drift.names)
         for (record, name), value, s in zip(whose, sizes, spread, strict=True):
             low, high = float(value - s), float(value + s)
             sure = is_determined(low, high)
@@ -1030,7 +1028,7 @@ def _left_out(trial: Trial, jac: np.ndarray) -> np.ndarray:
     out = trial.residuals.copy()
     reach = trial.problem.layout.reach(trial.x)[~trial.fixed]
     # a walk in a segment is foretold by that in the rest of its record
-    own = trial.problem.own_jacobian()
+    own = trial.problem.drift_jacobian()
     jac, reach = np.hstack([jac, own]), np.append(reach, np.full(own.shape[1], np.inf))
     normal = jac.T @ jac
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))

@@ -25,7 +25,7 @@ from dearig.model.diagnosis.bench import Bench, Trial
 from dearig.model.diagnosis.results import MUCH_LEFT
 from dearig.model.effects import EFFECTS, Effect, EffectValues, Parameter, any_hysteretic
 from dearig.model.film import Strip
-from dearig.model.fitting.problem import Problem, is_told
+from dearig.model.fitting.problem import Problem, agrees
 from dearig.model.records import ActuatorRecord, FilmRecord
 
 __all__ = ["Promise", "Screen", "is_of", "sizes_of", "with_effect"]
@@ -90,7 +90,7 @@ class Screen:
                 self._as_it_was = rough.residuals(trial.x)
             else:
                 self._fidelity = trial.problem.fidelity
-        self._sketch = trial.problem.sketch(trial.x, trial.residuals)
+        self._sketch = trial.problem.coarse_residuals(trial.x, trial.residuals)
 
     def promises(self, effect: Effect) -> list[Promise]:
         """Promises of ``effect``, best first: one for each shape on its grid."""
@@ -307,9 +307,9 @@ class Screen:
         nothing = tuple(p.neutral or 0.0 for p in effect.amplitudes)
         model = with_effect(self.trial.model, effect.name, nothing)
         problem = self.bench.problem(model, self._fidelity)
-        if problem.walks is None:
+        if problem.drift is None:
             return None
-        columns = problem.own_jacobian()
+        columns = problem.drift_jacobian()
         columns /= np.linalg.norm(columns, axis=0)
         across = columns - self._q @ (self._q.T @ columns)
         _, share = self._solve(across, columns, float(self._residual @ self._residual))
@@ -325,23 +325,23 @@ class Screen:
 
         By sketches, where these tell what the members ``asked`` do.
         """
-        by_sketch = np.zeros(len(population), dtype=bool)
-        moved, status = self._moved_by(problem, population[asked], by_sketch[asked])
+        coarse = np.zeros(len(population), dtype=bool)
+        moved, status = self._moved_by(problem, population[asked], coarse[asked])
         if self._sketch is not None and len(asked) < len(population):
-            sketched, failed = self._moved_by(problem, population[asked], ~by_sketch[asked])
-            told = all(is_told(w, s) for w, s in zip(moved, sketched, strict=True))
-            by_sketch[:] = told and not (status.any() or failed.any())
+            sketched, failed = self._moved_by(problem, population[asked], ~coarse[asked])
+            told = all(agrees(w, s) for w, s in zip(moved, sketched, strict=True))
+            coarse[:] = told and not (status.any() or failed.any())
         rest = np.setdiff1d(np.arange(len(population)), asked)
-        others, failed = self._moved_by(problem, population[rest], by_sketch[rest])
+        others, failed = self._moved_by(problem, population[rest], coarse[rest])
         order = np.argsort(np.append(asked, rest))
         return np.vstack([moved, others])[order], np.append(status, failed)[order]
 
     def _moved_by(
-        self, problem: Problem, population: np.ndarray, by_sketch: np.ndarray
+        self, problem: Problem, population: np.ndarray, coarse: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        predicted, status = problem.predict(population, by_sketch)
+        predicted, status = problem.predict(population, coarse)
         moved = (predicted - problem.measured) / problem.sigma
-        for row, sketched in zip(moved, by_sketch, strict=True):
+        for row, sketched in zip(moved, coarse, strict=True):
             row -= self._sketch if sketched else self._as_it_was
         return moved, status
 

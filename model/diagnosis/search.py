@@ -369,7 +369,7 @@ class _Search:
         self.report("telling laws apart", 0.92)
         fresh = {t.name: t.trial for t in due}
         for some in _abreast(list(fresh)):
-            trials = self.bench.together(lambda n: self.bench.to_the_last(fresh[n]), some)
+            trials = self.bench.parallel_map(lambda n: self.bench.to_the_last(fresh[n]), some)
             for trial in trials:
                 self._keep(trial)
                 key = frozenset(trial.effects)
@@ -528,7 +528,7 @@ class _Search:
         """Each of ``trials``, of different effects, as ``_ended`` has it: all, or none of them."""
         keys = [frozenset(t.effects) for t in trials]
         due = [k for k in zip(keys, trials, strict=True) if self._is_due(k[0], leader)]
-        found = self.bench.together(lambda k: self.bench.ended(k[1], leader), due)
+        found = self.bench.parallel_map(lambda k: self.bench.ended(k[1], leader), due)
         for (key, _), trial in zip(due, found, strict=True):
             self.settled.add(key)
             self.found[key] = trial
@@ -633,7 +633,7 @@ class _Search:
         def refit(names: list[str]) -> None:
             for some in _abreast([n for n in names if n not in {t.name for t in tried}]):
                 unknown = [n for n in some if self._owes(parent, n, shares[n])]
-                trials = self.bench.together(
+                trials = self.bench.parallel_map(
                     lambda n: self._refit(parent, n, promises[n], jacobian, other), unknown
                 )
                 for name, trial in zip(unknown, trials, strict=True):
@@ -701,7 +701,7 @@ class _Search:
         asked = [e for e in wanted if e.name not in known]
         for n in range(0, len(asked), _SCREENED):
             some = asked[n : n + _SCREENED]
-            found = self.bench.together(screen.promises, some)
+            found = self.bench.parallel_map(screen.promises, some)
             known.update({e.name: p[:_PROMISES] for e, p in zip(some, found, strict=True)})
             part = 0.25 * (n + len(some)) / len(asked)
             self.report(_stage(parent, "screening"), span[0] + span[1] * part)
@@ -730,7 +730,7 @@ class _Search:
         worth = [p for p in promises if p.share > _NEARLY * promises[0].share]
         for start, promise in ((nothing, promises[0]), *((p.start, p) for p in worth)):
             near = _near(jacobian, promise, effect)
-            starts.append((start, self.bench.problem(model).off_walks(near)))
+            starts.append((start, self.bench.problem(model).project_off_drift(near)))
         simpler = self._simpler(parent, effect, promises[0].start)
         if simpler is not None:
             starts.append((simpler, starts[0][1]))
@@ -1014,7 +1014,7 @@ class _Search:
             # where it leads shows in its last steps only
             return self.bench.ended(trial, lead.cost)
 
-        for trial in self.bench.together(fit, promises):
+        for trial in self.bench.parallel_map(fit, promises):
             self._keep(trial)
 
     def _ranked(self, best: Trial, tried: list[_Tried]) -> tuple[list[_Tried], float]:
@@ -1162,7 +1162,7 @@ class _Search:
             left, size = self._unaccounted(one, [f * size for f in _ANEW_CLOSER])
             return left, place, size
 
-        looks = [k for k in self.bench.together(looked, range(len(tried))) if k is not None]
+        looks = [k for k in self.bench.parallel_map(looked, range(len(tried))) if k is not None]
         looks.sort(key=lambda look: look[0])
         most = _CLEARLY * looks[0][0] if looks else 0.0
         if leader.is_noise:
@@ -1308,7 +1308,7 @@ class _Search:
                 known = _numbers(trial)
                 numbers = [known[f"{name}: {p.name}"] for p in EFFECTS[name].parameters[:2]]
                 starts += merged(layout, start, *numbers)
-            fits = self.bench.together(
+            fits = self.bench.parallel_map(
                 lambda x: self.bench.fit(model, [(x, None)], fixed, leader=math.inf), starts
             )
             self._keep(min(fits, key=lambda t: t.cost))

@@ -1,8 +1,9 @@
-"""Least squares with few simulations: the Jacobian is carried along by secants (Broyden).
+"""Least squares with few simulations: Broyden's secant update of the Jacobian.
 
-Trying dozens of effects needs to know how low each can get, not where exactly: a Jacobian that is
-known nearby (that of the model without the effect) is a good start, each step taken corrects it for
-the direction gone, and it is computed anew only where it has led astray or nothing is left to gain.
+A comparison of dozens of effects needs the lowest cost of each, not its exact place. A Jacobian
+known nearby (of the model without the effect) is a good start. Each step corrects it along the
+direction of the step. It is computed again only where it predicted a gain that did not come, or
+where no gain is left.
 """
 
 from __future__ import annotations
@@ -13,33 +14,33 @@ import numpy as np
 from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
-from dearig.model.fitting.anchored import by_sketches
 from dearig.model.fitting.levenberg import LocalFit
 from dearig.model.fitting.problem import Problem
+from dearig.model.fitting.space_mapping import descend_coarsely
 
-__all__ = ["boxed_step", "descend_by_secants"]
+__all__ = ["boxed_step", "descend_broyden"]
 
-_DAMPINGS = np.array([3e-3, 1.0])  # tried at once, times the present damping
+_DAMPINGS = np.array([3e-3, 1.0])  # tried at once, relative to the current damping
 _DAMPING_MAX = 1e7
-_FLAT = 1e-9  # of the scaled curvature: flatter directions are not seen by the data
-_CARRIED = 5  # steps by secants, then the Jacobian is computed anew
-_PATIENCE = 3  # Jacobians that together must gain something
-_ASTRAY = 0.25  # of the gain that was promised: less, and the Jacobian is computed anew
+_FLAT = 1e-9  # of the scaled curvature: the data do not determine flatter directions
+_SECANT_STEPS_MAX = 5  # then the Jacobian is computed again
+_PATIENCE = 3  # Jacobians that together must lower chi-square by the gain asked for
+_GAIN_SHARE_MIN = 0.25  # of the predicted gain: below, the Jacobian is computed again
 
 
 def boxed_step(
     normal: np.ndarray, gradient: np.ndarray, damping: float, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """Damped least-squares step (f,) within a box about 0, the best one there.
+    """Return the best damped least-squares step (f,) within a box about 0.
 
-    It minimises 2 gradient.s + s.(normal + damping I).s for low <= s <= high, all (f,). Clipped
-    afterwards, a step along a narrow valley would leave the valley.
+    It minimises 2 gradient.s + s.(normal + damping I).s for low <= s <= high, all (f,). A step that
+    is clipped afterwards would leave a narrow valley of the cost.
     """
     root = cholesky(normal + damping * np.eye(gradient.size))
     step = -cho_solve((root, False), gradient)
     if np.all((low <= step) & (step <= high)):
         return np.asarray(step)
-    # where a bound leaves no room at all there is nothing to solve for
+    # a coordinate without room between its bounds is no unknown
     open_ = high - low > 1e-12 * (1.0 + np.abs(low) + np.abs(high))
     step = np.where(open_, 0.0, np.clip(0.0, low, high))
     if open_.any():
@@ -50,7 +51,7 @@ def boxed_step(
     return step
 
 
-def descend_by_secants(
+def descend_broyden(
     problem: Problem,
     start: np.ndarray,
     fixed: np.ndarray,
@@ -59,14 +60,13 @@ def descend_by_secants(
     gain: float = 1.0,
     sure: bool = True,
 ) -> LocalFit:
-    """From ``start`` (d,) down, the numbers ``fixed`` (d,) held, inside the layout's bounds.
+    """Descend from ``start`` (d,) inside the layout's bounds; parameters ``fixed`` (d,) are held.
 
-    On the records' sketches, as far as these lead, then on the whole records.
-
-    ``jacobian`` (N, f) is one known near the start, None to compute it; columns of it that are not
-    finite are computed. Has converged where the quadratic model promises less than ``gain`` in
-    chi-square, with ``sure`` only by a Jacobian of that place; gives up where several Jacobians
-    together have gained no more.
+    The descent runs under the records' coarse drives as far as they lower the cost, then on the
+    full records. ``jacobian`` (N, f) is one known near the start, or None; columns that are not
+    finite are computed. The fit has converged where the quadratic model predicts a gain of less
+    than ``gain`` in chi-square, with ``sure`` only by a Jacobian computed at that place. It ends
+    unconverged where several Jacobians together gain no more.
     """
     free = ~fixed
     x = np.clip(start, problem.layout.lower, problem.layout.upper)
@@ -76,35 +76,35 @@ def descend_by_secants(
         x, float(costs[0]), residuals[0], unknown if jacobian is None else jacobian, 0, False
     )
 
-    def on_sketches(sketch: Problem, here: LocalFit, iterations: int) -> LocalFit:
-        return _by_secants(sketch, here, free, iterations, gain, sure, by_sketch=False)
+    def on_coarse_drives(coarse_problem: Problem, here: LocalFit, iterations: int) -> LocalFit:
+        return _broyden(coarse_problem, here, free, iterations, gain, sure, coarse=False)
 
-    reached = by_sketches(on_sketches, problem, here, free, iterations, gain)
+    reached = descend_coarsely(on_coarse_drives, problem, here, free, iterations, gain)
     if reached.iterations >= iterations or (reached.converged and not sure):
         return reached
-    # a descent on sketches needs all numbers told, a Jacobian takes what columns there are
-    told = np.zeros(1, dtype=bool) if problem.sketched is None else problem.sketched[free]
-    some = bool(told.any()) and not told.all()
-    by_sketch = some and problem.sketch(x, here.residuals) is not None
-    rest = _by_secants(
-        problem, reached, free, iterations - reached.iterations, gain, sure, by_sketch
+    # a coarse descent needs every column; a Jacobian of the full problem uses those there are
+    columns = (
+        np.zeros(1, dtype=bool) if problem.coarse_columns is None else problem.coarse_columns[free]
     )
+    some = bool(columns.any()) and not columns.all()
+    coarse = some and problem.coarse_residuals(x, here.residuals) is not None
+    rest = _broyden(problem, reached, free, iterations - reached.iterations, gain, sure, coarse)
     return replace(rest, iterations=reached.iterations + rest.iterations)
 
 
-def _by_secants(
+def _broyden(
     problem: Problem,
     here: LocalFit,
     free: np.ndarray,
     iterations: int,
     gain: float,
     sure: bool,
-    by_sketch: bool,
+    coarse: bool,
 ) -> LocalFit:
-    """From ``here`` down; its Jacobian is one known nearby, or not finite where it is not known.
+    """Descend from ``here``, whose Jacobian is known nearby, or not finite where unknown.
 
-    Others are ``by_sketch`` as far as they lead: along a valley numbers nearly cancel, and what is
-    left there sketches do not tell.
+    Further Jacobians are ``coarse`` while they lower the cost: in a narrow valley columns nearly
+    cancel, and the coarse drives do not resolve the difference.
     """
     layout = problem.layout
     x, r, chi2 = here.x, here.residuals, here.cost * problem.samples
@@ -115,19 +115,19 @@ def _by_secants(
         which = free.copy()
         which[free] = unknown
         jac = jac.copy()
-        jac[:, unknown] = problem.jacobian(x, which, r, by_sketch)
-    damping, done, converged, carried = 1e-2, 0, False, 0
+        jac[:, unknown] = problem.jacobian(x, which, r, coarse)
+    damping, done, converged, secant_steps = 1e-2, 0, False, 0
     marks: list[float] = []
     while done < iterations:
         if jac is None:
-            # what promises and does not keep it is a valley that curves: secants do not follow it
+            # repeated Jacobians without gain: the valley curves, and secants do not follow it
             marks.append(chi2)
             if len(marks) > _PATIENCE and marks[-1 - _PATIENCE] - chi2 < gain:
                 break
-            jac, fresh, carried = problem.jacobian(x, free, r, by_sketch), True, 0
+            jac, fresh, secant_steps = problem.jacobian(x, free, r, coarse), True, 0
         done += 1
         scale = np.linalg.norm(jac, axis=0)
-        scale = np.where(scale > 0.0, scale, np.inf)  # what is not seen does not move
+        scale = np.where(scale > 0.0, scale, np.inf)  # a parameter without influence does not move
         normal, gradient = (jac / scale).T @ (jac / scale), (jac / scale).T @ r
         part, reach = x[free], layout.reach(x)[free]
         finite = np.where(np.isfinite(scale), scale, 0.0)
@@ -135,11 +135,11 @@ def _by_secants(
         high = np.minimum(layout.upper[free] - part, reach) * finite
         best_step = boxed_step(normal, gradient, _FLAT, low, high)
         if -float(best_step @ (2.0 * gradient + normal @ best_step)) < gain:
-            if not sure or (fresh and not by_sketch):
+            if not sure or (fresh and not coarse):
                 converged = True
                 break
             if fresh:
-                by_sketch = False
+                coarse = False
                 marks.clear()
             jac = None
             continue
@@ -154,8 +154,8 @@ def _by_secants(
             if not fresh:
                 jac = None
                 continue
-            if by_sketch:
-                jac, by_sketch = None, False
+            if coarse:
+                jac, coarse = None, False
                 marks.clear()
                 continue
             damping *= 1e2
@@ -166,19 +166,19 @@ def _by_secants(
         step = trials[best][free] - part
         bent = residuals[best] - r - jac @ step
         straight = r + jac @ step
-        promised = chi2 - float(straight @ straight)
+        predicted = chi2 - float(straight @ straight)
         length2 = float(np.sum((step * finite) ** 2))
-        astray = chi2 - better < _ASTRAY * promised
+        poor = chi2 - better < _GAIN_SHARE_MIN * predicted
         x, r, chi2 = trials[best], residuals[best], better
         damping = max(dampings[best], 1e-9)
-        carried += 1
-        if (astray and not fresh) or carried > _CARRIED:
+        secant_steps += 1
+        if (poor and not fresh) or secant_steps > _SECANT_STEPS_MAX:
             jac = None
             continue
-        # the secant: what the step showed, in the direction gone
+        # Broyden's update: the observed change, along the direction of the step
         jac = jac + np.outer(bent, step * finite**2 / max(length2, 1e-300))
         fresh = False
     if jac is None:
-        # given up just after it led astray: whoever goes on from here computes it
+        # ended just after a poor prediction: the next descent computes the Jacobian
         jac = np.full((r.size, int(free.sum())), np.nan)
     return LocalFit(x, chi2 / problem.samples, r, jac, done, converged)

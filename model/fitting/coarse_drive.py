@@ -1,8 +1,9 @@
-"""A record's drive in fewer and longer steps, by which a fit is told what a number of a model does.
+"""A record's drive in fewer and longer steps, for derivatives with respect to parameters.
 
-A search asks far more often how readings change with a number than what they are. In the change,
-what a long step gets wrong is gone but for some hundredths; so such questions are answered by a
-drive that is cut only where something happens. Every reading and every error comes from the whole.
+A search needs derivatives of the readings far more often than the readings. In a difference the
+error of a long step cancels to some hundredths. So derivatives are computed under a drive with
+steps only where the voltage or the film changes quickly. Every reading and every reported error
+comes from the full drive.
 """
 
 from __future__ import annotations
@@ -16,20 +17,23 @@ from dearig.model.actuator import Actuator, Drive, reading_of
 from dearig.model.records import ActuatorRecord
 from dearig.model.sensor import at_sensor
 
-__all__ = ["Sketch", "sketched"]
+__all__ = ["CoarseDrive", "coarse_drive_of"]
 
-_LONGEST = 0.02  # s, of a step
-_NEAR = 0.25  # of a reading's noise: as near must neighbours tell what is between
-_NEAR_PULL = 1.0  # of the same: as near the pull, which the film does not follow at once
-_FLAT = 1.0  # of the same: less from sample to sample is standing
-_JUMPS = 3.0  # of the same: more change of what is less, or more, and a converter's steps show
-_SAME = 0.5  # of the same: as near in the mean must all readings be
-_WORTH = 0.7  # of the samples: a drive of more steps is not worth it
+_STEP_MAX = 0.02  # s
+# The following are in units of a reading's noise
+_INTERPOLATION_ERROR_MAX = 0.25  # of readings inside a step, interpolated from its ends
+_PULL_ERROR_MAX = 1.0  # of the electrostatic pull, which the film follows only slowly
+_CONSTANT = (
+    1.0  # change of the static reading from sample to sample: below, the voltage is constant
+)
+_JUMP = 3.0  # change of that change: above, the converter's staircase excites ringing
+_READING_ERROR_MAX = 0.5  # RMS of all readings
+_SHARE_MAX = 0.7  # of the samples: a drive with more steps saves too little
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sketch(Drive):
-    """A drive that goes from each sample linearly to ``to`` (N,) V, from where it jumps."""
+class CoarseDrive(Drive):
+    """A drive that is linear from each sample to ``to`` (N,) in V at the end of its step."""
 
     to: np.ndarray
 
@@ -39,80 +43,84 @@ class Sketch(Drive):
         return self.to
 
 
-def sketched(record: ActuatorRecord, model: Actuator) -> Sketch | None:
-    """The drive of ``record`` in steps as long as ``model`` foresees the same readings.
+def coarse_drive_of(record: ActuatorRecord, model: Actuator) -> CoarseDrive | None:
+    """Return the drive of ``record`` in the longest steps under which ``model`` reads the same.
 
-    None where that spares too little, or where the model cannot follow the record.
+    None where that saves too little, or where the simulation of the record fails.
     """
     c, length = model.coefficients(), model.film.length
     if not kernel.is_swift(c):
         return None
-    foreseen, status = reading_of(c, length, record.drive, record.lag, kernel.QUICK)
+    predicted, status = reading_of(c, length, record.drive, record.lag, kernel.QUICK)
     if status != kernel.OK:
         return None
-    foreseen /= record.noise
+    predicted /= record.noise
     strongest = float(np.max(record.drive.voltage**2))
-    pulled = float(np.max(np.abs(foreseen))) / max(strongest, 1e-300)  # of the noise, by 1 V^2
-    begins, ends, shown = _smoothed(record.drive, pulled)
-    edges = _joined(record.time, foreseen, begins, ends, shown, pulled)
-    if edges.size > _WORTH * record.time.size:
+    pulled = float(np.max(np.abs(predicted))) / max(
+        strongest, 1e-300
+    )  # in units of the noise per V^2
+    begins, ends, jumping = _smoothed(record.drive, pulled)
+    edges = _step_edges(record.time, predicted, begins, ends, jumping, pulled)
+    if edges.size > _SHARE_MAX * record.time.size:
         return None
-    drive = _drawn(record.drive, begins, ends, edges)
-    there, status = reading_of(c, length, drive, record.lag, kernel.COARSE, record.time)
-    near = float(np.mean((there / record.noise - foreseen) ** 2)) < _SAME**2
+    drive = _coarsened(record.drive, begins, ends, edges)
+    readings, status = reading_of(c, length, drive, record.lag, kernel.COARSE, record.time)
+    near = float(np.mean((readings / record.noise - predicted) ** 2)) < _READING_ERROR_MAX**2
     return drive if status == kernel.OK and near else None
 
 
 def _smoothed(drive: Drive, pulled: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Voltages (N - 1,) at which intervals begin and end, and where a converter's steps show.
+    """Return voltages (N - 1,) at the start and end of intervals, and where jumps matter (bool).
 
-    A held voltage is, but for where they do, as one that goes straight from half of each step to
-    half of the next: at the samples, the film is where it would be.
+    Except where its jumps excite ringing, a held voltage is replaced by straight lines from the
+    middle of each jump to the middle of the next, which move the film alike at the samples.
     """
     begins, ends = drive.voltage[:-1], drive.ends[:-1]
     if not drive.hold:
         return begins, ends, np.zeros(begins.size, dtype=bool)
     squares = begins * np.abs(begins)
     up = np.diff(squares, prepend=squares[0], append=squares[-1]) * pulled
-    standing = np.maximum(np.abs(up[:-1]), np.abs(up[1:])) < _FLAT
-    # all from one stand to the next, or none: half a step of a moving voltage would make it ring
+    standing = np.maximum(np.abs(up[:-1]), np.abs(up[1:])) < _CONSTANT
+    # a moving stretch of the drive is replaced as a whole: half a jump at its edge would ring
     course = np.cumsum(standing)
-    shows = np.zeros(course[-1] + 1, dtype=bool)
-    shows[course[np.abs(np.diff(up)) > _JUMPS]] = True
-    shown = shows[course]
-    shown |= np.append(shown[1:], False)
+    rings = np.zeros(course[-1] + 1, dtype=bool)
+    rings[course[np.abs(np.diff(up)) > _JUMP]] = True
+    jumping = rings[course]
+    jumping |= np.append(jumping[1:], False)
     half = np.append(0.5 * (squares[:-1] + squares[1:]), squares[-1])
     half = np.sign(half) * np.sqrt(np.abs(half))
     since_half = np.append(begins[:1], half[:-1])
-    return np.where(shown, begins, since_half), np.where(shown, ends, half), shown
+    return np.where(jumping, begins, since_half), np.where(jumping, ends, half), jumping
 
 
-def _joined(
+def _step_edges(
     time: np.ndarray,
-    foreseen: np.ndarray,
+    predicted: np.ndarray,
     begins: np.ndarray,
     ends: np.ndarray,
-    shown: np.ndarray,
+    jumping: np.ndarray,
     pulled: float,
 ) -> np.ndarray:
-    """Samples (B + 1,) between which a step may go: twice as far, as long as nothing is missed."""
+    """Return the samples (B + 1,) at which steps end: steps are doubled while errors stay small."""
     edges = np.arange(time.size)
     step = float(np.median(np.diff(time)))
-    rate = np.gradient(foreseen, time)
+    rate = np.gradient(predicted, time)
     between, slope = np.empty_like(time), np.empty_like(time)
     size = 2
-    while size * step <= _LONGEST * (1.0 + 1e-6):
+    while size * step <= _STEP_MAX * (1.0 + 1e-6):
         first = np.arange(0, time.size - size, size)
         inner = first[:, None] + np.arange(1, size)
-        good = ~np.any(shown[first[:, None] + np.arange(size)], axis=1)
-        at_sensor(time[::size], foreseen[::size], rate[::size], time, between, slope)
-        good &= np.max(np.abs(between - foreseen)[inner], axis=1) < _NEAR
+        good = ~np.any(jumping[first[:, None] + np.arange(size)], axis=1)
+        at_sensor(time[::size], predicted[::size], rate[::size], time, between, slope)
+        good &= np.max(np.abs(between - predicted)[inner], axis=1) < _INTERPOLATION_ERROR_MAX
         left, right, possible = _line(time, begins, ends, first, size)
         there = left[:, None] + (right - left)[:, None] * (np.arange(1, size) / size)
         pulls = pulled * (there**2 - begins[inner] ** 2)
-        good &= np.max(np.abs(pulls), axis=1) < _NEAR_PULL
+        good &= np.max(np.abs(pulls), axis=1) < _PULL_ERROR_MAX
         good &= possible
-        good[1:-1] &= good[:-2] & good[2:]  # of a film that rings a single one may fit by chance
+        good[1:-1] &= (
+            good[:-2] & good[2:]
+        )  # while the film rings, a single step may agree by chance
         edges = np.setdiff1d(edges, inner[good])
         size *= 2
     return edges
@@ -121,10 +129,10 @@ def _joined(
 def _line(
     time: np.ndarray, begins: np.ndarray, ends: np.ndarray, first: np.ndarray, size: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Voltages (B,) between which ``size`` intervals go straight, and whether they can.
+    """Return voltages (B,) at the ends of a line that replaces ``size`` intervals, and validity.
 
-    Over all of them the square of the voltage, which is what pulls, has the same mean and the same
-    first moment.
+    The square of the voltage, which is the pull, has the same mean and first moment over the line
+    as over the intervals.
     """
     inside = first[:, None] + np.arange(size)
     a, b = begins[inside], ends[inside]
@@ -145,8 +153,10 @@ def _line(
     return sign * (m - half), sign * (m + half), possible
 
 
-def _drawn(drive: Drive, begins: np.ndarray, ends: np.ndarray, edges: np.ndarray) -> Sketch:
-    """``drive`` in steps between samples ``edges`` (B + 1,)."""
+def _coarsened(
+    drive: Drive, begins: np.ndarray, ends: np.ndarray, edges: np.ndarray
+) -> CoarseDrive:
+    """Return ``drive`` in steps between samples ``edges`` (B + 1,)."""
     time = drive.time
     starts, to = begins[edges[:-1]].copy(), ends[edges[1:] - 1].copy()
     warmth = None if drive.warmth is None else drive.warmth[edges].copy()
@@ -158,4 +168,4 @@ def _drawn(drive: Drive, begins: np.ndarray, ends: np.ndarray, edges: np.ndarray
         if warmth is not None and drive.warmth is not None:
             warmth[which] = drive.warmth[first[:, None] + np.arange(size)].mean(axis=1)
     last = drive.voltage[-1]
-    return Sketch(time[edges], np.append(starts, last), warmth=warmth, to=np.append(to, last))
+    return CoarseDrive(time[edges], np.append(starts, last), warmth=warmth, to=np.append(to, last))

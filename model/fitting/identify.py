@@ -1,4 +1,4 @@
-"""Identification of a model from records, by one of two methods, with honest intervals."""
+"""Identify a model from records by one of two methods, with 95 % intervals."""
 
 from __future__ import annotations
 
@@ -32,22 +32,22 @@ __all__ = [
 
 METHODS = ("hybrid", "de")
 
-_COARSE_RATE = 125.0  # Hz: plenty for relaxation times of tens of milliseconds, and cheap
+_COARSE_RATE = 125.0  # Hz: resolves relaxation times of tens of milliseconds
 _COARSE_SAMPLES = 1500  # of a film record
-_SCOUT_ITERATIONS = 10  # of each start, before the hopeless ones are dropped
-_DETERMINED_RATIO = 5.0  # an interval wider than this factor determines nothing worth quoting
+_SCOUT_ITERATIONS = 10  # of each start, before the worse ones are dropped
+_DETERMINED_RATIO = 5.0  # ratio of the ends of an interval, above which a value is not quoted
 _J_WORDS = "no spring stiffens measurably at these stretches: only a lower bound"
 
 
 @dataclass(frozen=True)
 class Identification:
-    """What a fit found.
+    """Result of a fit.
 
-    ``model`` is the fitted actuator or network, ``estimates`` its numbers with 95 % intervals,
+    ``model`` is the fitted actuator or strip, ``estimates`` its parameters with 95 % intervals,
     ``covariance`` (f, f) that of ``covariance_names``, in SI units. ``cost`` is the mean square of
-    the residuals over the noise (1 when nothing is left but noise); ``correlation`` the correlation
+    the residuals over the noise (1 when only noise is left); ``correlation`` the correlation
     time of the residuals in samples, by which the intervals are widened. ``held_limits`` names the
-    locking limits that were held because the data do not see them. ``warnings``
+    locking limits that were held because the data do not determine them. ``warnings``
     are sentences for the operator.
     """
 
@@ -65,12 +65,12 @@ class Identification:
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Names of the numbers that these data do not determine."""
+        """Names of the parameters that these data do not determine."""
         return tuple(e.name for e in self.estimates if not e.determined)
 
 
 def _quiet(stage: str, fraction: float) -> None:
-    """Progress that nobody watches."""
+    """Progress that is not shown."""
 
 
 def identify(
@@ -87,10 +87,10 @@ def identify(
 
     ``base`` is an ``Actuator`` for records driven by voltage (its film and load are kept), a
     ``Strip`` for films driven by stretch. The values of its springs are not used as a start, only
-    the number of branches and the kinds of spring; the numbers of its effects are. ``seed`` matters
-    to "de" only. ``nested`` is a fit with fewer branches, from which one more descent starts, so
-    that more branches never fit worse. ``progress(stage, fraction)`` is called often. Raises
-    ``ModelError`` for records and models that do not fit together.
+    the number of branches and the kinds of spring; the parameters of its effects are. ``seed`` is
+    used by "de" only. ``nested`` is a fit with fewer branches, from which one more descent starts,
+    so that more branches never fit worse. ``progress(stage, fraction)`` is called repeatedly.
+    Raises ``ModelError`` for records and models that do not fit together.
     """
     if method not in METHODS:
         raise ModelError(f"method {method!r} is not one of {', '.join(METHODS)}")
@@ -114,7 +114,7 @@ def add_intervals(
     workers: int = 2,
     progress: Progress = _quiet,
 ) -> Identification:
-    """``fitted`` with the 95 % intervals of its numbers; ``records`` are those it was fitted to."""
+    """Return ``fitted`` with 95 % intervals; ``records`` are its training records."""
     layout = Layout(fitted.model)
     problem = Problem(records, layout, workers)
     held = np.array([name in fitted.held_limits for name in layout.names])
@@ -136,7 +136,7 @@ def _result(
     words: str,
     held_limits: tuple[str, ...],
 ) -> Identification:
-    """A fit that ended at natural values ``found`` (d,); ``words``: why it has no interval."""
+    """Return the result at natural values ``found`` (d,); ``words`` say why it has no interval."""
     layout = problem.layout
     values = layout.by_relaxation_time(found)
     model = layout.model(values)
@@ -163,7 +163,7 @@ def _result(
             f"are a rough guide"
         )
     if method == "hybrid" and not fit.converged:
-        warnings.append("the descent was still gaining when it was ended")
+        warnings.append("the fit stopped before it converged")
     return Identification(
         method=method,
         model=model,
@@ -180,7 +180,7 @@ def _result(
 
 
 def _coarse(problem: Problem) -> Problem:
-    """The same problem on means of neighbouring samples, where the record is denser than needed."""
+    """Return the problem on means of neighbouring samples where records are denser than needed."""
     base = problem.layout.base
     records = [
         r.coarse(_COARSE_SAMPLES)
@@ -192,9 +192,9 @@ def _coarse(problem: Problem) -> Problem:
 
 
 def _coarse_about(problem: Problem, values: np.ndarray) -> Problem:
-    """The coarse problem with its optimum where the full one has it.
+    """Return the coarse problem with its optimum at that of the full one.
 
-    Averaging bends a curve a little, and the intervals can be narrower than that: so the coarse
+    Averaging shifts a curve, and intervals can be narrower than the shift. So the coarse
     measurement is the coarse model at the optimum plus the averaged residual of the full problem.
     """
     coarse = _coarse(problem)
@@ -219,12 +219,12 @@ def _coarse_about(problem: Problem, values: np.ndarray) -> Problem:
 def fit_globally(
     problem: Problem, nested: Network | None, progress: Progress, stiffening: bool = True
 ) -> tuple[LocalFit, np.ndarray]:
-    """Global search, descents from several starts, then the limits: the fit, and what is held.
+    """Fit by global search, descents, then the limits; return the fit and what is held (d,).
 
     The locking limits of an actuator are first held where springs do not stiffen: at a few per cent
-    of strain they would otherwise wander, and drag the relaxation times along. They are freed at
-    the end, and stay free only if that explains significantly more. Those of a film are free,
-    unless its springs are not to be ``stiffening``.
+    of strain they are undetermined and distort the relaxation times. They are freed at the end, and
+    stay free only if that lowers chi-square significantly. Those of a film are free
+    unless ``stiffening`` is False.
     """
     layout = problem.layout
     limits = np.zeros(layout.size, dtype=bool)
@@ -244,7 +244,7 @@ def fit_globally(
     for n, start in enumerate(starts):
         fits.append(descend(coarse, start, first, iterations=_SCOUT_ITERATIONS))
         progress("descents", (n + 1) / steps)
-    # two, because the one that leads after a few steps is not always the one that gets down
+    # two, because the best after a few steps is not always the best at the end
     leaders = sorted(fits, key=lambda f: f.cost)[:2]
     best = min((descend(coarse, f.x, first) for f in leaders), key=lambda f: f.cost)
     progress("descents", (len(starts) + 2) / steps)
@@ -260,9 +260,9 @@ def fit_globally(
 
 
 def is_worth_freeing(problem: Problem, cost: float, freed: LocalFit, numbers: int) -> bool:
-    """Whether a fit with some ``numbers`` more explains significantly more than ``cost`` leaves.
+    """Whether ``freed``, with so many more parameters, is significantly better than ``cost``.
 
-    Readings count as what they are worth: neighbours are alike in what is left.
+    Correlated residuals count as fewer independent readings.
     """
     inflation = max(1.0, freed.cost) * max(1.0, correlation_time(freed.residuals))
     return (cost - freed.cost) * problem.samples / inflation > CHI2_95 * numbers
@@ -271,7 +271,7 @@ def is_worth_freeing(problem: Problem, cost: float, freed: LocalFit, numbers: in
 def _intervals(
     problem: Problem, values: np.ndarray, held: np.ndarray, progress: Progress
 ) -> tuple[list[Estimate], tuple[str, ...], np.ndarray]:
-    """Estimates with profile-likelihood intervals; ``held`` (d,) are limits the data do not see."""
+    """Return estimates with profile-likelihood intervals; ``held`` (d,) limits are undetermined."""
     layout = problem.layout
     coarse = _coarse_about(problem, values)
     centre = descend(coarse, layout.coordinates(values), held, iterations=10)
@@ -280,7 +280,7 @@ def _intervals(
     inflation = max(1.0, centre.cost) * max(1.0, correlation_time(residuals))
     jac = coarse.jacobian(centre.x, free)
     cov = covariance(jac.T @ jac, inflation)
-    # a held limit is freed alone for its own profile: the others are neo-Hookean in all but name
+    # a held limit is freed alone for its own profile; the others stay practically neo-Hookean
     estimates = []
     done = 0
 
@@ -291,7 +291,7 @@ def _intervals(
 
     chi2 = centre.cost * coarse.samples
     for j, q in enumerate(layout.quantities):
-        sides = (-1.0,) if held[j] else (-1.0, 1.0)  # a held limit is already as high as counts
+        sides = (-1.0,) if held[j] else (-1.0, 1.0)  # a held limit is already at its upper end
         low, high = profile(coarse, centre.x, chi2, j, jac, inflation, held, tick, sides)
         value = float(values[j])
         if q.logarithmic:
@@ -302,7 +302,7 @@ def _intervals(
         determined = is_determined(low, high)
         note = "" if determined else _open_words(low, high)
         if held[j]:
-            note = _J_WORDS if low > 0.0 else "these data say nothing about it"
+            note = _J_WORDS if low > 0.0 else "not determined by these data"
         estimates.append(Estimate(q.name, q.unit, value, low, high, determined, note))
     progress("intervals", 1.0)
     problem.simulations += coarse.simulations
@@ -312,16 +312,16 @@ def _intervals(
 
 
 def is_determined(low: float, high: float) -> bool:
-    """True where an interval is narrow enough for its value to be quoted, and leaves 0 out."""
+    """Whether an interval is narrow enough for its value to be quoted, and excludes 0."""
     near, far = sorted((abs(low), abs(high)))
     return low * high > 0.0 and far < math.inf and far / near <= _DETERMINED_RATIO
 
 
 def _open_words(low: float, high: float) -> str:
     if low < 0.0 < high:
-        return "these data do not tell it from 0"
+        return "not distinguishable from 0 with these data"
     if low == 0.0 and math.isinf(high):
-        return "these data say nothing about it"
+        return "not determined by these data"
     if math.isinf(high):
         return "only a lower bound"
     if low == 0.0:

@@ -1,4 +1,4 @@
-"""How far each number could be from its estimate: covariance and profile likelihood."""
+"""Uncertainty of parameters: covariance and profile likelihood."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ __all__ = ["CHI2_95", "correlation_time", "covariance", "is_flat", "profile", "u
 
 CHI2_95 = 3.841458820694124  #: 95 % of chi-square with one degree of freedom
 _POINTS_MAX = 8  # on one side of a profile
-_NEAR = 0.06  # of the threshold's root: close enough to call it crossed
-_NEAR_A_LIMIT = 0.3  # the same for a limit that is not determined: it is a bound by decades
+_NEAR = 0.06  # of the threshold's root: tolerance of its crossing
+_NEAR_A_LIMIT = 0.3  # the same for an undetermined limit, which is bounded to decades only
 _SHORTER = np.array([1.0, 0.5, 0.25, 0.1, 0.03])  # of a step: tried at once
-_BY_CHANCE = 0.01  # of white noise is not as flat as is asked for
+_BY_CHANCE = 0.01  # significance level: share of white noise that the test rejects
 _GUESS_MAX = 1e4  # thresholds above the optimum from which a refit takes a few iterations
 
 
 def correlation_time(residuals: np.ndarray) -> float:
-    """Integrated autocorrelation time of ``residuals`` (N,) in samples, 1 for white noise.
+    """Return the integrated autocorrelation time of ``residuals`` (N,) in samples.
 
-    N correlated residuals say no more than N over this number of independent ones. Summed until
-    the first lag whose correlation is lost in the noise (Sokal's window would need a model).
+    It is 1 for white noise. N correlated residuals carry as much information as N over this number
+    of independent ones. The sum ends at the first lag whose correlation is within the noise
+    (Sokal's window needs a model).
     """
     n = residuals.size
     centred = residuals - residuals.mean()
@@ -42,16 +43,16 @@ def correlation_time(residuals: np.ndarray) -> float:
 
 
 def is_flat(residuals: np.ndarray) -> bool:
-    """Whether ``residuals`` (N,) have as much power at any frequency, whatever their size."""
+    """Whether the spectrum of ``residuals`` (N,) is flat."""
     return unevenness(residuals) == 0.0
 
 
 def unevenness(residuals: np.ndarray, by_chance: float = _BY_CHANCE) -> float:
-    """The part of the power of ``residuals`` (N,) that stands where white noise would not have it.
+    """Return the least share of the power of ``residuals`` (N,) that white noise does not explain.
 
-    At least so much; 0 where white noise would show as much more often than ``by_chance``.
+    0 where white noise shows as much with a probability above ``by_chance``.
     Bartlett's test: the periodogram of white noise, summed up, is a straight line (Durbin,
-    Biometrika 56, 1969). Of 5000 samples it sees a twentieth of the power, where that is elsewhere.
+    Biometrika 56, 1969). With 5000 samples it detects a twentieth of the power elsewhere.
     """
     power = np.abs(np.fft.rfft(residuals))[1:-1] ** 2
     summed = np.cumsum(power)
@@ -64,9 +65,9 @@ def unevenness(residuals: np.ndarray, by_chance: float = _BY_CHANCE) -> float:
 
 
 def covariance(normal: np.ndarray, inflation: float) -> np.ndarray:
-    """Covariance (f, f) of the coordinates from J^T J, times ``inflation``.
+    """Return the covariance (f, f) of the coordinates from J^T J, times ``inflation``.
 
-    Directions that the data do not see at all get a huge variance rather than an exception.
+    Directions without influence on the data get a huge variance, not an exception.
     """
     if normal.size == 0:
         return normal
@@ -79,10 +80,10 @@ def covariance(normal: np.ndarray, inflation: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Path:
-    """Where the other numbers go when one of them, ``index``, is moved away from ``start`` (d,).
+    """Path of the refitted parameters while parameter ``index`` moves away from ``start`` (d,).
 
-    ``first`` and ``second`` (d,) are the first two derivatives there by that number, ``sigma`` the
-    standard deviation that they foretell for it.
+    ``first`` and ``second`` (d,) are the first two derivatives of the path by that parameter,
+    ``sigma`` its standard deviation by these derivatives.
     """
 
     index: int
@@ -92,7 +93,7 @@ class _Path:
     sigma: float
 
     def ahead(self, points: np.ndarray) -> np.ndarray:
-        """Guesses (P, d) at ``points`` (P,) of the moved number."""
+        """Return extrapolated parameters (P, d) at ``points`` (P,) of the moved parameter."""
         s = (points - self.start[self.index])[:, None]
         return self.start + self.first * s + 0.5 * self.second * s * s
 
@@ -100,7 +101,7 @@ class _Path:
 def _path(
     problem: Problem, best: np.ndarray, j: np.ndarray, others: np.ndarray, index: int
 ) -> _Path:
-    """The way along which coordinate ``index`` is profiled; ``j`` (N, f) is that of ``others``."""
+    """Return the path of coordinate ``index``; ``j`` (N, f) is the Jacobian of ``others``."""
     layout = problem.layout
     inverse = covariance(j.T @ j, 1.0)
     probe = layout.differences(best)[index]
@@ -112,7 +113,7 @@ def _path(
     first[others] = -inverse @ (j.T @ slope)
     left = slope + j @ first[others]
     sigma = 1.0 / max(math.sqrt(float(left @ left)), 1e-150)
-    # far enough for the bend to show, near enough for it to be one
+    # wide enough to resolve the curvature, and still local
     probe = min(0.1 * sigma, *(0.05 * layout.reach(best) / np.maximum(np.abs(first), 1e-300)))
     three = best + np.outer((-probe, 0.0, probe), first)
     if np.all((three >= layout.lower) & (three <= layout.upper)):
@@ -133,12 +134,12 @@ def profile(
     tick: Callable[[], None],
     sides: tuple[float, ...] = (-1.0, 1.0),
 ) -> tuple[float, float]:
-    """95 % interval of coordinate ``index``: where refitting all others no longer keeps up.
+    """Return the 95 % interval of coordinate ``index`` by profile likelihood.
 
     ``best`` (d,) with chi-square ``chi2`` is the optimum, ``jac`` (N, f) the Jacobian there, which
-    says how far to step and where the others will go, ``inflation`` the factor by which chi-square
-    counts less than its white-noise value, ``held`` (d,) bool the numbers that are not refitted.
-    An end that the data leave open, or that is not among the ``sides`` sought, is -inf or inf.
+    gives the step and the path of the others, ``inflation`` the factor by which chi-square
+    counts less than its white-noise value, ``held`` (d,) bool the parameters that are not refitted.
+    An end that the data do not determine, or that is not among ``sides``, is -inf or inf.
     ``tick`` is called at each point.
     """
     layout = problem.layout
@@ -159,7 +160,7 @@ def profile(
         end = sign * math.inf
         for _ in range(_POINTS_MAX):
             tick()
-            # the others follow a parabola only so far: step no further than the guess is good
+            # the parabola holds only locally: the longest step with a usable extrapolation is taken
             shorter = _SHORTER if math.isinf(outside) else _SHORTER[:1]
             points = np.clip(
                 inside + sign * step * shorter, layout.lower[index], layout.upper[index]
@@ -173,7 +174,7 @@ def profile(
             point = float(points[chosen])
             at_bound = sign * (point - bound) >= 0.0
             step_before = abs(point - inside)
-            # the gain asked of the refit is a fraction of what decides
+            # a fraction of the threshold
             gain = 0.03 * threshold
             fit = descend(
                 problem, guesses[chosen], fixed, iterations=8, gain=gain, damping=1e-5, patience=2
@@ -193,7 +194,7 @@ def profile(
             else:
                 outside, z_outside = point, z
             if math.isfinite(outside):
-                # the root of chi-square is nearly straight near the threshold, and nowhere else
+                # the root of chi-square is nearly linear close to the threshold only
                 part = 0.4
                 if z_outside < 4.0:
                     part = min(max((1.0 - z_inside) / (z_outside - z_inside), 0.15), 0.85)

@@ -1,4 +1,4 @@
-"""Levenberg-Marquardt in scaled coordinates: a local fit from one start."""
+"""Levenberg-Marquardt least squares in scaled coordinates."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from dearig.model.fitting.problem import Problem
 
 __all__ = ["LocalFit", "descend"]
 
-_DAMPINGS = np.array([1e-4, 1e-2, 1.0, 30.0])  # tried at once, times the present damping
+_DAMPINGS = np.array([1e-4, 1e-2, 1.0, 30.0])  # tried at once, relative to the current damping
 _DAMPING_MIN, _DAMPING_MAX = 1e-12, 1e8
-_GAIN_MIN = 0.1  # of chi-square: a third of a standard deviation of any number
-_PROBE = 0.1  # of a step, to see how the residuals curve along it
-_BEND_MAX = 0.4  # of a step: a larger correction is no correction
-_GAIN_MISFIT = 0.01  # the same over the mean square of residuals that are more than noise
-_PATIENCE = 5  # iterations that together must gain something
-_FLAT = 1e-9  # of the scaled curvature: flatter directions are not seen by the data
+_GAIN_MIN = 0.1  # of chi-square: a third of a standard deviation of any parameter
+_PROBE = 0.1  # of a step: length of the finite difference along it
+_BEND_MAX = 0.4  # of a step: a larger second-order part is left out
+_GAIN_MISFIT = 0.01  # of chi-square over the number of samples, where residuals exceed the noise
+_PATIENCE = 5  # iterations that together must lower chi-square by the gain asked for
+_FLAT = 1e-9  # of the scaled curvature: the data do not determine flatter directions
 
 
 @dataclass(frozen=True)
 class LocalFit:
-    """Where a descent ended: coordinates ``x`` (d,), mean-square cost, residuals (N,).
+    """End of a descent: coordinates ``x`` (d,), mean-square cost, residuals (N,).
 
-    ``jacobian`` (N, f) over the free coordinates is that of the last iteration: at ``x`` itself
-    where nothing was left to gain, else a step before.
+    ``jacobian`` (N, f) over the free coordinates is that of the last iteration: at ``x`` where the
+    descent converged, else one step before.
     """
 
     x: np.ndarray
@@ -47,19 +47,19 @@ def descend(
     patience: int = _PATIENCE,
     quick: bool = False,
 ) -> LocalFit:
-    """Least squares from ``start`` (d,), coordinates of the layout, inside its bounds.
+    """Minimise least squares from ``start`` (d,), coordinates of the layout, inside its bounds.
 
-    ``fixed`` (d,) bool holds some numbers where they are. Marquardt's scaling (each coordinate by
-    the length of its own Jacobian column) keeps numbers that the data hardly see, such as J at
-    small stretch, from stopping or misleading the others. Each iteration tries several dampings at
-    once, as one population on all cores, each with its geodesic acceleration: the valleys of
-    relaxation spectra are long, narrow and curved.
+    ``fixed`` (d,) bool holds parameters. Marquardt's scaling (each coordinate by the length of its
+    Jacobian column) keeps parameters with little influence, such as J at small stretch, from
+    distorting the steps of the others. Each iteration tries several dampings at once, as one
+    population on all cores, each with its geodesic acceleration: the valleys of relaxation spectra
+    are long, narrow and curved.
 
-    Ends when the quadratic model promises a gain in chi-square of less than ``gain``, or when
-    ``patience`` iterations have together gained no more. Without a ``gain`` it is a tenth, or
-    more where the residuals are far above the noise. ``damping`` is the first one, relative to the
-    scaled curvature; near an optimum it may be small. ``quick`` takes one-sided differences, which
-    cost half and blur only what two branches of nearly one relaxation time share.
+    It ends when the quadratic model predicts a gain in chi-square of less than ``gain``, or when
+    ``patience`` iterations together gained less. Without a ``gain`` it is a tenth, or more where
+    the residuals are far above the noise. ``damping`` is the first one, relative to the
+    scaled curvature; near an optimum it may be small. ``quick`` takes one-sided differences at
+    half the cost; they blur only the difference of two branches of nearly equal relaxation times.
     """
     layout = problem.layout
     free = np.ones(layout.size, dtype=bool) if fixed is None else ~fixed
@@ -77,7 +77,7 @@ def descend(
         normal, gradient = jac.T @ jac, jac.T @ r
         scale = np.maximum(np.sqrt(np.diag(normal)), 1e-3 * scale)
         safe = np.where(scale > 0.0, scale, 1.0)
-        # numbers at a bound that the gradient pushes outwards stay there
+        # a parameter at a bound whose gradient points outwards stays there
         part, reach = x[free], layout.reach(x)[free]
         stuck = ((part <= layout.lower[free]) & (gradient > 0.0)) | (
             (part >= layout.upper[free]) & (gradient < 0.0)
@@ -91,7 +91,7 @@ def descend(
         enough = gain
         if enough is None:
             enough = max(_GAIN_MIN, _GAIN_MISFIT * chi2 / problem.samples)
-        # what the quadratic model still promises, flat directions apart
+        # gain that the quadratic model predicts, flat directions excepted
         if float(np.sum(target**2 / np.maximum(w, _FLAT))) < enough:
             converged = True
             break
@@ -137,8 +137,8 @@ def _bend(
 ) -> np.ndarray:
     """Second-order part (D, f) of ``steps`` (D, f): geodesic acceleration.
 
-    Transtrum and Sethna (2012): half the step by which the residuals' second derivative along the
-    first-order step would be undone. Left out where it is not small against that step.
+    Transtrum and Sethna (2012): half the step that cancels the second derivative of the residuals
+    along the first-order step. It is zero where it is not small against that step.
     """
     layout = problem.layout
     probes = np.tile(x, (steps.shape[0], 1))

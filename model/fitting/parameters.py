@@ -1,4 +1,4 @@
-"""Which numbers of a model are free, what they are called, and where the kernel reads them."""
+"""Free parameters of a model: names, bounds, coordinates, and places in the coefficient vector."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ __all__ = ["THESIS_RANGES", "Estimate", "Layout", "Quantity"]
 #: Search ranges of the thesis's Algorithm 1: moduli Pa, limits J, relaxation times s.
 THESIS_RANGES = {"mu": (0.0, 8e6), "J": (0.0, 9e8), "T": (0.0, 3e6)}
 
-# Where a logarithm can follow those ranges; below, a spring or a branch does nothing measurable.
+# Lower ends for logarithmic coordinates; below, a spring or branch has no measurable influence.
 _FLOOR = {"mu": 1e-2, "J": 1e-3, "T": 1e-6}
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """One free number, and where the kernel reads it.
+    """One free parameter.
 
     ``kind`` is mu, J or T of spring ``index`` (0 is the equilibrium spring), or ``effect``: then it
-    is number ``index`` of the effect ``effect``.
+    is parameter ``index`` of the effect ``effect``.
     """
 
     kind: str
@@ -39,12 +39,12 @@ class Quantity:
 
     @property
     def parameter(self) -> Parameter:
-        """What an effect says of its number."""
+        """Description of the parameter by its effect."""
         return EFFECTS[self.effect].parameters[self.index]
 
     @property
     def name(self) -> str:
-        """mu_0, J_0, T_1, ..., or effect and number, as in ``linear drag: drag``."""
+        """mu_0, J_0, T_1, ..., or effect and parameter, as in ``linear drag: drag``."""
         if self.kind == "effect":
             return f"{self.effect}: {self.parameter.name}"
         return f"{self.kind}_{self.index}"
@@ -58,19 +58,19 @@ class Quantity:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Range in which it is sought."""
+        """Search range."""
         if self.kind == "effect":
             return self.parameter.fit_bounds
         return _FLOOR[self.kind], THESIS_RANGES[self.kind][1]
 
     @property
     def logarithmic(self) -> bool:
-        """True where a fit moves by ratios."""
+        """Whether the coordinate is the logarithm."""
         return self.parameter.logarithmic if self.kind == "effect" else self.kind != "mu"
 
     @property
     def column(self) -> int:
-        """Where it stands in the coefficient vector (a relaxation time as its inverse)."""
+        """Index in the coefficient vector (a relaxation time is stored as its inverse)."""
         if self.kind == "effect":
             return PLACES[self.effect].at + self.index
         return HEAD + WIDTH * self.index + {"mu": MODULUS, "J": LIMIT, "T": RATE}[self.kind]
@@ -78,11 +78,11 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a fit says of one number: ``value`` and its 95 % interval ``low`` .. ``high``.
+    """Estimate of one parameter: ``value`` and its 95 % interval ``low`` .. ``high``.
 
     An end of the interval that the data leave open is 0 or infinite. ``determined`` is False when
     the interval is so wide that the value should not be quoted; ``note`` then says so in words.
-    ``free`` is False for a number that follows from others (mu_0 of a measured rest length).
+    ``free`` is False for a parameter that follows from others (mu_0 of a measured rest length).
     """
 
     name: str
@@ -96,7 +96,7 @@ class Estimate:
 
 
 class Layout:
-    """The free numbers of a model: moduli, then limits, then times, as in the thesis, then effects.
+    """Free parameters of a model: moduli, limits, times, as in the thesis, then those of effects.
 
     ``base`` carries everything that is not free. A fit moves in *coordinates*: moduli as they are,
     limits and times as logarithms. The data fix sums of moduli long before their parts, and such
@@ -135,31 +135,31 @@ class Layout:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the free numbers in order."""
+        """Names of the free parameters in order."""
         return tuple(q.name for q in self.quantities)
 
     @property
     def size(self) -> int:
-        """How many numbers are free."""
+        """Number of free parameters."""
         return len(self.quantities)
 
     def column(self, kind: str) -> np.ndarray:
-        """Indices of the free numbers of one kind."""
+        """Indices of the free parameters of one kind."""
         return np.array([i for i, q in enumerate(self.quantities) if q.kind == kind], dtype=int)
 
     def coordinates(self, values: np.ndarray) -> np.ndarray:
-        """Coordinates (..., d) of natural ``values`` (..., d)."""
+        """Return coordinates (..., d) of natural ``values`` (..., d)."""
         return np.where(self._log, np.log(np.maximum(values, 1e-300)), values)
 
     def values(self, x: np.ndarray) -> np.ndarray:
-        """Natural values (..., d) at coordinates ``x`` (..., d)."""
+        """Return natural values (..., d) at coordinates ``x`` (..., d)."""
         return np.where(self._log, np.exp(np.where(self._log, x, 0.0)), x)
 
     def reach(self, x: np.ndarray) -> np.ndarray:
-        """How far (d,) one step from ``x`` may go in each coordinate before linearity is no guide.
+        """Return the largest step (d,) from ``x`` in each coordinate for which linearity holds.
 
-        A factor of 20 for a time or a limit; for a modulus the sum of all moduli; for a number of
-        an effect ten times what would be noticed, or itself.
+        A factor of 20 for a time or a limit; the sum of all moduli for a modulus; for a parameter
+        of an effect ten times its typical value, or its own value.
         """
         moduli = x[self.column("mu")]
         effects = np.maximum(10.0 * self._typical, np.abs(x))
@@ -170,13 +170,13 @@ class Layout:
 
     def differences(self, x: np.ndarray) -> np.ndarray:
         """Steps (d,) for difference quotients at coordinates ``x``."""
-        # effects have kinks, and a model with one has them everywhere: wide enough to look across;
-        # a film that turns elsewhere, by as little as it may, has rung otherwise since
+        # effects have kinks, so differences must be wide enough to cross them; with hysteresis a small
+        # shift of a turning point changes the ringing after it
         springs = 1e-3 if self.base.effects else 1e-4
         if any_hysteretic(self.base.effects):
             springs = 3e-3
         moduli = springs * np.maximum(np.abs(x), 1e-3 * self.reach(x))
-        # but not past a moment or a line
+        # but not across an instant or a spectral line
         placed = [
             q.kind == "effect" and q.parameter.relative_to in ("duration", "spectrum")
             for q in self.quantities
@@ -186,17 +186,17 @@ class Layout:
         return np.where(self._log, np.where(self._typical > 0.0, 2e-2, springs), linear)
 
     def initial(self) -> np.ndarray:
-        """Natural values (d,) of the base itself, inside the bounds."""
+        """Return natural values (d,) of the base, inside the bounds."""
         values = self._c[self._columns].copy()
         rates = self.column("T")
         values[rates] = self.network.times
         return self.values(np.clip(self.coordinates(values), self.lower, self.upper))
 
     def padded(self, network: Network) -> np.ndarray:
-        """Coordinates (d,) of ``network``, with weak branches added until it has as many as this.
+        """Return coordinates (d,) of ``network``, padded with weak branches.
 
-        The added branches relax at the geometric mean of the others: there, a weak branch changes
-        little and can grow in either direction.
+        The added branches relax at the geometric mean of the others, where a weak branch changes
+        little and its time can move in either direction.
         """
         springs, times = list(network.springs), list(network.times)
         logarithms = [math.log(max(t, _FLOOR["T"])) for t in times]
@@ -233,7 +233,7 @@ class Layout:
         return c
 
     def build(self, values: np.ndarray) -> Network:
-        """The network with the free numbers set to ``values`` (d,), natural."""
+        """Return the network with the free parameters at natural ``values`` (d,)."""
         c = self.coefficients(values)[0]
         springs = [
             Spring(
@@ -248,7 +248,7 @@ class Layout:
         return Network(springs[0], branches)
 
     def model(self, values: np.ndarray) -> Actuator | Strip:
-        """The base with the free numbers set to ``values`` (d,)."""
+        """Return the base with the free parameters at natural ``values`` (d,)."""
         return replace(self.base, network=self.build(values), effects=self._effects(values))
 
     def _effects(self, values: np.ndarray) -> EffectValues:
@@ -264,10 +264,10 @@ class Layout:
         )
 
     def by_relaxation_time(self, values: np.ndarray) -> np.ndarray:
-        """``values`` (d,) with the branches in order of relaxation time.
+        """Return ``values`` (d,) with the branches in order of relaxation time.
 
-        Branches of one kind of spring can be exchanged without changing the model, so their order
-        is a convention; without one, two fits of the same data could not be compared.
+        Branches with the same kind of spring are interchangeable; a fixed order makes two fits of
+        the same data comparable.
         """
         kinds = {s.kind for s in self.network.springs[1:]}
         if len(kinds) > 1:
@@ -283,7 +283,7 @@ class Layout:
 
 
 def require_free(layout: Layout, samples: int) -> None:
-    """Refuse a fit that has more unknowns than readings."""
+    """Raise ``ModelError`` for a fit with more unknowns than readings."""
     if samples <= layout.size:
         raise ModelError(
             f"{samples} samples cannot determine {layout.size} parameters; record longer or fit "

@@ -12,38 +12,40 @@ from dearig.model.actuator import Actuator, readings_of
 from dearig.model.effects import EFFECTS, SENSOR_COLUMNS
 from dearig.model.errors import ModelError
 from dearig.model.film import Strip, stress_of
-from dearig.model.fitting.drift import Walking, walks_of
+from dearig.model.fitting.drift import DriftFit, record_drift
+from dearig.model.fitting.parallel import parallel_map
 from dearig.model.fitting.parameters import Layout
-from dearig.model.fitting.threads import together
 from dearig.model.records import ActuatorRecord, FilmRecord, Record
 
-__all__ = ["Problem", "is_told"]
+__all__ = ["Problem", "agrees"]
 
-_SAME = 1.0  # of the noise: a sketch that is further from the whole is none
-_MOST = 0.6  # of the numbers
-_ALIKE = 0.15  # of what a number does: as near must a sketch tell it
-_OF_STRIP = 6.0  # steps of an actuator that a sample of a strip takes as long as
-_OF_EFFECT = 0.8  # of a step, that each effect takes which moves the film
-_OF_ANY = 1.5e4  # a population beside its steps: to hand it over, and what a fit makes of it
+# RMS, in units of the noise, by which readings by the coarse drive may differ from the full ones
+_COARSE_MISFIT_MAX = 1.0
+_COARSE_SHARE_MIN = 0.6  # of the parameters: below, no coarse derivative is trusted
+_COARSE_ERROR_MAX = 0.15  # relative error of a derivative by the coarse drive
+# Cost of a simulation, in integration steps of an actuator without effects
+_STRIP_SAMPLE_COST = 6.0
+_EFFECT_STEP_COST = 0.8
+_POPULATION_COST = 1.5e4  # of one call: handing over, and the linear algebra of the fit
 
 
-def is_told(whole: np.ndarray, sketch: np.ndarray) -> bool:
-    """Whether a ``sketch`` (N,) of what a number does is near enough to the ``whole``."""
-    return float(np.linalg.norm(sketch - whole)) <= _ALIKE * float(np.linalg.norm(whole))
+def agrees(full: np.ndarray, coarse: np.ndarray) -> bool:
+    """Whether a derivative (N,) by the ``coarse`` drive is close enough to the ``full`` one."""
+    return float(np.linalg.norm(coarse - full)) <= _COARSE_ERROR_MAX * float(np.linalg.norm(full))
 
 
 class Problem:
     """Least squares of model minus measurement, in units of the noise.
 
-    ``records`` are all of actuators or all of films, and ``layout`` says what is free. Members of a
-    population whose simulation ends early keep the last value they reached: a large but finite
-    residual, which a search walks away from. ``fidelity`` is as the kernel has it. ``simulations``
-    counts records simulated, and ``told`` is called with each such number. What the numbers
-    ``sketched`` (d,) bool do is told by the records' sketches, None where nothing is.
+    ``records`` are all of actuators or all of films, and ``layout`` names the free parameters. A
+    member of a population whose simulation ends early keeps the last value that it reached: its
+    residual is large but finite, so a search moves away from it. ``fidelity`` is the kernel's.
+    ``simulations`` counts the records simulated; ``on_simulations(count, cost)`` is called after
+    each population. ``coarse_columns`` (d,) bool are the parameters whose derivatives the records'
+    coarse drives give; None where none are.
 
-    Walks that each of several records has of its own are found on the way
-    (``dearig.model.fitting.drift``) and are part of every prediction; the layout's numbers of them
-    then do nothing.
+    Drift that each of several records has by itself is eliminated in every prediction
+    (``dearig.model.fitting.drift``); the layout's amplitudes of it then have no influence.
     """
 
     def __init__(
@@ -52,7 +54,7 @@ class Problem:
         layout: Layout,
         workers: int = 2,
         fidelity: int = kernel.CAREFUL,
-        told: Callable[[int, float], None] | None = None,
+        on_simulations: Callable[[int, float], None] | None = None,
     ) -> None:
         if not records:
             raise ModelError("a fit needs at least one record")
@@ -65,12 +67,13 @@ class Problem:
         self.layout = layout
         self.workers = workers
         self.fidelity = fidelity
-        self.told = told
-        self.sketched: np.ndarray | None = None
-        self._missed: np.ndarray | None = None  # by sketches, of all readings, where they are used
+        self.on_simulations = on_simulations
+        self.coarse_columns: np.ndarray | None = None
+        # difference of full and coarse readings (N,) in m, while the coarse drives are used
+        self._correction: np.ndarray | None = None
         self.simulations = 0
         self.measured = np.concatenate([r.measured for r in records])
-        # a reading that must not be used has no weight
+        # a masked reading has no weight
         self.sigma = np.concatenate(
             [
                 np.full(r.measured.size, r.noise)
@@ -80,34 +83,36 @@ class Problem:
             ]
         )
         self._edges = np.cumsum([0, *(r.measured.size for r in records)])
-        self.walks = walks_of(self.records, layout.base.effects)
-        own = () if self.walks is None else self.walks.names
-        #: (d,) bool of the layout's numbers that each record has for itself
+        self.drift = record_drift(self.records, layout.base.effects)
+        own = () if self.drift is None else self.drift.names
+        #: (d,) bool: parameters of the layout that each record has for itself
         self.own = np.array([name in own for name in layout.names], dtype=bool)
 
     @property
     def samples(self) -> int:
-        """How many readings are fitted."""
+        """Number of readings that are fitted."""
         return int(np.count_nonzero(np.isfinite(self.sigma)))
 
     def predict(
-        self, values: np.ndarray, sketched: np.ndarray | None = None
+        self, values: np.ndarray, coarse: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Model readings (P, N) and statuses (P,) of a population ``values`` (P, d), natural.
+        """Return readings (P, N) and statuses (P,) of a population ``values`` (P, d), natural.
 
-        Of members ``sketched`` (P,) bool, if any, by the sketches of the records that have one.
+        Members ``coarse`` (P,) bool are simulated under the coarse drives of the records that have
+        one.
         """
         c = self.layout.coefficients(values)
-        by_sketch = np.full(c.shape[0], self._missed is not None) if sketched is None else sketched
+        if coarse is None:
+            coarse = np.full(c.shape[0], self._correction is not None)
         out = np.zeros((c.shape[0], self.measured.size))
         status = np.zeros((c.shape[0], len(self.records)), dtype=np.int64)
 
-        films = self._films(c, by_sketch)
-        which = by_sketch[[members[0] for members in films]]
+        films = self._films(c, coarse)
+        which = coarse[[members[0] for members in films]]
         steps = np.zeros((which.size, len(self.records)))
 
         def run(jobs: list[tuple[int, int]]) -> None:
-            # some in one go: to hand them over one by one would take a part of the time
+            # several jobs a call: handing them over one by one costs a part of the time
             for film, i in jobs:
                 members = films[film]
                 part = slice(self._edges[i], self._edges[i + 1])
@@ -115,120 +120,118 @@ class Problem:
                     c[members], self.records[i], bool(which[film])
                 )
 
-        together(run, self._shared_out(which), self.workers)
+        parallel_map(run, self._shared_out(which), self.workers)
         self.simulations += steps.size
-        if self.told is not None:
-            self.told(steps.size, self._effort(float(steps.sum())))
-        if self._missed is not None:
-            out += self._missed
-        if self.walks is not None:
-            out += self.walks.nearest(self.measured - out)
-        # of several records the first that fails speaks
+        if self.on_simulations is not None:
+            self.on_simulations(steps.size, self._effort(float(steps.sum())))
+        if self._correction is not None:
+            out += self._correction
+        if self.drift is not None:
+            out += self.drift.nearest(self.measured - out)
+        # the status is that of the first record that fails
         failed = np.argmax(status != kernel.OK, axis=1)
         return out, np.take_along_axis(status, failed[:, None], axis=1)[:, 0]
 
-    def _films(self, c: np.ndarray, by_sketch: np.ndarray) -> list[list[int]]:
-        """Members of a population ``c`` (P, C) whose films move alike: one simulation does."""
+    def _films(self, c: np.ndarray, coarse: np.ndarray) -> list[list[int]]:
+        """Group members of a population ``c`` (P, C) whose films move alike, for one simulation."""
         sensors = any(EFFECTS[name].acts_on == "sensor" for name, _ in self.layout.base.effects)
         if len(c) < 2 or not sensors:
             return [[member] for member in range(len(c))]
         films: dict[tuple[bytes, bool], list[int]] = {}
         moving = np.delete(c, SENSOR_COLUMNS, axis=1)
-        for member, (row, sketched) in enumerate(zip(moving, by_sketch, strict=True)):
-            films.setdefault((row.tobytes(), bool(sketched)), []).append(member)
+        for member, (row, is_coarse) in enumerate(zip(moving, coarse, strict=True)):
+            films.setdefault((row.tobytes(), bool(is_coarse)), []).append(member)
         return list(films.values())
 
-    def _shared_out(self, by_sketch: np.ndarray) -> list[list[tuple[int, int]]]:
-        """Films, of which some are ``by_sketch`` (P,), and records for each of the workers.
+    def _shared_out(self, coarse: np.ndarray) -> list[list[tuple[int, int]]]:
+        """Share out (film, record) jobs among the workers; ``coarse`` (P,) films are cheaper.
 
-        The long ones first, each to who has least to do yet: records may differ much.
+        The longest jobs go first, each to the worker with the least load, since records differ.
         """
         steps = np.array([self._steps(r) for r in self.records])
-        jobs = list(np.ndindex(by_sketch.size, len(self.records)))
-        jobs.sort(key=lambda job: -steps[job[1], int(by_sketch[job[0]])])
+        jobs = list(np.ndindex(coarse.size, len(self.records)))
+        jobs.sort(key=lambda job: -steps[job[1], int(coarse[job[0]])])
         shares: list[list[tuple[int, int]]] = [[] for _ in range(min(self.workers, len(jobs)))]
         loads = [0.0] * len(shares)
         for film, i in jobs:
             least = loads.index(min(loads))
             shares[least].append((film, i))
-            loads[least] += steps[i, int(by_sketch[film])]
+            loads[least] += steps[i, int(coarse[film])]
         return shares
 
     @staticmethod
     def _steps(record: Record) -> tuple[float, float]:
-        """Samples that a simulation steps through: of the whole record, and of its sketch."""
-        if isinstance(record, FilmRecord) or record.sketch is None:
+        """Samples that a simulation steps through: full record, and coarse drive."""
+        if isinstance(record, FilmRecord) or record.coarse_drive is None:
             return float(record.time.size), float(record.time.size)
-        return float(record.time.size), float(record.sketch.time.size)
+        return float(record.time.size), float(record.coarse_drive.time.size)
 
     def _effort(self, steps: float) -> float:
-        """What it takes to simulate a population in so many ``steps``, in those of a bare film.
+        """Cost of simulating a population in so many ``steps``, in steps of a bare film.
 
-        As steps go, not seconds: the same on any machine, however busy.
+        Counted in steps, not seconds: the same on any machine under any load.
         """
         base = self.layout.base
         if isinstance(base, Strip):
-            return _OF_ANY + _OF_STRIP * steps
+            return _POPULATION_COST + _STRIP_SAMPLE_COST * steps
         moving = sum(EFFECTS[name].acts_on != "sensor" for name, _ in base.effects)
-        return _OF_ANY + (1.0 + _OF_EFFECT * moving) * steps
+        return _POPULATION_COST + (1.0 + _EFFECT_STEP_COST * moving) * steps
 
-    def _readings(
-        self, c: np.ndarray, record: Record, sketched: bool
-    ) -> tuple[np.ndarray, int, int]:
-        """Readings (M, N) of members ``c`` (M, C) whose films move alike; status and steps."""
+    def _readings(self, c: np.ndarray, record: Record, coarse: bool) -> tuple[np.ndarray, int, int]:
+        """Return readings (M, N) of members ``c`` (M, C) whose films move alike; status; steps."""
         if isinstance(record, FilmRecord):
             stress, status, _ = stress_of(c[0], record.time, record.stretch)
             return stress[None], status, record.time.size
         base = self.layout.base
         length = base.film.length if isinstance(base, Actuator) else 1.0
         drive, fidelity = record.drive, self.fidelity
-        if sketched and record.sketch is not None:
-            drive, fidelity = record.sketch, kernel.COARSE
+        if coarse and record.coarse_drive is not None:
+            drive, fidelity = record.coarse_drive, kernel.COARSE
         moved, status, steps = readings_of(c, length, drive, record.lag, fidelity, record.time)
         return record.seen(moved), status, steps
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
-        """(model - measured)/noise, (N,), at coordinates ``x`` (d,)."""
+        """Return (model - measured)/noise, (N,), at coordinates ``x`` (d,)."""
         predicted, _ = self.predict(self.layout.values(x))
         return (predicted[0] - self.measured) / self.sigma
 
-    def walking(self, x: np.ndarray) -> Walking | None:
-        """The walks of the records at ``x`` (d,); None where none has one of its own."""
-        if self.walks is None:
+    def fit_drift(self, x: np.ndarray) -> DriftFit | None:
+        """Return the drift of the records at ``x`` (d,); None where no record has its own."""
+        if self.drift is None:
             return None
         still = self.layout.values(x)
         still[self.own] = 0.0
-        missing = self.measured - self.without_walks().predict(still)[0][0]
-        return self.walks.walking(missing, self.sigma)
+        missing = self.measured - self.without_drift().predict(still)[0][0]
+        return self.drift.fit(missing, self.sigma)
 
-    def without_walks(self) -> Problem:
-        """The same, but that what each record has of its own is not found on the way."""
+    def without_drift(self) -> Problem:
+        """Return the same problem without the elimination of each record's drift."""
         other = copy(self)
-        other.walks, other.own = None, np.zeros_like(self.own)
+        other.drift, other.own = None, np.zeros_like(self.own)
         return other
 
-    def own_jacobian(self) -> np.ndarray:
-        """d(residuals)/d(sizes of the records' own walks), (N, K n); (N, 0) where none has one."""
-        if self.walks is None:
+    def drift_jacobian(self) -> np.ndarray:
+        """Return d(residuals)/d(drift amplitudes), (N, K n); (N, 0) where no record has drift."""
+        if self.drift is None:
             return np.empty((self.measured.size, 0))
-        return self.walks.ways / self.sigma[:, None]
+        return self.drift.basis / self.sigma[:, None]
 
-    def off_walks(self, jacobian: np.ndarray) -> np.ndarray:
-        """Columns of a ``jacobian`` (N, f) less what the walks of each record make up for."""
-        if self.walks is None:
+    def project_off_drift(self, jacobian: np.ndarray) -> np.ndarray:
+        """Return the columns of ``jacobian`` (N, f) less what the drift of each record absorbs."""
+        if self.drift is None:
             return jacobian
         sigma = np.where(np.isfinite(self.sigma), self.sigma, 0.0)
-        return jacobian - (self.walks.nearest(jacobian.T * sigma) / self.sigma).T
+        return jacobian - (self.drift.nearest(jacobian.T * sigma) / self.sigma).T
 
     def costs(self, x: np.ndarray) -> np.ndarray:
-        """Mean square of the residuals (P,) of a population of coordinates (P, d).
+        """Return the mean squares (P,) of the residuals of a population of coordinates (P, d).
 
-        Members that the model cannot follow cost more than doing nothing at all.
+        A member whose simulation fails costs more than a model that does not move.
         """
         return self.evaluate(x)[0]
 
     def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Costs (P,) as ``costs`` has them, and residuals (P, N), of coordinates (P, d)."""
+        """Return costs (P,) as in ``costs``, and residuals (P, N), of coordinates (P, d)."""
         predicted, status = self.predict(self.layout.values(x))
         still = float(np.sum((self.measured / self.sigma) ** 2)) / self.samples
         residuals = (predicted - self.measured) / self.sigma
@@ -240,24 +243,26 @@ class Problem:
         x: np.ndarray,
         free: np.ndarray,
         residuals: np.ndarray | None = None,
-        sketched: bool = False,
+        coarse: bool = False,
     ) -> np.ndarray:
-        """d(residuals)/dx (N, f) over the ``free`` (d,) coordinates, as one population.
+        """Return d(residuals)/dx (N, f) over the ``free`` (d,) coordinates, as one population.
 
-        Central differences: two branches of nearly one relaxation time have nearly parallel columns
-        (to 1e-5), and a one-sided difference would blur just the direction that is hard to see.
-        With the ``residuals`` at ``x`` given, one-sided ones, for half of the cost; if they may be
-        ``sketched``, those that sketches tell for a quarter of that.
+        Differences are central: two branches of nearly equal relaxation times have nearly parallel
+        columns (to 1e-5), and a one-sided difference blurs the direction in which they differ. With
+        the ``residuals`` at ``x`` given, differences are one-sided, for half the cost; with
+        ``coarse``, the ``coarse_columns`` come from the coarse drives, for a quarter of that.
         """
         moving = ~self.own[free]
         if not moving.all():
-            # what each record has for itself does nothing, and not even by rounding
+            # eliminated parameters have columns of exact zeros
             jac = np.zeros((self.measured.size, moving.size))
-            jac[:, moving] = self.jacobian(x, free & ~self.own, residuals, sketched)
+            jac[:, moving] = self.jacobian(x, free & ~self.own, residuals, coarse)
             return jac
         if residuals is not None:
-            by_sketch = None if self.sketched is None or not sketched else self.sketched[free]
-            return self._one_sided(x, free, residuals, by_sketch)
+            columns = None
+            if coarse and self.coarse_columns is not None:
+                columns = self.coarse_columns[free]
+            return self._one_sided(x, free, residuals, columns)
         steps = np.diag(self.layout.differences(x))[free]
         up = np.minimum(x + steps, self.layout.upper)
         down = np.maximum(x - steps, self.layout.lower)
@@ -266,70 +271,78 @@ class Problem:
         half = width.size
         return ((predicted[:half] - predicted[half:]) / self.sigma).T / width
 
-    def told_by_sketches(
+    def find_coarse_columns(
         self, x: np.ndarray, free: np.ndarray, known: np.ndarray | None = None
     ) -> np.ndarray:
-        """Which numbers (d,) bool sketches tell at ``x`` (d,) what they do, of those ``free``.
+        """Return which ``free`` parameters (d,) bool have a derivative by coarse drives at ``x``.
 
-        The first of them may be ``known``, and are not asked again.
+        ``known`` gives the answer for the first parameters, which are not computed again.
         """
-        told = np.zeros(x.size, dtype=bool)
-        if not self._has_sketches:
-            return told
+        seen = np.zeros(x.size, dtype=bool)
+        if not self._has_coarse_drives:
+            return seen
         residuals = self.residuals(x)
-        if self.sketch(x, residuals) is None:
-            return told  # much of what they miss would show in differences too
+        if self.coarse_residuals(x, residuals) is None:
+            return seen  # a large error of the reading is an error of the differences too
         asked = free.copy()
         if known is not None:
-            told[: known.size] = known
+            seen[: known.size] = known
             asked[: known.size] = False
-        wholly = self._one_sided(x, asked, residuals, None)
-        there = self._one_sided(x, asked, residuals, np.ones(wholly.shape[1], dtype=bool))
-        told[asked] = [is_told(w, t) for w, t in zip(wholly.T, there.T, strict=True)]
-        # where few are told, these are hardly to be trusted either
-        return told if np.mean(told[free]) > _MOST else np.zeros_like(told)
+        full = self._one_sided(x, asked, residuals, None)
+        by_coarse = self._one_sided(x, asked, residuals, np.ones(full.shape[1], dtype=bool))
+        seen[asked] = [agrees(w, t) for w, t in zip(full.T, by_coarse.T, strict=True)]
+        # where few derivatives agree, the others agree by chance
+        return seen if np.mean(seen[free]) > _COARSE_SHARE_MIN else np.zeros_like(seen)
 
-    def anchored(self, x: np.ndarray, residuals: np.ndarray, free: np.ndarray) -> Problem | None:
-        """The problem by sketches, which have the ``residuals`` (N,) at ``x`` (d,) as the whole.
+    def space_mapped(
+        self, x: np.ndarray, residuals: np.ndarray, free: np.ndarray
+    ) -> Problem | None:
+        """Return the problem under coarse drives, corrected to ``residuals`` (N,) at ``x`` (d,).
 
-        None where these do not tell what all ``free`` (d,) numbers do.
+        None where a ``free`` (d,) parameter has no derivative by the coarse drives.
         """
-        if self.sketched is None or not self.sketched[free].all():
+        if self.coarse_columns is None or not self.coarse_columns[free].all():
             return None
-        sketch = self.sketch(x, residuals)
-        if sketch is None:
+        coarse = self.coarse_residuals(x, residuals)
+        if coarse is None:
             return None
         other = copy(self)
-        other.sketched = None
-        # a reading that must not be used is missed by nothing
+        other.coarse_columns = None
+        # a masked reading needs no correction
         sigma = np.where(np.isfinite(self.sigma), self.sigma, 0.0)
-        other._missed = (residuals - sketch) * sigma
+        other._correction = (residuals - coarse) * sigma
         return other
 
-    def sketch(self, x: np.ndarray, residuals: np.ndarray) -> np.ndarray | None:
-        """The ``residuals`` (N,) at ``x`` (d,) as sketches have them; None where these are none."""
-        if not self._has_sketches:
+    def coarse_residuals(self, x: np.ndarray, residuals: np.ndarray) -> np.ndarray | None:
+        """Return residuals (N,) at ``x`` (d,) by coarse drives; None where they are not close."""
+        if not self._has_coarse_drives:
             return None
         predicted, _ = self.predict(self.layout.values(x), np.ones(1, dtype=bool))
-        sketch = np.asarray((predicted[0] - self.measured) / self.sigma)
-        return sketch if np.sum((sketch - residuals) ** 2) < _SAME**2 * self.samples else None
+        coarse = np.asarray((predicted[0] - self.measured) / self.sigma)
+        return (
+            coarse
+            if np.sum((coarse - residuals) ** 2) < _COARSE_MISFIT_MAX**2 * self.samples
+            else None
+        )
 
     @property
-    def _has_sketches(self) -> bool:
-        return any(isinstance(r, ActuatorRecord) and r.sketch is not None for r in self.records)
+    def _has_coarse_drives(self) -> bool:
+        return any(
+            isinstance(r, ActuatorRecord) and r.coarse_drive is not None for r in self.records
+        )
 
     def _one_sided(
-        self, x: np.ndarray, free: np.ndarray, residuals: np.ndarray, sketched: np.ndarray | None
+        self, x: np.ndarray, free: np.ndarray, residuals: np.ndarray, coarse: np.ndarray | None
     ) -> np.ndarray:
         steps = self.layout.differences(x)
         # away from a bound that is near
         steps = np.where(x + steps > self.layout.upper, -steps, steps)
         there = x + np.diag(steps)[free]
-        if sketched is None or not sketched.any():
+        if coarse is None or not coarse.any():
             predicted, _ = self.predict(self.layout.values(there))
             return ((predicted - self.measured) / self.sigma - residuals).T / steps[free]
         rows = np.vstack([there, x])
-        predicted, _ = self.predict(self.layout.values(rows), np.append(sketched, True))
+        predicted, _ = self.predict(self.layout.values(rows), np.append(coarse, True))
         moved = (predicted - self.measured) / self.sigma
-        here = np.where(sketched[:, None], moved[-1], residuals)
+        here = np.where(coarse[:, None], moved[-1], residuals)
         return (moved[:-1] - here).T / steps[free]

@@ -1,4 +1,4 @@
-"""Global searches: the thesis's Algorithm 1 as printed, and the starts of the hybrid method."""
+"""Global searches: the thesis's Algorithm 1 as printed, and starts of the hybrid method."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ __all__ = [
 
 Progress = Callable[[str, float], None]
 
-#: s, standard deviation of the window through which lam'' is read: it is kept to about 10 Hz
+#: Standard deviation in s of the smoothing window for lam'': it passes up to about 10 Hz.
 SMOOTHING = 0.015
 _WIDE_LIMIT = 1e4  # of J: a spring that does not stiffen within any stretch of an actuator
-_REST_TURNS = 6
+_REST_ITERATIONS = 6
 _SETS_MAX = 6000  # of branches, each tried by least squares: a third of a second
 
 
@@ -64,7 +64,7 @@ ALGORITHM_1 = Algorithm1()
 def algorithm_1(
     problem: Problem, seed: int, progress: Progress, settings: Algorithm1 = ALGORITHM_1
 ) -> np.ndarray:
-    """Natural parameter values (d,) found by differential evolution, as the thesis prints it.
+    """Return natural parameter values (d,) by differential evolution, as the thesis prints it.
 
     DE/rand/1/bin, uniform initial members over the printed ranges, linear (not logarithmic)
     coordinates. Eq. 50's e_rms is in the displacement's own unit, taken as mm.
@@ -111,13 +111,13 @@ def algorithm_1(
 
 
 def voltage_starts(problem: Problem, progress: Progress, starts: int = 6) -> np.ndarray:
-    """Coordinates (K, d) worth a descent for records driven by voltage, best first.
+    """Return start coordinates (K, d) for records driven by voltage, best first.
 
-    The stretch is measured but for its rest value, so the branches can be driven with it: every
-    term of the motion equation is then known, and linear in the moduli (film inertia is left out
-    here). The rest stretch depends on mu_0 alone and hardly changes the terms, so a few turns of
-    fit and rest state settle it. What remains is an exhaustive search over sets of relaxation
-    times, with non-negative least squares for the moduli: it needs no luck and no seed.
+    The stretch is measured except for its rest value, so it can be imposed on the branches. Every
+    term of the motion equation is then known and linear in the moduli (the film's inertia is left
+    out). The rest stretch depends on mu_0 alone and hardly changes the terms, so a few iterations
+    of fit and rest state suffice. The remaining search over sets of relaxation times is exhaustive,
+    with non-negative least squares for the moduli, and needs no seed.
     """
     layout = problem.layout
     candidates, parts, target = _at_rest_balance(problem, progress)
@@ -127,10 +127,10 @@ def voltage_starts(problem: Problem, progress: Progress, starts: int = 6) -> np.
 
 
 def moving_starts(problem: Problem, starts: int = 6) -> tuple[np.ndarray, float]:
-    """Starts (K, d) as of ``voltage_starts`` beside a mass that moves with the film; its kg.
+    """Return starts (K, d) as ``voltage_starts`` with a moving mass, and that mass in kg.
 
-    The stress that the mass takes is proportional to the measured acceleration: one more column of
-    the least squares. So it is told also where it has bent all that was fitted without it.
+    The stress on the mass is proportional to the measured acceleration: one more column of the
+    least squares. It is found even where a fit without the mass ended far off.
     """
     layout = problem.layout
     c = layout.coefficients(_start_values(layout))[0]
@@ -142,10 +142,10 @@ def moving_starts(problem: Problem, starts: int = 6) -> tuple[np.ndarray, float]
 
 
 def voltage_misfit(problem: Problem, rest: float) -> float:
-    """The part of the Maxwell stress that no branches account for, for the measured stretch (RMS).
+    """Return the relative RMS of the Maxwell stress that branches leave at the measured stretch.
 
-    As ``voltage_starts`` has it, but for any number of branches and about a ``rest`` stretch that
-    is known well enough: least squares, no simulation.
+    As in ``voltage_starts``, with any number of branches and about a given ``rest`` stretch: linear
+    least squares without simulation.
     """
     base = _actuator(problem)
     c = problem.layout.coefficients(_start_values(problem.layout))[0]
@@ -163,30 +163,30 @@ def _actuator(problem: Problem) -> Actuator:
 
 
 def _start_values(layout: Layout) -> np.ndarray:
-    """Natural values (d,) to begin with, no spring of which stiffens."""
+    """Return natural start values (d,) at which no spring stiffens."""
     values = layout.initial()
     values[layout.column("J")] = _WIDE_LIMIT
     return values
 
 
 def _candidates(problem: Problem) -> np.ndarray:
-    """Relaxation times and limits (G, 2) of the branches that there may be."""
+    """Return relaxation times and limits (G, 2) of the candidate branches."""
     return np.array([(t, _WIDE_LIMIT) for t in _time_grid(problem)])
 
 
 def _at_rest_balance(
     problem: Problem, progress: Progress, moving: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Candidates (G, 2) and the balance as in ``_balance``, about the rest that it leads to."""
+    """Return candidates (G, 2) and the balance as in ``_balance`` about its own rest state."""
     layout = problem.layout
     base = _actuator(problem)
     c = layout.coefficients(_start_values(layout))[0]
     candidates = _candidates(problem)
     measured = base.load.rest_length
     rest = 1.1 if measured is None else measured / base.film.length
-    for turn in range(_REST_TURNS):
+    for turn in range(_REST_ITERATIONS):
         parts, target = _balance(problem, base, c, candidates, rest, moving)
-        progress("global search", (turn + 1) / (_REST_TURNS + 1))
+        progress("global search", (turn + 1) / (_REST_ITERATIONS + 1))
         if measured is not None:
             break
         moduli, _ = nnls(parts.T, target)
@@ -240,9 +240,9 @@ def _balance(
 def film_starts(
     problem: Problem, progress: Progress, stiffening: bool = True, starts: int = 8
 ) -> np.ndarray:
-    """Coordinates (K, d) worth a descent for records driven by stretch, best first.
+    """Return start coordinates (K, d) for records driven by stretch, best first.
 
-    Springs are ``stiffening`` or as good as neo-Hookean.
+    Springs are practically neo-Hookean unless ``stiffening``.
 
     With the stretch imposed the stress is linear in the moduli: an exhaustive search over sets of
     branches (each a relaxation time and a locking limit) and over the limit of the equilibrium
@@ -254,7 +254,7 @@ def film_starts(
     firsts = greatest**2 * np.array([1.2, 3.0, 10.0, 100.0])
     if not stiffening or layout.network.equilibrium.kind == "neo-hookean":
         firsts = np.array([_WIDE_LIMIT])
-    # a branch that locks early flows at a nearly constant stress, whatever the rate
+    # a branch with a low limit flows at a nearly constant stress at any rate
     limits: tuple[float, ...] = (_WIDE_LIMIT, 1.0, 0.03)
     if not stiffening or layout.network.springs[-1].kind != "gent":
         limits = limits[:1]
@@ -279,7 +279,7 @@ def film_starts(
 
 
 def _time_grid(problem: Problem, points: int = 16) -> np.ndarray:
-    """Relaxation times that records can show, two samples to three durations, if they are free."""
+    """Return relaxation times that records resolve, two samples to three durations, in bounds."""
     layout = problem.layout
     shortest = min(float(np.median(np.diff(r.time))) for r in problem.records)
     longest = max(float(r.time[-1] - r.time[0]) for r in problem.records)
@@ -299,7 +299,7 @@ def _unit_stresses(
     time: np.ndarray,
     stretch: np.ndarray,
 ) -> tuple[np.ndarray, bool]:
-    """Stress per unit modulus (1 + G, N) of the equilibrium spring and of candidate branches.
+    """Return stress per unit modulus (1 + G, N) of the equilibrium spring and candidate branches.
 
     ``first`` is the limit of the equilibrium spring, ``candidates`` (G, 2) are relaxation times and
     limits of the branches.
@@ -319,10 +319,10 @@ def _subsets(
     parts: np.ndarray,
     target: np.ndarray,
 ) -> list[tuple[float, np.ndarray]]:
-    """(misfit, coordinates) of every set of branches among ``candidates``; spring 0 always belongs.
+    """Return (misfit, coordinates) of every set of branches among ``candidates`` and spring 0.
 
-    Where there would be too many sets, only candidates that least squares over all of them at once
-    makes use of, and their neighbours, take part.
+    Where there are too many sets, only candidates with weight in a least-squares fit of all of them
+    at once, and their neighbours, take part.
     """
     branches = layout.column("T").size
     triangle = np.asarray(np.linalg.qr(np.vstack([parts, target]).T, mode="r"))
@@ -340,7 +340,7 @@ def _subsets(
     for chosen in combinations(pool, branches):
         columns = [0, *(1 + i for i in chosen)]
         moduli, misfit = nnls(triangle[:, columns], triangle[:, -1])
-        # a branch that least squares leaves out still has to be seen by the descent
+        # a branch of zero weight still needs influence for the descent to move it
         moduli = np.maximum(moduli, 1e-3 * max(float(moduli.max()), 1.0))
         spring_limits = np.array([first, *candidates[list(chosen), 1]])
         values = layout.initial()
@@ -352,7 +352,7 @@ def _subsets(
 
 
 def _ranked(layout: Layout, found: list[tuple[float, np.ndarray]], starts: int) -> np.ndarray:
-    """The best starts (K, d), no two of them alike in all relaxation times and limits."""
+    """Return the best starts (K, d) that differ in a relaxation time or limit."""
     if not found:
         raise ModelError(
             "no set of springs can follow these records: check that stretch, displacement and "
@@ -362,7 +362,7 @@ def _ranked(layout: Layout, found: list[tuple[float, np.ndarray]], starts: int) 
     told_apart = np.concatenate([layout.column("T"), layout.column("J")])
     for _, x in sorted(found, key=lambda f: f[0]):
         start = np.clip(x, layout.lower, layout.upper)
-        # times and limits make the difference: the moduli follow from them
+        # only times and limits are compared: the moduli follow from them
         if not kept or all(np.max(np.abs((start - k)[told_apart]), initial=0) > 0.7 for k in kept):
             kept.append(start)
         if len(kept) == starts:

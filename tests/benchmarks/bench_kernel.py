@@ -25,7 +25,7 @@ from dearig.model.actuator import Actuator, Drive, at_rest, initial_state, readi
 from dearig.model.coefficients import REST
 from dearig.model.effects import EFFECTS, EffectValues
 from dearig.model.excitation import Sequence
-from dearig.model.fitting.coarse_drive import sketched
+from dearig.model.fitting.coarse_drive import coarse_drive_of
 from dearig.model.material import (
     STANDARD_GRAVITY,
     TABLE_3,
@@ -146,7 +146,7 @@ def what_quick_steps_save(actuator: Actuator, sequence: Sequence) -> None:
     t = np.arange(math.ceil(sequence.segments[0].duration * STAIRCASE)) / STAIRCASE
     drive = Drive(t, sequence.segments[0].voltage(t), hold=True)
     record = ActuatorRecord("staircase", drive, np.zeros(t.size), NOISE)
-    sketch = sketched(record, actuator)
+    sketch = coarse_drive_of(record, actuator)
     assert sketch is not None
     print(
         f"{'staircase of 200 Hz':<28}{'careful ms':>11}{'hasty ms':>10}{'ratio':>8}{'um':>8}"
@@ -165,7 +165,7 @@ def what_quick_steps_save(actuator: Actuator, sequence: Sequence) -> None:
             f"{name or 'no effect':<28}{careful * 1e3:>11.3f}{quick * 1e3:>10.3f}"
             f"{quick / careful:>7.2f}x{_rms_um((found - expected) * THESIS_FILM.length):>8.3f}"
             f"{drawn * 1e3:>11.3f}{drawn / careful:>7.2f}x{_rms_um(shown - moved):>8.3f}"
-            f"{100.0 * missed_by(model, replace(record, sketch=sketch)):>7.1f}%"
+            f"{100.0 * missed_by(model, replace(record, coarse_drive=sketch)):>7.1f}%"
         )
 
 
@@ -179,8 +179,8 @@ def missed_by(model: Actuator, record: ActuatorRecord) -> float:
     problem, x, free = posed(model, record, kernel.ROUGH)
     residuals = problem.residuals(x)
     whole = problem.jacobian(x, free, residuals)
-    problem.sketched = free
-    off = problem.jacobian(x, free, residuals, sketched=True) - whole
+    problem.coarse_columns = free
+    off = problem.jacobian(x, free, residuals, coarse=True) - whole
     return float(np.max(np.linalg.norm(off, axis=0) / np.linalg.norm(whole, axis=0)))
 
 

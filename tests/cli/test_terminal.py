@@ -70,7 +70,7 @@ class TestTables:
     def test_parameters(self):
         text = shown(identify_table(identify_outcome()))
         assert "45.65 to 45.89" in text
-        assert "J₁: these data say nothing about it" in text
+        assert "J₁: not determined by these data" in text
         assert "Warning: The residual is 3 times the noise." in text
 
     def test_ascii(self):
@@ -182,7 +182,7 @@ class TestJson:
         assert found["J_0"]["ci95"] == [59.595, None]
         assert found["J_1"] == {
             "name": "J_1", "value": 1e4, "unit": "", "ci95": [None, None], "determined": False,
-            "free": True, "note": "these data say nothing about it",
+            "free": True, "note": "not determined by these data",
         }  # fmt: skip
         assert found["mu_0"]["free"] is False
 

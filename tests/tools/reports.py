@@ -64,7 +64,7 @@ ESTIMATES = (
     Estimate("mu_2", "Pa", 45772.4, 45650.0, 45890.0, True),
     Estimate("mu_3", "Pa", 321.197, 321.0, 390.467, True),
     Estimate("J_0", "", 1e4, 59.595, math.inf, False, "only a lower bound"),
-    Estimate("J_1", "", 1e4, 0.0, math.inf, False, "these data say nothing about it"),
+    Estimate("J_1", "", 1e4, 0.0, math.inf, False, "not determined by these data"),
     Estimate("T_1", "s", 0.36048, 0.019546, 0.37498, False, "known only within a factor of 19.2"),
     Estimate("T_2", "s", 0.366765, 0.364832, 0.433317, True),
     Estimate("T_3", "s", 2.32465, 2.31076, 2.33359, True),

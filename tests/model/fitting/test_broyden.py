@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from dearig.model.fitting.broyden import boxed_step, descend_by_secants
+from dearig.model.fitting.broyden import boxed_step, descend_broyden
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
@@ -64,7 +64,7 @@ def require_the_optimum(fit, within=0.15):
 
 def test_from_nothing():
     problem, start, held = posed()
-    fit = descend_by_secants(problem, start, held, gain=0.01)
+    fit = descend_broyden(problem, start, held, gain=0.01)
     assert fit.converged
     require_the_optimum(fit)
     assert problem.simulations < 0.6 * by_full_jacobians()[1]
@@ -75,7 +75,7 @@ def test_from_a_jacobian_that_is_known():
     known = problem.jacobian(start, ~held)
     kept = known.copy()
     problem.simulations = 0
-    fit = descend_by_secants(problem, start, held, known, gain=0.01)
+    fit = descend_broyden(problem, start, held, known, gain=0.01)
     require_the_optimum(fit)
     assert problem.simulations < 0.6 * by_full_jacobians()[1]
     np.testing.assert_array_equal(known, kept)
@@ -86,14 +86,14 @@ def test_columns_that_are_not_known_are_computed():
     known = problem.jacobian(start, ~held)
     known[:, [1, 3]] = np.nan
     problem.simulations = 0
-    fit = descend_by_secants(problem, start, held, known, gain=0.01)
+    fit = descend_broyden(problem, start, held, known, gain=0.01)
     require_the_optimum(fit)
     assert np.isnan(known[:, [1, 3]]).all()
     assert problem.simulations < 0.6 * by_full_jacobians()[1]
     # nor of one that is known in part
     known = problem.jacobian(start, ~held)
     known[700:, 3] = np.nan
-    require_the_optimum(descend_by_secants(problem, start, held, known, gain=0.01))
+    require_the_optimum(descend_broyden(problem, start, held, known, gain=0.01))
 
 
 def test_a_misleading_jacobian_is_found_out():
@@ -101,19 +101,19 @@ def test_a_misleading_jacobian_is_found_out():
     wrong = problem.jacobian(start, ~held)
     rng = np.random.default_rng(0)
     wrong = wrong * rng.choice([-1.0, 1.0], wrong.shape[1])
-    require_the_optimum(descend_by_secants(problem, start, held, wrong, gain=0.01))
+    require_the_optimum(descend_broyden(problem, start, held, wrong, gain=0.01))
 
 
 def test_at_the_optimum_nothing_is_left_to_do():
     best, _ = by_full_jacobians()
     problem, _, held = posed()
-    fit = descend_by_secants(problem, best.x, held)
+    fit = descend_broyden(problem, best.x, held)
     assert fit.converged
     require_the_optimum(fit)
     # itself, and one Jacobian, one-sided, to be sure
     assert problem.simulations == 1 + np.count_nonzero(~held)
     problem.simulations = 0
-    fit = descend_by_secants(problem, best.x, held, best.jacobian, sure=False)
+    fit = descend_broyden(problem, best.x, held, best.jacobian, sure=False)
     assert fit.converged
     assert problem.simulations == 1
 
@@ -121,12 +121,12 @@ def test_at_the_optimum_nothing_is_left_to_do():
 def test_a_few_steps_are_a_few_steps():
     problem, start, held = posed()
     first = float(problem.costs(start[None])[0])
-    fit = descend_by_secants(problem, start, held, iterations=2)
+    fit = descend_broyden(problem, start, held, iterations=2)
     assert fit.iterations == 2
     assert not fit.converged
     assert fit.cost < first
     # and from there on
-    rest = descend_by_secants(problem, fit.x, held, fit.jacobian, gain=0.01)
+    rest = descend_broyden(problem, fit.x, held, fit.jacobian, gain=0.01)
     require_the_optimum(rest)
 
 
@@ -139,7 +139,7 @@ def test_bounds_hold():
     pushed = replace(other, displacement=other.displacement + 3e-6 * np.gradient(
         other.displacement, other.time) / 1e-3)  # fmt: skip
     problem = Problem([pushed], layout, workers=1)
-    fits = [f(problem, start, held) for f in (descend, descend_by_secants)]
+    fits = [f(problem, start, held) for f in (descend, descend_broyden)]
     for fit in fits:
         assert np.all(fit.x >= layout.lower)
         assert np.all(fit.x <= layout.upper)
@@ -149,7 +149,7 @@ def test_bounds_hold():
     outside = start.copy()
     outside[layout.column("effect")] = -50.0
     outside[0] = 2.0 * layout.upper[0]
-    fit = descend_by_secants(problem, outside, held, iterations=0)
+    fit = descend_broyden(problem, outside, held, iterations=0)
     assert fit.x[layout.column("effect")[0]] == layout.lower[layout.column("effect")[0]]
     assert fit.x[0] == layout.upper[0]
 

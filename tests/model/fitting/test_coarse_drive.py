@@ -13,8 +13,8 @@ from dearig.model.diagnosis.bench import Bench
 from dearig.model.diagnosis.screening import Screen
 from dearig.model.effects import EFFECTS
 from dearig.model.excitation import Chirp, Lobes, Ramp, Sequence, Steps
-from dearig.model.fitting.broyden import descend_by_secants
-from dearig.model.fitting.coarse_drive import sketched
+from dearig.model.fitting.broyden import descend_broyden
+from dearig.model.fitting.coarse_drive import coarse_drive_of
 from dearig.model.fitting.levenberg import descend
 from dearig.model.material import Branch, Network, Spring
 from tests.tools.engine import NOISE, PLAIN, effect, posed, record_of, typical
@@ -43,9 +43,9 @@ def seen(record, model, drive=None, fidelity=kernel.CAREFUL):
 
 
 def with_sketch(record, model=PLAIN):
-    sketch = sketched(record, model)
+    sketch = coarse_drive_of(record, model)
     assert sketch is not None
-    return replace(record, sketch=sketch)
+    return replace(record, coarse_drive=sketch)
 
 
 @pytest.mark.parametrize("lag", [0.0, 9e-5, 3e-3])
@@ -53,7 +53,7 @@ def with_sketch(record, model=PLAIN):
 @pytest.mark.parametrize(("segments", "part"), [(SLOW, 0.3), (CHIRP, 0.4), (STEPS, 0.5)])
 def test_a_sketch_is_shorter_and_shows_the_same(segments, part, hold, lag):
     one = replace(record(*segments, hold=hold), lag=lag)
-    sketch = sketched(one, PLAIN)
+    sketch = coarse_drive_of(one, PLAIN)
     assert sketch is not None
     assert sketch.time.size < part * one.time.size
     off = seen(one, PLAIN, sketch, kernel.COARSE) - seen(one, PLAIN)
@@ -62,7 +62,7 @@ def test_a_sketch_is_shorter_and_shows_the_same(segments, part, hold, lag):
 
 def test_slow_and_fast_are_cut_as_they_ask():
     one = record(*SLOW, *STEPS)
-    sketch = sketched(one, PLAIN)
+    sketch = coarse_drive_of(one, PLAIN)
     begins = Sequence("played", SLOW).duration
     steps = np.diff(sketch.time)
     assert np.median(steps[sketch.time[:-1] < begins]) == pytest.approx(0.02)
@@ -76,7 +76,7 @@ def test_slow_and_fast_are_cut_as_they_ask():
 def test_it_pulls_as_much(hold, sign):
     drive = played(*SLOW, hold=hold)
     one = record_of(PLAIN, replace(drive, voltage=sign * drive.voltage))
-    sketch = sketched(one, PLAIN)
+    sketch = coarse_drive_of(one, PLAIN)
 
     def pull(d):
         a, b = d.voltage[:-1], d.ends[:-1]
@@ -92,7 +92,7 @@ def test_it_pulls_as_much(hold, sign):
 def test_the_temperature_is_that_of_the_step():
     drive = played(*SLOW)
     warm = replace(drive, warmth=0.2 * drive.time)
-    sketch = sketched(record_of(PLAIN, warm), PLAIN)
+    sketch = coarse_drive_of(record_of(PLAIN, warm), PLAIN)
     middle = 0.5 * (sketch.time[1:-1] + sketch.time[:-2])
     # the samples of a step are the first half and more of it
     np.testing.assert_allclose(sketch.warmth[:-2], 0.2 * middle, atol=0.2 * 0.5 / RATE)
@@ -101,48 +101,48 @@ def test_the_temperature_is_that_of_the_step():
 def test_what_cannot_be_sketched():
     slow = record(*SLOW)
     held = replace(PLAIN, film=replace(PLAIN.film, kinematics="uniaxial"))
-    assert sketched(slow, held) is None  # its swinging is not in closed form
+    assert coarse_drive_of(slow, held) is None  # its swinging is not in closed form
     branches = tuple(Branch(Spring(10e3, 1e4), t) for t in (0.2, 0.4, 1.0, 4.0))
     many = replace(PLAIN, network=Network(PLAIN.network.springs[0], branches))
-    assert sketched(slow, many) is None
+    assert coarse_drive_of(slow, many) is None
     strong = replace(slow, drive=replace(slow.drive, voltage=60.0 * slow.drive.voltage))
-    assert sketched(strong, PLAIN) is None  # it pulls in
-    assert sketched(record(Chirp(3.5e3, 20.0, 60.0, 5.0)), PLAIN) is None
-    assert sketched(record(*SLOW, rate=60.0), PLAIN) is None  # as long as a step may be
+    assert coarse_drive_of(strong, PLAIN) is None  # it pulls in
+    assert coarse_drive_of(record(Chirp(3.5e3, 20.0, 60.0, 5.0)), PLAIN) is None
+    assert coarse_drive_of(record(*SLOW, rate=60.0), PLAIN) is None  # as long as a step may be
 
 
 def test_which_numbers_are_told():
     slow = with_sketch(record(*SLOW))
     for effects in (effect("linear drag", drag=300.0), effect("linear drift", drift=1e-6)):
         problem, x, free = posed(replace(PLAIN, effects=effects), slow)
-        np.testing.assert_array_equal(problem.told_by_sketches(x, free), free)
+        np.testing.assert_array_equal(problem.find_coarse_columns(x, free), free)
     # a moment within a step is not seen, nor bristles that slip within one
     late = effect("sudden change of force", stress=30.0, moment=4.003)
     problem, x, free = posed(replace(PLAIN, effects=late), slow)
     moment = problem.layout.names.index("sudden change of force: moment")
-    assert not problem.told_by_sketches(x, free)[moment]
+    assert not problem.find_coarse_columns(x, free)[moment]
     bristles = replace(PLAIN, effects=(typical("easing friction"),))
     problem, x, free = posed(bristles, slow)
-    assert not problem.told_by_sketches(x, free).any()
+    assert not problem.find_coarse_columns(x, free).any()
     problem, x, free = posed(PLAIN, record(*SLOW))
-    assert not problem.told_by_sketches(x, free).any()
+    assert not problem.find_coarse_columns(x, free).any()
 
 
 def test_what_is_known_is_not_asked_again():
     slow = with_sketch(record(*SLOW))
     plain, x, free = posed(PLAIN, slow)
-    springs = plain.told_by_sketches(x, free)
+    springs = plain.find_coarse_columns(x, free)
     problem, x, free = posed(replace(PLAIN, effects=effect("linear drag", drag=300.0)), slow)
-    told = problem.told_by_sketches(x, free)
+    told = problem.find_coarse_columns(x, free)
     asked = problem.simulations
     problem.simulations = 0
-    np.testing.assert_array_equal(problem.told_by_sketches(x, free, springs), told)
+    np.testing.assert_array_equal(problem.find_coarse_columns(x, free, springs), told)
     # the place itself three times, and the one number twice
     assert problem.simulations == 5 < asked
     # who was not told is not
     doubted = springs.copy()
     doubted[0] = False
-    assert not problem.told_by_sketches(x, free, doubted)[0]
+    assert not problem.find_coarse_columns(x, free, doubted)[0]
 
 
 def test_springs_are_asked_once_for_all_effects_that_leave_a_film_its_turns():
@@ -159,9 +159,9 @@ def test_springs_are_asked_once_for_all_effects_that_leave_a_film_its_turns():
         before = bench.simulations
         bench.fit(model, [(start, None)], fixed)
         asked.append(bench.simulations - before)
-        return bench.problem(model).sketched
+        return bench.problem(model).coarse_columns
 
-    springs = bench.problem(base.model).sketched
+    springs = bench.problem(base.model).coarse_columns
     np.testing.assert_array_equal(springs, ~base.fixed)
     np.testing.assert_array_equal(told(effect("linear drift", drift=1e-6))[:-1], springs)
     # one that sticks and slips is asked anew, and no sketch tells it
@@ -174,17 +174,17 @@ def test_differences_by_sketches_are_those_of_the_whole():
     problem, x, free = posed(model, with_sketch(record(*SLOW, model=model)))
     residuals = problem.residuals(x)
     whole = problem.jacobian(x, free, residuals)
-    problem.sketched = problem.told_by_sketches(x, free)
+    problem.coarse_columns = problem.find_coarse_columns(x, free)
     np.testing.assert_array_equal(problem.jacobian(x, free, residuals), whole)
-    by_sketch = problem.jacobian(x, free, residuals, sketched=True)
-    assert not np.array_equal(by_sketch, whole)
-    off = np.linalg.norm(by_sketch - whole, axis=0) / np.linalg.norm(whole, axis=0)
+    coarse = problem.jacobian(x, free, residuals, coarse=True)
+    assert not np.array_equal(coarse, whole)
+    off = np.linalg.norm(coarse - whole, axis=0) / np.linalg.norm(whole, axis=0)
     assert off.max() < 0.05
     # of one number not told, the whole itself
-    problem.sketched[0] = False
-    some = problem.jacobian(x, free, residuals, sketched=True)
+    problem.coarse_columns[0] = False
+    some = problem.jacobian(x, free, residuals, coarse=True)
     np.testing.assert_allclose(some[:, 0], whole[:, 0], rtol=1e-9, atol=1e-12)
-    np.testing.assert_array_equal(some[:, 1:], by_sketch[:, 1:])
+    np.testing.assert_array_equal(some[:, 1:], coarse[:, 1:])
 
 
 AWAY = replace(
@@ -199,10 +199,10 @@ def test_a_descent_ends_where_the_whole_record_says(off):
     truth = replace(PLAIN, effects=effect("linear drag", drag=400.0))
     one = with_sketch(record(*SLOW, model=truth))
     sketch = replace(one.sketch, voltage=off * one.sketch.voltage, to=off * one.sketch.to)
-    problem, x, free = posed(AWAY, replace(one, sketch=sketch))
+    problem, x, free = posed(AWAY, replace(one, coarse_drive=sketch))
     wanted = descend(problem, x, ~free, gain=0.01)
-    problem.sketched = free
-    fit = descend_by_secants(problem, x, ~free, gain=0.01)
+    problem.coarse_columns = free
+    fit = descend_broyden(problem, x, ~free, gain=0.01)
     assert fit.cost == pytest.approx(wanted.cost, abs=0.1 / problem.samples)
     assert fit.cost == pytest.approx(problem.costs(fit.x[None])[0], rel=1e-12)
     np.testing.assert_allclose(fit.residuals, problem.residuals(fit.x))
@@ -211,11 +211,11 @@ def test_a_descent_ends_where_the_whole_record_says(off):
 def screens(truth):
     """The score tests of one record, by the whole of it and by its sketch."""
     one = record(*SLOW, model=truth)
-    for sketch in (None, sketched(one, PLAIN)):
+    for sketch in (None, coarse_drive_of(one, PLAIN)):
         bench = Bench([one], PLAIN, workers=1)
         trial = bench.baseline(PLAIN, lambda *_: None)
         assert trial.problem.records[0].sketch is not None
-        bench.records = tuple(replace(r, sketch=sketch) for r in bench.records)
+        bench.records = tuple(replace(r, coarse_drive=sketch) for r in bench.records)
         yield Screen(bench, replace(trial, problem=bench.problem(PLAIN)))
 
 

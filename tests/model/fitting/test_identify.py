@@ -18,10 +18,10 @@ from dearig.model.film import Strip
 from dearig.model.fitting import identify
 from dearig.model.fitting.intervals import correlation_time, covariance, is_flat, unevenness
 from dearig.model.fitting.levenberg import descend
+from dearig.model.fitting.parallel import parallel_map
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import Algorithm1, algorithm_1
-from dearig.model.fitting.threads import together
 from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Load, Network, Spring
 from dearig.model.records import ActuatorRecord, FilmRecord
 from tests.tools.engine import effect, typical
@@ -372,20 +372,20 @@ def test_nothing_is_left_running_when_one_of_several_raises():
         done.append(job)
 
     with pytest.raises(ModelError, match="ended"):
-        together(work, range(20), 2)
+        parallel_map(work, range(20), 2)
     finished = list(done)
     time.sleep(0.2)
     assert done == finished
     assert len(done) < 19
-    assert together(lambda job: 2 * job, range(5), 2) == [0, 2, 4, 6, 8]
+    assert parallel_map(lambda job: 2 * job, range(5), 2) == [0, 2, 4, 6, 8]
 
 
 def test_work_that_asks_for_the_same_threads_does_not_wait_for_itself():
     def inner(job):
-        return together(lambda k: 10 * job + k, range(3), 2)
+        return parallel_map(lambda k: 10 * job + k, range(3), 2)
 
     done = []
-    asked = Thread(target=lambda: done.append(together(inner, range(4), 2)), daemon=True)
+    asked = Thread(target=lambda: done.append(parallel_map(inner, range(4), 2)), daemon=True)
     asked.start()
     asked.join(20.0)
     assert done == [[[10 * job + k for k in range(3)] for job in range(4)]]
@@ -400,11 +400,11 @@ def test_who_is_one_of_several_at_work_does_its_own():
 
     def abreast(_):
         meet.wait()  # both are at work
-        names = together(inner, range(4), 2)
+        names = parallel_map(inner, range(4), 2)
         meet.wait()
         return {current_thread().name}, set(names)
 
-    for mine, names in together(abreast, range(2), 2, "fit"):
+    for mine, names in parallel_map(abreast, range(2), 2, "fit"):
         assert names == mine
 
     def alone(job):
@@ -412,13 +412,13 @@ def test_who_is_one_of_several_at_work_does_its_own():
             return left.set()
         left.wait(20.0)
         for _ in range(200):  # the other has said that it leaves, and does so at once
-            names = set(together(inner, range(4), 2))
+            names = set(parallel_map(inner, range(4), 2))
             if not any(n.startswith("fit") for n in names):
                 return names
             time.sleep(0.01)
         return set()
 
-    _, helped = together(alone, range(2), 2, "fit")
+    _, helped = parallel_map(alone, range(2), 2, "fit")
     assert helped
     assert all(n.startswith("simulation") for n in helped)
 
@@ -460,7 +460,7 @@ def test_a_film_is_simulated_once_however_it_is_read():
     values[4] = values[3]
     values[4, layout.names.index("sensor lag: time_constant")] = 0.0
     told = []
-    problem.told = lambda *work: told.append(work)
+    problem.on_simulations = lambda *work: told.append(work)
     several, status = problem.predict(values)
     assert (status == kernel.OK).all()
     assert problem.simulations == told[0][0] == 2

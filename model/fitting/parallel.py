@@ -1,4 +1,4 @@
-"""Several simulations at once: the kernels release the interpreter."""
+"""Run simulations on several threads; the compiled kernels release the interpreter."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from functools import cache
 from threading import Lock, current_thread
 from typing import TypeVar
 
-__all__ = ["Job", "Result", "together"]
+__all__ = ["Job", "Result", "parallel_map"]
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -17,25 +17,25 @@ Result = TypeVar("Result")
 
 @cache
 def _pool(workers: int, name: str) -> ThreadPoolExecutor:
-    # kept: starting threads anew costs a tenth of a short simulation
+    # kept between calls: starting threads costs a tenth of a short simulation
     return ThreadPoolExecutor(workers, thread_name_prefix=name)
 
 
-_at_work: Counter[str] = Counter()  # jobs of each name that are being done
+_at_work: Counter[str] = Counter()  # running jobs by name
 _counting = Lock()
 
 
-def together(
+def parallel_map(
     work: Callable[[Job], Result],
     jobs: Sequence[Job],
     workers: int,
     name: str = "simulation",
 ) -> list[Result]:
-    """``work(job)`` of each of ``jobs``, in their order, done by ``workers`` threads.
+    """Return ``work(job)`` for each of ``jobs``, in their order, computed by ``workers`` threads.
 
-    When one raises, no other is left running when that is raised here. Work that itself asks for
-    this under the same ``name`` does its own one by one: threads would wait for each other. So does
-    work of another name while all of its kind's threads have something to do.
+    When one raises, the others have ended before the exception leaves this function. A nested call
+    under the same ``name`` runs its jobs one by one, since threads of one pool would wait for each
+    other. So does a nested call from another pool all of whose threads are busy.
     """
     mine = current_thread().name.rpartition("_")[0]
     if workers <= 1 or len(jobs) <= 1 or mine == name or _at_work[mine] >= workers:
@@ -54,5 +54,5 @@ def together(
     futures = [pool.submit(counted, job) for job in jobs]
     wait(futures, return_when=FIRST_EXCEPTION)
     wait([f for f in futures if not f.cancel()])
-    # those before the one that raised were begun before it: no result is asked of what was not
+    # results are taken in order: jobs before the one that raised had started, so all have ended
     return [f.result() for f in futures]

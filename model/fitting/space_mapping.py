@@ -1,4 +1,4 @@
-"""Descents on sketches of the records, held to the whole records wherever they end."""
+"""Descend under coarse drives, corrected to the full records (space mapping)."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from dearig.model.fitting.levenberg import LocalFit
 from dearig.model.fitting.problem import Problem
 
-__all__ = ["by_sketches"]
+__all__ = ["descend_coarsely"]
 
-#: From a fit on, with so many iterations at most.
+#: Descent of a problem from a fit, with at most so many iterations.
 Descent = Callable[[Problem, LocalFit, int], LocalFit]
 
 
-def by_sketches(
+def descend_coarsely(
     descent: Descent,
     problem: Problem,
     here: LocalFit,
@@ -24,20 +24,21 @@ def by_sketches(
     iterations: int,
     gain: float,
 ) -> LocalFit:
-    """Where a ``descent`` from ``here`` comes on sketches, as far as these lead; or ``here``.
+    """Return the fit that ``descent`` reaches from ``here`` under the coarse drives, or ``here``.
 
-    What they miss is taken from the whole records at every place it sets out from, so it ends
-    where a descent on these would (space mapping; Bandler et al., IEEE Trans. Microw. Theory Tech.
-    42, 2536 (1994)). Cost and residuals are those of the whole records. It has not converged where
-    sketches do not tell what the ``free`` (d,) numbers do, or lead astray: whoever asks goes on
-    from there without.
+    At the start of each descent the difference between full and coarse readings is added as a
+    correction, so the sequence ends where a descent on the full records ends (space mapping;
+    Bandler et al., IEEE Trans. Microw. Theory Tech. 42, 2536 (1994)). Cost and residuals are those
+    of the full records. The fit has not converged where the coarse drives give no derivative of a
+    ``free`` (d,) parameter, or where they do not lower the full cost: the caller then continues on
+    the full records.
     """
     done = 0
     while done < iterations:
-        sketch = problem.anchored(here.x, here.residuals, free)
-        if sketch is None:
+        coarse = problem.space_mapped(here.x, here.residuals, free)
+        if coarse is None:
             return replace(here, converged=False)
-        fit = descent(sketch, here, iterations - done)
+        fit = descent(coarse, here, iterations - done)
         done += max(fit.iterations, 1)
         if np.array_equal(fit.x, here.x):
             return replace(here, jacobian=fit.jacobian, iterations=done, converged=fit.converged)
