@@ -170,8 +170,8 @@ class Layout:
 
     def differences(self, x: np.ndarray) -> np.ndarray:
         """Steps (d,) for difference quotients at coordinates ``x``."""
-        # effects have kinks, so differences must be wide enough to cross them; with hysteresis a small
-        # shift of a turning point changes the ringing after it
+        # effects have kinks, so differences must be wide enough to cross them; with hysteresis a
+        # small shift of a turning point changes the ringing after it
         springs = 1e-3 if self.base.effects else 1e-4
         if any_hysteretic(self.base.effects):
             springs = 3e-3

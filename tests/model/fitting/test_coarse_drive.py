@@ -42,33 +42,33 @@ def seen(record, model, drive=None, fidelity=kernel.CAREFUL):
     return found
 
 
-def with_sketch(record, model=PLAIN):
-    sketch = coarse_drive_of(record, model)
-    assert sketch is not None
-    return replace(record, coarse_drive=sketch)
+def with_coarse_drive(record, model=PLAIN):
+    coarse = coarse_drive_of(record, model)
+    assert coarse is not None
+    return replace(record, coarse_drive=coarse)
 
 
 @pytest.mark.parametrize("lag", [0.0, 9e-5, 3e-3])
 @pytest.mark.parametrize("hold", [True, False])
 @pytest.mark.parametrize(("segments", "part"), [(SLOW, 0.3), (CHIRP, 0.4), (STEPS, 0.5)])
-def test_a_sketch_is_shorter_and_shows_the_same(segments, part, hold, lag):
+def test_a_coarse_drive_is_shorter_and_reads_the_same(segments, part, hold, lag):
     one = replace(record(*segments, hold=hold), lag=lag)
-    sketch = coarse_drive_of(one, PLAIN)
-    assert sketch is not None
-    assert sketch.time.size < part * one.time.size
-    off = seen(one, PLAIN, sketch, kernel.COARSE) - seen(one, PLAIN)
+    coarse = coarse_drive_of(one, PLAIN)
+    assert coarse is not None
+    assert coarse.time.size < part * one.time.size
+    off = seen(one, PLAIN, coarse, kernel.COARSE) - seen(one, PLAIN)
     assert np.sqrt(np.mean(off**2)) < 0.5 * NOISE
 
 
 def test_slow_and_fast_are_cut_as_they_ask():
     one = record(*SLOW, *STEPS)
-    sketch = coarse_drive_of(one, PLAIN)
+    coarse = coarse_drive_of(one, PLAIN)
     begins = Sequence("played", SLOW).duration
-    steps = np.diff(sketch.time)
-    assert np.median(steps[sketch.time[:-1] < begins]) == pytest.approx(0.02)
-    edge = np.abs(sketch.time[:-1] - begins - 0.01) < 0.01  # the first rise
+    steps = np.diff(coarse.time)
+    assert np.median(steps[coarse.time[:-1] < begins]) == pytest.approx(0.02)
+    edge = np.abs(coarse.time[:-1] - begins - 0.01) < 0.01  # the first rise
     np.testing.assert_allclose(steps[edge], 1.0 / RATE)
-    np.testing.assert_array_equal(np.isin(sketch.time, one.time), True)
+    np.testing.assert_array_equal(np.isin(coarse.time, one.time), True)
 
 
 @pytest.mark.parametrize("hold", [True, False])
@@ -76,29 +76,29 @@ def test_slow_and_fast_are_cut_as_they_ask():
 def test_it_pulls_as_much(hold, sign):
     drive = played(*SLOW, hold=hold)
     one = record_of(PLAIN, replace(drive, voltage=sign * drive.voltage))
-    sketch = coarse_drive_of(one, PLAIN)
+    coarse = coarse_drive_of(one, PLAIN)
 
     def pull(d):
         a, b = d.voltage[:-1], d.ends[:-1]
         return np.sum(np.diff(d.time) * (a * a + a * b + b * b)) / 3.0
 
-    assert pull(sketch) == pytest.approx(pull(one.drive), rel=1e-4)
-    assert (sign * sketch.voltage >= 0.0).all()
+    assert pull(coarse) == pytest.approx(pull(one.drive), rel=1e-4)
+    assert (sign * coarse.voltage >= 0.0).all()
     # where it goes on from where it came to, nothing rings
-    jumps = np.abs(sketch.voltage[1:-1] - sketch.to[:-2])
-    assert np.median(jumps) < 0.01 * np.max(np.abs(sketch.voltage))
+    jumps = np.abs(coarse.voltage[1:-1] - coarse.to[:-2])
+    assert np.median(jumps) < 0.01 * np.max(np.abs(coarse.voltage))
 
 
 def test_the_temperature_is_that_of_the_step():
     drive = played(*SLOW)
     warm = replace(drive, warmth=0.2 * drive.time)
-    sketch = coarse_drive_of(record_of(PLAIN, warm), PLAIN)
-    middle = 0.5 * (sketch.time[1:-1] + sketch.time[:-2])
+    coarse = coarse_drive_of(record_of(PLAIN, warm), PLAIN)
+    middle = 0.5 * (coarse.time[1:-1] + coarse.time[:-2])
     # the samples of a step are the first half and more of it
-    np.testing.assert_allclose(sketch.warmth[:-2], 0.2 * middle, atol=0.2 * 0.5 / RATE)
+    np.testing.assert_allclose(coarse.warmth[:-2], 0.2 * middle, atol=0.2 * 0.5 / RATE)
 
 
-def test_what_cannot_be_sketched():
+def test_records_without_a_coarse_drive():
     slow = record(*SLOW)
     held = replace(PLAIN, film=replace(PLAIN.film, kinematics="uniaxial"))
     assert coarse_drive_of(slow, held) is None  # its swinging is not in closed form
@@ -112,7 +112,7 @@ def test_what_cannot_be_sketched():
 
 
 def test_which_numbers_are_told():
-    slow = with_sketch(record(*SLOW))
+    slow = with_coarse_drive(record(*SLOW))
     for effects in (effect("linear drag", drag=300.0), effect("linear drift", drift=1e-6)):
         problem, x, free = posed(replace(PLAIN, effects=effects), slow)
         np.testing.assert_array_equal(problem.find_coarse_columns(x, free), free)
@@ -129,7 +129,7 @@ def test_which_numbers_are_told():
 
 
 def test_what_is_known_is_not_asked_again():
-    slow = with_sketch(record(*SLOW))
+    slow = with_coarse_drive(record(*SLOW))
     plain, x, free = posed(PLAIN, slow)
     springs = plain.find_coarse_columns(x, free)
     problem, x, free = posed(replace(PLAIN, effects=effect("linear drag", drag=300.0)), slow)
@@ -164,14 +164,14 @@ def test_springs_are_asked_once_for_all_effects_that_leave_a_film_its_turns():
     springs = bench.problem(base.model).coarse_columns
     np.testing.assert_array_equal(springs, ~base.fixed)
     np.testing.assert_array_equal(told(effect("linear drift", drift=1e-6))[:-1], springs)
-    # one that sticks and slips is asked anew, and no sketch tells it
+    # friction is computed again; coarse drives do not give its derivative
     assert not told((typical("easing friction"),)).any()
     assert asked[0] < asked[1]
 
 
-def test_differences_by_sketches_are_those_of_the_whole():
+def test_coarse_derivatives_equal_those_of_the_full_record():
     model = replace(PLAIN, effects=effect("linear drag", drag=300.0))
-    problem, x, free = posed(model, with_sketch(record(*SLOW, model=model)))
+    problem, x, free = posed(model, with_coarse_drive(record(*SLOW, model=model)))
     residuals = problem.residuals(x)
     whole = problem.jacobian(x, free, residuals)
     problem.coarse_columns = problem.find_coarse_columns(x, free)
@@ -195,11 +195,13 @@ AWAY = replace(
 
 
 @pytest.mark.parametrize("off", [1.0, 0.9997, 0.98, 0.6], ids=["good", "near", "off", "useless"])
-def test_a_descent_ends_where_the_whole_record_says(off):
+def test_a_coarse_descent_ends_at_the_optimum_of_the_full_record(off):
     truth = replace(PLAIN, effects=effect("linear drag", drag=400.0))
-    one = with_sketch(record(*SLOW, model=truth))
-    sketch = replace(one.sketch, voltage=off * one.sketch.voltage, to=off * one.sketch.to)
-    problem, x, free = posed(AWAY, replace(one, coarse_drive=sketch))
+    one = with_coarse_drive(record(*SLOW, model=truth))
+    coarse = replace(
+        one.coarse_drive, voltage=off * one.coarse_drive.voltage, to=off * one.coarse_drive.to
+    )
+    problem, x, free = posed(AWAY, replace(one, coarse_drive=coarse))
     wanted = descend(problem, x, ~free, gain=0.01)
     problem.coarse_columns = free
     fit = descend_broyden(problem, x, ~free, gain=0.01)
@@ -209,17 +211,17 @@ def test_a_descent_ends_where_the_whole_record_says(off):
 
 
 def screens(truth):
-    """The score tests of one record, by the whole of it and by its sketch."""
+    """Score tests of one record, by its full and by its coarse drive."""
     one = record(*SLOW, model=truth)
-    for sketch in (None, coarse_drive_of(one, PLAIN)):
+    for coarse in (None, coarse_drive_of(one, PLAIN)):
         bench = Bench([one], PLAIN, workers=1)
         trial = bench.baseline(PLAIN, lambda *_: None)
-        assert trial.problem.records[0].sketch is not None
-        bench.records = tuple(replace(r, coarse_drive=sketch) for r in bench.records)
+        assert trial.problem.records[0].coarse_drive is not None
+        bench.records = tuple(replace(r, coarse_drive=coarse) for r in bench.records)
         yield Screen(bench, replace(trial, problem=bench.problem(PLAIN)))
 
 
-def test_what_effects_promise_by_sketches():
+def test_score_tests_by_coarse_drives_equal_those_of_the_full_record():
     truth = replace(PLAIN, effects=effect("Mullins softening", softening=0.004, width=0.3))
     names = ("Mullins softening", "ageing", "linear drift", "dielectric relaxation")
     whole, told = (
@@ -230,7 +232,7 @@ def test_what_effects_promise_by_sketches():
     assert told != whole
 
 
-def test_a_sketch_that_does_not_tell_what_is_asked_is_not_believed():
+def test_a_coarse_drive_without_the_derivative_is_not_used():
     _, screen = screens(PLAIN)
     model = replace(
         screen.trial.model, effects=effect("Mullins softening", softening=0.0, width=0.3)

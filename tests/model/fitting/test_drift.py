@@ -147,7 +147,7 @@ def test_masked_readings_do_not_influence_the_drift():
     problem, x, held = problem_of([masked(TWO[0], bad), TWO[1]])
     fit = descend(problem, x, held)
     assert fit.cost == pytest.approx(1.0, abs=0.06)
-    assert off(problem, problem.fit_drift(fit.x).sizes, DRIFT_AMPLITUDES) < 5e-7
+    assert off(problem, problem.fit_drift(fit.x).amplitudes, DRIFT_AMPLITUDES) < 5e-7
 
 
 def test_one_common_drift_leaves_what_records_do_not_share():
@@ -167,6 +167,6 @@ def test_a_record_too_short_for_its_drift_is_fitted_without_error():
     )
     problem, x, held = problem_of([TWO[0], short])
     fit = descend(problem, x, held)
-    assert np.all(np.isfinite(problem.fit_drift(fit.x).sizes))
+    assert np.all(np.isfinite(problem.fit_drift(fit.x).amplitudes))
     assert np.max(np.abs(fit.residuals[-3:])) < 1e-6  # every drift starts at 0
     assert fit.cost == pytest.approx(1.0, abs=0.06)
