@@ -17,7 +17,7 @@ from pathlib import Path, PurePosixPath
 
 from dearig.errors import InputError
 
-__all__ = ["HOME", "Page", "file_at", "page_at", "page_named", "pages"]
+__all__ = ["HOME", "OPEN_SECTIONS", "Page", "file_at", "page_at", "page_named", "pages"]
 
 #: The page that opens first.
 HOME = "app/docs/README.md"
@@ -37,6 +37,8 @@ _SECTIONS = (
     ("Beside the code", ("app/", "drivers/", "model/", "sim_backend/")),
     ("Decisions", ("app/docs/decisions/",)),
 )
+#: Sections whose pages the navigation shows on every page.
+OPEN_SECTIONS = tuple(name for name, _ in _SECTIONS[:-1])
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from dearig.docs.pages import Page, file_at, page_at, pages
+from dearig.docs.pages import OPEN_SECTIONS, Page, file_at, page_at, pages
 from dearig.errors import InputError
 
 __all__ = ["anchors", "build", "slug", "to_html"]
@@ -103,7 +103,7 @@ def build(folder: Path) -> dict[str, Path]:
                 page=page,
                 body=to_html(page, linked),
                 headings=_headings(page.text),
-                sections=_sections(every, to),
+                sections=_sections(page, every, to),
                 previous=_neighbour(every, index - 1, to),
                 following=_neighbour(every, index + 1, to),
                 version=version("dearig"),
@@ -123,12 +123,20 @@ def _html(path: str) -> str:
     return f"{path.removesuffix('.md')}.html" if path.endswith(".md") else path
 
 
-def _sections(every: tuple[Page, ...], to: Callable[[str], str]) -> list[dict[str, Any]]:
-    """Sections of the navigation with their pages as (title, address, path)."""
+def _sections(
+    shown: Page, every: tuple[Page, ...], to: Callable[[str], str]
+) -> list[dict[str, Any]]:
+    """Sections of the navigation with their pages as (title, address, path).
+
+    All are open but the long list of decisions, which opens on a page of its own.
+    """
     sections: dict[str, list[tuple[str, str, str]]] = {}
     for page in every:
         sections.setdefault(page.section, []).append((page.title, to(page.path), page.path))
-    return [{"name": name, "pages": found} for name, found in sections.items()]
+    return [
+        {"name": name, "pages": found, "open": name in (shown.section, *OPEN_SECTIONS)}
+        for name, found in sections.items()
+    ]
 
 
 def _neighbour(

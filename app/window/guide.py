@@ -18,6 +18,7 @@ _FIRST = "app/docs/window.md"
 _WIDTH = 760  # px of a picture
 _STYLE = """
 code, pre { font-family: monospace; }
+pre { margin-left: 20px; }
 table { border-collapse: collapse; border: 1px solid gray; }
 td, th { border: 1px solid gray; padding: 3px; text-align: left; }
 """

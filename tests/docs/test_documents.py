@@ -27,6 +27,8 @@ from tests.tools.command import done, write
 
 #: Pages whose commands are run in the order shown, in one folder for each page.
 RUN = [p for p in documents() if p.startswith("app/docs/") or "/" not in p]
+#: Options of ``dearig`` itself.
+GENERAL = {"--help", "-h", "--version"}
 COMMANDS: dict[str, Any] = get_command(app).commands  # type: ignore[attr-defined]
 
 
@@ -68,6 +70,8 @@ def test_every_command_shown_is_accepted(block: Block) -> None:
 def test_every_command_within_a_line_exists(path: str) -> None:
     for text in inline_commands(path):
         name, *words = text.removeprefix("dearig ").split()
+        if name in GENERAL:
+            continue
         assert name in COMMANDS, text
         known = {"--help", "-h"}
         for parameter in COMMANDS[name].params:
@@ -80,7 +84,7 @@ def accept(words: list[str]) -> None:
     """Fail unless the command exists and takes these arguments."""
     shown = " ".join(words)
     if words[0] == "dearig":
-        if words[1] == "--version":
+        if words[1] in GENERAL:
             return
         assert words[1] in COMMANDS, f"{shown}: there is no such command"
         COMMANDS[words[1]].make_context(words[1], words[2:])
