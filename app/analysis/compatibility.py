@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import fields
-from pathlib import Path
 
 from dearig.analysis.quality import overlap
 from dearig.config.rigfile import FilmSection, LoadSection, RigFile
@@ -21,7 +20,6 @@ __all__ = [
     "base_model",
     "check_apart",
     "check_branches",
-    "check_named_once",
     "of_rig",
 ]
 
@@ -35,17 +33,6 @@ def check_branches(count: int) -> None:
         raise InputError(
             f"{count} branches cannot be fitted; give a number from 1 to {BRANCHES_MAX}"
         )
-
-
-def check_named_once(train: Sequence[str | Path], validation: Sequence[str | Path]) -> None:
-    """Refuse a file that is named both to fit and to validate."""
-    named = {Path(path).resolve() for path in train}
-    for path in validation:
-        if Path(path).resolve() in named:
-            raise InputError(
-                f"{path} is given both to fit and to validate: an error on fitted data proves "
-                f"nothing; leave it out of one of them"
-            )
 
 
 def base_model(

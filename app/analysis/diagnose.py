@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,6 @@ from dearig.analysis.compatibility import (
     base_model,
     check_apart,
     check_branches,
-    check_named_once,
     of_rig,
 )
 from dearig.analysis.cores import for_simulations
@@ -27,8 +27,8 @@ from dearig.analysis.outcomes import (
     pooled_rms,
 )
 from dearig.analysis.quality import beyond, check_enough, inspect
-from dearig.analysis.records import as_record, compare, open_all
-from dearig.config.modelfile import save_model
+from dearig.analysis.records import Source, as_record, check_named_once, compare, open_all
+from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence, parse_sequence
 from dearig.errors import (
@@ -58,33 +58,31 @@ _ENDS = (Interrupted, SafetyStop, InstrumentFault, DiskFault)  # of a run, the r
 
 
 def diagnose_recordings(
-    train: Sequence[str | Path],
+    train: Sequence[Source],
     *,
-    validation: Sequence[str | Path] = (),
-    model_out: str | Path | None = None,
+    validation: Sequence[Source] = (),
     branches: int = 3,
     drive: str = "command",
     rig_file: RigFile | None = None,
     thorough: bool = False,
-    overwrite: bool = False,
-    clock: Callable[[], float],
+    clock: Callable[[], float] = time.monotonic,
     progress: Progress = quiet,
 ) -> DiagnoseOutcome:
-    """Find what the thesis's model of ``train`` lacks; errors on ``validation`` are read last.
+    """Find the effects that the thesis's model of ``train`` lacks.
 
-    The improved model goes to ``model_out``. ``progress`` is told the fraction of the whole work.
-    A search that is not ``thorough`` is ended after about a minute. The first ctrl-C ends it and
-    keeps what was found (``finding.interrupted``); the second raises. Raises ``InputError`` for
-    what cannot be diagnosed, before anything is written.
+    The ``validation`` recordings are read last, and play no part in the search. ``progress``
+    receives the fraction of the whole work. A search that is not ``thorough`` ends after about a
+    minute. The first ctrl-C ends it and keeps what was found (``finding.interrupted``); the second
+    raises. Nothing is written; ``save_fitted_model`` writes the improved model. Raises
+    ``InputError`` for recordings that cannot be diagnosed.
     """
     started = clock()
-    _check_outputs(train, validation, model_out, overwrite)
+    check_named_once(train, validation)
     recordings = open_all(train)
     others = open_all(validation)
     base, quality = _prepared(recordings, others, branches, drive, rig_file)
     finding = _search(recordings, base, drive, thorough, progress)
-    outcome = _outcome(recordings, others, finding, quality, drive, rig_file, "", started, clock)
-    return _saved(outcome, recordings, model_out, overwrite)
+    return _outcome(recordings, others, finding, quality, drive, rig_file, "", started, clock)
 
 
 def diagnose_rig(
@@ -92,9 +90,8 @@ def diagnose_rig(
     out: Path,
     *,
     experiments: int = 1,
-    train: Sequence[str | Path] = (),
-    validation: Sequence[str | Path] = (),
-    model_out: str | Path | None = None,
+    train: Sequence[Source] = (),
+    validation: Sequence[Source] = (),
     branches: int = 3,
     drive: str = "command",
     rig_file: RigFile | None = None,
@@ -102,21 +99,21 @@ def diagnose_rig(
     seed: int = 0,
     thorough: bool = False,
     overwrite: bool = False,
-    clock: Callable[[], float],
+    clock: Callable[[], float] = time.monotonic,
     progress: Progress = quiet,
 ) -> DiagnoseOutcome:
-    """Diagnose the rig at ``address``: record, diagnose, run what separates the rivals, again.
+    """Diagnose the rig at ``address``: record, diagnose, run a separating experiment, repeat.
 
     The first recording is the thesis's (unless ``train`` are given), then come at most
     ``experiments`` more, for as long as rivals are left; at the end ``VALIDATION`` are recorded
     (unless ``validation`` are given) and read once. All recordings go to the folder ``out``.
-    ``seed`` is of a simulated rig's noise, ``thorough`` as of ``diagnose_recordings``. What ends a
-    run, ctrl-C, an interlock, an instrument or the disk, ends the recording, the rig safe: what was
-    found before is kept, and ``ended`` of the outcome says why. Raises what ends the first run, and
-    ``NotSafe`` at once.
+    ``seed`` is of a simulated rig's noise, ``thorough`` as of ``diagnose_recordings``. When ctrl-C,
+    an interlock, an instrument or the disk ends a run, the rig is safe and no more is recorded: the
+    results until then are kept, and ``ended`` of the outcome says why. Raises the error that ends
+    the first run, and ``NotSafe`` at once.
     """
     started = clock()
-    _check_outputs(train, validation, model_out, overwrite)
+    check_named_once(train, validation)
     settings = rig_file or RigFile()
     names = [*([] if train else ["thesis"]), *(f"experiment-{n + 1}" for n in range(experiments))]
     planned = [*names, *([] if validation else VALIDATION)]
@@ -130,7 +127,7 @@ def diagnose_rig(
         first = done
         return lambda stage, fraction: progress(stage, (first + size * fraction) / parts)
 
-    files = [Path(path) for path in train]
+    files: list[Source] = [*train]
     made: list[Path] = []
 
     def run(sequence: str, name: str) -> None:
@@ -193,21 +190,10 @@ def diagnose_rig(
     outcome = _outcome(
         recordings, others, finding, quality, drive, rig_file, address, started, clock, performed
     )
-    return _saved(replace(outcome, ended=ended), recordings, model_out, overwrite)
+    return replace(outcome, ended=ended)
 
 
 # ---------------------------------------------------------------- before
-
-
-def _check_outputs(
-    train: Sequence[str | Path],
-    validation: Sequence[str | Path],
-    model_out: str | Path | None,
-    overwrite: bool,
-) -> None:
-    if model_out is not None:
-        check_output(model_out, overwrite, *train, *validation)
-    check_named_once(train, validation)
 
 
 def _prepared(
@@ -282,18 +268,27 @@ def _outcome(
     experiment, words = None, "The recordings are of films: sequences of voltage do not apply."
     if recordings[0].kind == "actuator":
         experiment, words = _experiment(finding, noise, rig_file or RigFile())
+    seconds = clock() - started
+    said = (*quality, *dict.fromkeys(failed))
+    title = _title(recordings)
+    effects = ", ".join(name for name, _ in finding.final.predicting.effects)
+    history = _history(finding, recordings, stands, noise, drive, said, seconds)
     return DiagnoseOutcome(
-        title=_title(recordings),
+        title=title,
         kind=recordings[0].kind,
         drive=drive,
+        model=ModelFile(
+            f"{title}, with {effects}" if effects else f"{title}, nothing added",
+            finding.final.predicting,
+            history,
+        ),
         finding=finding,
         stands=stands,
         noise=noise,
         experiment=experiment,
         experiment_words=words,
-        quality=(*quality, *dict.fromkeys(failed)),
-        model_path="",
-        seconds=clock() - started,
+        quality=said,
+        seconds=seconds,
         performed=tuple(performed),
         rig=rig,
     )
@@ -341,27 +336,17 @@ def _experiment(
     return separating_experiment(rivals, of_rig(rig_file, final.film, final.load), noise)
 
 
-def _saved(
-    outcome: DiagnoseOutcome,
+def _history(
+    finding: Diagnosis,
     recordings: Sequence[Recording],
-    model_out: str | Path | None,
-    overwrite: bool,
-) -> DiagnoseOutcome:
-    """``outcome`` with its model written."""
-    if model_out is None:
-        return outcome
-    effects = ", ".join(name for name, _ in outcome.finding.final.predicting.effects)
-    name = f"{outcome.title}, with {effects}" if effects else f"{outcome.title}, nothing added"
-    path = save_model(
-        model_out, name, outcome.finding.final.predicting, _history(outcome, recordings), overwrite
-    )
-    return replace(outcome, model_path=str(path))
-
-
-def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[str, Any]:
+    stands: Sequence[Stand],
+    noise: float,
+    drive: str,
+    quality: Sequence[str],
+    seconds: float,
+) -> dict[str, Any]:
     """Where the model comes from, for its file."""
-    finding = outcome.finding
-    shown = SHOWN[outcome.kind]
+    shown = SHOWN[recordings[0].kind]
 
     def rms(comparisons: Sequence[Comparison]) -> float | None:
         return pooled_rms(comparisons) * shown.error_factor if comparisons else None
@@ -374,18 +359,18 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
 
     return {
         "method": "diagnosis",
-        "drive": outcome.drive,
-        "seconds": outcome.seconds,
+        "drive": drive,
+        "seconds": seconds,
         "simulations": finding.simulations,
         "verdict": finding.verdict,
         "interrupted": finding.interrupted,
         "mean_square_over_noise": finding.final.cost,
-        f"noise_floor_{shown.suffix}": outcome.noise * shown.error_factor,
-        "notes": [*finding.notes, *outcome.quality],
-        "before": errors(outcome.before),
-        "after": errors(outcome.after),
+        f"noise_floor_{shown.suffix}": noise * shown.error_factor,
+        "notes": [*finding.notes, *quality],
+        "before": errors(stands[0]),
+        "after": errors(stands[-1]),
         "train": [{"name": r.name, "sha256": r.sha256} for r in recordings],
-        "validation": [{"name": c.name} for c in outcome.after.validation],
+        "validation": [{"name": c.name} for c in stands[-1].validation],
         "step": [
             {
                 "effect": s.effect,

@@ -1,19 +1,26 @@
-"""Identification of a model from recordings, into a model file."""
+"""Identification of a model from recordings."""
 
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dearig.analysis.compatibility import base_model, check_apart, check_branches, check_named_once
+from dearig.analysis.compatibility import base_model, check_apart, check_branches
 from dearig.analysis.cores import for_simulations
 from dearig.analysis.outcomes import BranchTrial, Comparison, IdentifyOutcome
-from dearig.analysis.records import PUBLISHED_FIT, as_record, compare, open_all
-from dearig.config.modelfile import save_model
+from dearig.analysis.records import (
+    PUBLISHED_FIT,
+    Source,
+    as_record,
+    check_named_once,
+    compare,
+    open_all,
+)
+from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
@@ -21,7 +28,6 @@ from dearig.model.fitting import Identification, add_intervals, identify
 from dearig.model.material import Network
 from dearig.model.records import Record
 from dearig.progress import Progress, quiet
-from dearig.recording.files import check_output
 from dearig.recording.recording import Recording
 
 __all__ = ["identify_recordings"]
@@ -29,10 +35,9 @@ __all__ = ["identify_recordings"]
 
 @for_simulations()
 def identify_recordings(
-    train: Sequence[str | Path],
-    out: str | Path,
+    train: Sequence[Source],
     *,
-    validation: Sequence[str | Path] = (),
+    validation: Sequence[Source] = (),
     method: str = "hybrid",
     branches: Sequence[int] = (3,),
     spring: str = "gent",
@@ -41,19 +46,17 @@ def identify_recordings(
     rig_file: RigFile | None = None,
     seed: int = 0,
     intervals: bool = True,
-    overwrite: bool = False,
-    clock: Callable[[], float],
+    clock: Callable[[], float] = time.monotonic,
     progress: Progress = quiet,
 ) -> IdentifyOutcome:
-    """Fit the recordings ``train`` and write the model to ``out``.
+    """Fit the model to the recordings ``train``.
 
-    With several numbers of ``branches`` each is fitted, and the one with the least information
+    With several numbers of ``branches`` each is fitted, and the one with the lowest information
     criterion on the training data is kept; the ``validation`` recordings are read once, at the end,
     and play no part in the choice. Film and load come from the recordings, else from ``rig_file``.
-    ``clock`` gives seconds. Raises ``InputError`` for everything that cannot be fitted, before
-    anything is written.
+    ``clock`` gives seconds. Nothing is written; ``save_fitted_model`` writes the model. Raises
+    ``InputError`` for everything that cannot be fitted.
     """
-    check_output(out, overwrite, *train, *validation)
     check_named_once(train, validation)
     started = clock()
     recordings = open_all(train)
@@ -104,17 +107,16 @@ def identify_recordings(
     title = recordings[0].title or recordings[0].name
     name = f"{title}, {count} branches" if count != 1 else f"{title}, 1 branch"
     history = _history(fit, recordings, compared, validated, spring, drive, seconds)
-    path = save_model(out, name, fit.model, history, overwrite)
     is_thesis_run = kind == "actuator" and any(c.row == "identification" for c in compared)
     return IdentifyOutcome(
         title=name,
         kind=kind,
         method=method,
+        model=ModelFile(name, fit.model, history),
         fit=fit,
         train=tuple(compared),
         validation=tuple(validated),
         trials=tuple(trials),
-        model_path=str(path),
         seconds=seconds,
         published_fit=PUBLISHED_FIT if is_thesis_run else None,
     )

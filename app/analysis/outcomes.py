@@ -1,18 +1,20 @@
-"""What identification, validation and diagnosis hand to terminal, JSON and report."""
+"""Results of identification, validation and diagnosis, for terminal, JSON and report."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from dearig.errors import DearigError
 
 if TYPE_CHECKING:
-    # a report's words are needed by commands that fit nothing; these import SciPy
+    # these import SciPy, which commands that fit nothing do without
+    from dearig.config.modelfile import ModelFile
     from dearig.model.diagnosis.results import Diagnosis
     from dearig.model.fitting import Identification
     from dearig.model.measures import Errors
@@ -28,6 +30,7 @@ __all__ = [
     "ValidateOutcome",
     "pooled_noise",
     "pooled_rms",
+    "save_fitted_model",
 ]
 
 
@@ -41,7 +44,7 @@ class Published:
 
 @dataclass(frozen=True)
 class Comparison:
-    """One recording beside a model of it.
+    """One recording with a model's prediction of it.
 
     ``kind`` is actuator (``drive`` in V, ``measured`` and ``model`` in m) or film (``drive`` is the
     stretch, the others in Pa); all arrays are (N,) on ``time`` s, ``measured`` is NaN where a
@@ -85,23 +88,31 @@ class BranchTrial:
 
 @dataclass(frozen=True)
 class IdentifyOutcome:
-    """A finished identification: the fit, the training runs beside it, and validation if any."""
+    """A finished identification: fit, training runs, and validation runs if any.
+
+    ``model`` is the fitted model with its history; ``model_path`` is where it was saved, "" if it
+    was not. ``seconds`` is the computing time.
+    """
 
     title: str
     kind: str
     method: str
+    model: ModelFile
     fit: Identification
     train: tuple[Comparison, ...]
     validation: tuple[Comparison, ...]
     trials: tuple[BranchTrial, ...]
-    model_path: str
     seconds: float
+    model_path: str = ""
     published_fit: Published | None = None
 
 
 @dataclass(frozen=True)
 class ValidateOutcome:
-    """A finished validation: one comparison a recording."""
+    """A finished validation: one comparison for each recording.
+
+    ``model_path`` is the model's file, "" for a model that is in none.
+    """
 
     title: str
     kind: str
@@ -112,9 +123,9 @@ class ValidateOutcome:
 
 @dataclass(frozen=True)
 class Stand:
-    """One model beside all recordings: ``effects`` it has, and how it does on them.
+    """One model with its ``effects`` on all recordings.
 
-    ``train`` was fitted, ``validation`` was not seen by any fit or choice.
+    ``train`` were fitted; ``validation`` were not used by any fit or choice.
     """
 
     effects: tuple[str, ...]
@@ -143,26 +154,29 @@ class SeparatingExperiment:
 
 @dataclass(frozen=True)
 class DiagnoseOutcome:
-    """A finished (or interrupted) diagnosis, with its errors on recordings of either role.
+    """A finished (or interrupted) diagnosis, with its errors on training and validation recordings.
 
-    ``stands`` are the baseline, the model after each step, and last the final one. ``noise`` is the
-    pooled noise floor of the training recordings in m or Pa. ``experiment`` separates what the data
-    do not; ``experiment_words`` says of it, or of why there is none. ``performed`` tells of the
-    experiments that were run on a rig, one sentence each. ``quality`` are sentences on recordings.
-    ``ended`` is why no more was recorded on the rig than was, None where all was.
+    ``model`` is the final model with its history; ``model_path`` is where it was saved, "" if it
+    was not. ``stands`` are the baseline, the model after each step, and last the final one.
+    ``noise`` is the pooled noise floor of the training recordings in m or Pa. ``experiment``
+    separates explanations that the data do not separate; ``experiment_words`` describes it, or says
+    why there is none. ``performed`` describes the experiments that were run on a rig, one sentence
+    each. ``quality`` are sentences on recordings. ``ended`` is the error that ended the recording
+    on the rig early, None if none did. ``seconds`` is the computing time.
     """
 
     title: str
     kind: str
     drive: str
+    model: ModelFile
     finding: Diagnosis
     stands: tuple[Stand, ...]
     noise: float
     experiment: SeparatingExperiment | None
     experiment_words: str
     quality: tuple[str, ...]
-    model_path: str
     seconds: float
+    model_path: str = ""
     performed: tuple[str, ...] = ()
     rig: str = ""
     ended: DearigError | None = None
@@ -176,6 +190,21 @@ class DiagnoseOutcome:
     def after(self) -> Stand:
         """The final model."""
         return self.stands[-1]
+
+
+_Fitted = TypeVar("_Fitted", bound=IdentifyOutcome | DiagnoseOutcome)
+
+
+def save_fitted_model(outcome: _Fitted, path: str | Path, overwrite: bool = False) -> _Fitted:
+    """Write the model of ``outcome`` to ``path``; return the outcome, which then names the file.
+
+    Raises ``InputError`` where the file may not be written.
+    """
+    from dearig.config.modelfile import save_model
+
+    model = outcome.model
+    written = save_model(path, model.name, model.model, model.history, overwrite)
+    return replace(outcome, model_path=str(written))
 
 
 def pooled_rms(comparisons: Sequence[Comparison]) -> float:

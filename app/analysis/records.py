@@ -26,7 +26,18 @@ from dearig.recording.reader import open_recording
 from dearig.recording.recording import Recording
 from dearig.recording.rest_noise import MIN_QUIET, noise_floor
 
-__all__ = ["PUBLISHED_FIT", "as_record", "compare", "open_all"]
+__all__ = [
+    "PUBLISHED_FIT",
+    "Source",
+    "as_record",
+    "check_named_once",
+    "compare",
+    "open_all",
+    "recording_drive",
+]
+
+#: A recording that was opened, or the path of one.
+Source = str | Path | Recording
 
 #: What the thesis prints for its identification run.
 PUBLISHED_FIT = Published(2.13, 4.07)
@@ -48,19 +59,20 @@ _TABLE_5 = dict(
 )
 
 
-def open_all(paths: Sequence[str | Path]) -> list[Recording]:
-    """Recordings at ``paths``, all of one kind.
+def open_all(sources: Sequence[Source]) -> list[Recording]:
+    """Return the recordings ``sources``, all of one kind; those given by path are opened.
 
-    Raises ``InputError`` for one that cannot be read, for a mixture of kinds, and for a file named
-    twice or beside a copy of it (its samples would count double).
+    Raises ``InputError`` for one that cannot be read, for a mixture of kinds, and for a file given
+    twice or together with a copy of it (its samples would count double).
     """
     named: set[Path] = set()
-    for path in paths:
-        where = Path(path).resolve()
+    for source in sources:
+        path = _path(source)
+        where = path.resolve()
         if where in named:
             raise InputError(f"{path} is named twice; each recording counts once")
         named.add(where)
-    recordings = [open_recording(p) for p in paths]
+    recordings = [s if isinstance(s, Recording) else open_recording(s) for s in sources]
     seen: dict[str, Path] = {}
     for recording in recordings:
         if recording.sha256 in seen:
@@ -74,6 +86,21 @@ def open_all(paths: Sequence[str | Path]) -> list[Recording]:
         words = ", ".join(f"{r.path} is of {_KIND_WORDS[r.kind]}" for r in recordings)
         raise InputError(f"these recordings cannot be used together: {words}")
     return recordings
+
+
+def check_named_once(train: Sequence[Source], validation: Sequence[Source]) -> None:
+    """Refuse a file that is given both to fit and to validate."""
+    named = {_path(source).resolve() for source in train}
+    for source in validation:
+        if _path(source).resolve() in named:
+            raise InputError(
+                f"{_path(source)} is given both to fit and to validate: an error on fitted data "
+                f"proves nothing; leave it out of one of them"
+            )
+
+
+def _path(source: Source) -> Path:
+    return source.path if isinstance(source, Recording) else Path(source)
 
 
 _THERMOMETER = 1.0  # s, over which a temperature is the mean: films do not warm faster

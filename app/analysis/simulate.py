@@ -1,16 +1,17 @@
-"""What a model predicts under a recorded or planned drive, as a recording or as CSV."""
+"""Prediction of a model under a recorded or planned drive."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from dearig.analysis.records import recording_drive
-from dearig.config.modelfile import load_model, model_toml
+from dearig.config.modelfile import ModelFile, load_model, model_toml
 from dearig.config.rigfile import RigFile
-from dearig.config.sequencefile import load_sequence
+from dearig.config.sequencefile import LoadedSequence, load_sequence
 from dearig.errors import InputError
 from dearig.model.actuator import Actuator, Drive
 from dearig.model.film import Strip
@@ -18,84 +19,119 @@ from dearig.model.stability import pull_in_voltage
 from dearig.recording.files import check_output, replaced_when_done
 from dearig.recording.metadata import RunMetadata
 from dearig.recording.reader import open_recording
+from dearig.recording.recording import Recording
 from dearig.recording.save import save_recording
 
-__all__ = ["Prediction", "simulate_model"]
+__all__ = ["Prediction", "save_prediction", "simulate_model"]
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """What was written where, and for an actuator how near it came to breaking down.
+    """What ``model`` predicts under a drive.
 
-    ``field_max`` is the largest true field phi/z in V/m. ``pull_in`` is the voltage in V beyond
-    which the film has no stable stretch; None where it stiffens first. Both are None for a film.
+    ``values`` are arrays (N,) in SI units by the names that a recording has, ``time`` first;
+    ``kind`` is actuator or film, ``hold`` and ``kinematics`` as of a recording, ``sequence_toml``
+    that of the drive. ``field_max`` is the largest true field phi/z in V/m. ``pull_in`` is the
+    voltage in V beyond which the film has no stable stretch; None where it stiffens first. Both are
+    None for a film.
     """
 
-    path: Path
+    title: str
+    kind: str
+    model: ModelFile
+    values: Mapping[str, np.ndarray]
+    hold: bool = False
+    kinematics: str = "uniaxial"
+    sequence_toml: str = ""
     field_max: float | None = None
     pull_in: float | None = None
 
 
 def simulate_model(
-    model_path: str | Path,
-    drive: str | Path,
-    out: str | Path,
+    model: str | Path | ModelFile,
+    drive: str | Path | Recording | LoadedSequence,
     *,
-    rig_file: RigFile,
+    rig_file: RigFile | None = None,
     voltage: str = "command",
-    overwrite: bool = False,
 ) -> Prediction:
-    """Drive the model with a recording (``.h5``) or a sequence, and write ``.h5`` or ``.csv``.
+    """Drive ``model`` with a recording or a sequence; a path is opened, and so is a preset's name.
 
     A recorded voltage is followed as the recording says (held by the converter, or linear between
-    samples); a planned one as the sequence itself, sampled at the rig file's rate. ``voltage`` is
-    command or monitor. Raises ``InputError``.
+    samples); a planned one as the sequence itself, sampled at the rate of ``rig_file``. ``voltage``
+    is command or monitor. Nothing is written; ``save_prediction`` does. Raises ``InputError``.
     """
-    loaded = load_model(model_path)
-    target = check_output(out, overwrite, model_path, drive)
+    given = model if isinstance(model, ModelFile) else load_model(model)
+    if not isinstance(drive, Recording | LoadedSequence):
+        recorded = Path(drive).suffix in (".h5", ".hdf5", ".nxs")
+        drive = open_recording(drive) if recorded else load_sequence(drive)
+    if isinstance(drive, LoadedSequence):
+        rate = float((rig_file or RigFile()).card.sample_rate_Hz)
+        values, field_max, pull_in = _actuator(given.model, Drive(*drive.sample(rate)))
+        return Prediction(
+            title=f"{given.name} under {drive.sequence.name}",
+            kind="actuator",
+            model=given,
+            values=values,
+            sequence_toml=drive.toml,
+            field_max=field_max,
+            pull_in=pull_in,
+        )
+    title = f"{given.name} under {drive.title or drive.name}"
+    if drive.kind == "film":
+        return Prediction(
+            title=title,
+            kind="film",
+            model=given,
+            values=_film(given.model, drive.kinematics, drive.time, drive.stretch),
+            kinematics=drive.kinematics,
+            sequence_toml=drive.sequence_toml,
+        )
+    driven = recording_drive(drive, voltage)
+    values, field_max, pull_in = _actuator(given.model, driven)
+    return Prediction(
+        title=title,
+        kind="actuator",
+        model=given,
+        values=values,
+        hold=driven.hold,
+        sequence_toml=drive.sequence_toml,
+        field_max=field_max,
+        pull_in=pull_in,
+    )
+
+
+def save_prediction(prediction: Prediction, out: str | Path, overwrite: bool = False) -> Path:
+    """Write ``prediction`` as a recording (``.h5``) or a table (``.csv``) and return the path.
+
+    Raises ``InputError`` for another ending, or where the file may not be written.
+    """
+    target = check_output(out, overwrite)
     if target.suffix not in (".h5", ".csv"):
         raise InputError(f"{out}: the output is a recording (.h5) or a table (.csv)")
-    sequence_toml, hold, kinematics = "", False, "uniaxial"
-    field_max, pull_in = None, None
-    if Path(drive).suffix in (".h5", ".hdf5", ".nxs"):
-        recording = open_recording(drive)
-        title = f"{loaded.name} under {recording.title or recording.name}"
-        sequence_toml = recording.sequence_toml
-        if recording.kind == "film":
-            values = _film(loaded.model, recording.kinematics, recording.time, recording.stretch)
-            kinematics = recording.kinematics
-        else:
-            given = recording_drive(recording, voltage)
-            values, field_max, pull_in = _actuator(loaded.model, given)
-            hold = given.hold
-    else:
-        plan = load_sequence(drive)
-        title = f"{loaded.name} under {plan.sequence.name}"
-        sequence_toml = plan.toml
-        time, volts = plan.sample(float(rig_file.card.sample_rate_Hz))
-        values, field_max, pull_in = _actuator(loaded.model, Drive(time, volts))
     if target.suffix == ".csv":
         with replaced_when_done(target) as partial:
-            _write_csv(partial, values)
-        return Prediction(target, field_max, pull_in)
-    actuator = loaded.model if isinstance(loaded.model, Actuator) else None
-    save_recording(
+            _write_csv(partial, prediction.values)
+        return target
+    given = prediction.model
+    film = load = None
+    if isinstance(given.model, Actuator) and prediction.kind == "actuator":
+        film, load = given.model.film, given.model.load
+    return save_recording(
         target,
-        "film" if "stretch" in values else "actuator",
-        values,
+        prediction.kind,
+        prediction.values,
         RunMetadata(
-            title=title,
-            film=actuator.film if actuator and "stretch" not in values else None,
-            load=actuator.load if actuator and "stretch" not in values else None,
-            sequence_toml=sequence_toml,
-            model_toml=model_toml(loaded.name, loaded.model, {}),
+            title=prediction.title,
+            film=film,
+            load=load,
+            sequence_toml=prediction.sequence_toml,
+            model_toml=model_toml(given.name, given.model, {}),
             notes="a prediction of a model, not a measurement",
         ),
-        hold=hold,
-        kinematics=kinematics,
+        hold=prediction.hold,
+        kinematics=prediction.kinematics,
         overwrite=overwrite,
     )
-    return Prediction(target, field_max, pull_in)
 
 
 def _actuator(
@@ -130,7 +166,7 @@ def _film(
     return {"time": time, "stretch": stretch, "nominal_stress": answer.stress}
 
 
-def _write_csv(path: Path, values: dict[str, np.ndarray]) -> None:
+def _write_csv(path: Path, values: Mapping[str, np.ndarray]) -> None:
     columns = {
         "time": ("time_s", 1.0),
         "voltage_command": ("voltage_V", 1.0),

@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import os
-import shutil
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from dearig.analysis.compatibility import of_rig
 from dearig.analysis.diagnose import diagnose_recordings
 from dearig.analysis.identify import identify_recordings
-from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome
+from dearig.analysis.outcomes import (
+    Comparison,
+    DiagnoseOutcome,
+    IdentifyOutcome,
+    save_fitted_model,
+)
 from dearig.analysis.residual import even, spectrum
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
 from dearig.model.diagnosis.results import Dependence, MissingStress, Signature
 from dearig.progress import Progress, quiet
-from dearig.recording.files import in_words, replaced_when_done
+from dearig.recording.files import in_words
 from dearig.recording.reader import open_recording
 
 __all__ = ["Residual", "Study", "Task", "Trace", "study"]
@@ -108,24 +111,19 @@ def study(
     if not (folder.is_dir() and os.access(folder, os.W_OK)):
         raise InputError(f"{folder} cannot be written to; choose another folder for the results")
     found: IdentifyOutcome | DiagnoseOutcome
-    # elsewhere until it is done: who ends it by force finds nothing half made beside the recordings
-    with TemporaryDirectory() as scratch:
-        made = Path(scratch) / "model.toml"
-        if task.diagnose:
-            found = diagnose_recordings(
-                task.train, validation=task.validation, model_out=made, branches=task.branches,
-                drive=task.drive, rig_file=_rig_of(task), clock=clock, progress=progress,
-            )  # fmt: skip
-        else:
-            found = identify_recordings(
-                task.train, made, validation=task.validation, branches=(task.branches,),
-                spring=task.spring, drive=task.drive, clock=clock, progress=progress,
-            )  # fmt: skip
-        where = _new_folder(folder)
-        model, report = where / "model.toml", where / "report.html"
-        with replaced_when_done(model) as partial:
-            shutil.copyfile(made, partial)
-    found = replace(found, model_path=str(model))
+    if task.diagnose:
+        found = diagnose_recordings(
+            task.train, validation=task.validation, branches=task.branches, drive=task.drive,
+            rig_file=_rig_of(task), clock=clock, progress=progress,
+        )  # fmt: skip
+    else:
+        found = identify_recordings(
+            task.train, validation=task.validation, branches=(task.branches,), spring=task.spring,
+            drive=task.drive, clock=clock, progress=progress,
+        )  # fmt: skip
+    where = _new_folder(folder)
+    model, report = where / "model.toml", where / "report.html"
+    found = save_fitted_model(found, model)
     progress("report", 1.0)
     write_report(found, report)
     if isinstance(found, DiagnoseOutcome):

@@ -6,35 +6,36 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dearig.analysis.outcomes import ValidateOutcome
-from dearig.analysis.records import compare, open_all
-from dearig.config.modelfile import load_model
+from dearig.analysis.records import Source, compare, open_all
+from dearig.config.modelfile import ModelFile, load_model
 from dearig.progress import Progress, quiet
 
 __all__ = ["validate_model"]
 
 
 def validate_model(
-    model_path: str | Path,
-    paths: Sequence[str | Path],
+    model: str | Path | ModelFile,
+    recordings: Sequence[Source],
     *,
     drive: str = "command",
     progress: Progress = quiet,
 ) -> ValidateOutcome:
-    """Compare the model in ``model_path`` with each recording. Raises ``InputError``.
+    """Compare ``model``, or the one in the model file of that path, with each recording.
 
-    A recording that the model was fitted to is marked as training data, by its checksum.
+    A recording that the model was fitted to is marked as training data, by its checksum. Raises
+    ``InputError``.
     """
-    model = load_model(model_path)
-    recordings = open_all(paths)
+    given = model if isinstance(model, ModelFile) else load_model(model)
+    opened = open_all(recordings)
     comparisons = []
-    for i, recording in enumerate(recordings):
-        role = "train" if recording.sha256 in model.fitted else "validation"
-        comparisons.append(compare(recording, model.model, role, drive))
-        progress("validation", (i + 1) / len(recordings))
+    for i, recording in enumerate(opened):
+        role = "train" if recording.sha256 in given.fitted else "validation"
+        comparisons.append(compare(recording, given.model, role, drive))
+        progress("validation", (i + 1) / len(opened))
     return ValidateOutcome(
-        title=f"{model.name} on {len(recordings)} recording{'s' if len(recordings) > 1 else ''}",
-        kind=recordings[0].kind,
-        model_name=model.name,
-        model_path=str(model_path),
+        title=f"{given.name} on {len(opened)} recording{'s' if len(opened) > 1 else ''}",
+        kind=opened[0].kind,
+        model_name=given.name,
+        model_path="" if isinstance(model, ModelFile) else str(model),
         comparisons=tuple(comparisons),
     )

@@ -9,7 +9,12 @@ from pathlib import Path
 from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.diagnose import VALIDATION, diagnose_recordings
 from dearig.analysis.identify import identify_recordings
-from dearig.analysis.outcomes import DiagnoseOutcome, IdentifyOutcome, ValidateOutcome
+from dearig.analysis.outcomes import (
+    DiagnoseOutcome,
+    IdentifyOutcome,
+    ValidateOutcome,
+    save_fitted_model,
+)
 from dearig.analysis.validate import validate_model
 from dearig.config.presets import VALIDATION_A, VALIDATION_B
 from dearig.config.rigfile import RigFile
@@ -66,12 +71,10 @@ def run_demo(
             RunOptions(seed=seed * len(presets) + n, overwrite=overwrite),
         )  # fmt: skip
         progress("recording 11 runs", (n + 1) / len(presets))
-    identified = identify_recordings(
-        [files["thesis"]],
+    identified = save_fitted_model(
+        identify_recordings([files["thesis"]], clock=clock, progress=progress),
         out / "model.toml",
-        overwrite=overwrite,
-        clock=clock,
-        progress=progress,
+        overwrite,
     )
     validated = validate_model(
         out / "model.toml", [files[p] for p in presets[1:]], progress=progress
@@ -93,11 +96,10 @@ def run_demo(
     diagnosed = diagnose_recordings(
         [hidden["thesis"]],
         validation=[hidden[preset] for preset in VALIDATION],
-        model_out=out / "improved.toml",
-        overwrite=overwrite,
         clock=clock,
         progress=lambda _, fraction: progress("diagnosis", fraction),
     )
+    diagnosed = save_fitted_model(diagnosed, out / "improved.toml", overwrite)
     page = out / "diagnosis.html"
     write_diagnosis_report(diagnosed, page)
     return DemoResult(identified, validated, diagnosed, report, page, clock() - started)

@@ -114,6 +114,7 @@ def identify(
     determine.
     """
     from dearig.analysis.identify import identify_recordings
+    from dearig.analysis.outcomes import save_fitted_model
     from dearig.cli.terminal import branch_table, identify_table
     from dearig.config.rigfile import load_rig_file
     from dearig.report.as_json import outcome_json
@@ -123,7 +124,6 @@ def identify(
     with working(json) as (console, progress):
         outcome = identify_recordings(
             train,
-            out,
             validation=validate_ or [],
             method=method.value,
             branches=numbers,
@@ -133,10 +133,9 @@ def identify(
             rig_file=None if rig_file is None else load_rig_file(rig_file),
             seed=seed,
             intervals=intervals,
-            overwrite=force,
-            clock=time.monotonic,
             progress=progress,
         )
+        outcome = save_fitted_model(outcome, out, force)
         if report is not None:
             from dearig.report.html import write_identify_report
 
@@ -248,6 +247,7 @@ def diagnose(
     Adds the effects found to the model and compares the errors before and after.
     """
     from dearig.analysis.diagnose import diagnose_recordings, diagnose_rig
+    from dearig.analysis.outcomes import save_fitted_model
     from dearig.cli.terminal import diagnosis_tables
     from dearig.config.rigfile import load_rig_file
     from dearig.config.toml_input import read_text
@@ -271,18 +271,18 @@ def diagnose(
     with working(json, whole=True) as (console, progress):
         if rig is None:
             outcome = diagnose_recordings(
-                given, validation=others, model_out=model_out, branches=branches,
-                drive=drive.value, rig_file=settings, thorough=thorough, overwrite=force,
-                clock=time.monotonic, progress=progress,
+                given, validation=others, branches=branches, drive=drive.value,
+                rig_file=settings, thorough=thorough, progress=progress,
             )  # fmt: skip
         else:
             outcome = diagnose_rig(
                 rig, out, experiments=experiments, train=given, validation=others,
-                model_out=model_out, branches=branches, drive=drive.value, rig_file=settings,
+                branches=branches, drive=drive.value, rig_file=settings,
                 configuration="" if rig_file is None else read_text(rig_file, "rig file"),
-                seed=seed, thorough=thorough, overwrite=force, clock=time.monotonic,
-                progress=progress,
+                seed=seed, thorough=thorough, overwrite=force, progress=progress,
             )  # fmt: skip
+        if model_out is not None:
+            outcome = save_fitted_model(outcome, model_out, force)
         if report is not None:
             progress("report", 1.0)
             write_diagnosis_report(outcome, report)
@@ -319,7 +319,7 @@ def simulate(
     force: Force = False,
 ) -> None:
     """Compute what a model predicts under a recorded or planned drive."""
-    from dearig.analysis.simulate import simulate_model
+    from dearig.analysis.simulate import save_prediction, simulate_model
     from dearig.config.rigfile import load_rig_file
 
     check_files(force, (model, drive, rig_file), out, json=json)
@@ -327,12 +327,11 @@ def simulate(
         prediction = simulate_model(
             model,
             drive,
-            out,
             rig_file=load_rig_file(rig_file),
             voltage=voltage.value,
-            overwrite=force,
         )
-    print_line(console, str(prediction.path))
+        written = save_prediction(prediction, out, force)
+    print_line(console, str(written))
     if prediction.field_max is not None:
         limit = "no static pull-in: the springs stiffen first"
         if prediction.pull_in is not None:
@@ -343,7 +342,7 @@ def simulate(
             "format": "dearig-simulation/1",
             "model": str(model),
             "drive": drive,
-            "out": str(prediction.path),
+            "out": str(written),
             "true_field_max_V_per_m": prediction.field_max,
             "pull_in_voltage_V": prediction.pull_in,
         },

@@ -210,7 +210,7 @@ class TestOutputs:
             "--report", tmp_path / "r.html", "--model-out", tmp_path / "m.toml",
         )  # fmt: skip
         assert answer.code == 130
-        assert answer.err.splitlines()[-1].startswith("dearig: interrupted: what had been found")
+        assert answer.err.splitlines()[-1].startswith("dearig: interrupted: the results found")
         assert strict_json((tmp_path / "d.json").read_text())["interrupted"] is True
         assert names(tmp_path) == {"d.json", "r.html", "m.toml"}
         assert load_model(tmp_path / "m.toml").history["interrupted"] is True
@@ -330,7 +330,7 @@ class TestRig:
             "--json", tmp_path / "d.json",
         )  # fmt: skip
         assert answer.code == code
-        assert "what had been found until then was kept" in answer.err.splitlines()[-1]
+        assert "the results found before that were kept" in answer.err.splitlines()[-1]
         kept = strict_json((tmp_path / "d.json").read_text())
         assert kept["interrupted"] is interrupted
         assert f"No more was recorded: {ends}" in kept["notes"]

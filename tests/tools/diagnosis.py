@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, SeparatingExperiment, Stand
+from dearig.config.modelfile import ModelFile
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.results import (
     Candidate,
@@ -170,6 +171,7 @@ def diagnose_outcome(**changes) -> DiagnoseOutcome:
         title="thesis identification",
         kind="actuator",
         drive="command",
+        model=ModelFile("thesis identification, with leakage", BASE),
         finding=finding(),
         stands=_stands((train,), others),
         noise=NOISE,

@@ -14,6 +14,7 @@ from dearig.analysis.outcomes import (
     Published,
     ValidateOutcome,
 )
+from dearig.config.modelfile import ModelFile
 from dearig.model.actuator import Actuator
 from dearig.model.excitation import Sequence
 from dearig.model.film import Strip
@@ -121,6 +122,7 @@ def identify_outcome(**changes) -> IdentifyOutcome:
         title="Thesis excitation",
         kind="actuator",
         method="hybrid",
+        model=ModelFile("Thesis excitation, 3 branches", fit().model),
         fit=fit(),
         train=(actuator_comparison(),),
         validation=(),
