@@ -1,0 +1,1 @@
+"""Python interface for notebooks and scripts; ``import dearig`` gives its names."""
