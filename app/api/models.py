@@ -1,0 +1,106 @@
+"""Models: opened from a file, or taken from a result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+from dearig.api.display import card, facts, table_html
+from dearig.config.modelfile import ModelFile, load_model, model_toml, save_model
+from dearig.model.actuator import Actuator
+from dearig.model.material import Spring
+from dearig.report.numbers import NO_VALUE, significant
+from dearig.report.sentences import describe_model
+from dearig.report.tables import Row, Table
+
+__all__ = ["Model", "ModelSource", "as_model_file"]
+
+
+class Model(ModelFile):
+    """A fitted model: ``name``, ``model`` (film, load, springs, effects) and ``history``.
+
+    ``Model.open("model.toml")`` reads a model file.
+    """
+
+    @classmethod
+    def open(cls, path: str | Path) -> Model:
+        """Read the model file at ``path``. Raises ``InputError``."""
+        return cls.of(load_model(path))
+
+    @classmethod
+    def of(cls, file: ModelFile) -> Model:
+        """Return ``file`` with what a notebook needs."""
+        return file if isinstance(file, cls) else cls(file.name, file.model, file.history)
+
+    def to_toml(self) -> str:
+        """Return the text of a model file."""
+        return model_toml(self.name, self.model, self.history)
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write a model file (TOML) to ``path`` and return the path. Raises ``InputError``."""
+        return save_model(path, self.name, self.model, self.history, overwrite)
+
+    def _repr_html_(self) -> str:
+        network = self.model.network
+        springs: list[tuple[str, Spring, float | None]] = []
+        springs.append(("equilibrium", network.equilibrium, None))
+        springs += [
+            (f"branch {i + 1}", branch.spring, branch.relaxation_time)
+            for i, branch in enumerate(network.branches)
+        ]
+        rows = tuple(
+            Row(
+                (
+                    label,
+                    significant(spring.modulus * 1e-3, 4),
+                    significant(spring.limit, 4),
+                    NO_VALUE if time is None else significant(time, 4),
+                )
+            )
+            for label, spring, time in springs
+        )
+        head = (("", ""), ("Modulus", "kPa"), ("Limit J", ""), ("Relaxation time", "s"))
+        return card(
+            self.name,
+            facts(self._facts()),
+            table_html(Table("", head, rows)),
+            sentences=[f"{describe_model(self.model)}."],
+        )
+
+    def _facts(self) -> list[tuple[str, str]]:
+        rows = []
+        if isinstance(self.model, Actuator):
+            film, load = self.model.film, self.model.load
+            size = " x ".join(f"{x * 1e3:.4g}" for x in (film.length, film.width, film.thickness))
+            rows += [
+                ("film", f"{size} mm, {film.kinematics}"),
+                ("load", f"{load.mass * 1e3:.4g} g"),
+            ]
+        rows += [(name, _numbers(dict(values))) for name, values in self.model.effects]
+        return rows
+
+
+def _numbers(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {significant(value, 4)}" for name, value in values.items())
+
+
+class _HasModel(Protocol):
+    @property
+    def model(self) -> Any: ...
+
+
+#: A model, a result that has one, or the path of a model file.
+ModelSource = str | Path | ModelFile | _HasModel
+
+
+def as_model_file(source: ModelSource) -> str | Path | ModelFile:
+    """Return what the analysis takes: a path as it is, a model, or the model of a result."""
+    if isinstance(source, str | Path | ModelFile):
+        return source
+    file = getattr(source, "model", None)
+    if not isinstance(file, ModelFile):
+        raise TypeError(
+            f"a model is a path, a dearig.Model or a result with one, not {type(source).__name__}"
+        )
+    return file

@@ -1,0 +1,101 @@
+"""Predictions of a model, as arrays, tables, figures and files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dearig.analysis import simulate
+from dearig.api.display import card, drawing, facts, write_page
+from dearig.api.models import Model
+from dearig.errors import InputError
+from dearig.recording.layout import UNITS
+from dearig.report.numbers import seconds, significant
+from dearig.report.signal_figures import signal_figure
+from dearig.units import SHOWN
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+__all__ = ["Prediction"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction:
+    """What a model predicts under a drive; arrays are (N,) in SI units."""
+
+    prediction: simulate.Prediction
+
+    @property
+    def model(self) -> Model:
+        """The model that was simulated."""
+        return Model.of(self.prediction.model)
+
+    @property
+    def time(self) -> np.ndarray:
+        """Time in s."""
+        return self.prediction.values["time"]
+
+    @property
+    def drive(self) -> np.ndarray:
+        """The voltage in V, or the stretch of a film."""
+        actuator = self.prediction.kind == "actuator"
+        return self.prediction.values["voltage_command" if actuator else "stretch"]
+
+    @property
+    def response(self) -> np.ndarray:
+        """The displacement in m from the loaded rest state, or the nominal stress in Pa."""
+        actuator = self.prediction.kind == "actuator"
+        return self.prediction.values["displacement" if actuator else "nominal_stress"]
+
+    def to_pandas(self) -> DataFrame:
+        """Return a data frame over ``time`` in s, with the units in ``frame.attrs``.
+
+        Raises ``InputError`` where pandas is not installed.
+        """
+        try:
+            from pandas import DataFrame, Index
+        except ImportError as error:
+            raise InputError(
+                "pandas is not installed: pip install 'dearig[notebook]' installs it"
+            ) from error
+        values = dict(self.prediction.values)
+        frame = DataFrame(values, index=Index(values.pop("time"), name="time"))
+        frame.attrs["units"] = {name: UNITS[name] for name in values}
+        return frame
+
+    def plot(self) -> Figure:
+        """Return a figure of the drive and the predicted response over time."""
+        return signal_figure(self.prediction.kind, self.time, self.drive, model=self.response)
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write a recording (``.h5``) or a table (``.csv``) to ``path`` and return the path."""
+        return simulate.save_prediction(self.prediction, path, overwrite)
+
+    def to_html(self, path: str | Path) -> Path:
+        """Write a page with the main facts and a figure to ``path``, replacing it."""
+        return write_page(path, self.prediction.title, self._repr_html_())
+
+    def __repr__(self) -> str:
+        """Return title and size in a line."""
+        return f"<Prediction {self.prediction.title!r}: {self.time.size} samples>"
+
+    def _repr_html_(self) -> str:
+        found, shown = self.prediction, SHOWN[self.prediction.kind]
+        long = float(self.time[-1] - self.time[0])
+        span = [significant(float(f(self.response)) * shown.factor) for f in (np.min, np.max)]
+        rows = [
+            ("samples", f"{self.time.size:,}, {seconds(long)}"),
+            (shown.quantity.lower(), f"{span[0]} to {span[1]} {shown.unit}"),
+        ]
+        if found.field_max is not None:
+            rows.append(("true field", f"up to {significant(found.field_max * 1e-6)} MV/m"))
+            limit = "none: the springs stiffen first"
+            if found.pull_in is not None:
+                limit = f"{significant(found.pull_in * 1e-3)} kV"
+            rows.append(("static pull-in", limit))
+        return card(found.title, facts(rows), drawing(self.plot(), f"{found.title} over time"))

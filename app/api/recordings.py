@@ -1,0 +1,238 @@
+"""Recordings: opened from a file, or made by a run."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+import weakref
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import tomli_w
+
+from dearig.acquisition.overlay import OverlayModel
+from dearig.acquisition.run import RunOptions
+from dearig.acquisition.run import record as run
+from dearig.analysis.compatibility import of_rig
+from dearig.api.display import card, drawing, facts, write_page
+from dearig.api.models import ModelSource, as_model_file
+from dearig.api.sequences import SequenceSource, as_loaded
+from dearig.config.modelfile import ModelFile, load_model, model_toml
+from dearig.config.presets import PRESETS
+from dearig.config.rigfile import RigFile, load_rig_file
+from dearig.config.rigform import parse_rig_file
+from dearig.config.sequencefile import LoadedSequence
+from dearig.config.toml_input import read_text
+from dearig.drivers.gate import Margin
+from dearig.errors import InputError
+from dearig.model.actuator import Actuator
+from dearig.progress import Progress, quiet
+from dearig.recording import recording as stored
+from dearig.recording.files import check_output, replaced_when_done
+from dearig.recording.reader import open_recording
+from dearig.report.numbers import seconds, significant
+from dearig.report.signal_figures import signal_figure
+from dearig.sim_backend.faults import FaultPlan
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Recording", "RigSource", "load_rig", "open", "record"]
+
+#: The path of a rig file, or its tables, such as ``{"load": {"mass_g": 50}}``.
+RigSource = str | Path | Mapping[str, Mapping[str, object]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(stored.Recording):
+    """A recording: arrays (N,) in SI units, read when they are first used, and its metadata.
+
+    ``margins`` say how near the run was planned to come to each limit of the rig; they are empty
+    for a recording that was opened.
+    """
+
+    margins: tuple[Margin, ...] = ()
+
+    @classmethod
+    def of(cls, recording: stored.Recording, margins: tuple[Margin, ...] = ()) -> Recording:
+        """Return ``recording`` with what a notebook needs."""
+        known = {f.name: getattr(recording, f.name) for f in fields(stored.Recording)}
+        return cls(**known, margins=margins)
+
+    def plot(self) -> Figure:
+        """Return a figure of the drive and the response over time, with the overlay model's."""
+        return signal_figure(
+            self.kind,
+            self.time,
+            self.voltage_command if self.kind == "actuator" else self.stretch,
+            self.signal,
+            self.displacement_model,
+        )
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Copy the recording's file to ``path`` and return the path. Raises ``InputError``."""
+        out = check_output(path, overwrite, self.path)
+        with replaced_when_done(out) as partial:
+            shutil.copyfile(self.path, partial)
+        return out
+
+    def to_html(self, path: str | Path) -> Path:
+        """Write a page with the main facts and a figure to ``path``, replacing it."""
+        return write_page(path, self.name, self._repr_html_())
+
+    def __repr__(self) -> str:
+        """Return name, kind and size in a line."""
+        return (
+            f"<Recording {self.name!r}: {self.kind}, {self.samples} samples, {self.duration:.4g} s>"
+        )
+
+    def _repr_html_(self) -> str:
+        rows = [("title", self.title)] if self.title and self.title != self.name else []
+        rate = "" if self.rate is None else f" at {significant(self.rate)} Hz"
+        rows.append(("samples", f"{self.samples:,}, {seconds(self.duration)}{rate}"))
+        if self.noise_floor is not None:
+            rows.append(("noise floor", f"{significant(self.noise_floor * 1e6)} \N{MICRO SIGN}m"))
+        film = self.film
+        if film is not None:
+            size = " x ".join(f"{x * 1e3:.4g}" for x in (film.length, film.width, film.thickness))
+            rows.append(("film", f"{self.film_id + ', ' if self.film_id else ''}{size} mm"))
+        if self.load is not None:
+            rows.append(("load", f"{self.load.mass * 1e3:.4g} g"))
+        ended = self.outcome if self.complete else f"INCOMPLETE: {self.outcome}"
+        rows.append(("ended", ended))
+        rows += [(f"{e.level} at {e.time:.4g} s", e.message) for e in self.events[:_EVENTS_MAX]]
+        if len(self.events) > _EVENTS_MAX:
+            rows.append(("events", f"{len(self.events) - _EVENTS_MAX} more"))
+        label = f"Drive and response of {self.name} over time"
+        return card(self.name, facts(rows), drawing(self.plot(), label))
+
+
+_EVENTS_MAX = 5  # of a card; ``recording.events`` has them all
+
+
+def open(path: str | Path) -> Recording:  # noqa: A001  (the name of the interface)
+    """Return the recording in the file at ``path``.
+
+    Raises ``InputError`` where the file is no recording that can be read.
+    """
+    return Recording.of(open_recording(path))
+
+
+def record(
+    sequence: SequenceSource,
+    *,
+    rig: str = "sim",
+    path: str | Path | None = None,
+    rig_file: RigSource | None = None,
+    model: ModelSource | None = None,
+    overlay: ModelSource | None = None,
+    operator: str = "",
+    film: str = "",
+    notes: str = "",
+    seed: int = 0,
+    paced: bool = False,
+    faults: Iterable[str] = (),
+    overwrite: bool = False,
+    progress: Progress = quiet,
+) -> Recording:
+    """Play a sequence on a rig, record it, and return the recording.
+
+    Parameters
+    ----------
+    sequence : Sequence, path or name of a preset
+        What is played.
+    rig : str
+        ``sim``, ``sim:SEED`` for a simulated rig with a hidden effect, ``daqmx:Dev1`` for a card.
+    path : path, optional
+        The file to write. Without one the recording is in a temporary file, which is deleted when
+        the returned value is; ``Recording.save`` keeps it.
+    rig_file : path or mapping, optional
+        Film, load, instruments and limits: a rig file, or its tables such as
+        ``{"load": {"mass_g": 50}}``. The thesis's rig where it is left out.
+    model : model, result or path, optional
+        The film and load of the simulated rig ``sim``.
+    overlay : model, result or path, optional
+        A model that runs in step with the measurement and is recorded with it.
+    operator, film, notes : str
+        Kept in the recording.
+    seed : int
+        Of the simulated noise.
+    paced : bool
+        Simulate in real time; otherwise as fast as possible.
+    faults : iterable of str
+        What goes wrong in a simulated rig, such as ``arc@3.2`` (kind, seconds).
+    overwrite : bool
+        Replace the file at ``path``.
+    progress : callable, optional
+        Called with a stage and the fraction of it that is done.
+
+    Raises
+    ------
+    InputError
+        For a sequence that the rig's limits do not allow, before anything is touched.
+    SafetyStop, InstrumentFault, DiskFault, Interrupted
+        For a run that ended early. The rig is safe, and the file that the message names is kept,
+        also a temporary one. An interrupt of the kernel ramps the voltage down to 0 V.
+    """
+    settings, text = load_rig(rig_file)
+    loaded = as_loaded(sequence)
+    actuator = None
+    if model is not None:
+        actuator = _actuator(model)[1]
+        settings = of_rig(settings, actuator.film, actuator.load)
+    in_step = None
+    if overlay is not None:
+        file, moved = _actuator(overlay)
+        in_step = OverlayModel(file.name, moved, toml=model_toml(file.name, moved, file.history))
+    try:
+        plan = FaultPlan.parse(list(faults))
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    options = RunOptions(
+        text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced,
+        actuator=actuator, faults=plan,
+    )  # fmt: skip
+    folder = None if path is not None else Path(tempfile.mkdtemp(prefix="dearig-"))
+    out = Path(path) if path is not None else _unnamed(folder, sequence, loaded)
+    try:
+        result = run(loaded, rig, settings, out, options, overlay=in_step, progress=progress)
+        found = Recording.of(open_recording(result.path), result.margins)
+    except BaseException:
+        if folder is not None and not any(folder.iterdir()):
+            folder.rmdir()  # a run that ended early has left its file there
+        raise
+    if folder is not None:
+        weakref.finalize(found, shutil.rmtree, folder, ignore_errors=True)
+    return found
+
+
+def _unnamed(folder: Path | None, source: SequenceSource, loaded: LoadedSequence) -> Path:
+    """A file in ``folder`` with the name of a preset, of a sequence file, or of the sequence."""
+    name = loaded.sequence.name
+    if isinstance(source, str | Path):
+        name = str(source) if str(source) in PRESETS else Path(source).stem
+    stem = re.sub(r"[^\w.]+", "-", name).strip("-.")[:60]
+    return (folder or Path()) / f"{stem or 'recording'}.h5"
+
+
+def _actuator(source: ModelSource) -> tuple[ModelFile, Actuator]:
+    """The model of ``source``, which must be of an actuator."""
+    given = as_model_file(source)
+    file = given if isinstance(given, ModelFile) else load_model(given)
+    if not isinstance(file.model, Actuator):
+        raise InputError(
+            f"the model {file.name!r} is of a bare film, which a voltage does not move: give one "
+            f"of an actuator"
+        )
+    return file, file.model
+
+
+def load_rig(source: RigSource | None) -> tuple[RigFile, str]:
+    """Return the settings in a rig file or its tables, and the text that a recording keeps."""
+    if isinstance(source, Mapping):
+        text = tomli_w.dumps({name: dict(table) for name, table in source.items()})
+        return parse_rig_file(text), text
+    return load_rig_file(source), "" if source is None else read_text(Path(source), "rig file")

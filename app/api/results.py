@@ -1,0 +1,287 @@
+"""Results of identification, validation and diagnosis: numbers, figures, pages and files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dearig.analysis.outcomes import (
+    Comparison,
+    DiagnoseOutcome,
+    IdentifyOutcome,
+    ValidateOutcome,
+)
+from dearig.api.display import card, drawing, table_html
+from dearig.api.models import Model
+from dearig.api.rows import Parameter, RecordingErrors, Rows, errors_of, parameters_of
+from dearig.api.sequences import Sequence as VoltageSequence
+from dearig.errors import InputError
+from dearig.recording.files import check_output
+from dearig.recording.json_file import write_json
+from dearig.report import diagnosis as words
+from dearig.report import figures
+from dearig.report.as_json import diagnosis_json, outcome_json
+from dearig.report.diagnosis_figures import bars_figure, before_after_figure
+from dearig.report.page import write_report
+from dearig.report.parameter_figures import branches_figure, parameters_figure
+from dearig.report.residual_figures import residual_figure
+from dearig.report.sentences import identify_summary, validate_summary, warnings_of
+from dearig.report.tables import error_table, parameter_table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["DiagnoseResult", "IdentifyResult", "ValidateResult"]
+
+
+def _save_json(value: dict[str, Any], path: Path, overwrite: bool) -> Path:
+    out = check_output(path, overwrite)
+    write_json(value, out)
+    return out
+
+
+def _named(comparisons: Sequence[Comparison], name: str, others: Sequence[str]) -> Comparison:
+    """The comparison called ``name``. Raises ``InputError``, which lists what can be plotted."""
+    for comparison in comparisons:
+        if name == comparison.name:
+            return comparison
+    known = (*others, *(c.name for c in comparisons))
+    raise InputError(f"{name!r} cannot be plotted; what can is {', '.join(known)}")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class IdentifyResult:
+    """A finished identification; ``outcome`` has everything that is known of it."""
+
+    outcome: IdentifyOutcome
+
+    @property
+    def model(self) -> Model:
+        """The fitted model."""
+        return Model.of(self.outcome.model)
+
+    @property
+    def parameters(self) -> Rows[Parameter]:
+        """The parameters in SI units with their 95 % intervals."""
+        return Rows(parameters_of(self.outcome.fit.estimates))
+
+    @property
+    def errors(self) -> Rows[RecordingErrors]:
+        """The errors on every recording, those that were fitted first."""
+        return errors_of((*self.outcome.train, *self.outcome.validation))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the operator should know of the recordings and the fit."""
+        return warnings_of(self.outcome)
+
+    def plot(self, what: str = "overview") -> Figure:
+        """Return a figure.
+
+        ``what`` is ``overview``, ``parameters``, ``branches`` (where several numbers were tried),
+        ``residual`` (of the first recording) or the name of a recording. Raises ``InputError``.
+        """
+        outcome = self.outcome
+        if what == "overview":
+            return figures.overview_figure(outcome.train[0], outcome.validation)
+        if what == "parameters":
+            return parameters_figure(outcome.fit)
+        if what == "residual":
+            return residual_figure(outcome.train[0])
+        others = ["overview", "parameters", "residual"]
+        if outcome.trials:
+            others.append("branches")
+            if what == "branches":
+                return branches_figure(outcome.trials, outcome.kind)
+        every = (*outcome.train, *outcome.validation)
+        return figures.comparison_figure(_named(every, what, others))
+
+    def to_html(self, path: str | Path) -> Path:
+        """Write the report to ``path``, replacing it. Raises ``InputError``."""
+        return write_report(self.outcome, path)
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the model (``.toml``) or all numbers (``.json``) to ``path`` and return the path.
+
+        Raises ``InputError``.
+        """
+        return _save(self, outcome_json(self.outcome), Path(path), overwrite)
+
+    def __repr__(self) -> str:
+        """Return the summary in sentences."""
+        return "\n".join(identify_summary(self.outcome))
+
+    def _repr_html_(self) -> str:
+        outcome = self.outcome
+        every = (*outcome.train, *outcome.validation)
+        return card(
+            f"Identification: {outcome.title}",
+            table_html(parameter_table(outcome.fit)),
+            table_html(error_table("", every)),
+            drawing(self.plot(outcome.train[0].name), f"Measurement and model, {outcome.title}"),
+            sentences=[*identify_summary(outcome)[1:], *self.warnings],
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ValidateResult:
+    """A finished validation; ``outcome`` has everything that is known of it."""
+
+    outcome: ValidateOutcome
+
+    @property
+    def errors(self) -> Rows[RecordingErrors]:
+        """The errors on every recording; ``role`` is train for one that the model was fitted to."""
+        return errors_of(self.outcome.comparisons)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the operator should know of the recordings."""
+        return warnings_of(self.outcome)
+
+    def plot(self, what: str = "") -> Figure:
+        """Return a figure of the recording ``what``, by default the one with the largest error.
+
+        ``residual`` is that one's residual. Raises ``InputError`` for another name.
+        """
+        every = self.outcome.comparisons
+        worst = max(every, key=lambda c: c.errors.rms)
+        if what == "residual":
+            return residual_figure(worst)
+        return figures.comparison_figure(_named(every, what or worst.name, ["residual"]))
+
+    def to_html(self, path: str | Path) -> Path:
+        """Write the report to ``path``, replacing it. Raises ``InputError``."""
+        return write_report(self.outcome, path)
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write all numbers (``.json``) to ``path`` and return the path. Raises ``InputError``."""
+        out = Path(path)
+        if out.suffix != ".json":
+            raise InputError(f"{out}: a validation is saved as numbers, in a file that ends .json")
+        return _save_json(outcome_json(self.outcome), out, overwrite)
+
+    def __repr__(self) -> str:
+        """Return the summary in sentences."""
+        return "\n".join(validate_summary(self.outcome))
+
+    def _repr_html_(self) -> str:
+        outcome = self.outcome
+        return card(
+            f"Validation: {outcome.title}",
+            table_html(error_table("", outcome.comparisons)),
+            drawing(self.plot(), f"Measurement and model, {outcome.title}"),
+            sentences=[*validate_summary(outcome), *self.warnings],
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DiagnoseResult:
+    """A finished (or interrupted) diagnosis; ``outcome`` has everything that is known of it."""
+
+    outcome: DiagnoseOutcome
+
+    @property
+    def verdict(self) -> str:
+        """``nothing_missing``, ``explained``, ``partly_explained`` or ``unexplained``."""
+        return self.outcome.finding.verdict
+
+    @property
+    def headline(self) -> str:
+        """The verdict in words."""
+        return words.headline(self.outcome.finding)
+
+    @property
+    def model(self) -> Model:
+        """The model with the effects that were found."""
+        return Model.of(self.outcome.model)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects that were found, in the order in which they were added."""
+        return tuple(step.effect for step in self.outcome.finding.steps)
+
+    @property
+    def parameters(self) -> Rows[Parameter]:
+        """The parameters of the effects that were found, in SI units with 95 % intervals."""
+        steps = self.outcome.finding.steps
+        return Rows(p for step in steps for p in parameters_of(step.estimates, step.effect))
+
+    @property
+    def errors(self) -> Rows[RecordingErrors]:
+        """The errors of the final model; ``errors_before`` are those of the thesis's model."""
+        return errors_of((*self.outcome.after.train, *self.outcome.after.validation))
+
+    @property
+    def errors_before(self) -> Rows[RecordingErrors]:
+        """The errors of the thesis's model."""
+        return errors_of((*self.outcome.before.train, *self.outcome.before.validation))
+
+    @property
+    def experiment(self) -> VoltageSequence | None:
+        """The sequence that separates what these data do not; None if there is none."""
+        found = self.outcome.experiment
+        return None if found is None else VoltageSequence.from_toml(found.sequence)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the operator should know of the recordings and the search."""
+        return words.warnings(self.outcome)
+
+    def plot(self, what: str = "errors") -> Figure:
+        """Return a figure.
+
+        ``what`` is ``errors`` (RMS of every recording before and after) or the name of a recording.
+        Raises ``InputError``.
+        """
+        before, after = self.outcome.before, self.outcome.after
+        first = {c.name: c for c in (*before.train, *before.validation)}
+        last = (*after.train, *after.validation)
+        pairs = [(first[c.name], c) for c in last if c.name in first]
+        if what == "errors":
+            return bars_figure(pairs, self.outcome.noise, self.outcome.kind)
+        chosen = _named([after for _, after in pairs], what, ["errors"])
+        return before_after_figure(first[chosen.name], chosen)
+
+    def to_html(self, path: str | Path) -> Path:
+        """Write the report to ``path``, replacing it. Raises ``InputError``."""
+        return write_report(self.outcome, path)
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the model (``.toml``) or all numbers (``.json``) to ``path`` and return the path.
+
+        Raises ``InputError``.
+        """
+        return _save(self, diagnosis_json(self.outcome), Path(path), overwrite)
+
+    def __repr__(self) -> str:
+        """Return the verdict in sentences."""
+        return "\n".join([f"{self.headline}.", *words.summary(self.outcome)])
+
+    def _repr_html_(self) -> str:
+        outcome = self.outcome
+        parts = [
+            table_html(words.before_after_table(title, before, after, outcome.kind))
+            for title, before, after in (
+                ("Untouched recordings", outcome.before.validation, outcome.after.validation),
+                ("Training recordings", outcome.before.train, outcome.after.train),
+            )
+            if before and after
+        ]
+        if self.effects:
+            parts.insert(0, table_html(words.effect_table(outcome)))
+        if outcome.after.train:
+            parts.append(drawing(self.plot(), "RMS errors before and after"))
+        return card(self.headline, *parts, sentences=[*words.summary(outcome), *self.warnings])
+
+
+def _save(
+    result: IdentifyResult | DiagnoseResult, numbers: dict[str, Any], path: Path, overwrite: bool
+) -> Path:
+    if path.suffix == ".toml":
+        return result.model.save(path, overwrite=overwrite)
+    if path.suffix == ".json":
+        return _save_json(numbers, path, overwrite)
+    raise InputError(f"{path}: end the name in .toml for the model or in .json for all numbers")
