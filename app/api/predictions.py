@@ -11,7 +11,7 @@ import numpy as np
 from dearig.analysis import simulate
 from dearig.api.display import card, drawing, facts, write_page
 from dearig.api.models import Model
-from dearig.errors import InputError
+from dearig.extras import import_extra
 from dearig.recording.layout import UNITS
 from dearig.report.numbers import seconds, significant
 from dearig.report.signal_figures import signal_figure
@@ -57,14 +57,10 @@ class Prediction:
 
         Raises ``InputError`` where pandas is not installed.
         """
-        try:
-            from pandas import DataFrame, Index
-        except ImportError as error:
-            raise InputError(
-                "pandas is not installed: pip install 'dearig[notebook]' installs it"
-            ) from error
+        lib = import_extra("pandas", "notebook", "to_pandas")
         values = dict(self.prediction.values)
-        frame = DataFrame(values, index=Index(values.pop("time"), name="time"))
+        index = lib.Index(values.pop("time"), name="time")
+        frame: DataFrame = lib.DataFrame(values, index=index)
         frame.attrs["units"] = {name: UNITS[name] for name in values}
         return frame
 

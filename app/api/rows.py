@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar, overload
 
 from dearig.api.display import table_html
-from dearig.errors import InputError
+from dearig.extras import import_extra
 from dearig.report.numbers import NO_VALUE, significant
 from dearig.report.tables import Row, Table
 from dearig.units import SHOWN
@@ -102,13 +102,8 @@ class Rows(Sequence[T], Generic[T]):
 
         Raises ``InputError`` where pandas is not installed.
         """
-        try:
-            from pandas import DataFrame
-        except ImportError as error:
-            raise InputError(
-                "pandas is not installed: pip install 'dearig[notebook]' installs it"
-            ) from error
-        frame = DataFrame([vars(row) for row in self._rows])
+        lib = import_extra("pandas", "notebook", "to_pandas")
+        frame: DataFrame = lib.DataFrame([vars(row) for row in self._rows])
         return frame.set_index("name") if self._rows else frame
 
     def _repr_html_(self) -> str:

@@ -14,7 +14,8 @@ import tomli_w
 from dearig.api.display import card, drawing, facts, write_page
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
-from dearig.config.sequencefile import SEGMENT_KINDS, LoadedSequence, load_sequence, parse_sequence
+from dearig.config.segments import SEGMENT_KINDS
+from dearig.config.sequencefile import LoadedSequence, load_sequence, parse_sequence
 from dearig.errors import InputError
 from dearig.recording.files import check_output, replaced_when_done
 from dearig.report.numbers import seconds, significant
