@@ -95,7 +95,7 @@ def diagnosis_tables(outcome: DiagnoseOutcome) -> RenderableType:
     finding = outcome.finding
     pieces: list[_Piece] = [f"{headline(finding)}.", *summary(outcome)]
     for heading, before, after in (
-        ("Untouched recordings", outcome.before.validation, outcome.after.validation),
+        ("Validation recordings", outcome.before.validation, outcome.after.validation),
         ("Training recordings", outcome.before.train, outcome.after.train),
     ):
         if before and after:

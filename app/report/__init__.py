@@ -1,1 +1,1 @@
-"""Reports: what was found, as figures and as one page that can be read anywhere."""
+"""Reports of results: sentences, tables, figures, JSON, and HTML pages in one file."""

@@ -1,4 +1,4 @@
-"""An outcome as JSON, for programs."""
+"""JSON of an outcome, for programs."""
 
 from __future__ import annotations
 
@@ -194,6 +194,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             "seconds": _number(experiment.seconds),
         },
         "experiment_words": outcome.experiment_words,
+        "experiment_summary": outcome.experiment_words,
         "rounds": [
             {
                 "base": list(r.base),
@@ -298,6 +299,7 @@ def _signature_json(signature: Signature, kind: str) -> dict[str, Any]:
         "correlation_time_s": _number(signature.correlation_time),
         "explained": {d.quantity: _number(d.explained) for d in signature.dependences},
         "words": list(signature.words),
+        "remarks": list(signature.words),
     }
 
 
@@ -312,8 +314,11 @@ def _candidate_json(candidate: Candidate, kind: str) -> dict[str, Any]:
         f"train_rms_{shown.suffix}": _number(stage.train_rms * shown.error_factor),
         f"selection_rms_{shown.suffix}": _number(stage.selection_rms * shown.error_factor),
         "promised": _number(candidate.promised),
+        "predicted_share": _number(candidate.promised),
         "gained": _number(candidate.gained),
+        "explained_share": _number(candidate.gained),
         "gain": _number(candidate.gain),
         "behind": _number(candidate.behind),
+        "criterion_behind_best": _number(candidate.behind),
         "note": candidate.note,
     }

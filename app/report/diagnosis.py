@@ -1,4 +1,4 @@
-"""What a diagnosis found, in sentences and tables, for the terminal and for the page alike."""
+"""Sentences and tables of a diagnosis, for the terminal, the window and the HTML page."""
 
 from __future__ import annotations
 
@@ -38,20 +38,20 @@ __all__ = [
     "warnings",
 ]
 
-#: The verdicts as headlines.
+#: Headline of each verdict.
 HEADLINES = {
-    "nothing_missing": "Nothing is missing",
-    "explained": "Found and explained",
-    "partly_explained": "Explained in part",
-    "unexplained": "Something is missing, and no known effect explains it",
+    "nothing_missing": "No missing effect found",
+    "explained": "Residual explained",
+    "partly_explained": "Residual partly explained",
+    "unexplained": "Residual not explained by any known effect",
 }
 
 
 def pooled_errors(comparisons: Sequence[Comparison]) -> Errors | None:
-    """Errors over all samples of all recordings: None where there are none.
+    """Return the errors over all samples of all recordings; None without recordings.
 
-    The RMS is over all samples, the largest error is that of any; what is relative is relative to
-    the range (or peak) of all recordings together, so that a small run does not count for more.
+    Relative errors refer to the range (or peak) of all recordings together, so that a recording
+    with a small range does not dominate.
     """
     from dearig.model.measures import Errors
 
@@ -78,42 +78,43 @@ def pooled_errors(comparisons: Sequence[Comparison]) -> Errors | None:
     )
 
 
-# ---------------------------------------------------------------- sentences
+# sentences
 
 
 def headline(finding: Diagnosis) -> str:
-    """The verdict as a headline."""
+    """Return the headline of the verdict."""
     if finding.interrupted and not finding.rounds:
-        tried = "all effects were" if finding.steps else "anything was"
+        tried = "all effects were" if finding.steps else "any effect was"
         return f"Interrupted before {tried} tried"
     return HEADLINES[finding.verdict]
 
 
 def family_label(family: str) -> str:
-    """A family as words."""
-    return "of no known family" if family == "unknown" else family.replace("_", " ")
+    """Return the name of an effect family in words."""
+    return "no known family" if family == "unknown" else family.replace("_", " ")
 
 
 def step_label(step: Step) -> str:
-    """A step's effect, its family and where it acts, in words."""
+    """Return a step's effect with its family and the quantity that it acts on."""
     family = "" if family_label(step.family) == step.effect else f"{family_label(step.family)}, "
     return f"{step.effect} ({family}acting on the {step.acts_on})"
 
 
 def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
-    """The verdict, and what it rests on."""
+    """Return the verdict and its evidence as sentences."""
     finding = outcome.finding
     said = [_verdict(outcome)]
     for role, before, after in (
-        ("recordings that took no part in any fit or choice", outcome.before.validation,
-         outcome.after.validation),
+        ("the validation recordings, which no fit and no selection used,",
+         outcome.before.validation, outcome.after.validation),
         ("the training recordings", outcome.before.train, outcome.after.train),
     ):  # fmt: skip
         if before and after:
             said.append(_error_change(role, before, after, outcome, bool(finding.steps)))
     if not outcome.after.validation:
         said.append(
-            "No untouched recordings were given, so nothing here says how well the model predicts."
+            "No validation recordings were given: the errors do not show how well the model "
+            "predicts other recordings."
         )
     said += [_rivals_sentence(step) for step in finding.steps if step.indistinguishable_from]
     if finding.unnamed is not None:
@@ -123,8 +124,8 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
         said.append(_sentence(outcome.experiment_words))
     if finding.interrupted:
         said.append(
-            "The search was interrupted: this is what had been found until then, and a full run "
-            "may find more."
+            "The search was interrupted. These are the results so far; a complete search may find "
+            "more."
         )
     return tuple(readable(s) for s in said)
 
@@ -134,32 +135,36 @@ def _verdict(outcome: DiagnoseOutcome) -> str:
     if finding.interrupted and not finding.rounds:
         if finding.steps:
             return (
-                "The search was interrupted before all effects were tried: this one did best until "
-                "then, and another may do better."
+                "The search was interrupted before all effects were tried. This effect is the best "
+                "so far; another one may be better."
             )
-        return "The search was interrupted before anything was tried: nothing is known yet."
+        return "The search was interrupted before any effect was tried; there is no result yet."
     if finding.verdict == "nothing_missing":
         return (
-            f"Nothing is missing: the thesis's model explains these recordings down to the noise"
-            f"{_film_tolerance(outcome) or ','} and no other effect improves on it by more than "
-            f"chance would."
+            f"The thesis model explains these recordings down to the noise"
+            f"{_film_tolerance(outcome) or ','} and no other effect improves it by more than "
+            f"chance."
         )
     names = [step_label(s) for s in finding.steps]
-    effects = f"the model lacks {listed(names)}"
+    lacks = f"The thesis model lacks {listed(names)}"
     if finding.verdict == "explained":
-        left = f"only noise{_film_tolerance(outcome)} is left"
-        return f"{effects[0].upper()}{effects[1:]}; with that, {left}."
+        return f"{lacks}. With {_them(names)}, only noise{_film_tolerance(outcome)} is left."
     if finding.verdict == "partly_explained":
         return (
-            f"{effects[0].upper()}{effects[1:]}; that explains part of the residual, and something "
-            f"is left that none of the known effects explains."
+            f"{lacks}. With {_them(names)}, part of the residual is explained; no known effect "
+            f"explains the rest."
         )
-    tried = f" ({listed(names)} helps, but explains little)" if names else ""
-    return f"Something is missing that none of the known effects explains{tried}."
+    helps = "helps" if len(names) == 1 else "help"
+    tried = f" {listed(names)} {helps}, but only a little." if names else ""
+    return f"The residual is more than noise, and no known effect explains it.{tried}"
+
+
+def _them(names: list[str]) -> str:
+    return "it" if len(names) == 1 else "them"
 
 
 def _film_tolerance(outcome: DiagnoseOutcome) -> str:
-    """What may be left besides noise where everything is explained."""
+    """Return the model error that a film model is allowed besides the noise."""
     from dearig.model.diagnosis.bench import FILM_MODEL_ERROR
 
     film = outcome.kind == "film"
@@ -184,7 +189,7 @@ def _error_change(
             f"{shown.error_unit} RMS, {significant(last / outcome.noise)} times {floor}."
         )
     return (
-        f"On {role} the error {'falls' if last < first else 'goes'} from "
+        f"On {role} the error {'falls' if last < first else 'changes'} from "
         f"{significant(first * shown.error_factor)} to {significant(last * shown.error_factor)} "
         f"{shown.error_unit} RMS, which is {significant(last / outcome.noise)} times {floor}."
     )
@@ -192,9 +197,9 @@ def _error_change(
 
 def _rivals_sentence(step: Step) -> str:
     return (
-        f"These data cannot tell {step.effect} from "
-        f"{listed(family_label(f) for f in step.indistinguishable_from)}: each explains them as "
-        f"well."
+        f"These data cannot separate {step.effect} from "
+        f"{listed(family_label(f) for f in step.indistinguishable_from)}: each explains them "
+        f"equally well."
     )
 
 
@@ -203,7 +208,7 @@ def _unnamed(outcome: DiagnoseOutcome) -> str:
     if unnamed is None:
         return ""
     formula = f"; as a formula: {unnamed.expression}" if unnamed.expression else ""
-    return _sentence(f"What no known family covers acts on the {unnamed.acts_on}{formula}")
+    return _sentence(f"The part that no known family covers acts on the {unnamed.acts_on}{formula}")
 
 
 def _sentence(text: str) -> str:
@@ -211,20 +216,20 @@ def _sentence(text: str) -> str:
 
 
 def warnings(outcome: DiagnoseOutcome) -> tuple[str, ...]:
-    """What is to be said of recordings and search, none twice."""
+    """Return the warnings about recordings and search, without duplicates."""
     said = [*outcome.quality, *(w[:1].upper() + w[1:] for w in outcome.finding.notes)]
     for comparison in (*outcome.after.train, *outcome.after.validation):
         said += [f"{comparison.name}: {w}" for w in comparison.warnings]
     return tuple(dict.fromkeys(readable(_sentence(w)) for w in said))
 
 
-# ---------------------------------------------------------------- tables
+# tables
 
 
 def _pairs(
     before: Sequence[Comparison], after: Sequence[Comparison]
 ) -> list[tuple[str, Errors, Errors, float | None]]:
-    """(name, errors before, errors after, noise) of every recording, and of all together."""
+    """Return (name, errors before, errors after, noise) of every recording and of all pooled."""
     first = {c.name: c for c in before}
     rows = [(c.name, first[c.name].errors, c.errors, c.noise) for c in after if c.name in first]
     if len(rows) > 1:
@@ -239,7 +244,7 @@ def _pairs(
 def before_after_table(
     title: str, before: Sequence[Comparison], after: Sequence[Comparison], kind: str
 ) -> Table:
-    """RMS, NRMSE and RMS over noise of every recording, with the thesis's model and after."""
+    """Return RMS, NRMSE and RMS over noise of every recording, before and after."""
     shown, film = SHOWN[kind], kind == "film"
     rows = []
     for name, one, two, noise in _pairs(before, after):
@@ -264,7 +269,7 @@ def before_after_table(
 def thesis_before_after_table(
     title: str, before: Sequence[Comparison], after: Sequence[Comparison], kind: str
 ) -> Table:
-    """The largest error and the thesis's measures of every recording, before and after."""
+    """Return the thesis's measures and the largest error of every recording, before and after."""
     shown, film = SHOWN[kind], kind == "film"
     rows = []
     for name, one, two, _ in _pairs(before, after):
@@ -283,10 +288,10 @@ def thesis_before_after_table(
 
 
 def step_table(outcome: DiagnoseOutcome) -> Table:
-    """The model step by step: error where it was fitted, where it was chosen, and untouched."""
+    """Return the errors of the model after each step: training, selection and validation."""
     shown, finding = SHOWN[outcome.kind], outcome.finding
     stages = [finding.baseline, *(s.stage for s in finding.steps)]
-    names = ["thesis's model", *(f"+ {s.effect}" for s in finding.steps)]
+    names = ["thesis model", *(f"+ {s.effect}" for s in finding.steps)]
     rows = []
     for i, (name, stage) in enumerate(zip(names, stages, strict=True)):
         stand = outcome.stands[i] if i < len(stages) - 1 else outcome.after
@@ -307,32 +312,32 @@ def step_table(outcome: DiagnoseOutcome) -> Table:
         )
     head = (
         ("Model", ""), ("Training", shown.error_unit), ("Selection", shown.error_unit),
-        ("Untouched", shown.error_unit), ("Untouched", "/ noise"),
+        ("Validation", shown.error_unit), ("Validation", "/ noise"),
     )  # fmt: skip
     note = (
-        "RMS errors. Training: on what was fitted. Selection: on stretches of time in the training "
-        "recordings that were predicted by a fit to the others. Untouched: on other recordings, "
-        "read once at the end."
+        "RMS errors. Training: recordings that were fitted. Selection: time segments of the "
+        "training recordings, each predicted by a fit to the others. Validation: other "
+        "recordings, compared once at the end."
     )
     return Table("Step by step", head, tuple(rows), note)
 
 
-_WORDS = {
+_VERDICTS = {
     "chosen": "chosen",
-    "indistinguishable": "not told apart",
-    "better": "helps, but less",
+    "indistinguishable": "not separable",
+    "better": "explains less",
     "worthless": "no better than chance",
-    "failed": "could not be fitted",
+    "failed": "fit failed",
 }
 
 
 def ranking_table(found: Round, longest: int | None = None) -> Table:
-    """The candidates of one round, best first.
+    """Return the candidates of one round, best first.
 
-    With ``longest`` only so many, and without what a terminal has no room for.
+    With ``longest`` it has at most so many rows, and fewer columns for a terminal.
     """
     brief = longest is not None
-    base = f"on top of {listed(found.base)}" if found.base else "on top of the thesis's model"
+    base = f"on top of {listed(found.base)}" if found.base else "on top of the thesis model"
     rows = []
     for c in found.candidates[:longest]:
         cells = [c.effect]
@@ -341,55 +346,56 @@ def ranking_table(found: Round, longest: int | None = None) -> Table:
         cells.append(_share(c.gained))
         if not brief:
             cells += [_share(c.promised), significant(c.gain, 3)]
-        cells += [significant(c.behind, 3), _WORDS.get(c.verdict, c.verdict)]
+        cells += [significant(c.behind, 3), _VERDICTS.get(c.verdict, c.verdict)]
         idle = c.verdict in ("worthless", "failed")
         rows.append(Row(tuple(cells), c.note, idle, c.verdict == "chosen"))
     head = [("Effect", ""), ("Explains", "%"), ("Behind", "best"), ("Verdict", "")]
     if not brief:
         head[1:1] = [("Family", "")]
-        head[3:3] = [("Promised", "%"), ("Gain", "")]
+        head[3:3] = [("Predicted", "%"), ("Gain", "")]
     rest = len(found.candidates) - len(rows)
     note = _sentence(found.reason[:1].upper() + found.reason[1:]) if found.reason else ""
     if rest:
-        note = f"{note} {rest} more did worse."
+        note = f"{note} {rest} more candidates are worse."
     return Table(f"Candidates {base}", tuple(head), tuple(rows), note.strip())
 
 
 def _share(of_one: float) -> str:
-    """In per cent, where less than a tenth says nothing."""
+    """Return a share in percent, with one decimal."""
     return f"{100.0 * max(of_one, 0.0):.1f}"
 
 
 def dropped_effects(outcome: DiagnoseOutcome) -> str:
-    """A sentence on what was chosen on the way and is not in the final model; empty without."""
+    """Return a sentence on effects that were chosen and later removed; empty without any."""
     finding = outcome.finding
     kept = {s.effect for s in finding.steps}
     gone = dict.fromkeys(r.chosen for r in finding.rounds if r.chosen and r.chosen not in kept)
     if not gone or not kept:
         return ""
-    was = "was the best alone and is" if len(gone) == 1 else "were the best on the way and are"
+    was = "was the best single effect but is" if len(gone) == 1 else "were chosen first but are"
+    it = "it adds" if len(gone) == 1 else "they add"
     return (
-        f"{listed(gone)} {was} not in the final model: {listed(kept)} together explain more, with "
-        f"nothing left for it to do."
+        f"{listed(gone)} {was} not in the final model: {listed(kept)} together explain more, and "
+        f"{it} nothing to them."
     )
 
 
 def effect_table(outcome: DiagnoseOutcome) -> Table:
-    """The numbers of the effects that were found, with intervals and meaning."""
+    """Return the parameters of the effects found, with intervals and meaning."""
     from dearig.model.effects import EFFECTS
 
     rows = []
     for step in outcome.finding.steps:
         meanings = {p.name: p.meaning for p in EFFECTS[step.effect].parameters}
         for e in step.estimates:
-            about = meanings.get(e.name.split(" in ")[0], "")  # of one recording, if so
+            about = meanings.get(e.name.split(" in ")[0], "")  # may be a parameter of one recording
             detail = "; ".join(w for w in (about, e.note) if w)
             rows.append(_estimate(e, f"{step.effect}: {e.name.replace('_', ' ')}", detail))
-    return Table("Numbers of what was found", _ESTIMATES, tuple(rows))
+    return Table("Fitted parameters", _ESTIMATES, tuple(rows))
 
 
 def estimate_table(estimates: Sequence[Estimate]) -> Table:
-    """All numbers of a model."""
+    """Return all parameters of a model."""
     rows = tuple(_estimate(e, symbol(e.name).replace("_", " "), e.note) for e in estimates)
     note = ""
     if any(not e.determined for e in estimates):
@@ -404,7 +410,7 @@ def _estimate(e: Estimate, name: str, detail: str) -> Row:
     factor, unit = parameter_unit(e.unit)
     low, high = e.low * factor, e.high * factor
     value = quoted(e.value * factor, low, high)
-    within = interval(low, high) if e.free else "follows"
+    within = interval(low, high) if e.free else "derived"
     if e.free and e.low == e.high == e.value:
         within = NO_VALUE
     return Row(
@@ -415,7 +421,7 @@ def _estimate(e: Estimate, name: str, detail: str) -> Row:
 
 
 def experiment_table(outcome: DiagnoseOutcome) -> Table | None:
-    """The excitations that were considered, the best first; None where there were none."""
+    """Return the excitations that were considered, the best first; None without any."""
     experiment = outcome.experiment
     if experiment is None:
         return None
@@ -423,9 +429,9 @@ def experiment_table(outcome: DiagnoseOutcome) -> Table | None:
         Row((name, significant(apart), seconds(duration)), mark=name == experiment.name)
         for name, apart, duration in experiment.tried
     )
-    head = (("Excitation", ""), ("Separation", "/ noise"), ("Takes", ""))
+    head = (("Excitation", ""), ("Separation", "/ noise"), ("Duration", ""))
     note = (
-        "Separation is the RMS difference between the predictions of the two rivals that are "
-        "nearest to each other, in noise floors."
+        "Separation: RMS difference between the predictions of the two most similar rivals, "
+        "divided by the noise floor."
     )
     return Table("Excitations considered", head, rows, note)

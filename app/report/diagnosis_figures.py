@@ -1,4 +1,4 @@
-"""Figures of a diagnosis: the residual before and after, what it goes with, and the way between."""
+"""Figures of a diagnosis: errors and residuals before and after, and the missing stress."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ AFTER = "#0072B2"
 LOADING = "#0072B2"
 UNLOADING = "#E69F00"
 
-_POINTS = 900  # of a cloud
+_POINTS = 900  # of a scatter plot
 _NAME = 26
 
 
 def before_after_figure(before: Comparison, after: Comparison) -> Figure:
-    """Drive, measurement beside both models, and both errors of one recording over time."""
+    """Draw drive, measurement, both models and both errors of one recording over time."""
     shown = SHOWN[after.kind]
     time = after.time
     with base.style():
@@ -78,7 +78,7 @@ def before_after_figure(before: Comparison, after: Comparison) -> Figure:
 
 
 def residual_time_figure(before: Signature, after: Signature | None, kind: str) -> Figure:
-    """Measured less model over time, before and after, each on its own scale."""
+    """Draw measured minus model over time, before and after, each on its own scale."""
     shown = SHOWN[kind]
     pairs = [("before", before, BEFORE)]
     if after is not None:
@@ -103,7 +103,7 @@ def residual_time_figure(before: Signature, after: Signature | None, kind: str) 
 
 
 def spectra_figure(before: Signature, after: Signature | None, kind: str) -> Figure:
-    """Amplitude density of the residual, before and after, above that of the noise."""
+    """Draw the amplitude density of the residual, before and after, with the noise floor."""
     shown = SHOWN[kind]
     floor = math.sqrt(before.floor_density) * shown.error_factor
     with base.style():
@@ -134,7 +134,7 @@ def spectra_figure(before: Signature, after: Signature | None, kind: str) -> Fig
 
 
 def dependence_figure(dependence: Dependence, kind: str) -> Figure:
-    """Mean residual against one quantity, where that rises and where it falls."""
+    """Draw the mean residual against one quantity, for rising and for falling values."""
     shown = SHOWN[kind]
     scale = shown.error_factor
     with base.style():
@@ -142,7 +142,7 @@ def dependence_figure(dependence: Dependence, kind: str) -> Figure:
         ax = figure.subplots()
         error = 2.0 * dependence.error * scale
         ax.fill_between(
-            dependence.at, -error, error, color=base.NOISE, linewidth=0, label="chance",
+            dependence.at, -error, error, color=base.NOISE, linewidth=0, label="95 % of noise",
             zorder=0.5, step="mid",
         )  # fmt: skip
         ax.axhline(0.0, color=base.UNSURE, linewidth=0.6, zorder=0.6)
@@ -154,7 +154,7 @@ def dependence_figure(dependence: Dependence, kind: str) -> Figure:
                 dependence.at, values * scale, marker, color=colour, label=name, markersize=3.2,
                 linestyle="-", linewidth=1.0,
             )  # fmt: skip
-        # empty bins have an error as wide as the plot
+        # the error of empty bins is as large as the plot and does not set its range
         seen = np.concatenate((dependence.loading, dependence.unloading)) * scale
         seen = seen[np.isfinite(seen)]
         reach = 1.25 * float(np.max(np.abs(seen))) if seen.size else 1.0
@@ -169,7 +169,7 @@ def dependence_figure(dependence: Dependence, kind: str) -> Figure:
 
 
 def missing_time_figure(before: MissingStress, after: MissingStress | None) -> Figure:
-    """The missing stress over time, before and after."""
+    """Draw the missing stress over time, before and after."""
     with base.style():
         figure = base.blank(2.1 * base.WIDTH, 2.5)
         ax = figure.subplots()
@@ -189,13 +189,13 @@ def missing_time_figure(before: MissingStress, after: MissingStress | None) -> F
 
 
 def missing_figures(missing: MissingStress, kind: str) -> list[tuple[str, Figure]]:
-    """``(quantity, figure)``: the missing stress against what it may depend on."""
+    """Draw the missing stress against quantities; return ``(quantity, figure)`` for each."""
     quantities = [("stretch", "stretch", missing.stretch)]
     if kind == "actuator":
         quantities.append(
             ("voltage squared", _labelled("voltage squared", "kV^2"), (missing.voltage * 1e-3) ** 2)
         )
-    quantities.append(("rate", "Rate of stretch (1/s)", missing.rate))
+    quantities.append(("rate", "Stretch rate (1/s)", missing.rate))
     loading = missing.rate >= 0.0
     drawn = []
     for name, label, values in quantities:
@@ -223,7 +223,7 @@ def missing_figures(missing: MissingStress, kind: str) -> list[tuple[str, Figure
 def bars_figure(
     pairs: Sequence[tuple[Comparison, Comparison]], noise: float | None, kind: str
 ) -> Figure:
-    """RMS error of every recording, before and after, beside the noise floor."""
+    """Draw the RMS error of every recording, before and after, with the noise floor."""
     shown = SHOWN[kind]
     rows = np.arange(len(pairs))
     before = np.array([b.errors.rms for b, _ in pairs]) * shown.error_factor
@@ -264,7 +264,7 @@ def _band(ax: Axes, noise: float | None, shown: Shown) -> None:
 
 
 def _inside(ax: Axes, text: str) -> None:
-    """Words above the axes at the left, where no curve can run through them."""
+    """Put words above the axes at the left, clear of the curves."""
     ax.set_title(text, loc="left", fontsize=9.0, pad=2.5)
 
 
@@ -283,5 +283,5 @@ def _labelled(quantity: str, unit: str) -> str:
 
 
 def _broken(label: str) -> str:
-    """Name above unit, where an axis is too short for both in a row."""
+    """Put the unit below the name, for a short axis."""
     return label.replace(" (", "\n(")

@@ -1,4 +1,4 @@
-"""The report of a diagnosis: the error before and after, and why it should be believed."""
+"""HTML report of a diagnosis: errors before and after, and the evidence."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ __all__ = ["write_diagnosis_report"]
 
 _Of = TypeVar("_Of", "Signature", "MissingStress")
 
-#: Recordings whose residuals are drawn; more would make the page long, and say the same.
+#: Recordings whose residuals are drawn; more would make the page long.
 _DRAWN_MAX = 2
-_UNTOUCHED_MAX = 6
+_VALIDATION_MAX = 6
 
 
 @dataclass(frozen=True)
 class Group:
-    """What is shown of one recording: sentences, wide figures, small figures."""
+    """Section of one recording: sentences, wide figures, small figures."""
 
     name: str
     words: tuple[str, ...]
@@ -59,7 +59,7 @@ class Group:
 
 @dataclass(frozen=True)
 class FoundEffect:
-    """One effect in words."""
+    """Section of one effect."""
 
     title: str
     about: str
@@ -68,7 +68,7 @@ class FoundEffect:
 
 @dataclass(frozen=True)
 class DiagnosisPage:
-    """The whole page as the template takes it; empty tuples leave their sections out."""
+    """Values of the template; empty tuples leave their sections out."""
 
     title: str
     headline: str
@@ -96,8 +96,8 @@ class DiagnosisPage:
 
 
 def write_diagnosis_report(outcome: DiagnoseOutcome, path: str | Path) -> Path:
-    """Write what a diagnosis found to ``path``. Raises ``InputError``."""
-    title = f"What the model lacks: {outcome.title}"
+    """Write the report of a diagnosis to ``path``. Raises ``InputError``."""
+    title = f"Missing effects: {outcome.title}"
     return write_page(path, "diagnosis.html.j2", lambda: {"d": _page(outcome, title, prefixes())})
 
 
@@ -106,11 +106,11 @@ def _page(outcome: DiagnoseOutcome, title: str, names: Iterator[str]) -> Diagnos
     changed = bool(finding.steps)
     errors = []
     for heading, before, after in (
-        ("Untouched recordings", outcome.before.validation, outcome.after.validation),
+        ("Validation recordings", outcome.before.validation, outcome.after.validation),
         ("Training recordings", outcome.before.train, outcome.after.train),
     ):
         if before and after:
-            ours = before_after_table("Measured less model", before, after, kind)
+            ours = before_after_table("Measured minus model", before, after, kind)
             theirs = thesis_before_after_table("By the thesis's formulas", before, after, kind)
             errors.append((heading, (ours, theirs)))
     pairs = [
@@ -123,8 +123,8 @@ def _page(outcome: DiagnoseOutcome, title: str, names: Iterator[str]) -> Diagnos
             picture(
                 drawn.bars_figure(pairs, outcome.noise, kind),
                 names,
-                "RMS error of every recording with the thesis's model (before) and with what was "
-                "found (after). At the noise floor, only noise is left.",
+                "RMS error of every recording with the thesis model (before) and with the effects "
+                "found (after). An error at the noise floor is noise alone.",
             ),
         )
     experiments = experiment_table(outcome)
@@ -148,7 +148,7 @@ def _page(outcome: DiagnoseOutcome, title: str, names: Iterator[str]) -> Diagnos
         ),
         rankings=tuple(ranking_table(r) for r in finding.rounds),
         dropped_effects=_capitalised(dropped_effects(outcome)),
-        pictures=_untouched(outcome, changed, names),
+        pictures=_validation_pictures(outcome, changed, names),
         after=tuple(
             (s.record, tuple(readable(_with_full_stop(_capitalised(w))) for w in s.words))
             for s in finding.after
@@ -179,7 +179,7 @@ def _steps(outcome: DiagnoseOutcome) -> tuple[FoundEffect, ...]:
         against: tuple[str, ...] = ()
         if step.indistinguishable_from:
             others = ", ".join(family_label(f) for f in step.indistinguishable_from)
-            against = (f"Against it: these data are explained as well by {others}.",)
+            against = (f"Evidence against: {others} would explain these data equally well.",)
         found.append(
             FoundEffect(
                 _capitalised(step_label(step)),
@@ -209,31 +209,31 @@ def _residual(
     after = _same(outcome.finding.after, before.record) if changed else None
     words = [
         *before.words,
-        f"the residual resembles itself over {_duration(before.correlation_time)}; the "
-        f"probability that noise alone would be as correlated is "
-        f"{_probability(before.ljung_box_p)} (Ljung-Box), and that it would change its sign "
-        f"as seldom {_probability(before.runs_p)} (runs)",
+        f"the correlation time of the residual is {_duration(before.correlation_time)}; noise "
+        f"alone is as correlated with probability {_probability(before.ljung_box_p)} "
+        f"(Ljung-Box test), and changes its sign as seldom with probability "
+        f"{_probability(before.runs_p)} (runs test)",
     ]
     when = "before and after, each on its own scale" if after is not None else "over time"
     wide = (
         picture(
             drawn.residual_time_figure(before, after, kind),
             names,
-            f"{before.record}: measured less model, {when}. Dashed lines are the noise floor.",
+            f"{before.record}: measured minus model, {when}. Dashed lines are the noise floor.",
         ),
         picture(
             drawn.spectra_figure(before, after, kind),
             names,
-            f"{before.record}: how the residual spreads over frequency. White noise would follow "
-            f"the dashed line.",
+            f"{before.record}: amplitude density of the residual. White noise would follow the "
+            f"dashed line.",
         ),
     )
     small = tuple(
         picture(
             drawn.dependence_figure(d, kind),
             names,
-            f"Before, against {d.quantity}: this alone accounts for "
-            f"{significant(100.0 * d.explained, 2)} % of the residual's variance.",
+            f"Residual before, against {d.quantity}, which alone explains "
+            f"{significant(100.0 * d.explained, 2)} % of its variance.",
         )
         for d in before.dependences
     )
@@ -249,34 +249,35 @@ def _missing(
     size = math.sqrt(float(np.mean(missing.stress**2)))
     what = "Maxwell stress" if outcome.kind == "actuator" else "measured stress"
     words = [
-        f"{significant(size)} Pa RMS are missing, {significant(100.0 * size / missing.scale, 2)} % "
-        f"of the {what}'s {significant(missing.scale)} Pa."
+        f"The missing stress is {significant(size)} Pa RMS, "
+        f"{significant(100.0 * size / missing.scale, 2)} % of the {what} "
+        f"({significant(missing.scale)} Pa RMS)."
     ]
     if after is not None:
         left = math.sqrt(float(np.mean(after.stress**2)))
-        words.append(f"With what was found, {significant(left)} Pa RMS are left.")
+        words.append(f"With the effects found, {significant(left)} Pa RMS remain.")
     wide = (
         picture(
             drawn.missing_time_figure(missing, after),
             names,
-            f"{missing.record}: the missing stress over time, kept up to "
+            f"{missing.record}: missing stress over time, low-pass filtered at "
             f"{significant(missing.band, 2)} Hz.",
         ),
     )
     small = tuple(
-        picture(figure, names, f"Before, against {name}.")
+        picture(figure, names, f"Missing stress before, against {name}.")
         for name, figure in drawn.missing_figures(missing, outcome.kind)
     )
     return Group(missing.record, tuple(words), wide, small)
 
 
-def _untouched(
+def _validation_pictures(
     outcome: DiagnoseOutcome, changed: bool, names: Iterator[str]
 ) -> tuple[Picture, ...]:
     shown = SHOWN[outcome.kind]
     found = []
     for before, after in _paired(outcome.before.validation, outcome.after.validation)[
-        :_UNTOUCHED_MAX
+        :_VALIDATION_MAX
     ]:
         label = f"{after.name} ({after.row})" if after.row else after.name
         last = f"{significant(after.errors.rms * shown.error_factor)} {shown.error_unit} RMS"
@@ -290,7 +291,7 @@ def _untouched(
                 names,
                 f"{label}: {shown.drive.lower()}, {shown.quantity.lower()} measured and by both "
                 f"models, and the error before ({first}) and after ({last}); the "
-                f"axes of the errors differ.",
+                f"error axes have different scales.",
             )
         )
     return tuple(found)
@@ -299,14 +300,14 @@ def _untouched(
 def _after_pictures(
     outcome: DiagnoseOutcome, worst: list[Signature], names: Iterator[str]
 ) -> tuple[Picture, ...]:
-    """The last residual of the recording that was worst: its size, correlation and spectrum."""
+    """Draw histogram, correlation and spectrum of the final residual of the worst recording."""
     chosen = [c for c in outcome.after.train if worst and c.name == worst[0].record]
     if not chosen:
         return ()
     captions = (
-        "how large the error is, and how large noise alone would be.",
-        "how like itself the error is after a time; noise is not.",
-        "how the error spreads over frequency; white noise would be flat.",
+        "histogram of the error, and the distribution of noise alone.",
+        "autocorrelation of the error; that of noise lies in the grey band.",
+        "amplitude density of the error; that of white noise is flat.",
     )
     return tuple(
         picture(figure, names, f"{chosen[0].name}, after: {caption}")
@@ -319,14 +320,14 @@ def _provenance(outcome: DiagnoseOutcome) -> tuple[tuple[str, tuple[str, ...]], 
     every = (*outcome.after.train, *outcome.after.validation)
     rows = [
         ("Fitted to", tuple(c.name for c in outcome.after.train)),
-        ("Validated on", tuple(c.name for c in outcome.after.validation) or ("nothing",)),
+        ("Validated on", tuple(c.name for c in outcome.after.validation) or ("no recording",)),
         ("Samples", (f"{sum(c.errors.samples for c in every):,}",)),
         ("Driven by", (f"voltage {outcome.drive}" if outcome.kind == "actuator" else "stretch",)),
         ("Baseline", (describe_model(finding.baseline.model),)),
         ("Model", (describe_model(finding.final.model),)),
         ("Model file", (outcome.model_path or "not written",)),
         ("Simulations", (f"{finding.simulations:,}",)),
-        ("Time taken", (seconds(outcome.seconds),)),
+        ("Computing time", (seconds(outcome.seconds),)),
     ]
     if outcome.rig:
         rows.insert(0, ("Rig", (outcome.rig,)))

@@ -17,7 +17,7 @@ __all__ = ["save_png", "svg"]
 
 
 def save_png(figure: Figure, path: str | Path, dpi: int = 200) -> Path:
-    """Write ``figure`` as PNG; the file appears as a whole or not at all. Raises ``InputError``."""
+    """Write ``figure`` as PNG, completely or not at all. Raises ``InputError``."""
     from dearig.recording.files import check_output, replaced_when_done
 
     path = check_output(path, overwrite=True)
@@ -30,10 +30,10 @@ def save_png(figure: Figure, path: str | Path, dpi: int = 200) -> Path:
 
 
 def svg(figure: Figure, prefix: str, label: str) -> str:
-    """``figure`` as an SVG element to stand inside an HTML page.
+    """Return ``figure`` as an SVG element for an HTML page.
 
-    ``prefix`` keeps its identifiers apart from other figures of that page, ``label`` says in words
-    what is seen. It has no fixed size, takes the page's font, and refers to nothing outside.
+    ``prefix`` separates its identifiers from those of other figures; ``label`` describes it for
+    screen readers. It has no fixed size, uses the font of the page, and refers to no other file.
     """
     stream = io.StringIO()
     with style():
@@ -43,7 +43,7 @@ def svg(figure: Figure, prefix: str, label: str) -> str:
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r"\s*<style [^>]*>.*?</style>", "", text, flags=re.DOTALL)
     text = re.sub(r"\s*<!--.*?-->", "", text, flags=re.DOTALL)
-    # matplotlib's identifiers differ from run to run; only those that something refers to are kept
+    # identifiers of matplotlib differ from run to run; only those that are referred to are kept
     text = re.sub(r"\bxlink:href=", "href=", text)
     used = dict.fromkeys(re.findall(r'(?:href="|url\()#([^")]+)', text))
     short = {name: f"{prefix}-{i}" for i, name in enumerate(used)}
@@ -62,5 +62,5 @@ def svg(figure: Figure, prefix: str, label: str) -> str:
 
 
 def _rounded(path: str) -> str:
-    """Path data to a hundredth of a point: half the bytes, and nothing that could be seen."""
+    """Round path data to 0.01 point, which halves the size and is not visible."""
     return re.sub(r"-?\d+\.\d{3,}", lambda n: f"{float(n[0]):.2f}", path)

@@ -40,7 +40,7 @@ __all__ = [
 ]
 
 
-#: Okabe and Ito's colours: told apart with every kind of colour vision, and in grey.
+#: Colours of Okabe and Ito: distinct for every kind of colour vision, and in grey.
 MEASURED = "#0072B2"
 MODEL = "#D55E00"
 ERROR = "#667085"
@@ -50,9 +50,9 @@ NOISE = "#C9CED6"
 THESIS = "#009E73"
 UNSURE = "#8A8A8A"
 
-#: Width in inches of a figure that stays legible on a phone, where it shrinks to three quarters.
+#: Width of a figure in inches; on a phone it shrinks to three quarters and stays legible.
 WIDTH = 4.8
-#: Pixels along a time axis; a phone or a sheet of paper shows no more.
+#: Columns along a time axis; a phone or a sheet of paper shows no more.
 COLUMNS = 600
 
 _STYLE = MappingProxyType(
@@ -69,7 +69,7 @@ _STYLE = MappingProxyType(
         "axes.unicode_minus": True,
         "figure.facecolor": "white",
         "font.family": "sans-serif",
-        "font.sans-serif": ["DejaVu Sans"],  # comes with matplotlib: the same everywhere
+        "font.sans-serif": ["DejaVu Sans"],  # comes with matplotlib
         "font.size": 9.5,
         "grid.color": "#E3E6EA",
         "grid.linewidth": 0.6,
@@ -84,7 +84,7 @@ _STYLE = MappingProxyType(
         "svg.fonttype": "none",
         "svg.hashsalt": "dearig",
         "text.color": "#111111",
-        "text.parse_math": False,  # a file's name may hold a dollar sign
+        "text.parse_math": False,  # file names may contain a dollar sign
         "xtick.color": "#404040",
         "xtick.labelcolor": "#111111",
         "xtick.labelsize": 9.0,
@@ -97,7 +97,7 @@ _STYLE = MappingProxyType(
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Fonts, colours and lines of every figure, while it is drawn or saved."""
+    """Use the fonts, colours and lines of all figures while one is drawn or saved."""
     from matplotlib import rc_context
 
     settings: Any = dict(_STYLE)  # matplotlib types its keys only in some versions
@@ -106,19 +106,19 @@ def style() -> Iterator[None]:
 
 
 def blank(width: float, height: float) -> Figure:
-    """An empty figure of ``width`` and ``height`` in inches."""
+    """Make an empty figure of ``width`` and ``height`` in inches."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def legend(ax: Axes, columns: int = 2) -> None:
-    """A legend above the axes, where no curve can run through it."""
+    """Put a legend above the axes, clear of the curves."""
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns)
 
 
 def few_ticks(ax: Axes, x: int | None = None, y: int | None = None) -> None:
-    """At most about ``x`` and ``y`` ticks."""
+    """Set at most about ``x`` and ``y`` ticks."""
     from matplotlib.ticker import MaxNLocator
 
     if x is not None:
@@ -128,7 +128,7 @@ def few_ticks(ax: Axes, x: int | None = None, y: int | None = None) -> None:
 
 
 def log_axis(ax: Axes, which: str, low: float, high: float) -> None:
-    """A logarithmic axis from ``low`` to ``high`` > 0, with a few labels but at least two."""
+    """Make an axis logarithmic from ``low`` to ``high`` > 0, with two to about six labels."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
     low, high = float(low), max(float(high), 1.1 * float(low))
@@ -143,7 +143,7 @@ def log_axis(ax: Axes, which: str, low: float, high: float) -> None:
 
 
 def log_ticks(axis: Axis) -> None:
-    """Labels 0.1, 1, 10 where the axis stays among such numbers, else powers of ten."""
+    """Label an axis with 0.1, 1, 10 if its range allows, otherwise with powers of ten."""
     from matplotlib.ticker import FuncFormatter
 
     def label(value: float, _: int | None) -> str:
@@ -159,15 +159,15 @@ def log_ticks(axis: Axis) -> None:
 
 
 def decimated_log(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A curve for a logarithmic axis of ``x`` (N,) > 0, made short."""
+    """Decimate a curve for a logarithmic axis of ``x`` (N,) > 0."""
     log_x, kept = decimate(np.log(x), y, COLUMNS // 2)
     return np.exp(log_x), kept
 
 
 def drawable(text: str, longest: int) -> str:
-    """``text`` with what the font has, and no longer than there is room for.
+    """Return ``text`` with characters of the font only, and at most ``longest`` characters.
 
-    The full name, in any script, stands in the page around the figure.
+    The page around the figure shows the full name, in any script.
     """
     kept = "".join(
         c if c.isprintable() and (ord(c) < 0x530 or 0x2000 <= ord(c) < 0x2100) else "?"

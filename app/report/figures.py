@@ -40,7 +40,7 @@ __all__ = ["comparison_figure", "loop_figure", "overview_figure"]
 
 
 def comparison_figure(comparison: Comparison) -> Figure:
-    """Drive, measurement beside model, and error of one recording over time (thesis Fig. 10-16)."""
+    """Draw drive, measurement and model, and error over time (as the thesis's Fig. 10-16)."""
     with style():
         figure = blank(WIDTH, 5.0)
         axes = figure.subplots(3, 1, sharex=True, height_ratios=(1.0, 1.7, 1.2))
@@ -50,7 +50,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
 
 
 def loop_figure(comparison: Comparison) -> Figure:
-    """Measured quantity and model against the drive: loops, whose area is what was dissipated."""
+    """Draw measurement and model against the drive; the area of a loop is dissipated energy."""
     shown = SHOWN[comparison.kind]
     with style():
         figure = blank(WIDTH, 3.4)
@@ -68,7 +68,7 @@ def loop_figure(comparison: Comparison) -> Figure:
 
 
 def overview_figure(train: Comparison, validation: Sequence[Comparison]) -> Figure:
-    """One picture of a whole identification: its training run, and its error on every other."""
+    """Draw an identification: its training recording, and the errors of all others."""
     bars = len(validation)
     with style():
         figure = blank(1.2 * WIDTH, 5.6 + (0.9 + 0.24 * bars if bars else 0.0))
@@ -90,7 +90,7 @@ def _measured_look() -> dict[str, Any]:
 
 
 def _model_look() -> dict[str, Any]:
-    # thin and dashed on top of thick and solid: where they agree, both are seen
+    # thin and dashed on top of thick and solid: where they agree, both are visible
     return {"color": MODEL, "linewidth": 1.1, "dashes": (4, 1.6)}
 
 
@@ -103,7 +103,7 @@ def _stack(axes: list[Axes], comparison: Comparison) -> None:
         time = time - time[0]
 
     def curve(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        # the first sample lies at time zero, where a logarithmic axis never gets
+        # the first sample, at time zero, is not on a logarithmic axis
         return decimated_log(time[1:], values[1:]) if log else decimate(time, values, COLUMNS)
 
     drive.plot(*curve(comparison.drive * shown.drive_factor), color=DRIVE, linewidth=1.2)
@@ -130,9 +130,9 @@ def _stack(axes: list[Axes], comparison: Comparison) -> None:
 
 
 def _is_hold(comparison: Comparison) -> bool:
-    """Whether the drive stood still for nearly all of a film's record, as in a relaxation test.
+    """Return True for a film recording whose drive is constant nearly all the time.
 
-    There everything happens early, and is only seen over the logarithm of time.
+    In such a relaxation test the stress changes early, which only a logarithmic time axis shows.
     """
     if comparison.kind != "film" or comparison.time.size < 3:
         return False
@@ -149,7 +149,7 @@ def _noise_band(ax: Axes, comparison: Comparison, shown: Shown) -> None:
         floor = comparison.noise * shown.error_factor
         ax.axhspan(-floor, floor, color=NOISE, linewidth=0, zorder=0.5)
         for i, edge in enumerate((-floor, floor)):
-            # on top as well: where the error is nothing but noise, it covers the band
+            # edges on top of the curve, which covers the band where the error is noise
             ax.axhline(
                 edge, color=MARK, linewidth=0.8, linestyle=(0, (3, 2)), zorder=4,
                 label=None if i else
@@ -186,5 +186,5 @@ def _validation_bars(ax: Axes, train: Comparison, validation: Sequence[Compariso
     ax.set_ylim(len(validation) - 0.4, -0.6)
     ax.set_xlim(0.0, 1.12 * longest or 1.0)
     ax.grid(visible=False, axis="y")
-    ax.set_xlabel(f"RMS error on recordings the fit did not see ({shown.error_unit})")
+    ax.set_xlabel(f"RMS error on validation recordings ({shown.error_unit})")
     legend(ax, 4)

@@ -1,4 +1,4 @@
-"""The report: one HTML page that needs nothing but itself, for a screen, a phone or paper."""
+"""HTML report in one file, for screens, phones and paper."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure in the page: its drawing, and in words what it shows."""
+    """Figure of a page with its caption."""
 
     svg: Markup
     caption: str
@@ -57,7 +57,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Side:
-    """Tables that stand side by side where there is room."""
+    """Tables that are side by side where there is room."""
 
     title: str
     tables: tuple[Table, ...]
@@ -65,7 +65,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Part:
-    """One outcome as the template takes it; empty tuples leave their sections out."""
+    """Values of one outcome for the template; empty tuples leave their sections out."""
 
     title: str
     lead: str
@@ -84,12 +84,12 @@ class Part:
 
 
 def write_identify_report(outcome: IdentifyOutcome, path: str | Path) -> Path:
-    """Write what an identification found to ``path``. Raises ``InputError``."""
+    """Write the report of an identification to ``path``. Raises ``InputError``."""
     return _write(path, outcome.title, lambda p: (_identify_part(outcome, p),))
 
 
 def write_validate_report(outcome: ValidateOutcome, path: str | Path) -> Path:
-    """Write how a model did on recordings to ``path``. Raises ``InputError``."""
+    """Write the report of a validation to ``path``. Raises ``InputError``."""
     return _write(path, outcome.title, lambda p: (_validate_part(outcome, p),))
 
 
@@ -98,7 +98,7 @@ def write_demo_report(
 ) -> Path:
     """Write an identification and a validation of its model as one page. Raises ``InputError``."""
     if {c.name for c in identify.validation} <= {c.name for c in validate.comparisons}:
-        identify = replace(identify, validation=())  # they stand in the other half
+        identify = replace(identify, validation=())  # the other half shows them
     return _write(
         path,
         identify.title,
@@ -125,10 +125,10 @@ def write_page(path: str | Path, template: str, contents: Callable[[], dict[str,
     """Write ``template`` with ``contents`` to ``path``. Raises ``InputError``."""
     from dearig.recording.files import check_output, replaced_when_done
 
-    path = check_output(path, overwrite=True)  # before seconds go into the figures
+    path = check_output(path, overwrite=True)  # before seconds are spent on figures
     page = _render(template, contents())
     with replaced_when_done(path) as partial:
-        # a file's name may hold bytes that are no text: shown as ?, rather than no report at all
+        # bytes of a file name that are no text are shown as ?
         partial.write_text(page, encoding="utf-8", errors="replace", newline="\n")
     return path
 
@@ -148,25 +148,23 @@ def _render(template: str, contents: dict[str, Any]) -> str:
 
 
 def _non_breaking(sentence: str) -> str:
-    """``sentence`` in which no line ends between a number and its unit."""
+    """Return ``sentence`` with non-breaking spaces between numbers and units."""
     return re.sub(
         r"(?<=\d) (?=%|\N{MICRO SIGN}m\b|kPa\b|s\b|min\b|h\b)", "\N{NO-BREAK SPACE}", sentence
     )
 
 
 def prefixes() -> Iterator[str]:
-    """What keeps the figures of one page apart."""
+    """Yield a different prefix for each figure of a page."""
     return (f"f{n}" for n in count(1))
 
 
 def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
     fit = outcome.fit
-    # the thesis's figures are of one run: several recordings have no share in them
+    # the published errors are those of one recording
     published = outcome.published_fit if len(outcome.train) == 1 else None
-    errors = [_side("Training: the recordings that were fitted", outcome.train, published)]
-    errors += _validation_sides(
-        outcome.validation, "Validation: recordings that the fit did not see"
-    )
+    errors = [_side("Training: recordings that were fitted", outcome.train, published)]
+    errors += _validation_sides(outcome.validation, "Validation: recordings that were not fitted")
     pictures = [("Training", _comparison_pictures(outcome.train, prefixes))]
     if outcome.validation:
         pictures.append(("Validation", _comparison_pictures(outcome.validation, prefixes)))
@@ -178,8 +176,8 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
             picture(
                 branches_figure(outcome.trials, outcome.kind),
                 prefixes,
-                "Error on training and validation data, and the information criterion (BIC) of "
-                "the training data, against number of branches.",
+                "Error on training and validation data, and the Bayesian information criterion "
+                "(BIC) of the training data, against the number of branches.",
             ),
         )
     every = (*outcome.train, *outcome.validation)
@@ -194,8 +192,8 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
             picture(
                 parameters_figure(fit),
                 prefixes,
-                "Parameters with their 95 % intervals. An arrow is an end that the data leave "
-                "open; grey is what they do not determine."
+                "Parameters with their 95 % intervals. An arrow is an open end; grey parameters "
+                "are not determined by the data."
                 if fit.covariance.size > 0
                 else "Parameters; no intervals were computed.",
             ),
@@ -206,7 +204,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
         residuals=tuple((c.name, _residual_pictures(c, prefixes)) for c in outcome.train),
         provenance=(
             ("Fitted to", tuple(c.name for c in outcome.train)),
-            ("Validated on", tuple(c.name for c in outcome.validation) or ("nothing",)),
+            ("Validated on", tuple(c.name for c in outcome.validation) or ("no recording",)),
             ("Samples", (f"{sum(c.errors.samples for c in every):,}",)),
             ("Model", (describe_model(fit.model),)),
             ("Model file", (outcome.model_path or "not written",)),
@@ -215,7 +213,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
             ("Simulations", (f"{fit.simulations:,}",)),
             ("Residual over noise", (significant(fit.cost**0.5),)),
             ("Residual correlation", (f"{significant(fit.correlation)} samples",)),
-            ("Time taken", (seconds(outcome.seconds),)),
+            ("Computing time", (seconds(outcome.seconds),)),
         ),
         film=outcome.kind == "film",
         rest_length_known=any(not e.free for e in fit.estimates),
@@ -235,7 +233,12 @@ def _validate_part(outcome: ValidateOutcome, prefixes: Iterator[str]) -> Part:
         branches=(),
         branch_pictures=(),
         pictures=(("Recordings", _comparison_pictures(outcome.comparisons, prefixes)),),
-        residuals=((f"{worst.name}, where it is largest", _residual_pictures(worst, prefixes)),),
+        residuals=(
+            (
+                f"{worst.name}, where the error is largest",
+                _residual_pictures(worst, prefixes),
+            ),
+        ),
         provenance=(
             ("Recordings", tuple(c.name for c in outcome.comparisons)),
             ("Samples", (f"{sum(c.errors.samples for c in outcome.comparisons):,}",)),
@@ -248,12 +251,12 @@ def _validate_part(outcome: ValidateOutcome, prefixes: Iterator[str]) -> Part:
 
 
 def _over_noise(comparison: Comparison) -> float:
-    """RMS in noise floors, or as it is where no floor is known."""
+    """Return RMS over the noise floor, or the RMS where the floor is unknown."""
     return comparison.errors.rms / (comparison.noise or 1.0)
 
 
 def _side(title: str, comparisons: Sequence[Comparison], published: Published | None) -> Side:
-    ours = error_table("Measured less model", comparisons)
+    ours = error_table("Measured minus model", comparisons)
     theirs = thesis_error_table("By the thesis's formulas, in %", comparisons, published)
     return Side(title, (ours,) if theirs is None else (ours, theirs))
 
@@ -264,7 +267,7 @@ def _validation_sides(comparisons: Sequence[Comparison], alone: str) -> list[Sid
 
 
 def picture(figure: Figure, prefixes: Iterator[str], caption: str) -> Picture:
-    """``figure`` for a page, whose ``prefixes`` keep its figures apart."""
+    """Return ``figure`` for a page; ``prefixes`` yields one prefix for each figure."""
     from markupsafe import Markup
 
     # matplotlib has escaped all text in the drawing, and the label is an escaped attribute
@@ -284,7 +287,7 @@ def _comparison_pictures(
                 comparison_figure(c),
                 prefixes,
                 f"{name}: {shown.drive.lower()}, {shown.quantity.lower()} measured and by the "
-                f"model, and measured less model ({error}).",
+                f"model, and measured minus model ({error}).",
             )
         )
         if c.kind == "film":
@@ -295,9 +298,9 @@ def _comparison_pictures(
 
 def _residual_pictures(comparison: Comparison, prefixes: Iterator[str]) -> tuple[Picture, ...]:
     captions = (
-        "How large the error is, and how large noise alone would be.",
-        "How like itself the error is after a time; noise is not.",
-        "How the error spreads over frequency; white noise would be flat.",
+        "Histogram of the error, and the distribution of noise alone.",
+        "Autocorrelation of the error; that of noise lies in the grey band.",
+        "Amplitude density of the error; that of white noise is flat.",
     )
     return tuple(
         picture(figure, prefixes, caption)

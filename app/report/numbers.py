@@ -1,4 +1,4 @@
-"""Numbers as a reader should see them: with the digits that the data support, and no more."""
+"""Format of numbers: as many digits as the data support."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = [
     "to_ascii",
 ]
 
-#: Stands where there is no number.
+#: Text in place of a missing number.
 NO_VALUE = "\N{EN DASH}"
 
 _TIMES = "\N{MULTIPLICATION SIGN}"
@@ -41,23 +41,23 @@ _PLAIN = str.maketrans(
     }
 )
 _NAMED = re.compile(r"(mu|J|T)_(\d+)")
-_DIGITS_MAX = 6  # more would be believed by nobody
-_WIDE = 5.0  # beyond this ratio of its ends an interval is an order of magnitude, not a tolerance
+_DIGITS_MAX = 6  # significant digits of a value
+_WIDE = 5.0  # ratio of its ends above which an interval gives no digits
 
 
 def power_of_ten(exponent: int) -> str:
-    """10 with ``exponent`` raised, without any markup."""
+    """Return 10 with a raised ``exponent``, without markup."""
     return "10" + str(exponent).translate(_SUPERSCRIPT)
 
 
 def _fixed(value: float, decimals: int) -> str:
-    """``value`` rounded at ``decimals`` behind the point; negative: tens, hundreds, ..."""
+    """Round ``value`` to ``decimals``; negative ones mean tens, hundreds, ..."""
     text = f"{round(value, decimals):.{max(decimals, 0)}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 
 def significant(value: float, digits: int = 3) -> str:
-    """``value`` with ``digits`` significant digits; very large and very small ones as powers."""
+    """Return ``value`` with ``digits`` significant digits; extreme values as powers of ten."""
     if math.isnan(value):
         return NO_VALUE
     if math.isinf(value):
@@ -72,7 +72,7 @@ def significant(value: float, digits: int = 3) -> str:
 
 
 def _decimals(value: float, width: float) -> int:
-    """Decimals that show two digits of a ``width`` of uncertainty about ``value``."""
+    """Return the decimals that show two digits of an uncertainty ``width`` of ``value``."""
     decimals = 1 - math.floor(math.log10(width))
     if value != 0.0:
         decimals = min(decimals, _DIGITS_MAX - 1 - math.floor(math.log10(abs(value))))
@@ -80,7 +80,7 @@ def _decimals(value: float, width: float) -> int:
 
 
 def _tolerance(low: float, high: float) -> float | None:
-    """Half the width of an interval that is one; None for an open or a wide one, or a point."""
+    """Return half the width of an interval; None if it is open, wide, or a point."""
     if not (math.isfinite(low) and math.isfinite(high)) or high <= low:
         return None
     if low <= 0.0 <= high or (low > 0.0 and high / low > _WIDE):
@@ -89,7 +89,7 @@ def _tolerance(low: float, high: float) -> float | None:
 
 
 def quoted(value: float, low: float, high: float) -> str:
-    """``value`` with as many digits as its 95 % interval ``low`` .. ``high`` gives a meaning to."""
+    """Return ``value`` with the digits that its 95 % interval ``low`` .. ``high`` supports."""
     width = _tolerance(low, high)
     if width is None or not math.isfinite(value) or not 1e-4 < abs(value) < 1e6:
         return significant(value, 5 if low == high else 2)
@@ -97,7 +97,7 @@ def quoted(value: float, low: float, high: float) -> str:
 
 
 def interval(low: float, high: float) -> str:
-    """An interval in words; an end that is 0 or infinite is open."""
+    """Return an interval in words; an end that is 0 or infinite is open."""
     if low == 0.0 and math.isinf(high):
         return "open"
     if math.isinf(high):
@@ -112,7 +112,7 @@ def interval(low: float, high: float) -> str:
 
 
 def seconds(duration: float) -> str:
-    """A duration in s, and in min or h once it is long."""
+    """Return a duration in s, or in min or h if it is long."""
     if duration < 120.0:
         return f"{significant(duration)} s"
     if duration < 7200.0:
@@ -121,7 +121,7 @@ def seconds(duration: float) -> str:
 
 
 def symbol(name: str) -> str:
-    """The field's own symbol for a parameter: mu_0 is a Greek letter with a subscript."""
+    """Return the symbol of a parameter: mu_0 becomes a Greek letter with a subscript."""
     match = _NAMED.fullmatch(name)
     if match is None:
         return name
@@ -130,7 +130,7 @@ def symbol(name: str) -> str:
 
 
 def to_ascii(text: str) -> str:
-    """``text`` in ASCII: ``um`` and ``mu_0`` for what has a name there, escapes for the rest."""
+    """Return ``text`` in ASCII, with ``um`` and ``mu_0`` for symbols and escapes for the rest."""
     for shape, sign in ((_RAISED, "^"), (_LOWERED, "_")):
         back = str.maketrans(shape, "-0123456789"[-len(shape) :])
         text = re.sub(f"[{shape}]+", lambda m, s=sign, b=back: s + m[0].translate(b), text)  # type: ignore[misc]

@@ -1,4 +1,4 @@
-"""One report page for any outcome: identification, validation or diagnosis."""
+"""Report page of any outcome: identification, validation or diagnosis."""
 
 from __future__ import annotations
 

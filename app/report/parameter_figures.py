@@ -37,9 +37,9 @@ __all__ = ["branches_figure", "parameters_figure"]
 
 
 def parameters_figure(fit: Identification) -> Figure:
-    """Every parameter with its 95 % interval; open ends are arrows, undetermined ones are grey.
+    """Draw every parameter with its 95 % interval; open ends are arrows, undetermined ones grey.
 
-    A network of the thesis's make stands beside the thesis's Table 3.
+    The thesis's Table 3 is drawn beside a network with as many branches.
     """
     groups = _groups(fit)
     rows = [len(g) for g in groups.values()]
@@ -61,7 +61,7 @@ def parameters_figure(fit: Identification) -> Figure:
 
 
 def branches_figure(trials: Sequence[BranchTrial], kind: str) -> Figure:
-    """Training and validation error, and the information criterion, against number of branches."""
+    """Draw training error, validation error and BIC against the number of branches."""
     shown = SHOWN[kind]
     n = np.array([t.branches for t in trials])
     train = np.array([t.train_rms for t in trials]) * shown.error_factor
@@ -87,7 +87,7 @@ def branches_figure(trials: Sequence[BranchTrial], kind: str) -> Figure:
         upper.set_ylabel(f"RMS error ({shown.error_unit})")
         above = bic - np.nanmin(np.where(np.isfinite(bic), bic, np.nan))
         lower.plot(n, above, "D-", color=MARK, markersize=4.5)
-        # the decision is made among the smallest values, while the first can be thousands above
+        # the smallest values decide, and the first can be thousands above them
         lower.set_yscale("symlog", linthresh=10.0)
         log_ticks(lower.yaxis)
         lower.set_ylim(bottom=-2.0)
@@ -107,7 +107,7 @@ def branches_figure(trials: Sequence[BranchTrial], kind: str) -> Figure:
 
 
 def _groups(fit: Identification) -> dict[str, list[Estimate]]:
-    """Estimates by what they are, under the label of their axis."""
+    """Return the estimates by the label of their axis."""
     labels = {"mu": "Modulus", "J": "Locking limit", "T": "Relaxation time"}
     groups: dict[str, list[Estimate]] = {}
     for e in fit.estimates:
@@ -119,7 +119,7 @@ def _groups(fit: Identification) -> dict[str, list[Estimate]]:
 
 _FITTED = "fitted, with 95 % interval"
 _BARE = "fitted, no interval"
-_FOLLOWS = "follows from other numbers"
+_FOLLOWS = "derived from other parameters"
 _UNDETERMINED = "not determined by these data"
 _TABLE_3 = "thesis, Table 3"
 _PARAMETER_LABELS = (_FITTED, _BARE, _FOLLOWS, _UNDETERMINED, _TABLE_3)
@@ -138,7 +138,7 @@ def _intervals(ax: Axes, label: str, estimates: Sequence[Estimate], fit: Identif
     if log:
         ends = ends[ends > 0.0] if (ends > 0.0).any() else np.array([1.0])
         left, right = ends.min() / 2.5, ends.max() * 2.5
-        # a whole decade at least, or the axis would have no label
+        # at least a decade, or the axis has no label
         spare = max(0.0, 1.2 - math.log10(right / left)) / 2.0
         left, right = left * 10.0**-spare, right * 10.0**spare
     else:
@@ -178,7 +178,7 @@ def _intervals(ax: Axes, label: str, estimates: Sequence[Estimate], fit: Identif
 def _interval(
     ax: Axes, row: int, low: float, high: float, limits: tuple[float, float], colour: str
 ) -> None:
-    """A bar with an end stop where the interval ends, and an arrow where it does not."""
+    """Draw an interval with a stop at each end, or an arrow at an open end."""
     left, right = limits
     ends = (left if low == 0.0 else low, right if math.isinf(high) else high)
     ax.plot(ends, [row, row], color=colour, linewidth=1.6, solid_capstyle="butt", zorder=2)

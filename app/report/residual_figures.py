@@ -34,7 +34,7 @@ __all__ = ["residual_figure", "residual_panels"]
 
 
 def residual_figure(comparison: Comparison) -> Figure:
-    """The residual in one row: its histogram, its correlation with itself, its spectrum."""
+    """Draw histogram, autocorrelation and spectrum of the residual in one row."""
     with style():
         figure = blank(1.6 * WIDTH, 2.7)
         for ax, draw in zip(figure.subplots(1, 3), _RESIDUAL_PANELS, strict=True):
@@ -43,7 +43,7 @@ def residual_figure(comparison: Comparison) -> Figure:
 
 
 def residual_panels(comparison: Comparison) -> tuple[Figure, Figure, Figure]:
-    """The panels of ``residual_figure`` one by one, for a page that sets them as it has room."""
+    """Draw the panels of ``residual_figure`` as three figures, for a page that arranges them."""
     figures = []
     with style():
         for draw in _RESIDUAL_PANELS:
@@ -56,7 +56,7 @@ def residual_panels(comparison: Comparison) -> tuple[Figure, Figure, Figure]:
 def _histogram(ax: Axes, comparison: Comparison) -> None:
     shown = SHOWN[comparison.kind]
     residual = _residual(comparison) * shown.error_factor
-    # a few stray samples must not squeeze everything else into one bar
+    # a few outliers must not squeeze everything else into one bar
     centre = float(np.median(residual))
     reach = min(4.5 * float(np.std(residual)), 1.1 * float(np.max(np.abs(residual - centre))))
     noise = None if comparison.noise is None else comparison.noise * shown.error_factor
@@ -72,7 +72,7 @@ def _histogram(ax: Axes, comparison: Comparison) -> None:
         x = np.linspace(edges[0], edges[-1], 201)
         bell = np.exp(-0.5 * (x / noise) ** 2) / (noise * math.sqrt(2.0 * math.pi))
         ax.plot(x, bell, color=MODEL, linewidth=1.4, label="noise")
-        # noise far below the residual is a needle: cut it, rather than flatten the histogram
+        # the curve of noise far below the residual is narrow and high; cut, it leaves bars visible
         tallest = float(counts.max()) / (residual.size * width)
         ax.set_ylim(0.0, 1.08 * max(tallest, min(float(bell.max()), 2.0 * tallest)))
     ax.set_xlim(edges[0], edges[-1])
@@ -86,7 +86,7 @@ def _correlation(ax: Axes, comparison: Comparison) -> None:
     step, residual = even(comparison.time, _residual(comparison))
     lag, correlation = autocorrelation(step, residual)
     chance = 2.0 / math.sqrt(residual.size)
-    ax.axhspan(-chance, chance, color=NOISE, linewidth=0, zorder=0.5, label="chance, 95 %")
+    ax.axhspan(-chance, chance, color=NOISE, linewidth=0, zorder=0.5, label="95 % of noise")
     ax.axhline(0.0, color=UNSURE, linewidth=0.6, zorder=0.6)
     ax.plot(*decimated_log(lag, correlation), color=MEASURED, linewidth=1.1)
     log_axis(ax, "x", lag[0], lag[-1])

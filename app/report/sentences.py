@@ -1,4 +1,4 @@
-"""What an outcome says, in sentences for someone who has not read the thesis."""
+"""Summaries of identification and validation, for readers who do not know the thesis."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ _METHODS = {
     "hybrid": "a global search followed by least squares",
     "de": "the thesis's Algorithm 1 (differential evolution) as printed",
 }
-_NAMES_MAX = 6  # more names than this are a number
-# RMS over noise floor: hardly anything left; little left; more, and the model lacks something
+_NAMES_MAX = 6  # more recordings than this are counted and not named
+# RMS over noise floor below which the residual is almost only noise, and mostly noise
 _AT_NOISE, _NEAR_NOISE = 1.1, 1.5
 
 
 def listed(names: Iterable[str]) -> str:
-    """a, b and c."""
+    """Join names as "a, b and c"."""
     names = list(names)
     if len(names) < 2:
         return "".join(names)
@@ -52,7 +52,7 @@ def _recordings(comparisons: Sequence[Comparison]) -> str:
 
 
 def describe_model(model: Actuator | Strip) -> str:
-    """Springs, branches and effects of a model, in a few words."""
+    """Return springs, branches and effects of a model in a few words."""
     network = model.network
     kinds = sorted({s.kind for s in network.springs})
     names = {"gent": "Gent", "neo-hookean": "neo-Hookean", "arruda-boyce": "Arruda-Boyce"}
@@ -64,7 +64,7 @@ def describe_model(model: Actuator | Strip) -> str:
 
 
 def identify_summary(outcome: IdentifyOutcome) -> tuple[str, ...]:
-    """What was fitted on what, how well it follows, and how well where it was not fitted."""
+    """Return sentences on the fit and its errors on training and validation data."""
     train = outcome.train
     samples = sum(c.errors.samples for c in train)
     free = sum(e.free for e in outcome.fit.estimates)
@@ -74,11 +74,11 @@ def identify_summary(outcome: IdentifyOutcome) -> tuple[str, ...]:
         f"{_recordings(train)}, {_counted(samples, 'sample')} in all, by "
         f"{_METHODS.get(outcome.method, outcome.method)}. It took {seconds(outcome.seconds)}."
     ]
-    said.append(f"On {_these(train)} it {_misses(train)}")
+    said.append(f"On {_these(train)} its {_error(train)}")
     if outcome.validation:
         n = len(outcome.validation)
         others = "another recording" if n == 1 else f"{n} other recordings"
-        said.append(f"On {others}, which the fit never saw, it {_misses(outcome.validation)}")
+        said.append(f"On {others}, not used in the fit, its {_error(outcome.validation)}")
     if outcome.published_fit is not None:
         said.append(
             f"The thesis reports e_rms = {outcome.published_fit.e_rms_pct:g} % and e_m = "
@@ -89,20 +89,20 @@ def identify_summary(outcome: IdentifyOutcome) -> tuple[str, ...]:
     if chosen:
         tried = listed(str(t.branches) for t in outcome.trials)
         said.append(
-            f"Of {tried} branches, {chosen[0].branches} were chosen, by the information criterion "
-            f"of the training data alone."
+            f"Of {tried} branches, {chosen[0].branches} were chosen by the Bayesian information "
+            f"criterion of the training data."
         )
     said.append(undetermined_sentence(outcome.fit))
     return tuple(said)
 
 
 def validate_summary(outcome: ValidateOutcome) -> tuple[str, ...]:
-    """How well a model follows recordings, and where it does worst."""
+    """Return sentences on the errors of a model on recordings."""
     all_of = outcome.comparisons
     fresh = tuple(c for c in all_of if c.role != "train")
     said = [
-        f"The model ({outcome.model_name}) was set beside {_recordings(all_of)}. "
-        f"On {_these(all_of)} it {_misses(all_of)}"
+        f"The model ({outcome.model_name}) was compared with {_recordings(all_of)}. "
+        f"On {_these(all_of)} its {_error(all_of)}"
     ]
     if len(fresh) < len(all_of):
         seen = [c.name for c in all_of if c.role == "train"]
@@ -114,30 +114,30 @@ def validate_summary(outcome: ValidateOutcome) -> tuple[str, ...]:
         shown = SHOWN[outcome.kind]
         worst = max(all_of, key=lambda c: c.errors.rms)
         said.append(
-            f"It does worst on {worst.name}: "
+            f"The largest error is that on {worst.name}: "
             f"{significant(worst.errors.rms * shown.error_factor)} {shown.error_unit} RMS."
         )
     return tuple(said)
 
 
 def undetermined_sentence(fit: Identification) -> str:
-    """One sentence on what the data leave open."""
+    """Return a sentence on the parameters that the data do not determine."""
     if fit.covariance.size == 0:
         return (
-            "No intervals were computed, so nothing is known about how well the data determine "
-            "these parameters."
+            "No intervals were computed, so it is not known how well the data determine these "
+            "parameters."
         )
     if not fit.undetermined:
         return "The data determine every parameter."
     named = listed(symbol(n) for n in fit.undetermined)
     return (
-        f"The data do not determine {named}: other values would fit as well, and no digit of "
-        f"theirs should be quoted."
+        f"The data do not determine {named}: other values fit equally well. Do not quote these "
+        f"values."
     )
 
 
 def warnings_of(outcome: IdentifyOutcome | ValidateOutcome) -> tuple[str, ...]:
-    """All warnings, those of a recording with its name, none twice."""
+    """Return all warnings without duplicates; those of a recording begin with its name."""
     fit = getattr(outcome, "fit", None)
     said = [w[:1].upper() + w[1:] for w in fit.warnings] if fit is not None else []
     if fit is not None:
@@ -165,8 +165,8 @@ def _worst(comparisons: Sequence[Comparison], measure: str) -> str:
     return f"{_span([getattr(c.errors, measure) for c in comparisons])} %"
 
 
-def _misses(comparisons: Sequence[Comparison]) -> str:
-    """... misses the measured displacement by 1.2 um RMS ... (a verb phrase and its sequel)."""
+def _error(comparisons: Sequence[Comparison]) -> str:
+    """Return "error in displacement is 1.2 um RMS ..." and its comparison with the noise."""
     kind = comparisons[0].kind
     shown = SHOWN[kind]
     rms = pooled_rms(comparisons)
@@ -176,23 +176,23 @@ def _misses(comparisons: Sequence[Comparison]) -> str:
         share = f"{_span([c.errors.nrmse_pct for c in comparisons])} % of the measured range"
     largest = max(c.errors.max for c in comparisons)
     words = (
-        f"misses the measured {shown.quantity.lower()} by "
-        f"{significant(rms * shown.error_factor)} {shown.error_unit} RMS ({share}), and by "
-        f"{significant(largest * shown.error_factor)} {shown.error_unit} at most."
+        f"error in {shown.quantity.lower()} is {significant(rms * shown.error_factor)} "
+        f"{shown.error_unit} RMS ({share}) and at most "
+        f"{significant(largest * shown.error_factor)} {shown.error_unit}."
     )
     noise = pooled_noise(comparisons)
     if not noise:
-        return f"{words} The noise floor is not known, so there is nothing to measure that against."
+        return f"{words} The noise floor is not known, so the error cannot be compared with it."
     floor = f"{significant(noise * shown.error_factor)} {shown.error_unit}"
     ratio = rms / noise
     if ratio <= _AT_NOISE:
-        return f"{words} The noise floor is {floor}: hardly anything but noise is left."
+        return f"{words} The noise floor is {floor}: the residual is almost only noise."
     if ratio <= _NEAR_NOISE:
         return (
             f"{words} The noise floor is {floor}: the error is {significant(ratio)} times that, so "
-            f"most of what is left is noise."
+            f"most of the residual is noise."
         )
     return (
         f"{words} The noise floor is {floor}: the error is {significant(ratio)} times that, so "
-        f"there is something that the model does not describe."
+        f"the residual contains more than noise, which the model does not describe."
     )

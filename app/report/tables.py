@@ -1,4 +1,4 @@
-"""Tables of results as rows of words, for the terminal and for the page alike."""
+"""Tables of results as rows of text, for the terminal, the window and the HTML page."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Row:
-    """Cells of a line; ``detail`` is a sentence on it, ``muted`` or ``mark`` set it back or off."""
+    """Row of a table; ``detail`` explains it, ``muted`` greys it, ``mark`` highlights it."""
 
     cells: tuple[str, ...]
     detail: str = ""
@@ -38,7 +38,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table; ``head`` gives name and unit of every column, the first is what the rows are of."""
+    """Table; ``head`` has name and unit of every column, the first of which names the rows."""
 
     title: str
     head: tuple[tuple[str, str], ...]
@@ -46,9 +46,9 @@ class Table:
     note: str = ""
 
     def beside(self, other: Table) -> Table:
-        """Both tables as one, where they are of the same rows."""
+        """Return both tables as one. Raises ``ValueError`` unless they have the same rows."""
         if [r.cells[0] for r in self.rows] != [r.cells[0] for r in other.rows]:
-            raise ValueError(f"{self.title!r} and {other.title!r} are not of the same rows")
+            raise ValueError(f"{self.title!r} and {other.title!r} do not have the same rows")
         rows = tuple(
             Row(a.cells + b.cells[1:], a.detail, a.muted, a.mark)
             for a, b in zip(self.rows, other.rows, strict=True)
@@ -67,9 +67,9 @@ _TITLES = {
 def by_thesis_table(
     comparisons: Sequence[Comparison], alone: str
 ) -> list[tuple[str, tuple[Comparison, ...]]]:
-    """``(title, comparisons)`` for each of the thesis's validation tables that occurs.
+    """Return ``(title, comparisons)`` for each of the thesis's validation tables that occurs.
 
-    ``alone`` is the title of recordings of which none belongs to such a table.
+    ``alone`` is the title if no recording belongs to such a table.
     """
     found = []
     for table, title in _TITLES.items():
@@ -81,12 +81,12 @@ def by_thesis_table(
 
 
 def _label(comparison: Comparison) -> str:
-    # the label of a table's row is short: it stays in one piece
+    # the label of a row is short and does not wrap
     return comparison.row.replace(" ", "\N{NO-BREAK SPACE}") or comparison.name
 
 
 def error_table(title: str, comparisons: Sequence[Comparison]) -> Table:
-    """Our own measures: RMS, the same in per cent, the largest error, and RMS over noise floor."""
+    """Return RMS, relative RMS, largest error, and RMS over noise floor of each recording."""
     shown = SHOWN[comparisons[0].kind]
     film = comparisons[0].kind == "film"
     rows = []
@@ -117,9 +117,9 @@ def error_table(title: str, comparisons: Sequence[Comparison]) -> Table:
 def thesis_error_table(
     title: str, comparisons: Sequence[Comparison], published: Published | None = None
 ) -> Table | None:
-    """The thesis's two measures as printed, beside its own figures; None for film data.
+    """Return the thesis's two measures and its published values; None for film data.
 
-    ``published`` stands for comparisons that bring no figures of their own.
+    ``published`` is used for comparisons without published values of their own.
     """
     if comparisons[0].kind == "film":
         return None
@@ -148,7 +148,7 @@ def thesis_error_table(
 
 
 def parameter_table(fit: Identification) -> Table:
-    """Every parameter with its 95 % interval, beside the thesis's Table 3 where that applies."""
+    """Return every parameter with its 95 % interval, and the thesis's Table 3 if it applies."""
     published = table_3(fit.model)
     known = fit.covariance.size > 0
     rows = []
@@ -156,14 +156,14 @@ def parameter_table(fit: Identification) -> Table:
         factor, unit = parameter_unit(e.unit)
         if known:
             value = quoted(e.value * factor, e.low * factor, e.high * factor)
-            within = interval(e.low * factor, e.high * factor) if e.free else "follows"
+            within = interval(e.low * factor, e.high * factor) if e.free else "derived"
         else:
             value, within = significant(e.value * factor, 4), NO_VALUE
         cells = [symbol(e.name), value if e.determined or not known else f"({value})", unit, within]
         if published:
             theirs = published.get(e.name, math.nan)
             cells.append(significant(theirs * factor, 4))
-        # without intervals every row would say the same; the page says it once
+        # without intervals all notes are the same, and the page shows it once
         rows.append(Row(tuple(cells), e.note if known else "", known and not e.determined))
     head = [("", ""), ("Value", ""), ("Unit", ""), ("95 % interval", "")]
     if published:
@@ -172,12 +172,12 @@ def parameter_table(fit: Identification) -> Table:
     if known and fit.undetermined:
         notes.append("Values in brackets are not determined by these data.")
     if published:
-        notes.append("Table 3's branches are listed by relaxation time, as ours are.")
+        notes.append("Branches, also those of Table 3, are sorted by relaxation time.")
     return Table("Parameters", tuple(head), tuple(rows), " ".join(notes))
 
 
 def branch_trials(trials: Sequence[BranchTrial], kind: str) -> Table:
-    """What each number of branches did on training and on validation data."""
+    """Return the errors of each number of branches on training and validation data."""
     shown = SHOWN[kind]
     best = min((t.bic for t in trials), default=0.0)
     rows = []
@@ -201,7 +201,7 @@ def branch_trials(trials: Sequence[BranchTrial], kind: str) -> Table:
         ("BIC", "above best"),
     )
     note = (
-        "* was chosen, by the BIC (an information criterion) of the training data; validation "
-        "plays no part in the choice."
+        "* chosen by the Bayesian information criterion (BIC) of the training data; validation "
+        "data are not used for the choice."
     )
     return Table("Number of branches", head, tuple(rows), note)

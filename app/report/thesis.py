@@ -1,4 +1,4 @@
-"""The thesis's own figures, to stand beside ours."""
+"""Published values of the thesis, for comparison."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ __all__ = ["table_3"]
 
 
 def table_3(model: Actuator | Strip) -> dict[str, float]:
-    """The thesis's Table 3 by parameter name (SI), if ``model`` is an actuator of that make.
+    """Return Table 3 by parameter name (SI); empty unless ``model`` has as many branches.
 
-    Table 3's branches are put in order of relaxation time, as fitted ones are: its order is a
-    convention, and like has to stand beside like.
+    The branches are sorted by relaxation time, as fitted ones are, so that similar branches have
+    the same name.
     """
     from dearig.model.actuator import Actuator
     from dearig.model.material import TABLE_3

@@ -31,8 +31,8 @@ class _Thread(QThread):
 class Background(QObject):
     """Runs one function at a time, and then the newest of those that came while it was busy.
 
-    ``done`` carries the function's result, ``failed`` the message of its ``DearigError``. The
-    result of a function is dropped when a newer function waits. ``close`` waits for the thread.
+    ``done`` carries the function's result, ``failed`` the message of its ``DearigError``. A result
+    is dropped when a newer function waits. ``close`` waits for the thread.
     """
 
     done = Signal(object)

@@ -28,7 +28,7 @@ class BeforeAfterPlot(QWidget):
         self._pairs: tuple[_Pair, ...] = ()
         self.record = QComboBox()
         self.record.setToolTip(
-            "Validation recordings come first; no fit and no selection used them"
+            "Validation recordings, which no fit and no selection used, come first"
         )
         of = QLabel("Recor&ding")
         of.setBuddy(self.record)

@@ -1,4 +1,4 @@
-"""The files of a folder as rows: thumbnail, sequence, film, error, events."""
+"""Table model of a folder of recordings: thumbnail, sequence, film, errors, state."""
 
 from __future__ import annotations
 
@@ -35,24 +35,24 @@ PATH = SUMMARY + 1
 SORT = SUMMARY + 2
 _ROOT = QModelIndex()
 
-#: Heads of the columns, each with what it means.
+#: Heads and tooltips of the columns.
 COLUMNS = (
-    ("", "The measured displacement (or stress) over time"),
+    ("", "Measured displacement (or stress) over time"),
     ("Recording", "Name of the file"),
-    ("Sequence", "What was played"),
-    ("Film", "Which film hung there"),
-    ("Made", "When the run began"),
-    ("Length", "Duration in s"),
+    ("Sequence", "Name of the sequence"),
+    ("Film", "Name of the film"),
+    ("Start", "Start of the run"),
+    ("Duration", "Duration in s"),
     ("RMS", "RMS error of the chosen model, in µm (kPa for a film driven by stretch)"),
     ("NRMSE", "RMS error in % of the measured range"),
-    ("RMS / noise", "RMS error over the noise floor: 1 is as good as can be"),
-    ("State", "How the run ended, and what happened in it"),
+    ("RMS / noise", "RMS error divided by the noise floor; 1 is the best possible"),
+    ("State", "End of the run, and its events"),
 )
-_NAME, _SEQUENCE, _FILM, _MADE, _LENGTH, _RMS, _NRMSE, _NOISE, _STATE = range(1, 10)
+_NAME, _SEQUENCE, _FILM, _START, _DURATION, _RMS, _NRMSE, _NOISE, _STATE = range(1, 10)
 
 
 class FolderModel(QAbstractTableModel):
-    """One row a file; what is not known yet is empty."""
+    """One row for each file; cells are empty until the file is read."""
 
     def __init__(self, session: Session) -> None:
         super().__init__(session)
@@ -66,14 +66,14 @@ class FolderModel(QAbstractTableModel):
     def set_files(
         self, files: dict[Path, tuple[float, int]], summaries: dict[Path, RecordingSummary]
     ) -> None:
-        """Show ``files`` (path to time of change and size), with the ``summaries`` there are."""
+        """Show ``files`` (path to time of change and size), with the ``summaries`` known so far."""
         paths = sorted(files, key=lambda path: (-files[path][0], path.name))
         changed = {path: about[0] for path, about in files.items()}
         if paths == self._paths:
             self._summaries, self._changed = dict(summaries), changed
             self._redraw()
             return
-        # only what came and went: a selection stays
+        # only new and missing files change rows, so that a selection stays
         for row in reversed(range(len(self._paths))):
             if self._paths[row] not in files:
                 self.beginRemoveRows(_ROOT, row, row)
@@ -89,14 +89,14 @@ class FolderModel(QAbstractTableModel):
         self._row = {path: i for i, path in enumerate(self._paths)}
 
     def set_summary(self, summary: RecordingSummary) -> None:
-        """What was found in one of the files."""
+        """Show the summary of one file."""
         row = self._row.get(summary.path)
         if row is not None:
             self._summaries[summary.path] = summary
             self.dataChanged.emit(self.index(row, 0), self.index(row, len(COLUMNS) - 1))
 
     def clear_errors(self) -> None:
-        """Another model was chosen: the errors are no longer those of the one that is named."""
+        """Remove all errors; they belong to a model that is no longer chosen."""
         self._summaries = {
             path: replace(g, errors=None, unfit="", fitted=False)
             for path, g in self._summaries.items()
@@ -135,7 +135,7 @@ class FolderModel(QAbstractTableModel):
             return self._text(path, summary, column)
         if role == Qt.ItemDataRole.ToolTipRole:
             return _tip(path, summary, column)
-        if role == Qt.ItemDataRole.TextAlignmentRole and _LENGTH <= column <= _NOISE:
+        if role == Qt.ItemDataRole.TextAlignmentRole and _DURATION <= column <= _NOISE:
             return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         if role == Qt.ItemDataRole.ForegroundRole and column == _STATE and summary is not None:
             theme, level = self._session.theme, _level(summary)
@@ -152,7 +152,7 @@ class FolderModel(QAbstractTableModel):
             return "…" if column == _STATE else ""
         if column == _STATE:
             return _state(summary)
-        if column == _MADE:
+        if column == _START:
             return _when(summary.started, self._changed.get(path, 0.0))
         if summary.trouble:
             return ""
@@ -160,16 +160,16 @@ class FolderModel(QAbstractTableModel):
             return summary.title
         if column == _FILM:
             return summary.film
-        if column == _LENGTH:
+        if column == _DURATION:
             return f"{significant(summary.duration)} s"
         return _error(summary, column)
 
     def _sort_key(self, path: Path, summary: RecordingSummary | None, column: int) -> Any:
-        if column == _MADE:
+        if column == _START:
             return self._changed.get(path, 0.0)
         if summary is None or summary.trouble:
-            return path.stem if column in (0, _NAME) else (-1.0 if column >= _LENGTH else "")
-        if column == _LENGTH:
+            return path.stem if column in (0, _NAME) else (-1.0 if column >= _DURATION else "")
+        if column == _DURATION:
             return summary.duration
         if _RMS <= column <= _NOISE:
             e = summary.errors
@@ -200,7 +200,7 @@ def _level(summary: RecordingSummary) -> str:
 
 
 def _state(summary: RecordingSummary) -> str:
-    # a sign besides the colour
+    # a sign beside the colour, for readers who cannot tell the colours apart
     sign = {"fault": "\N{MULTIPLICATION X} ", "warning": "! "}.get(_level(summary), "")
     if summary.trouble:
         return f"{sign}cannot be read"
@@ -225,14 +225,14 @@ def _error(summary: RecordingSummary, column: int) -> str:
 
 def _tip(path: Path, summary: RecordingSummary | None, column: int) -> str:
     if summary is None:
-        return f"{path}: not looked at yet"
+        return f"{path}: not read yet"
     if summary.trouble:
         return summary.trouble
     if _RMS <= column <= _NOISE:
         if summary.unfit:
             return summary.unfit
         if summary.fitted:
-            return "The model was fitted to this very recording: its error here proves nothing"
+            return "The model was fitted to this recording; this error is no validation"
         return COLUMNS[column][1]
     if column == _STATE:
         told = [f"{event.time:.4g} s, {event.level}: {event.message}" for event in summary.events]
@@ -243,7 +243,7 @@ def _tip(path: Path, summary: RecordingSummary | None, column: int) -> str:
 
 
 def _when(started: str, changed: float) -> str:
-    """The start of the run in the time of this place, else the file's own time."""
+    """Return the start of the run in local time, or the time of the file's last change."""
     try:
         moment = datetime.fromisoformat(started)
     except ValueError:

@@ -1,4 +1,4 @@
-"""The main window: the pages at the left, the state of the high voltage always in sight."""
+"""Main window: the list of pages, the pages, and the state of the high voltage."""
 
 from __future__ import annotations
 
@@ -39,24 +39,24 @@ from dearig.window.theme import DARK, LIGHT, apply, system_theme
 
 __all__ = ["MainWindow"]
 
-_COLOUR_SCHEMES = {"system": "As the system has it", "light": "Light", "dark": "Dark"}
+_COLOUR_SCHEMES = {"system": "Same as the system", "light": "Light", "dark": "Dark"}
 
 
 class Page(Protocol):
-    """What the frame knows of a page."""
+    """Attributes of every page."""
 
     title: str
     shortcut: str
 
 
 class MainWindow(QMainWindow):
-    """Holds the pages together, and lets nothing be closed before the rig is safe."""
+    """Holds the pages; it closes only when the rig is safe."""
 
     def __init__(self, session: Session) -> None:
         super().__init__()
         self.session = session
         self.setWindowTitle("dearig")
-        self.setMinimumHeight(680)  # how wide it is at least the pages say, with their fonts
+        self.setMinimumHeight(680)  # px; the pages set the minimum width, which depends on fonts
         self.planner = Planner(session, self)
         self.rig_page = RigPage(session)
         self.sequence_page = SequencePage(session)
@@ -75,10 +75,10 @@ class MainWindow(QMainWindow):
         self._build()
         self._connect()
         self._apply_colour_scheme()
-        self._restore()
+        self._restore_state()
         self.planner.renew()
 
-    # asked by keys and pages
+    # commands
 
     def show_page(self, page: QWidget) -> None:
         """Bring ``page`` to the front."""
@@ -86,7 +86,7 @@ class MainWindow(QMainWindow):
 
     @Slot()
     def show_guide(self) -> None:
-        """Open the guide, beside the window."""
+        """Open the guide in a window of its own."""
         if self._guide is None:
             self._guide = Guide(self)
         self._guide.show()
@@ -94,7 +94,7 @@ class MainWindow(QMainWindow):
 
     @Slot()
     def reset_layout(self) -> None:
-        """Put every part back to where it was at the first start."""
+        """Give all parts the sizes and places of the first start."""
         for key in ("geometry", "page", GROUP):
             self.session.settings.remove(key)
         for page in (self.sequence_page, self.recordings_page, self.study_page):
@@ -103,37 +103,37 @@ class MainWindow(QMainWindow):
         self.show_page(self.run_page)
 
     def leave(self) -> None:
-        """Close without asking, once the rig is safe; for a program that is told to end."""
+        """Close without a question once the rig is safe; for a program that gets a signal."""
         self._closing = True
         self.close()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
-        """STOP by a key, whatever has the focus; but a space may still be typed into a text."""
+        """Stop the run on Esc or Space, whatever has the focus; fields still accept a space."""
         if event.type() == QEvent.Type.KeyPress and self.run_page.runner.running:
             pressed = cast(QKeyEvent, event)
             key = pressed.key()
             typing = isinstance(QApplication.focusWidget(), QLineEdit | QPlainTextEdit | QComboBox)
             if key == Qt.Key.Key_Escape or (key == Qt.Key.Key_Space and not typing):
-                if not pressed.isAutoRepeat():  # the second press means something else
+                if not pressed.isAutoRepeat():  # a second press goes to 0 V without a ramp
                     self.run_page.stop()
                 return True
         return super().eventFilter(watched, event)
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
-        """Ask where a run goes on, and make safe whatever the answer."""
+        """Ask during a run, and make the rig safe whatever the answer."""
         runner = self.run_page.runner
         if runner.running and not self._closing and not self._ask_to_close():
             event.ignore()
             return
         self._closing = True
         if runner.running:
-            # the ramp takes its time; the window stays and shows it, and closes itself after
+            # the window shows the ramp, and closes when the run has ended
             runner.stop()
             runner.ended.connect(self.close, Qt.ConnectionType.QueuedConnection)
             event.ignore()
             return
-        self._remember()
-        self._listen(running=False)
+        self._save_state()
+        self._filter_keys(running=False)
         self.run_page.close_work()
         self.planner.close()
         for page in (
@@ -143,20 +143,20 @@ class MainWindow(QMainWindow):
         event.accept()
 
     def _ask_to_close(self) -> bool:
-        """True to close. Either way the voltage is ramped down first."""
+        """Stop the run and return True if the window is to close afterwards."""
         runner = self.run_page.runner
         runner.stop()
         asked = QMessageBox(self)
-        asked.setWindowTitle("A run is going on")
+        asked.setWindowTitle("A run is in progress")
         asked.setIcon(QMessageBox.Icon.Warning)
         asked.setText("The run is being stopped: the voltage is ramped down to 0 V.")
-        asked.setInformativeText("What was recorded is kept. Close the window then?")
+        asked.setInformativeText("The recording is kept. Close the window at 0 V?")
         close = asked.addButton("Close", QMessageBox.ButtonRole.AcceptRole)
-        asked.addButton("Stay", QMessageBox.ButtonRole.RejectRole)
+        asked.addButton("Keep open", QMessageBox.ButtonRole.RejectRole)
         asked.exec()
         return asked.clickedButton() is close
 
-    # how it is laid out
+    # layout
 
     def _build(self) -> None:
         self.list = QListWidget()
@@ -197,9 +197,9 @@ class MainWindow(QMainWindow):
         bar.addWidget(self.badge)
         self.status = QLabel()
         bar.addWidget(self.status, 1)
-        self.where = QLabel()
-        self.where.setProperty("role", "muted")
-        bar.addPermanentWidget(self.where)
+        self.rig_and_folder = QLabel()
+        self.rig_and_folder.setProperty("role", "muted")
+        bar.addPermanentWidget(self.rig_and_folder)
 
     def _menu_button(self) -> QToolButton:
         menu = QMenu(self)
@@ -208,20 +208,20 @@ class MainWindow(QMainWindow):
         guide.triggered.connect(self.show_guide)
         menu.addAction(guide)
         self.addAction(guide)
-        looks = menu.addMenu("&Colours")
+        schemes = menu.addMenu("&Colour scheme")
         self._scheme_actions: dict[str, QAction] = {}
         for name, words in _COLOUR_SCHEMES.items():
-            look = QAction(words, self)
-            look.setCheckable(True)
-            look.triggered.connect(lambda _=False, name=name: self.set_colour_scheme(name))
-            looks.addAction(look)
-            self._scheme_actions[name] = look
-        reset = QAction("&Reset the layout", self)
+            action = QAction(words, self)
+            action.setCheckable(True)
+            action.triggered.connect(lambda _=False, name=name: self.set_colour_scheme(name))
+            schemes.addAction(action)
+            self._scheme_actions[name] = action
+        reset = QAction("&Reset layout", self)
         reset.triggered.connect(self.reset_layout)
         menu.addAction(reset)
         made = QToolButton()
         made.setText("≡  Window")
-        made.setToolTip("Guide (F1), colours, layout")
+        made.setToolTip("Guide (F1), colour scheme, layout")
         made.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         made.setMenu(menu)
         made.setFixedWidth(132)
@@ -233,20 +233,20 @@ class MainWindow(QMainWindow):
         run.runner.state_changed.connect(self._state_changed)
         run.show_sequence.connect(lambda: self.show_page(self.sequence_page))
         run.show_recording.connect(self._show_recording)
-        session.rig_changed.connect(self._where_changed)
-        session.folder_changed.connect(self._where_changed)
+        session.rig_changed.connect(self._rig_or_folder_changed)
+        session.folder_changed.connect(self._rig_or_folder_changed)
         session.message.connect(self.status.setText)
         self.sequence_page.show_run.connect(lambda: self.show_page(run))
         self.recordings_page.open_sequence.connect(self._read_sequence)
         self.study_page.open_sequence.connect(self._play_sequence)
         self.study_page.show_model.connect(self._show_model)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_colour_scheme)
-        session.running_changed.connect(self._listen)
-        self._where_changed()
+        session.running_changed.connect(self._filter_keys)
+        self._rig_or_folder_changed()
 
     @Slot(bool)
-    def _listen(self, running: bool) -> None:
-        """Hear every key while a run goes on, and none else: all events pass through here."""
+    def _filter_keys(self, running: bool) -> None:
+        """Filter key presses during a run only: all events of the program pass the filter."""
         application = QApplication.instance()
         if application is not None:
             application.removeEventFilter(self)
@@ -259,10 +259,10 @@ class MainWindow(QMainWindow):
         self.badge.show_state(state, words)
 
     @Slot()
-    def _where_changed(self) -> None:
+    def _rig_or_folder_changed(self) -> None:
         folder = self.session.folder
-        self.where.setText(f"rig {self.session.address}   ·   {folder.name or folder}  ")
-        self.where.setToolTip(f"Recordings go to {folder}")
+        self.rig_and_folder.setText(f"rig {self.session.address}   ·   {folder.name or folder}  ")
+        self.rig_and_folder.setToolTip(f"Folder of the recordings: {folder}")
         self._state_changed(self.run_page.runner.state)
 
     @Slot(int)
@@ -281,7 +281,7 @@ class MainWindow(QMainWindow):
 
     @Slot(str)
     def _play_sequence(self, toml: str) -> None:
-        """Fill in a proposed experiment; it has to be armed like any other."""
+        """Show a proposed experiment on the Run page; the operator arms it as usual."""
         self.session.set_sequence(toml, Path())
         self.show_page(self.run_page)
 
@@ -291,33 +291,33 @@ class MainWindow(QMainWindow):
         self.show_page(self.run_page)
 
     def set_colour_scheme(self, name: str) -> None:
-        """``system``, ``light`` or ``dark``."""
-        self.session.settings.setValue("look", name)
+        """Use the colour scheme ``system``, ``light`` or ``dark``."""
+        self.session.settings.setValue("colour_scheme", name)
         self._apply_colour_scheme()
 
     @Slot()
     def _apply_colour_scheme(self) -> None:
-        name = str(self.session.settings.value("look", "system"))
+        name = str(self.session.settings.value("colour_scheme", "system"))
         theme = {"light": LIGHT, "dark": DARK}.get(name) or system_theme()
         application = QApplication.instance()
         if isinstance(application, QApplication):
             apply(application, theme)
-        for key, look in self._scheme_actions.items():
-            look.setChecked(key == name)
+        for key, action in self._scheme_actions.items():
+            action.setChecked(key == name)
         self.session.set_theme(theme)
 
-    def _remember(self) -> None:
+    def _save_state(self) -> None:
         self.session.settings.setValue("geometry", self.saveGeometry())
 
-    def _restore(self) -> None:
+    def _restore_state(self) -> None:
         settings = self.session.settings
         geometry = settings.value("geometry")
         if geometry is None or not self.restoreGeometry(geometry):
             self._default_geometry()
-        # a first start shows what is to be done first: a rig that is ready, and the way to run it
+        # the first start shows the Run page: a simulated rig is ready to be armed
         row = int(str(settings.value("page", self.pages.index(self.run_page))))
         self.list.setCurrentRow(min(max(row, 0), len(self.pages) - 1))
 
     def _default_geometry(self) -> None:
-        room = QGuiApplication.primaryScreen().availableSize()
-        self.resize(room.boundedTo(QSize(1600, 980)))
+        available = QGuiApplication.primaryScreen().availableSize()
+        self.resize(available.boundedTo(QSize(1600, 980)))

@@ -1,4 +1,4 @@
-"""The recordings of the session's folder: listed at once, looked at in another process."""
+"""Recordings of the session's folder: listed in a thread, read in another process."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from dearig.window.worker import Job, Worker
 
 __all__ = ["Library", "shared_library"]
 
-_SETTLE_MS = 300  # after which a folder that changes is looked at; several files come at once
+_SETTLE_MS = 300  # wait after a change of the folder; several files often change together
 
 
 class Library(QObject):
-    """``files`` in the folder, and ``summaries`` of those that were looked at until now.
+    """``files`` in the folder, and the ``summaries`` of those that are read.
 
-    ``listed``: other files; ``looked``: its summary is there; ``trouble``: the folder cannot be
-    read; ``busy``: how many files are still to be looked at. All are compared with ``model``. While
-    a run goes on no file is opened: it may be the one that is being written.
+    ``listed``: the list of files has changed; ``summarised``: the summary of a file is there;
+    ``trouble``: the folder cannot be read; ``busy``: the number of files still to be read. Each
+    summary compares its recording with ``model``. During a run no file is opened: it may be the one
+    that is being written.
     """
 
     listed = Signal()
-    looked = Signal(Path)
+    summarised = Signal(Path)
     trouble = Signal(str)
     busy = Signal(int)
 
@@ -37,38 +38,38 @@ class Library(QObject):
         self._worker = Worker(self)
         self._watcher = QFileSystemWatcher(self)
         self._settle = QTimer(self, singleShot=True, interval=_SETTLE_MS)
-        self._listing = Background(self)  # a thread: it has to wait for no process
-        self._listing.done.connect(self._took_list)
+        self._listing = Background(self)  # a thread, which starts at once; a process takes a second
+        self._listing.done.connect(self._take_list)
         self._listing.failed.connect(self.trouble)
         self._pending: set[Path] = set()
-        self._round = 0  # of looks: a late answer of an earlier one is not shown
+        self._round = 0  # number of the current reading; late results of an earlier one are dropped
         self.model: Path | None = None
         self.files: dict[Path, tuple[float, int]] = {}
         self.summaries: dict[Path, RecordingSummary] = {}
         self._settle.timeout.connect(self.refresh)
         self._watcher.directoryChanged.connect(self._changed)
-        session.folder_changed.connect(self._moved)
+        session.folder_changed.connect(self._folder_changed)
         session.recorded.connect(self._changed)
         session.running_changed.connect(self._changed)
-        self._moved()
+        self._folder_changed()
 
     @property
     def folder(self) -> Path:
-        """Where they lie."""
+        """Folder of the recordings."""
         return self._session.folder
 
     def submit(self, function: Callable[..., Any], *given: Any) -> Job:
-        """Have something else done with recordings, before the looks that still wait."""
+        """Run ``function(*given)`` in the process, before the summaries that still wait."""
         return self._worker.submit(function, *given, first=True)
 
     def set_model(self, path: Path | None) -> None:
-        """Compare all with the model in ``path``; None is the thesis's."""
+        """Compare all recordings with the model file ``path``; None is the thesis model."""
         if path != self.model:
             self.model = path
             self._worker.clear()
             self._pending.clear()
             self._round += 1
-            self._look(sorted(self.files, key=lambda path: -self.files[path][0]))
+            self._summarise(sorted(self.files, key=lambda path: -self.files[path][0]))
 
     def close(self) -> None:
         """End the process."""
@@ -79,9 +80,9 @@ class Library(QObject):
 
     @Slot()
     def refresh(self) -> None:
-        """List the folder again, and look at what is new or changed."""
+        """List the folder again, and read new and changed files."""
         if self._session.running:
-            return  # its end comes here again
+            return  # the end of the run calls this again
         folder = self.folder
         self._listing.start(lambda: recordings_in(folder))
 
@@ -92,7 +93,7 @@ class Library(QObject):
         self._settle.start()
 
     @Slot()
-    def _moved(self) -> None:
+    def _folder_changed(self) -> None:
         watched = self._watcher.directories()
         if watched:
             self._watcher.removePaths(watched)
@@ -106,9 +107,9 @@ class Library(QObject):
         self.refresh()
 
     @Slot(object)
-    def _took_list(self, files: dict[Path, tuple[float, int]]) -> None:
+    def _take_list(self, files: dict[Path, tuple[float, int]]) -> None:
         if any(path.parent != self.folder for path in files):
-            return  # of the folder that was left meanwhile
+            return  # files of the previous folder
         before, self.files = self.files, files
         self.summaries = {path: g for path, g in self.summaries.items() if path in files}
         fresh = [
@@ -117,32 +118,32 @@ class Library(QObject):
             or (path not in self.summaries and path not in self._pending)
         ]  # fmt: skip
         self.listed.emit()
-        self._look(sorted(fresh, key=lambda path: -files[path][0]))
+        self._summarise(sorted(fresh, key=lambda path: -files[path][0]))
 
-    def _look(self, paths: list[Path]) -> None:
+    def _summarise(self, paths: list[Path]) -> None:
         drive, round_ = self._session.overlay_drive, self._round
         for path in paths:
             job = self._worker.submit(summarise, path, self.model, drive)
-            job.finished.connect(lambda found, of=round_: self._took(found, of))
+            job.finished.connect(lambda found, of=round_: self._take_summary(found, of))
             job.failed.connect(
-                lambda words, of=round_, path=path: self._took(
+                lambda words, of=round_, path=path: self._take_summary(
                     RecordingSummary(path, trouble=words), of
                 )
             )
         self._pending.update(paths)
         self.busy.emit(len(self._pending))
 
-    def _took(self, found: RecordingSummary, of: int) -> None:
+    def _take_summary(self, found: RecordingSummary, of: int) -> None:
         if of != self._round:
             return
         self._pending.discard(found.path)
         if found.path in self.files:
             self.summaries[found.path] = found
-            self.looked.emit(found.path)
+            self.summarised.emit(found.path)
         self.busy.emit(len(self._pending))
 
 
 def shared_library(session: Session) -> Library:
-    """The library of ``session``, which all its pages share."""
+    """Return the library of ``session``, which its pages share."""
     found = session.findChild(Library)
     return found if isinstance(found, Library) else Library(session)

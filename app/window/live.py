@@ -1,7 +1,8 @@
-"""A run as a screen shows it: blocks from the rig's thread in, curves and numbers out.
+"""Curves and readouts of a run in progress.
 
-Three threads meet here and none waits for another: the rig's hands a block over and goes on, one of
-our own makes curves of it and lets the models follow, and the screen's looks at what is there.
+Three threads use this module without waiting for each other: the rig's thread hands over blocks, a
+thread of this module converts them and advances the overlay models, and the interface thread reads
+the curves.
 """
 
 from __future__ import annotations
@@ -30,17 +31,17 @@ _SIGNALS = {
     "current_monitor": "current",
     "displacement": "displacement",
 }
-_READOUT = 0.01  # s over which a number is the mean, so that it can be read
-_RECENT = 1.0  # s of the running error
+_READOUT = 0.01  # s, averaging time of a readout, so that it can be read
+_RECENT = 1.0  # s, window of the recent RMS error
 
 
 @dataclass(frozen=True)
 class RunSnapshot:
-    """A moment of a run: ``samples`` of ``total`` at ``rate`` Hz, and the means of its last 10 ms.
+    """State of a run: ``samples`` of ``total`` at ``rate`` Hz, and the means of its last 10 ms.
 
-    ``revision`` is another one whenever there is something else to draw. ``values`` in
-    SI units by name (command, monitor, current, displacement), ``errors`` and
-    ``words`` (why it could not follow) one for each model.
+    ``revision`` changes whenever there is something new to draw. ``values`` are in SI units by
+    signal (command, monitor, current, displacement). ``errors`` and ``words`` (why the model could
+    not be simulated) have one item for each overlay model.
     """
 
     samples: int
@@ -65,7 +66,7 @@ class Live(RunObserver):
         self._events: list[Event] = []
         self._thread: threading.Thread | None = None
 
-    # from the thread that runs the rig
+    # called from the rig's thread
 
     def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:
         run = _Run(planned.voltage.size, identity.channels, rate)
@@ -81,31 +82,31 @@ class Live(RunObserver):
         with self._lock:
             self._events.append(event)
 
-    # from the screen's
+    # called from the interface thread
 
     def follow(self, overlays: Sequence[OverlayModel], drive: str) -> None:
-        """Let other models run beside the measurement, from its start on."""
+        """Use other overlay models; they are simulated from the start of the run."""
         self._wanted = (tuple(overlays), drive)
         self._inbox.put(self._wanted)
 
     def take_events(self) -> list[Event]:
-        """What happened since this was asked last."""
+        """Return the events since the last call."""
         with self._lock:
             taken, self._events = self._events, []
         return taken
 
     def now(self) -> RunSnapshot | None:
-        """The present moment; None before the run has started."""
+        """Return the present state; None before the run has started."""
         if self._run is None:
             return None
         with self._lock:
             return self._run.now()
 
     def view(self, name: str, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
-        """Time in s and values in SI units of a signal, (m,) each, from ``first`` to ``last`` s.
+        """Return time in s and values in SI units of a signal, (m,) each, ``first`` to ``last`` s.
 
         ``name`` is command, monitor, current, displacement, or model, residual, rms with the
-        number of the model (``model 0``); unknown names have nothing to show.
+        number of the model (``model 0``). Unknown names give empty arrays.
         """
         run = self._run
         if run is None:
@@ -119,7 +120,7 @@ class Live(RunObserver):
         return samples / run.rate, values
 
     def close(self) -> None:
-        """Take in what is waiting, and end the thread."""
+        """Convert the waiting blocks, and end the thread."""
         if self._thread is not None:
             self._inbox.put(None)
             self._thread.join()
@@ -133,7 +134,7 @@ class Live(RunObserver):
                 with self._lock:
                     run.show(taken)
                 continue
-            # a model that comes late runs through what it has missed, on curves of its own
+            # a new model is simulated from the start of the run, on curves of its own
             fresh = run.with_models(*item)
             with self._lock:
                 self._run = run = fresh
@@ -146,7 +147,7 @@ class _Converted:
 
 
 class _Model:
-    """One model beside a run."""
+    """One overlay model."""
 
     def __init__(self, overlay: Overlay | None, words: str, rate: float) -> None:
         self.overlay = overlay
@@ -164,7 +165,7 @@ class _Model:
 
 
 class _Run:
-    """Curves and models of one run; ``show`` and what reads are called under the lock."""
+    """Curves and models of one run; ``show`` and readers are called under the lock."""
 
     def __init__(self, total: int, channels: tuple[Channel, ...], rate: float) -> None:
         self.total = total
@@ -191,7 +192,7 @@ class _Run:
         self._models = tuple(models)
 
     def with_models(self, overlays: tuple[OverlayModel, ...], drive: str) -> _Run:
-        """The same run so far, with other models."""
+        """Return the same run so far with other models."""
         fresh = _Run(self.total, self.channels, self.rate)
         fresh.follow(overlays, drive)
         fresh.revision = self.revision + 1
@@ -200,7 +201,7 @@ class _Run:
         return fresh
 
     def convert(self, block: Block) -> _Converted:
-        """The block in SI units, with what the models make of it; the slow part."""
+        """Convert a block to SI units and advance the models; the slow part."""
         self._blocks.append(block)
         values = {
             _SIGNALS[c.name]: c.scaling.physical(block.counts[i])
@@ -243,7 +244,7 @@ class _Run:
 
 
 class _RestReference:
-    """Displacement from the mean reading over the lead-in, as far as it has come."""
+    """Displacement from the mean reading over the lead-in, as far as the lead-in is read."""
 
     def __init__(self) -> None:
         self._sum = 0.0

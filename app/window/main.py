@@ -1,4 +1,4 @@
-"""Opens the window, and tells in a sentence why it cannot."""
+"""Start of the window, and the messages where it cannot start."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from dearig.errors import InputError
 
 __all__ = ["run_window"]
 
-# a closed terminal or a stopped service must not leave a voltage up
+# a closed terminal or a stopped service must not leave a voltage on
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
-_HEARD = 200  # ms
+_SIGNAL_INTERVAL = 200  # ms
 _INSTALL = "install it with: pip install 'dearig[gui]'"
-# where Qt finds no way to a screen it aborts: so another process tries, and leaves no core behind
+# Qt aborts when it cannot open a screen: another process tries first, without a core dump
 _TRY = (
     "import resource; resource.setrlimit(resource.RLIMIT_CORE, (0, 0)); "
     "from PySide6.QtGui import QGuiApplication; QGuiApplication([])"
 )
-_TRY_FOR = 30.0  # s, for a screen at the other end of a slow line
+_TRY_FOR = 30.0  # s; a remote screen may be slow
 _NO_SCREEN = ("offscreen", "minimal")
 
 
 def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Path()) -> int:
     """Show the window until it is closed; returns the exit code.
 
-    Recordings go to ``folder``. Raises ``InputError`` where there is no Qt, no screen, or no such
-    rig file.
+    Recordings are written to ``folder``. Raises ``InputError`` if Qt, a screen or the rig file is
+    missing.
     """
     _require_qt()
     _require_screen()
@@ -45,7 +45,7 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     from dearig.window.session import Session
     from dearig.window.theme import prepare_plots, system_theme
 
-    # before anything is shown: what is wrong with a file belongs in the terminal it was given in
+    # before the window opens: faults of a file belong in the terminal where it was named
     settings = load_rig_file(rig_file)
     text = "" if rig_file is None else read_text(rig_file, "rig file")
     application = QApplication(sys.argv[:1])
@@ -59,10 +59,10 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     for name in _SIGNALS:
         if (number := getattr(signal, name, None)) is not None:
             signal.signal(number, lambda *_: window.leave())
-    # signals are heard when the interpreter runs, which an idle window does not let it do
-    heard = QTimer()
-    heard.timeout.connect(_nothing)
-    heard.start(_HEARD)
+    # Python handles signals only while its interpreter runs, and an idle Qt loop does not run it
+    wake = QTimer()
+    wake.timeout.connect(_run_interpreter)
+    wake.start(_SIGNAL_INTERVAL)
     collector = Collector(application)
     window.show()
     try:
@@ -71,14 +71,14 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
         collector.close()
 
 
-def _nothing() -> None:
-    """Let the interpreter run."""
+def _run_interpreter() -> None:
+    """Do nothing: the call alone lets Python handle signals."""
 
 
 def _require_qt() -> None:
-    """Raises ``InputError`` where Qt is not there, or a library of the system that it needs."""
+    """Raise ``InputError`` if Qt, or a system library that it needs, is missing."""
     try:
-        import PySide6.QtGui  # first: pyqtgraph would blame another package
+        import PySide6.QtGui  # first: the message of pyqtgraph names another package
         import PySide6.QtWidgets  # noqa: F401
     except ModuleNotFoundError as error:
         raise InputError(f"the window needs PySide6, which is not installed; {_INSTALL}") from error
@@ -96,7 +96,7 @@ def _require_qt() -> None:
 
 
 def _require_screen() -> None:
-    """Raises ``InputError`` where Qt would end the program for want of a screen."""
+    """Raise ``InputError`` if Qt would abort the program because there is no screen."""
     asked = os.environ.get("QT_QPA_PLATFORM", "")
     if asked.startswith(_NO_SCREEN) or not sys.platform.startswith("linux"):
         return
@@ -122,8 +122,8 @@ def _require_screen() -> None:
 
 
 def _why(said: str) -> str:
-    """The cause, of all the lines that Qt says before it aborts."""
+    """Return the cause among the lines that Qt prints before it aborts."""
     lines = [line.strip().rstrip(".") for line in said.splitlines() if line.strip()]
     causes = [line for line in lines if "even though it was found" not in line]
-    first = (causes or lines or ["Qt ended without a word"])[0]
+    first = (causes or lines or ["Qt ended without a message"])[0]
     return first.partition(": ")[2] if first.startswith("qt.") else first

@@ -1,4 +1,4 @@
-"""The plan of the present sequence, made anew in the background whenever something changes."""
+"""Plan of the session's sequence, made again in the background after every change."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from dearig.window.traces import Pyramid
 
 __all__ = ["Planner", "make_preview"]
 
-_BREACHES_MAX = 50  # stretches of time marked in one plot; more are drawn as one
+_BREACHES_MAX = 50  # time spans marked in one plot; more are drawn as one
 
 
 class Planner(QObject):
-    """Keeps ``session.preview`` true to the sequence, the rig file and the film."""
+    """Keeps ``session.preview`` up to date with the sequence, the rig file and the film."""
 
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -34,7 +34,7 @@ class Planner(QObject):
 
     @Slot()
     def renew(self) -> None:
-        """Make the plan anew."""
+        """Make the plan again."""
         s = self._session
         s.preview = None
         toml, folder, rig_file, film = s.sequence_toml, s.sequence_folder, s.rig_file, s.film
@@ -50,7 +50,7 @@ class Planner(QObject):
 
 
 def make_preview(toml: str, folder: Path, rig_file: RigFile, film: str = "") -> Preview:
-    """What becomes of the sequence ``toml``; faults in it are a sentence, not an exception."""
+    """Plan the sequence ``toml``; a fault in it becomes ``Preview.sentence``."""
     try:
         loaded = parse_sequence(toml, "the sequence", folder)
     except InputError as error:
@@ -90,13 +90,13 @@ def _segments(loaded: LoadedSequence, end: float) -> tuple[tuple[str, float, flo
 
 
 def _breaches(planned: Plan, limits: Limits) -> tuple[Breach, ...]:
-    """Where the gate's limits of an instant are broken; which are broken at all says the gate."""
+    """Return the time spans in which an instantaneous limit of the gate is exceeded."""
     volts, rate = planned.voltage, planned.rate
     slew = np.abs(np.diff(volts, append=volts[-1:])) * rate
     broken = {
         "voltage": (volts > limits.voltage_max) | (volts < limits.voltage_min),
         "slew": slew > limits.slew,
-        "true field": planned.field > limits.field,  # what is not known is not marked
+        "true field": planned.field > limits.field,  # NaN, an unknown field, is not marked
     }
     found: list[Breach] = []
     for quantity, where in broken.items():

@@ -1,4 +1,4 @@
-"""Curves, legends and levels as the plots of finished recordings have them."""
+"""Curves, legends and axes of the plots of finished recordings."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ __all__ = [
 ]
 
 
-_FEW = 2.5  # decades, below which powers of ten alone would be too few marks
+_FEW = 2.5  # decades; below this, powers of ten alone are too few labels
 
 
 class DecadeAxis(pg.AxisItem):
-    """A logarithmic axis with words at 1, 2, 5 or at powers of ten, so that none touch."""
+    """Logarithmic axis with labels at 1, 2, 5 or at powers of ten, so that none overlap."""
 
     def tickStrings(  # noqa: N802
         self, values: list[float], scale: float, spacing: float
@@ -41,7 +41,7 @@ class DecadeAxis(pg.AxisItem):
 
 
 def stacked_plots(weights: tuple[int, ...]) -> tuple[pg.GraphicsLayoutWidget, list[pg.PlotItem]]:
-    """Plots one below the other on one time axis, as high as ``weights`` say."""
+    """Make plots one below the other on one time axis, with heights in the ratio ``weights``."""
     area = pg.GraphicsLayoutWidget()
     plots = [area.addPlot(row=row, col=0) for row in range(len(weights))]
     for plot in plots[1:]:
@@ -55,7 +55,7 @@ def stacked_plots(weights: tuple[int, ...]) -> tuple[pg.GraphicsLayoutWidget, li
 
 
 def clear_plot(plot: pg.PlotItem, theme: Theme) -> None:
-    """Take everything out of ``plot``, and give it the colours of ``theme``."""
+    """Clear ``plot``, and give it the colours of ``theme``."""
     plot.clear()
     style_plot(plot, theme)
     if plot.legend is not None:
@@ -71,16 +71,16 @@ def add_curve(
     name: str = "",
     dashed: bool = False,
 ) -> None:
-    """A curve of any length, which breaks where ``y`` is NaN; a ``name`` is for the legend."""
+    """Add a curve of any length, which breaks where ``y`` is NaN; ``name`` is for the legend."""
     item = pg.PlotDataItem(x, y, pen=pen(colour, dashed), name=name or None, connect="finite")
     plot.addItem(item)
-    # only now: while it is put into a view it takes the whole widget for one
+    # only now: before it is in a view, pyqtgraph clips it to the whole widget
     item.setClipToView(True)
     item.setDownsampling(auto=True, method="peak")
 
 
 def add_legend(plot: pg.PlotItem, theme: Theme) -> None:
-    """A legend at the upper left, where runs are at rest, for the curves that come after it."""
+    """Add a legend at the upper left, where runs are at rest, for the curves added later."""
     plot.addLegend(
         offset=(8, 4), labelTextColor=QColor(theme.text), verSpacing=-5,
         brush=QColor(theme.surface), pen=pg.mkPen(QColor(theme.line)),
@@ -88,7 +88,7 @@ def add_legend(plot: pg.PlotItem, theme: Theme) -> None:
 
 
 def legend_html(*entries: tuple[str, str, str]) -> str:
-    """A legend as rich text: (sign, name, colour) of each curve, which no line breaks."""
+    """Return a legend as rich text from (sign, name, colour); entries do not wrap."""
     whole = str.maketrans({" ": "\N{NO-BREAK SPACE}", "-": "\N{NON-BREAKING HYPHEN}"})
     return " \N{NO-BREAK SPACE} ".join(
         f'<span style="color:{colour}">{escape(f"{sign} {name}".translate(whole))}</span>'
@@ -97,13 +97,13 @@ def legend_html(*entries: tuple[str, str, str]) -> str:
 
 
 def set_legend_title(plot: pg.PlotItem, *entries: tuple[str, str, str]) -> None:
-    """A legend above the plot, for curves that leave no room."""
+    """Put a legend above the plot, where the curves leave no room inside."""
     plot.setTitle(legend_html(*entries), size="9pt")
 
 
 def add_noise(plot: pg.PlotItem, theme: Theme, *levels: float) -> None:
-    """Dashed lines at the noise floor."""
+    """Add dashed lines at the noise floor."""
     for level in levels:
         line = pg.InfiniteLine(level, angle=0, pen=pen(theme.muted, dashed=True))
-        line.setToolTip("the noise floor")
+        line.setToolTip("Noise floor")
         plot.addItem(line, ignoreBounds=True)

@@ -1,4 +1,4 @@
-"""What a sequence would do, drawn: voltage, predicted displacement, true field, and the limits."""
+"""Plots of a planned sequence: voltage, predicted displacement, true field, and limits."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ __all__ = ["PreviewPlots"]
 
 _PLOTS = {
     "voltage": ("Voltage (kV)", 1e-3),
-    "displacement": ("Predicted (mm)", 1e3),
+    "displacement": ("Displacement (mm)", 1e3),
     "field": ("True field (MV/m)", 1e-6),
 }
 _MARKED = {"voltage": "voltage", "slew": "voltage", "true field": "field"}
 
 
 class PreviewPlots(pg.GraphicsLayoutWidget):
-    """Shows a ``Preview``; the wheel zooms in time, a double click shows all again."""
+    """Shows a ``Preview``; the wheel zooms in time, a double click shows the whole sequence."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -48,7 +48,7 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
 
     @property
     def marks(self) -> int:
-        """How many stretches of time are marked as refused."""
+        """Number of time spans that are marked as refused."""
         return sum(isinstance(item, _Refused) for _, item in self._marks)
 
     @property
@@ -58,9 +58,9 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
         return tuple(n for n, y in found.items() if y is not None and np.isfinite(y).any())
 
     def show_preview(self, preview: Preview | None) -> None:
-        """Draw ``preview``; None stands for one that is still being made.
+        """Draw ``preview``; None is one that is still being made.
 
-        Where nothing is foreseen nothing is drawn: a curve that was there is of another sequence.
+        Without a prediction nothing is drawn: an old curve belongs to another sequence.
         """
         self._preview = preview
         planned = preview is not None and preview.plan is not None
@@ -70,9 +70,9 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
             curve.setData(x, y * _PLOTS[name][1])
             words = None
             if preview is not None and not planned:
-                words = "nothing to draw: the sequence cannot be played"
+                words = "no prediction: the sequence cannot be played"
             elif y.size and not np.isfinite(y).any():
-                words = "not foreseen: a limit is broken without it"
+                words = "no prediction: a limit is already exceeded"
             self._plots[name].setTitle(words, color=self._session.theme.muted, size="9pt")
         self._mark()
         if preview is None or preview.plan is None:
@@ -82,7 +82,7 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
             plot.enableAutoRange(axis="y")
 
     def choose(self, span: tuple[float, float] | None) -> None:
-        """Shade a stretch of time: the segment that is chosen."""
+        """Shade the time span (s) of the chosen segment."""
         if span != self._chosen:
             self._chosen = span
             self._mark()
@@ -102,7 +102,7 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
         self._mark()
 
     def _mark(self) -> None:
-        """Limits, the chosen segment, and where limits are broken."""
+        """Draw limits, the chosen segment, and the time spans beyond limits."""
         theme = self._session.theme
         for plot, item in self._marks:
             plot.removeItem(item)
@@ -140,4 +140,4 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
 
 
 class _Refused(pg.LinearRegionItem):
-    """A stretch of time in which a limit is broken."""
+    """Time span in which a limit is exceeded."""

@@ -1,4 +1,4 @@
-"""A table of a report in the window: same rows and words as in terminal and page, to be copied."""
+"""Widget for a table of a report, with the rows of the terminal and the HTML page."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ __all__ = ["ReportTable", "two_columns"]
 _NUMBER = re.compile(
     r"[(<]?[-\N{MINUS SIGN}\N{EN DASH}\N{INFINITY}+]?\d|[-\N{EN DASH}\N{INFINITY}]$"
 )
-_NARROW = ("Recording", "Level")  # heads of columns that hold a word, among those with sentences
+_NARROW = ("Recording", "Level")  # columns that hold a word, beside columns of sentences
 
 
 def two_columns(title: str, rows: tuple[tuple[str, str], ...]) -> Table:
-    """(what, value) lines as a table."""
+    """Make a table of (name, value) rows."""
     return Table(title, (("", ""), ("", "")), tuple(Row(row) for row in rows))
 
 
 class ReportTable(QTableWidget):
-    """Shows a ``Table``; what is selected in it can be copied.
+    """Shows a ``Table``; Ctrl+C copies the selected cells.
 
-    With ``whole`` it is as high as its rows, and whatever it stands in scrolls. With ``words`` its
-    cells are sentences, wrapped to its width, else numbers.
+    With ``whole`` it is as high as its rows, and its parent scrolls. With ``words`` its cells are
+    sentences wrapped to its width, otherwise numbers.
     """
 
     def __init__(
@@ -48,17 +48,17 @@ class ReportTable(QTableWidget):
         self.setAlternatingRowColors(True)
         self.setShowGrid(False)
         self.setWordWrap(True)
-        self.setTabKeyNavigation(False)  # tab goes on to the next widget
+        self.setTabKeyNavigation(False)  # Tab moves to the next widget
         self.verticalHeader().hide()
         self.horizontalHeader().setHighlightSections(False)
-        self.setToolTip("Ctrl+C copies what is selected")
+        self.setToolTip("Ctrl+C copies the selection")
         if whole:
             self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
             self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
             self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def show_table(self, table: Table) -> None:
-        """Show ``table`` in place of what was shown; its title is for the caller to show."""
+        """Show ``table`` without its title, which the caller shows."""
         self.clear()
         self.setRowCount(len(table.rows))
         self.setColumnCount(len(table.head))
@@ -111,7 +111,7 @@ class ReportTable(QTableWidget):
         QGuiApplication.clipboard().setText("\n".join(lines))
 
     def _mute(self) -> None:
-        """Set back what is of less weight, in the colours of the present theme."""
+        """Draw muted rows in the muted colour of the present theme."""
         for i, row in enumerate(self._shown.rows):
             for k in range(len(row.cells)) if row.muted else ():
                 item = self.item(i, k)
@@ -123,7 +123,7 @@ class ReportTable(QTableWidget):
         if not self._whole:
             return
         header, edges = self.horizontalHeader(), 2 * self.frameWidth()
-        # hidden, not invisible: this is asked before the table itself is seen
+        # isHidden and not isVisible: the table itself is not shown yet
         height = edges + (0 if header.isHidden() else header.sizeHint().height())
         height += sum(self.rowHeight(row) for row in range(self.rowCount()))
         self.setFixedHeight(height)

@@ -1,4 +1,4 @@
-"""What a model leaves of a recording, seen from several sides: time, frequency, its causes."""
+"""Plots of a residual: over time, over frequency, against quantities, and the missing stress."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from dearig.window.widgets import label
 
 __all__ = ["ResidualPlots"]
 
-_POINTS = 2000  # of a cloud; more are a blot
+_POINTS = 2000  # of a scatter plot; more points cover each other
 
 
 class ResidualPlots(QWidget):
-    """Four plots of one recording's residual; where two models are compared, both are drawn."""
+    """Four plots of one recording's residual, before and after a diagnosis."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
         self._residuals: tuple[Residual, ...] = ()
         self.record = QComboBox()
-        self.record.setToolTip("The recording whose residual is shown")
+        self.record.setToolTip("Recording whose residual is shown")
         self.quantity = QComboBox()
-        self.quantity.setToolTip("What the residual and the missing stress are drawn against")
+        self.quantity.setToolTip("Quantity on the horizontal axis of the lower plots")
         self.stand = QComboBox()
         self.stand.addItems(["before", "after"])
-        self.stand.setToolTip("With the thesis's model (before), or with what was found (after)")
+        self.stand.setToolTip("Thesis model (before), or model with the effects found (after)")
         self.time, self.dependence, self.missing = (pg.PlotWidget() for _ in range(3))
         self.density = pg.PlotWidget(axisItems={"left": DecadeAxis("left")})
         for plot, name in (
@@ -47,8 +47,8 @@ class ResidualPlots(QWidget):
         ):
             plot.setAccessibleName(name)
             plot.setMinimumHeight(130)
-        self.words = label("", "muted")
-        self.words.setWordWrap(True)
+        self.remarks = label("", "muted")
+        self.remarks.setWordWrap(True)
 
         row = QHBoxLayout()
         for text, box in (
@@ -67,7 +67,7 @@ class ResidualPlots(QWidget):
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
         outer.addLayout(row)
         outer.addLayout(grid, 1)
-        outer.addWidget(self.words)
+        outer.addWidget(self.remarks)
 
         self.record.currentIndexChanged.connect(self._another_record)
         self.quantity.currentIndexChanged.connect(self._draw)
@@ -75,7 +75,7 @@ class ResidualPlots(QWidget):
         session.theme_changed.connect(self._draw)
 
     def show_residuals(self, residuals: tuple[Residual, ...]) -> None:
-        """Show these, the first of them first."""
+        """Show these residuals, starting with the first."""
         self._residuals = residuals
         self.record.blockSignals(True)
         self.record.clear()
@@ -111,9 +111,9 @@ class ResidualPlots(QWidget):
         self.dependence.setVisible(found is None or bool(found.dependences))
         self.missing.setVisible(found is None or bool(found.missing))
         if found is None:
-            self.words.setText("")
+            self.remarks.setText("")
             return
-        self.words.setText(readable(". ".join(w[:1].upper() + w[1:] for w in found.words)))
+        self.remarks.setText(readable(". ".join(w[:1].upper() + w[1:] for w in found.words)))
         self._over_time(found)
         self._over_frequency(found)
         last = min(self.stand.currentIndex(), len(found.over_time) - 1)
@@ -127,7 +127,7 @@ class ResidualPlots(QWidget):
         return (("before", theme.models[0]), ("after", theme.models[1]))
 
     def _key(self, stands: int) -> tuple[tuple[str, str, str], ...]:
-        """What the colours mean where ``stands`` models are compared."""
+        """Return the legend for ``stands`` models."""
         names = self._colours()[:stands]
         if stands == 1:
             names = (("residual", names[0][1]),)
@@ -169,9 +169,9 @@ class ResidualPlots(QWidget):
         unit = found.unit.replace("^2", "\N{SUPERSCRIPT TWO}")
         plot.setLabel("bottom", f"{found.quantity} ({unit})" if unit else found.quantity)
         set_legend_title(
-            plot, ("\N{BLACK CIRCLE}", "rising", theme.command),
-            ("\N{BLACK SQUARE}", "falling", theme.monitor),
-            ("\N{FULL BLOCK}", "chance", theme.muted),
+            plot, ("\N{BLACK CIRCLE}", "loading", theme.command),
+            ("\N{BLACK SQUARE}", "unloading", theme.monitor),
+            ("\N{FULL BLOCK}", "95 % band of noise", theme.muted),
         )  # fmt: skip
         chance = 2.0 * found.error * scale
         band = QColor(theme.muted)
@@ -197,7 +197,7 @@ class ResidualPlots(QWidget):
         if kind == "actuator" and "oltage" in quantity:
             values, text = (missing.voltage * 1e-3) ** 2, "voltage squared (kV\N{SUPERSCRIPT TWO})"
         elif "rate" in quantity:
-            values, text = missing.rate, "rate of stretch (1/s)"
+            values, text = missing.rate, "stretch rate (1/s)"
         elif "time" in quantity:
             values, text = missing.time, "time (s)"
         plot.setLabel("left", "Missing stress (Pa)")

@@ -1,4 +1,4 @@
-"""The page of the rig: which one, whether it is well, and its file."""
+"""Page Rig: choice of the rig, check of its instruments, and its rig file."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ from dearig.window.widgets import Message, button, card, label
 __all__ = ["RigPage"]
 
 _SHAPES = {"ok": "●", "warning": "▲", "wrong": "✗", "not wired": "○"}
-_WORDS = {"ok": "well", "warning": "look at it", "wrong": "wrong", "not wired": "not wired"}
+_WORDS = {"ok": "OK", "warning": "Check", "wrong": "Wrong", "not wired": "Not wired"}
 _KINDS = ("sim", "hidden", "local", "remote")
 
 
 class RigPage(QWidget):
-    """Chooses the rig, looks at it, and edits the rig file with what is wrong beside each field."""
+    """Chooses and checks the rig, and edits the rig file with faults beside their fields."""
 
     title = "Rig"
     shortcut = "Ctrl+1"
@@ -56,7 +56,7 @@ class RigPage(QWidget):
         super().__init__(parent)
         self.session = session
         self.text = session.rig_text
-        self.forms: dict[str, Form] = {}  # made when they are first looked at
+        self.forms: dict[str, Form] = {}  # made when their tab is first shown
         self._areas: dict[str, QScrollArea] = {}
         self._saved = session.rig_text
         self._checks = Background(self)
@@ -76,11 +76,11 @@ class RigPage(QWidget):
         self._show_outcome()
         self._show_all()
 
-    # which rig
+    # choice and check of the rig
 
     @Slot()
     def choose(self) -> None:
-        """Take the rig that the fields say."""
+        """Use the rig of the fields."""
         kind = _KINDS[self.kinds.checkedId()]
         device = self.device.text().strip()
         address = {
@@ -96,12 +96,12 @@ class RigPage(QWidget):
 
     @Slot()
     def check(self) -> None:
-        """Look at the instruments; nothing but 0 V is put out."""
+        """Check the instruments; the output stays at 0 V."""
         address, rig_file = self.session.address, self.session.rig_file
         self._checks.start(lambda: check_rig(address, rig_file))
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
-        """Look at a simulated rig without being asked: there is nothing to be moved."""
+        """Check a simulated rig when the page is shown; a real one waits for the button."""
         super().showEvent(event)
         if self.outcome is None and not self._checks.busy and is_simulated(self.session.address):
             self.check()
@@ -115,11 +115,11 @@ class RigPage(QWidget):
     def _checking(self, busy: bool) -> None:
         self.check_button.setEnabled(not busy and not self.session.running)
         if busy:
-            self.summary.show_text(f"looking at {self.session.address} …", "muted")
+            self.summary.show_text(f"Checking {self.session.address} …", "muted")
 
     @Slot(bool)
     def _running_changed(self, running: bool) -> None:
-        for part in (self.which, self.editor):
+        for part in (self.address_card, self.editor):
             part.setEnabled(not running)
         self.check_button.setEnabled(not running and not self._checks.busy)
 
@@ -128,7 +128,7 @@ class RigPage(QWidget):
         self.outcome = None
         self._show_outcome()
         self._show_address()
-        if self.session.rig_text != self.text:  # another page has brought another file
+        if self.session.rig_text != self.text:  # another page has opened another file
             self.text = self._saved = self.session.rig_text
             self._show_all()
 
@@ -139,7 +139,7 @@ class RigPage(QWidget):
         self._files.start(lambda: (path, read_text(path, "rig file")))
 
     def save_file(self, path: Path) -> None:
-        """Write the rig file as it stands; a file of that name is replaced."""
+        """Write the rig file to ``path``; an existing file is replaced."""
         text = self.text
 
         def write() -> tuple[Path, None]:
@@ -151,7 +151,7 @@ class RigPage(QWidget):
         self._files.start(write)
 
     def set_value(self, table: str, key: str, value: Any) -> None:
-        """Change one key; a file that is not in order is shown so, and not used."""
+        """Change one key; a rig file with faults shows them and is not used."""
         self._take(with_value(self.text, table, key, value), self.session.rig_path)
 
     def close_work(self) -> None:
@@ -166,7 +166,7 @@ class RigPage(QWidget):
         if text is None:
             self._saved = self.text
             self.session.set_rig_file(path, self.session.rig_text, self.session.rig_file)
-            self.session.message.emit(f"saved {path}")
+            self.session.message.emit(f"Saved {path}")
         else:
             self._saved = text
             self._take(text, path)
@@ -198,12 +198,12 @@ class RigPage(QWidget):
             mark = "✗ " if keys else ""
             self.tabs.setTabText(i, f"{mark}{table}")
         rest = [words for place, words in faults.items() if place not in said]
-        many = f"{len(faults)} thing{'s' if len(faults) > 1 else ''} to mend; until then the rig "
-        head = f"{many}file is used as it was before" if faults else ""
+        errors = f"{len(faults)} error{'s' if len(faults) > 1 else ''}"
+        head = f"Fix {errors}; the previous limits still apply" if faults else ""
         self.state.show_text("\n".join([head, *rest]).strip(), "bad")
         path = self.session.rig_path
         unsaved = " (not saved)" if self.text != self._saved else ""
-        self.file_name.setText(f"{path.name if path else 'the thesis rig, in no file'}{unsaved}")
+        self.file_name.setText(f"{path.name if path else 'rig of the thesis, not saved'}{unsaved}")
         self.file_name.setToolTip("" if path is None else str(path))
         self.save_button.setEnabled(not faults)
 
@@ -217,7 +217,7 @@ class RigPage(QWidget):
             self.open_file(Path(names[0]))
         event.acceptProposedAction()
 
-    # what is shown
+    # display
 
     @Slot()
     def _show_outcome(self) -> None:
@@ -225,8 +225,8 @@ class RigPage(QWidget):
         self.findings.setRowCount(0 if outcome is None else len(outcome.findings))
         if outcome is None:
             self.summary.show_text(
-                f"{self.session.address} was not looked at yet: Check looks at every instrument, "
-                f"and puts out nothing but 0 V",
+                f"{self.session.address} is not checked yet. Check reads every instrument; the "
+                f"output stays at 0 V.",
                 "muted",
             )
             return
@@ -237,7 +237,7 @@ class RigPage(QWidget):
             verdict = f"{_SHAPES[finding.verdict]} {_WORDS[finding.verdict]}"
             found = finding.found
             if finding.verdict != "ok" and finding.wanted:
-                found += f"; {finding.wanted} is wanted"
+                found += f"; expected {finding.wanted}"
             if finding.advice:
                 found += f"; {finding.advice}"
             for column, text in enumerate((verdict, finding.instrument, finding.item, found)):
@@ -256,7 +256,7 @@ class RigPage(QWidget):
         kind = "remote" if "@" in body else "local" if address.startswith("daqmx:") else "sim"
         if address.startswith("sim:"):
             kind = "hidden"
-            before = self.seed.blockSignals(True)  # it is shown, not chosen
+            before = self.seed.blockSignals(True)  # shown, not chosen
             self.seed.setValue(int(body) if body.isdigit() else 0)
             self.seed.blockSignals(before)
         if kind in ("local", "remote"):
@@ -269,7 +269,7 @@ class RigPage(QWidget):
         self.device.setEnabled(kind in ("local", "remote"))
         self.server.setEnabled(kind == "remote")
 
-    # how it is laid out
+    # layout
 
     def _build(self) -> None:
         outer = QHBoxLayout(self)
@@ -277,33 +277,34 @@ class RigPage(QWidget):
         outer.setSpacing(SPACE)
         left = QVBoxLayout()
         left.setSpacing(SPACE)
-        self.which = self._which()
-        left.addWidget(self.which)
-        left.addWidget(self._look(), 1)
+        self.address_card = self._make_address_card()
+        left.addWidget(self.address_card)
+        left.addWidget(self._make_check_card(), 1)
         outer.addLayout(left, 10)
-        self.editor = self._editor()
+        self.editor = self._make_editor_card()
         outer.addWidget(self.editor, 11)  # all its tabs are seen at 1366 px
 
-    def _which(self) -> QWidget:
+    def _make_address_card(self) -> QWidget:
         grid = QGridLayout()
-        grid.addWidget(label("The rig", "heading"), 0, 0, 1, 3)
+        grid.addWidget(label("Rig", "heading"), 0, 0, 1, 3)
         self.kinds = QButtonGroup(self)
         self.seed = QSpinBox()
         self.seed.setRange(0, 999_999)
         self.seed.setValue(7)
-        self.seed.setMinimumHeight(24)  # as its neighbours
-        self.seed.setToolTip("Which film: each number hides something else, or nothing")
+        self.seed.setMinimumHeight(24)  # as high as its neighbours
+        self.seed.setToolTip("Each seed is another film: with another hidden effect, or with none")
         self.device = QLineEdit(self.session.rig_file.card.device)
-        self.device.setToolTip("Name of the card in NI MAX, such as Dev1")
+        self.device.setToolTip("Name of the card in NI MAX, for example Dev1")
         self.server = QLineEdit("localhost:31763")
-        self.server.setToolTip("HOST:PORT of NI's device server")
+        self.server.setToolTip("HOST:PORT of NI's gRPC device server")
         for i, (words, tip, field) in enumerate(
             (
-                ("&Simulated", "Obeys the model exactly; nothing can break", None),
-                ("Simulated, &hiding something", "A film with an effect that the model lacks",
-                 self.seed),
-                ("&Card in this computer", "NI-DAQmx", self.device),
-                ("Card &behind a server", "NI-DAQmx over the network", self.server),
+                ("&Simulated rig", "Simulated rig that follows the model exactly", None),
+                ("Simulated rig with a &hidden effect",
+                 "A film with an effect that the model lacks", self.seed),
+                ("&Card in this computer", "Local card, through NI-DAQmx", self.device),
+                ("Card on a &network server",
+                 "Card of another computer, through NI's gRPC device server", self.server),
             )
         ):  # fmt: skip
             choice = QRadioButton(words)
@@ -319,13 +320,13 @@ class RigPage(QWidget):
         self.server.editingFinished.connect(self.choose)
         return card(grid)
 
-    def _look(self) -> QWidget:
+    def _make_check_card(self) -> QWidget:
         column = QVBoxLayout()
         row = QHBoxLayout()
-        row.addWidget(label("The instruments", "heading"))
+        row.addWidget(label("Instruments", "heading"))
         row.addStretch(1)
         self.check_button = button(
-            "Chec&k", "Look at every instrument; nothing but 0 V is put out (F7)", primary=True
+            "Chec&k", "Check every instrument; the output stays at 0 V (F7)", primary=True
         )
         self.check_button.setShortcut("F7")
         self.check_button.clicked.connect(self.check)
@@ -334,36 +335,34 @@ class RigPage(QWidget):
         self.summary = Message()
         column.addWidget(self.summary)
         self.findings = QTableWidget(0, 4)
-        self.findings.setHorizontalHeaderLabels(("", "Instrument", "What", "Found"))
+        self.findings.setHorizontalHeaderLabels(("", "Instrument", "Item", "Result"))
         self.findings.verticalHeader().hide()
         self.findings.setShowGrid(False)
         self.findings.setWordWrap(True)
         self.findings.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.findings.setTabKeyNavigation(False)
-        self.findings.setAccessibleName("Findings")
+        self.findings.setAccessibleName("Results of the check")
         header = self.findings.horizontalHeader()
         for i in (0, 2):
             header.setSectionResizeMode(i, QHeaderView.ResizeMode.ResizeToContents)
-        header.resizeSection(1, 120)  # a long name is cut, and whole in the tip
+        header.resizeSection(1, 120)  # px; the tooltip has the whole name
         header.setSectionResizeMode(3, QHeaderView.ResizeMode.Stretch)
         self.findings.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         column.addWidget(self.findings, 1)
         return card(column)
 
-    def _editor(self) -> QWidget:
+    def _make_editor_card(self) -> QWidget:
         column = QVBoxLayout()
         row = QHBoxLayout()
-        row.addWidget(label("The rig file", "heading"))
+        row.addWidget(label("Rig file", "heading"))
         self.file_name = label("", "muted")
         row.addWidget(self.file_name, 1)
-        open_button = button(
-            "&Open …", "Read a rig file; it may be dropped here too (Ctrl+Shift+O)"
-        )
+        open_button = button("&Open …", "Read a rig file; files can be dropped here (Ctrl+Shift+O)")
         open_button.setShortcut(QKeySequence("Ctrl+Shift+O"))
         open_button.clicked.connect(self._ask_open)
-        self.save_button = button("Save &as …", "Write the rig file as it stands here")
+        self.save_button = button("Save &as …", "Write the rig file")
         self.save_button.clicked.connect(self._ask_save)
-        defaults = button("&Thesis's", "Back to the rig of the thesis, in no file")
+        defaults = button("&Thesis rig", "Use the rig file of the thesis")
         defaults.clicked.connect(self._ask_defaults)
         for made in (open_button, self.save_button, defaults):
             row.addWidget(made)
@@ -387,7 +386,7 @@ class RigPage(QWidget):
         return card(column)
 
     def form(self, table: str) -> Form:
-        """The form of one table of the rig file."""
+        """Return the form of one table of the rig file."""
         if table not in self.forms:
             values = section_values(self.text, table)
             form = Form(form_fields(SECTIONS[table]), values, explain=True)
@@ -398,7 +397,7 @@ class RigPage(QWidget):
         return self.forms[table]
 
     def show_table(self, table: str) -> None:
-        """Bring a table of the rig file to the front."""
+        """Show the tab of one table of the rig file."""
         self.tabs.setCurrentIndex(list(SECTIONS).index(table))
 
     @Slot(int)
@@ -426,7 +425,7 @@ class RigPage(QWidget):
     def _ask_defaults(self) -> None:
         if self.text != self._saved:
             answer = QMessageBox.question(
-                self, "The rig of the thesis", "What was changed here is not saved. Drop it?"
+                self, "Rig file of the thesis", "The changes are not saved. Discard them?"
             )
             if answer is not QMessageBox.StandardButton.Yes:
                 return

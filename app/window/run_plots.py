@@ -1,4 +1,4 @@
-"""The three plots of a run: voltage, displacement with the models, and what is left between."""
+"""Plots of a run in progress: voltage, displacement with the models, and residuals."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _PLOTS = {
     "residual": ("Residual (µm)", ("residual 0", "residual 1", "rms 0", "rms 1")),
 }
 _NAMES = {"command": "commanded", "monitor": "monitor", "displacement": "measured"}
-_KEY_ROOM = 0.25  # of the range of a plot: above its curves, for their names
-_RESIDUAL_LEAST = 5e-6  # m: noise shall not fill the plot
+_LEGEND_SPACE = 0.35  # of the range of a plot, above its curves
+_RESIDUAL_LEAST = 5e-6  # m, smallest range of the residual, so that noise does not fill the plot
 
 
 class RunPlots(pg.GraphicsLayoutWidget):
-    """Draws what ``Live`` has; ``window`` s of it, or all where that is None."""
+    """Draws the last ``window`` s of a ``Live``, or the whole run if that is None."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -47,7 +47,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
             plot.setMouseEnabled(x=False, y=False)
             plot.disableAutoRange()
             for signal in signals:
-                # plain curves: the bins are thin already, and nothing is to be thinned again
+                # plain curves: the data are decimated already
                 curve = pg.PlotCurveItem(skipFiniteCheck=True, connect="all")
                 plot.addItem(curve)
                 self._curves[signal] = curve
@@ -68,7 +68,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
         self.show_prediction(None)
 
     def restyle(self) -> None:
-        """Take the theme's colours, and the names of the models."""
+        """Use the colours of the theme and the names of the models."""
         theme = self._session.theme
         colours = {
             "command": theme.command,
@@ -80,7 +80,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
         for curve in self._planned.values():
             curve.setPen(pen(theme.muted))
         for signal, curve in self._curves.items():
-            # where two lie on each other, the upper one lets the lower one through
+            # of two curves that coincide, the upper one is dashed and shows the lower one
             dashed = signal in ("command", "model 1") or signal.startswith("rms")
             curve.setPen(pen(colours[signal], dashed))
         for plot in self._plots.values():
@@ -88,10 +88,10 @@ class RunPlots(pg.GraphicsLayoutWidget):
         self._name()
 
     def _name(self) -> None:
-        """Say beside the curves what they are."""
+        """Make the legends."""
         theme = self._session.theme
         ground = QColor(theme.surface)
-        ground.setAlpha(200)  # what lies under the words is seen still
+        ground.setAlpha(200)  # curves under the legend stay visible
         for legend in self._legends:
             legend.scene().removeItem(legend)
         self._legends = []
@@ -102,13 +102,13 @@ class RunPlots(pg.GraphicsLayoutWidget):
             legend.setParentItem(plot.getViewBox())
             self._legends.append(legend)
             if name in self._predicted:
-                legend.addItem(self._planned[name], "foreseen")
+                legend.addItem(self._planned[name], "predicted")
             for signal in _PLOTS[name][1]:
                 if words := self._words(signal):
                     legend.addItem(self._curves[signal], words)
 
     def show_prediction(self, preview: Preview | None) -> None:
-        """Show what is foreseen, and forget what was drawn."""
+        """Show the prediction of ``preview``, and clear the curves of the last run."""
         self._predicted.clear()
         nothing = np.empty(0)
         for curve in (*self._curves.values(), *self._planned.values()):
@@ -129,7 +129,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
         self._show(0.0, self._duration)
 
     def start(self) -> None:
-        """Room for the run that begins: what was foreseen is taken away, it would cost frames."""
+        """Prepare for a run: remove the prediction, whose drawing would cost frames."""
         for curve in self._planned.values():
             curve.setData(np.empty(0), np.empty(0))
         self._predicted.clear()
@@ -137,7 +137,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
         self._roll(0.0)
 
     def draw(self, live: Live, end: float) -> None:
-        """Draw what there is up to ``end`` s."""
+        """Draw the curves up to ``end`` s."""
         begin = 0.0 if self.window is None else max(0.0, end - self.window)
         grown = False
         for name, (_, signals) in _PLOTS.items():
@@ -162,10 +162,10 @@ class RunPlots(pg.GraphicsLayoutWidget):
         name = overlays[int(number)].name
         if kind == "rms":
             return "RMS, last 1 s" if number == "0" else ""
-        return name if kind == "model" else f"to {name}"
+        return name if kind == "model" else f"residual of {name}"
 
     def _include(self, name: str, values: np.ndarray) -> bool:
-        """Let the range of a plot hold ``values``; True where it had to grow."""
+        """Extend the range of a plot to ``values``; return True if it grew."""
         values = values[np.isfinite(values)]
         if not values.size:
             return False
@@ -173,7 +173,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
         grown = low < self._low[name] or high > self._high[name]
         if name == "residual":
             size = max(-low, high)
-            if grown:  # in steps, and the same up and down, so that it seldom jumps
+            if grown:  # in steps and symmetric, so that it seldom changes
                 self._high[name] = size = _next_step(size)
                 self._low[name] = -size
         elif grown:
@@ -186,7 +186,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
         for name, plot in self._plots.items():
             low, high = self._low[name] * _SCALE[name], self._high[name] * _SCALE[name]
             size = high - low
-            above = _KEY_ROOM if name in self._planned else 0.03
+            above = _LEGEND_SPACE if name in self._planned else 0.03
             plot.setYRange(low - 0.03 * size, high + above * size, padding=0.0)
 
     def _roll(self, end: float) -> None:
@@ -204,6 +204,6 @@ class RunPlots(pg.GraphicsLayoutWidget):
 
 
 def _next_step(size: float) -> float:
-    """The next of 1, 2, 5, 10, ... above ``size``."""
+    """Return the next of 1, 2, 5, 10, ... above ``size``."""
     decade = 10.0 ** math.floor(math.log10(size))
     return next(step * decade for step in (1.0, 2.0, 5.0, 10.0, 20.0) if step * decade > size)

@@ -1,4 +1,4 @@
-"""One run in a thread of its own, and what the window has to know of it."""
+"""Runs in a thread of their own: their state, their end, and how they are stopped."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from dearig.window.live import Live
 __all__ = ["RunEnd", "RunRequest", "Runner", "next_recording_path"]
 
 _PROGRAM_FAULT = (
-    "a fault of the program ended the run: see that the amplifier is at 0 V; what it was stands in "
-    "the terminal"
+    "an error in the program ended the run: check that the amplifier is at 0 V; the terminal shows "
+    "the details of the error"
 )
 _ENDS: dict[type[DearigError], str] = {
     Interrupted: "Stopped",
@@ -45,10 +45,10 @@ _ENDS: dict[type[DearigError], str] = {
 
 @dataclass(frozen=True)
 class RunRequest:
-    """Everything that a run needs; ``folder`` gets the recording, in a file named by the sequence.
+    """Everything that a run needs; the recording is written to ``folder``, named by the sequence.
 
-    ``seed`` is of the simulated noise, ``paced`` lets a simulated rig take its time, and ``faults``
-    go wrong in it. ``overlay`` is the model whose displacement the recording keeps.
+    For a simulated rig, ``seed`` is that of its noise, ``paced`` runs it in real time, and
+    ``faults`` occur in it. The displacement of the model ``overlay`` is kept in the recording.
     """
 
     loaded: LoadedSequence
@@ -69,8 +69,8 @@ class RunRequest:
 class RunEnd:
     """How a run ended: a ``headline``, a ``sentence``, and the recording if there is one.
 
-    ``safe`` is True where the program knows that its output is at 0 V, False where it does not, and
-    None where nothing was played: then it is as it was before.
+    ``safe`` is True if the program knows that its output is at 0 V, False if it does not, and None
+    if nothing was played: then the output is as it was before.
     """
 
     headline: str
@@ -81,10 +81,10 @@ class RunEnd:
 
 
 class Runner(QObject):
-    """Runs one order after another, never two at once.
+    """Plays one run after another, never two at once.
 
-    ``state_changed`` tells the high voltage's state, ``ended`` how the run ended; both in the
-    interface thread, which waits for nothing here but in ``wait``.
+    ``state_changed`` carries the ``HighVoltage``, ``ended`` the ``RunEnd``; both come in the
+    interface thread. Only ``wait`` blocks it.
     """
 
     state_changed = Signal(object)
@@ -94,11 +94,11 @@ class Runner(QObject):
         super().__init__(parent)
         self._thread: _RunThread | None = None
         self._state = HighVoltage.SAFE
-        self._before = HighVoltage.SAFE  # what it was when it was armed
+        self._before = HighVoltage.SAFE  # state before it was armed
 
     @property
     def state(self) -> HighVoltage:
-        """What may be on the electrodes."""
+        """Voltage that may be on the electrodes."""
         return self._state
 
     @property
@@ -107,7 +107,7 @@ class Runner(QObject):
         return self._thread is not None
 
     def arm(self, armed: bool) -> None:
-        """The first step of two, or back."""
+        """Arm or disarm the rig."""
         if self.running or armed == (self._state is HighVoltage.ARMED):
             return
         if armed:
@@ -115,18 +115,18 @@ class Runner(QObject):
         self._set_state(HighVoltage.ARMED if armed else self._before)
 
     def start(self, order: RunRequest, live: Live) -> bool:
-        """The second step: begins a run that was armed; False where it was not."""
+        """Begin a run; return False if the rig is not armed."""
         if self.running or self._state is not HighVoltage.ARMED:
             return False
         self._thread = _RunThread(order, live, self)
         self._thread.finished.connect(self._finished)
         self._set_state(HighVoltage.ON)
-        # what the rig gives must be read in time, whatever the screen draws
+        # the samples of the rig must be read in time, whatever the interface draws
         self._thread.start(QThread.Priority.TimeCriticalPriority)
         return True
 
     def stop(self) -> None:
-        """Ramp down to 0 V and end the run; also takes back the first step."""
+        """Ramp down to 0 V and end the run; without a run, disarm."""
         if self._thread is None:
             self.arm(armed=False)
             return
@@ -134,12 +134,12 @@ class Runner(QObject):
         self._set_state(HighVoltage.RAMPING)
 
     def stop_without_ramp(self) -> None:
-        """0 V without a ramp: for whoever pressed STOP and finds the ramp too slow."""
+        """Set 0 V without a ramp; for an operator who finds the ramp too slow."""
         if self._thread is not None:
             self._thread.interrupts.ask_at_once()
 
     def wait(self) -> None:
-        """Wait until the run has ended; for a window that closes."""
+        """Wait until the run has ended; used when the window closes."""
         if self._thread is not None:
             self._thread.wait()
 
@@ -176,8 +176,8 @@ class _RunThread(QThread):
         except OSError as error:
             self.end = RunEnd(
                 "Refused",
-                f"the folder {order.folder} cannot be used: {error.strerror or error}; choose "
-                f"another one; nothing was played",
+                f"the folder {order.folder} cannot be used: {error.strerror or error}; nothing was "
+                f"played; choose another one",
                 None,
                 safe=None,
             )
@@ -206,7 +206,7 @@ class _RunThread(QThread):
 
 
 def _early_end(error: DearigError, out: Path, played: bool) -> RunEnd:
-    """An instrument that failed is believed to be safe only where it says so."""
+    """Describe a run that ended early; ``NotSafe`` says that 0 V is not confirmed."""
     safe = not isinstance(error, NotSafe) if played else None
     headline = next((words for kind, words in _ENDS.items() if isinstance(error, kind)), "Ended")
     sentence = str(error).removeprefix("interrupted: ")
@@ -214,7 +214,7 @@ def _early_end(error: DearigError, out: Path, played: bool) -> RunEnd:
 
 
 def next_recording_path(folder: Path, name: str) -> Path:
-    """A file for a recording: the name of its sequence and the next number, ``thesis-007.h5``."""
+    """Return the file of the next recording: ``name`` and a number, as ``thesis-007.h5``."""
     stem = re.sub(r"[^\w.]+", "-", name).strip("-.") or "run"
     stem = stem[:60]
     taken = [
@@ -226,5 +226,5 @@ def next_recording_path(folder: Path, name: str) -> Path:
 
 
 def simulated(address: str) -> bool:
-    """True where no high voltage is switched at all."""
+    """Return True for a rig without real instruments."""
     return is_simulated(address)

@@ -1,4 +1,4 @@
-"""What the pages of the window share, and the news when it changes; nothing is computed here."""
+"""State that the pages of the window share, with signals for its changes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FIRST_SEQUENCE = "thesis"
 
 @dataclass(frozen=True)
 class Breach:
-    """Where a plan breaks a limit: from ``first`` to ``last`` s, ``quantity`` in words."""
+    """Time span ``first`` to ``last`` s in which a plan exceeds the limit of ``quantity``."""
 
     quantity: str
     first: float
@@ -36,10 +36,10 @@ class Breach:
 
 @dataclass(frozen=True)
 class Preview:
-    """A sequence's text and what became of it: a plan, or a ``sentence`` why there is none.
+    """The text of a sequence and its plan, or a ``sentence`` that says why there is none.
 
-    ``curves`` are (time in s, value in SI units) of voltage, displacement and field, thinned for a
-    plot with their extremes kept; ``segments`` are label, begin and end in s, with the quiet ends.
+    ``curves`` are (time in s, value in SI units) of voltage, displacement and field, decimated with
+    their extremes kept; ``segments`` are label, begin and end in s, with lead-in and tail.
     """
 
     toml: str
@@ -52,16 +52,16 @@ class Preview:
 
     @property
     def playable(self) -> bool:
-        """True when it has passed the gate."""
+        """True if the gate accepts the plan."""
         return self.plan is not None and self.plan.waveform is not None
 
 
 class Session(QObject):
-    """The rig, the sequence, the overlays, the folder and what is noted with a run.
+    """Rig, sequence, overlay models, folder, and the operator's entries for a recording.
 
     ``rig_changed``: address or rig file; ``sequence_changed``: its text; ``preview_changed``: its
-    plan is there; ``recorded``: a new recording lies in the folder; ``running_changed``: a run has
-    begun (True) or ended, and while it goes on nothing that it uses may be changed.
+    plan is ready; ``recorded``: a new recording is in the folder; ``running_changed``: a run has
+    begun (True) or ended (False). During a run nothing that it uses may be changed.
     """
 
     rig_changed = Signal()
@@ -74,7 +74,7 @@ class Session(QObject):
     recent_changed = Signal()
     recorded = Signal(Path)
     running_changed = Signal(bool)
-    message = Signal(str)  #: one line for the status bar
+    message = Signal(str)  #: text for the status bar
 
     def __init__(
         self,
@@ -105,15 +105,15 @@ class Session(QObject):
         self.running = False
 
     def set_address(self, address: str) -> None:
-        """Another rig: ``sim``, ``sim:7``, ``daqmx:Dev1``, ``daqmx:Dev1@HOST:PORT``."""
+        """Use the rig ``sim``, ``sim:7``, ``daqmx:Dev1`` or ``daqmx:Dev1@HOST:PORT``."""
         if address != self.address:
             self.address = address
             self.rig_changed.emit()
 
     def set_rig_file(self, path: Path | None, text: str, rig_file: RigFile) -> None:
-        """Another rig file; ``text`` goes into every recording, ``path`` is None for none yet."""
+        """Use a rig file; recordings keep its ``text``. ``path`` is None if it is not saved."""
         self.rig_path, self.rig_text, self.rig_file = path, text, rig_file
-        self.preview = None  # it was made under other limits
+        self.preview = None  # it was planned with other limits
         self.rig_changed.emit()
         if any(model.path is None for model in self.overlays):
             thesis = self.thesis_model
@@ -121,64 +121,64 @@ class Session(QObject):
             self.set_overlays(overlays, self.overlay_drive)
 
     def set_sequence(self, toml: str, folder: Path, path: Path | None = None) -> None:
-        """Another sequence, as text; its CSV files lie in ``folder``."""
+        """Use the sequence ``toml``; its CSV files are in ``folder``."""
         if (toml, folder, path) == (self.sequence_toml, self.sequence_folder, self.sequence_path):
             return
         self.sequence_toml, self.sequence_folder, self.sequence_path = toml, folder, path
-        self.preview = None  # the old plan is not this one's
+        self.preview = None  # the plan of the previous sequence
         self.sequence_changed.emit()
 
     def set_preview(self, preview: Preview) -> None:
-        """The plan of the present sequence."""
+        """Set the plan of the present sequence."""
         self.preview = preview
         self.preview_changed.emit()
 
     def set_overlays(self, overlays: tuple[OverlayModel, ...], drive: str = "command") -> None:
-        """The models beside the measurement, two at most, and what drives them."""
+        """Use these overlay models, at most two, driven by ``command`` or ``monitor``."""
         self.overlays, self.overlay_drive = overlays[:2], drive
         self.overlays_changed.emit()
 
     @property
     def thesis_model(self) -> OverlayModel:
-        """The thesis's springs (Table 3) in the film and under the load of the rig file."""
+        """Thesis model: the springs of Table 3 with the film and the load of the rig file."""
         name = "thesis (Table 3)"
         actuator = Actuator(self.rig_file.as_film(), self.rig_file.as_load(), TABLE_3)
         return OverlayModel(name, actuator, toml=model_toml(name, actuator, {}))
 
     def set_folder(self, folder: Path) -> None:
-        """Where recordings are made and looked for."""
+        """Use another folder for recordings."""
         if folder != self.folder:
             self.folder = folder
             self.settings.setValue("folder", str(folder))
             self.folder_changed.emit()
 
     def set_notes(self, operator: str, film: str, notes: str) -> None:
-        """Who runs which film; remembered, all but the notes."""
+        """Set operator, film and notes; operator and film are kept for the next start."""
         film_before, self.operator, self.film, self.notes = self.film, operator, film, notes
         self.settings.setValue("operator", operator)
         self.settings.setValue("film", film)
         self.notes_changed.emit()
-        if film != film_before and self.rig_file.film.name:  # its limits are those of one film
+        if film != film_before and self.rig_file.film.name:  # the limits hold for one film
             self.preview = None
             self.sequence_changed.emit()
 
     def set_theme(self, theme: Theme) -> None:
-        """Light or dark."""
+        """Use another theme."""
         if theme != self.theme:
             self.theme = theme
             self.theme_changed.emit()
 
     def set_running(self, running: bool) -> None:
-        """A run has begun or ended."""
+        """Say that a run has begun or ended."""
         if running != self.running:
             self.running = running
             self.running_changed.emit(running)
 
     @property
     def recent(self) -> list[Path]:
-        """Sequence files used lately, the newest first."""
+        """Recently used sequence files, the newest first."""
         found = self.settings.value("recent", [])
-        if isinstance(found, str):  # one comes back bare
+        if isinstance(found, str):  # QSettings returns a list of one as a string
             found = [found]
         return [Path(str(name)) for name in found] if isinstance(found, list) else []
 

@@ -1,7 +1,7 @@
-"""How the window looks: colours that colour-blind eyes tell apart, light or dark, and large digits.
+"""Theme of the window: colours for all kinds of colour vision, light and dark, and large digits.
 
-The hues are those of Okabe and Ito; on light ground the pale ones are darkened until thin lines are
-seen. What a colour says is said by a shape or a word besides.
+The hues are those of Okabe and Ito; on a light ground the pale ones are darkened so that thin lines
+are visible. A shape or a word repeats what a colour says.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ __all__ = [
     "system_theme",
 ]
 
-SPACE = 8  #: px between things
+SPACE = 8  #: px between widgets
 _ICONS = Path(__file__).with_name("icons")
 
 
 @dataclass(frozen=True)
 class Theme:
-    """Colours by what they stand for, as ``#rrggbb``."""
+    """Colours by their use, as ``#rrggbb``."""
 
     dark: bool
     window: str
@@ -56,7 +56,7 @@ class Theme:
 
     @property
     def curves(self) -> tuple[str, ...]:
-        """Colours that are told apart, for several curves."""
+        """Colours for several curves in one plot."""
         return (self.command, *self.models, self.monitor, self.field, self.measured)
 
 
@@ -104,18 +104,18 @@ DARK = Theme(
 
 
 def system_theme() -> Theme:
-    """Light or dark, as the system has it; light where it does not say."""
+    """Return the theme of the system; the light one if it is unknown."""
     dark = QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
     return DARK if dark else LIGHT
 
 
 def prepare_plots() -> None:
-    """Set pyqtgraph up, once and before the first plot: no antialiasing, which costs the frames."""
+    """Configure pyqtgraph before the first plot: without antialiasing, which costs frames."""
     pg.setConfigOptions(antialias=False, useOpenGL=False)
 
 
 def apply(application: QApplication, theme: Theme) -> None:
-    """Give the whole application this look."""
+    """Use ``theme`` for the whole application."""
     if not application.styleSheet():
         application.setStyle("Fusion")
     palette = QPalette()
@@ -143,7 +143,7 @@ def apply(application: QApplication, theme: Theme) -> None:
     for role in (roles.Text, roles.ButtonText, roles.WindowText):
         palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(theme.muted))
     sheet = _sheet(theme)
-    if application.styleSheet() != sheet:  # each time all widgets are looked at anew
+    if application.styleSheet() != sheet:  # a new style sheet makes Qt restyle all widgets
         application.setPalette(palette)
         application.setStyleSheet(sheet)
 
@@ -200,7 +200,7 @@ def _sheet(t: Theme) -> str:
 
 
 def digits(points: int) -> QFont:
-    """Large digits that keep their places while they change."""
+    """Return a bold font of fixed width, so that digits keep their places."""
     font = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
     font.setPointSize(points)
     font.setBold(True)
@@ -208,15 +208,15 @@ def digits(points: int) -> QFont:
 
 
 def pen(colour: str, dashed: bool = False) -> object:
-    """A pen one pixel wide: wider ones are drawn twenty times as slowly."""
+    """Make a pen one pixel wide; wider ones are drawn twenty times as slowly."""
     style = Qt.PenStyle.DashLine if dashed else Qt.PenStyle.SolidLine
     return pg.mkPen(QColor(colour), width=1, style=style)
 
 
 def style_plot(plot: pg.PlotItem, theme: Theme) -> None:
-    """Give a plot and the widget it is in the theme's colours.
+    """Use the theme's colours in a plot and its widget.
 
-    The left axis is wide enough not to move while its numbers change.
+    The left axis has a fixed width, so that the plot does not move while its labels change.
     """
     widget = plot.getViewWidget()
     if widget is not None:
@@ -226,13 +226,13 @@ def style_plot(plot: pg.PlotItem, theme: Theme) -> None:
         axis = plot.getAxis(name)
         axis.setPen(pg.mkPen(QColor(theme.muted)))
         axis.setTextPen(pg.mkPen(QColor(theme.text)))
-        # few lines, behind the curves and none that shines through: pyqtgraph's own grid costs more
-        # than the curves do
+        # few opaque lines behind the curves: drawing pyqtgraph's own grid takes longer than drawing
+        # the curves
         axis.setTickPen(pg.mkPen(QColor(theme.raised)))
         axis.setStyle(maxTickLevel=0, tickAlpha=255)
         axis.setZValue(-1000)
-        if axis.autoSIPrefix:  # switched off again it would scale once more, and for good
-            axis.enableAutoSIPrefix(False)  # the units are what people say: kV, mm
+        if axis.autoSIPrefix:  # switching it off twice would scale the axis again
+            axis.enableAutoSIPrefix(False)  # the labels have fixed units: kV, mm
     plot.getAxis("left").setWidth(64)
     plot.setMenuEnabled(False)
     plot.hideButtons()

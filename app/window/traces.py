@@ -1,7 +1,7 @@
-"""What a plot shows of a run that goes on: extremes over fixed bins, and running errors.
+"""Decimated signals of a run in progress, and running errors.
 
-Bins are fixed to the sample numbers, so that a trace does not shimmer while it scrolls, and each
-keeps its least and its greatest value, so that no spike is lost however far one looks back.
+Bins are fixed to sample numbers, so that a trace does not flicker while it scrolls. Each bin keeps
+its minimum and maximum, so that no spike is lost.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ __all__ = ["ErrorsSoFar", "Pyramid", "RunningErrors"]
 
 
 class _Level:
-    """The newest ``capacity`` bins of ``size`` samples each; whole bins only."""
+    """The newest ``capacity`` complete bins of ``size`` samples each."""
 
     def __init__(self, size: int, capacity: int) -> None:
         self.size = size
@@ -26,7 +26,7 @@ class _Level:
 
     @property
     def oldest(self) -> int:
-        """Number of the first bin that is still there."""
+        """Number of the first bin that is still kept."""
         return max(0, self.count - self.capacity)
 
     def push(self, low: np.ndarray, high: np.ndarray) -> None:
@@ -44,8 +44,8 @@ class _Level:
 class Pyramid:
     """Extremes of a signal over bins of 1, 2, 4, ... samples, ``capacity`` bins each.
 
-    What is kept does not grow with the length of the run: the finest bins hold its last moments,
-    the coarsest all of ``total`` samples.
+    Memory does not grow with the length of the run: the finest bins hold its newest samples, the
+    coarsest all of ``total`` samples.
     """
 
     def __init__(self, total: int, capacity: int = 2048) -> None:
@@ -53,7 +53,7 @@ class Pyramid:
         while self._levels[-1].size * capacity < total:
             self._levels.append(_Level(self._levels[-1].size * 2, capacity))
         self._samples = 0
-        # what does not fill a bin of the next level yet, for each level
+        # samples that do not fill a bin of the next level yet, for each level
         self._rest = [(np.empty(0), np.empty(0)) for _ in self._levels]
 
     @property
@@ -62,7 +62,7 @@ class Pyramid:
         return self._samples
 
     def push(self, values: np.ndarray) -> None:
-        """Take ``values`` (n,), the next samples; NaN is nothing to draw."""
+        """Add ``values`` (n,), the next samples; NaN is not drawn."""
         low = high = np.asarray(values, dtype=np.float64)
         self._samples += low.size
         self._levels[0].push(low, high)
@@ -71,16 +71,16 @@ class Pyramid:
             high = np.concatenate((self._rest[k][1], high))
             whole = low.size // 2 * 2
             self._rest[k] = (low[whole:], high[whole:])
-            # fmin and fmax: a bin with a gap in it still shows what it has
+            # fmin and fmax ignore NaN: a bin with a gap shows its other sample
             low = np.fmin(low[0:whole:2], low[1:whole:2])
             high = np.fmax(high[0:whole:2], high[1:whole:2])
             self._levels[k].push(low, high)
 
     def view(self, first: int, last: int) -> tuple[np.ndarray, np.ndarray]:
-        """Sample numbers and values (m,) to be joined by lines, for samples ``first`` to ``last``.
+        """Return sample numbers and values (m,) of a polyline for samples ``first`` to ``last``.
 
-        The finest bins that still reach back to ``first``: each gives its least and its greatest
-        value, one after the other; what has filled no bin yet follows sample by sample.
+        It uses the finest bins that reach back to ``first``. Each bin gives its minimum and its
+        maximum; the samples that have filled no bin yet follow one by one.
         """
         first, last = max(first, 0), min(last, self._samples)
         if last <= first:
@@ -112,7 +112,7 @@ class Pyramid:
 class ErrorsSoFar:
     """Errors of a model so far: ``rms`` and ``recent`` (of the last second) in m, ``nrmse_pct``.
 
-    NaN where there is nothing to tell.
+    They are NaN without data.
     """
 
     rms: float
@@ -121,7 +121,7 @@ class ErrorsSoFar:
 
 
 class RunningErrors:
-    """Root mean square of a residual so far and over the last ``window`` samples."""
+    """RMS of a residual, over all samples so far and over the last ``window`` samples."""
 
     def __init__(self, window: int) -> None:
         self._window = max(1, window)
@@ -132,7 +132,7 @@ class RunningErrors:
         self._held = 0
 
     def push(self, measured: np.ndarray, model: np.ndarray) -> None:
-        """Take the next ``measured`` and ``model`` (n,) m; NaN is left out."""
+        """Add the next ``measured`` and ``model`` (n,) in m; NaN is left out."""
         both = np.isfinite(measured) & np.isfinite(model)
         if not both.any():
             return
@@ -148,7 +148,7 @@ class RunningErrors:
             self._held -= self._blocks.popleft().size
 
     def now(self) -> ErrorsSoFar:
-        """The errors so far; the range of the measurement is that of what was measured so far."""
+        """Return the errors so far; NRMSE uses the range measured so far."""
         if not self._count:
             return ErrorsSoFar(np.nan, np.nan, np.nan)
         rms = float(np.sqrt(self._squares / self._count))

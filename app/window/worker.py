@@ -1,4 +1,4 @@
-"""Work in a process of its own: progress, time left, cancel; the window never waits for it."""
+"""Jobs in a process of their own, with progress, time left and cancel."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ __all__ = ["Estimate", "Job", "Worker"]
 
 
 class Estimate:
-    """How long a stage will still take, from how long its part took until now."""
+    """Time that a stage still needs, estimated from the time it has taken."""
 
-    #: Below this part of the stage, or this many s, nothing can be said.
+    #: No estimate is made before this part of the stage is done and this many s have passed.
     PART_MIN, SECONDS_MIN = 0.02, 1.0
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class Estimate:
         self._first = 0.0
 
     def left(self, stage: str, fraction: float, now: float) -> float | None:
-        """Seconds to the end of ``stage``; None while that cannot be told. ``now`` is in s."""
+        """Return the seconds to the end of ``stage``, None without an estimate; ``now`` in s."""
         if stage != self._stage:
             self._stage, self._began, self._first = stage, now, fraction
             return None
@@ -42,29 +42,29 @@ class Estimate:
 
 
 class Job(QObject):
-    """One piece of work. Exactly one of ``finished``, ``failed`` and ``cancelled`` ends it."""
+    """One job. Exactly one of ``finished``, ``failed`` and ``cancelled`` ends it."""
 
-    #: stage, its fraction, and s left (NaN where that is not known)
+    #: stage, its fraction, and s left (NaN if unknown)
     progressed = Signal(str, float, float)
     finished = Signal(object)
     failed = Signal(str)
     cancelled = Signal()
 
-    def __init__(self, worker: Worker, ask: Request, whole: bool) -> None:
-        super().__init__()  # no parent: it lives as long as somebody cares for it
+    def __init__(self, worker: Worker, request: Request, whole: bool) -> None:
+        super().__init__()  # no parent: it lives as long as it is referred to
         self._worker = worker
-        self.request = ask
+        self.request = request
         self.whole = whole
         self.asked_to_stop = False
 
     @Slot()
     def cancel(self) -> None:
-        """End it: the first time as it wants to end, the second time at once."""
+        """Interrupt the job; the second call ends its process at once."""
         self._worker.cancel(self)
 
 
 class Worker(QObject):
-    """Does jobs one after another, in a process that is spawned with the first."""
+    """Does jobs one after another, in a process that starts with the first job."""
 
     _arrived = Signal(int, object)
 
@@ -79,7 +79,7 @@ class Worker(QObject):
         self._process: BaseProcess | None = None
         self._connection: Connection | None = None
         self._reader: threading.Thread | None = None
-        self._life = 0  # of the process: what an earlier one said late is not heard
+        self._life = 0  # number of the process; late messages of an earlier one are dropped
         self._number = 0
         self._current: Job | None = None
         self._urgent: deque[Job] = deque()
@@ -90,11 +90,11 @@ class Worker(QObject):
     def submit(
         self, function: Callable[..., Any], *given: Any, first: bool = False, whole: bool = False
     ) -> Job:
-        """Have ``function(*given, progress=...)`` called; ``first`` before those that are not.
+        """Call ``function(*given, progress=...)`` in the process; ``first`` jobs go before others.
 
-        ``whole``: it tells the fraction of all its work, not of each of its stages.
-        The function stands at the top of a module, and everything that goes in and comes out can
-        be pickled. A ``DearigError`` becomes ``failed`` with its sentence.
+        ``whole``: progress is the fraction of the whole job and not of each stage. The function is
+        defined at the top of a module; its arguments and its result can be pickled. A
+        ``DearigError`` becomes ``failed`` with its message.
         """
         self._number += 1
         job = Job(self, Request(self._number, function, given), whole)
@@ -104,11 +104,11 @@ class Worker(QObject):
 
     @property
     def busy(self) -> bool:
-        """True while something is under way or waits."""
+        """True while a job runs or waits."""
         return self._current is not None or bool(self._urgent or self._waiting)
 
     def cancel(self, job: Job) -> None:
-        """End ``job``, whether it waits or is under way."""
+        """End ``job``, whether it waits or runs."""
         for queue in (self._urgent, self._waiting):
             if job in queue:
                 queue.remove(job)
@@ -124,18 +124,18 @@ class Worker(QObject):
                 self._send(StopRequest(job.request.number))
 
     def clear(self) -> None:
-        """Cancel everything that waits and is not urgent, not what is under way."""
+        """Cancel all waiting jobs that were not submitted as ``first``."""
         while self._waiting:
             self._end(self._waiting.popleft(), "stopped", None)
 
     def close(self) -> None:
-        """End the process and wait for it; nothing is signalled any more."""
+        """End the process and wait for it; no signal follows."""
         self._urgent.clear()
         self._waiting.clear()
         self._current = None
         self._kill()
 
-    # ------------------------------------------------------------ the process
+    # process
 
     def _next(self) -> None:
         queue = self._urgent or self._waiting
@@ -155,10 +155,10 @@ class Worker(QObject):
         )
         with isolated_spawn():
             self._process.start()
-        theirs.close()  # so that the end of the process is the end of the connection
+        theirs.close()  # so that the connection ends with the process
         self._connection = ours
         self._reader = threading.Thread(
-            target=self._read, args=(ours, self._life), name="dearig worker's answers", daemon=True
+            target=self._read, args=(ours, self._life), name="dearig worker messages", daemon=True
         )
         self._reader.start()
 
@@ -168,10 +168,10 @@ class Worker(QObject):
         try:
             self._connection.send(message)
         except OSError:
-            return  # it is gone; the reader sees that too, and says so
+            return  # the process is gone; the reader reports it
 
     def _read(self, connection: Connection, life: int) -> None:
-        """Unpickle in a thread: a result can be large, and may import what the window lacks."""
+        """Receive messages in a thread: unpickling a large result takes time."""
         while True:
             try:
                 message = connection.recv()
@@ -189,11 +189,11 @@ class Worker(QObject):
             return
         process.kill()
         process.join()
-        reader.join()  # the other end of the connection is closed: it returns
+        reader.join()  # the process is dead, so that the reader returns
         connection.close()
         process.close()
 
-    # ------------------------------------------------------------ its answers
+    # messages of the process
 
     @Slot(int, object)
     def _take(self, life: int, answer: Response | None) -> None:
@@ -205,7 +205,7 @@ class Worker(QObject):
             self._kill()
             self._current = None
             if job is not None:
-                words = f"the process that did this work ended by itself (exit code {code})"
+                words = f"the process of this work ended unexpectedly (exit code {code})"
                 self._end(job, "broken", f"{words}; start the work again")
             self._next()
             return
@@ -213,7 +213,7 @@ class Worker(QObject):
             return
         if answer.kind == "progress":
             stage, fraction = answer.value
-            # of the whole work one estimate holds, whatever its stage is called
+            # progress of a whole job has one estimate for all stages
             left = self._estimate.left("" if job.whole else stage, fraction, self._clock())
             job.progressed.emit(stage, fraction, float("nan") if left is None else left)
             return

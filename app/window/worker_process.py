@@ -1,4 +1,4 @@
-"""The process in which a worker's work is done, one piece after another; knows no screen."""
+"""Process of a worker: it does one job after another, without Qt."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from dearig.errors import DearigError
 
 __all__ = ["Request", "Response", "StopRequest", "serve"]
 
-#: Of a stage: what is less than this is not worth a message.
+#: Smallest progress of a stage that is reported.
 _STEP = 1.0 / 256.0
 
 
 @dataclass(frozen=True)
 class Request:
-    """Call ``function(*given, progress=...)``; all of it can be pickled."""
+    """Request to call ``function(*given, progress=...)``; all of it can be pickled."""
 
     number: int
     function: Callable[..., Any]
@@ -32,17 +32,17 @@ class Request:
 
 @dataclass(frozen=True)
 class StopRequest:
-    """End the work ``number`` as ctrl-C would, and keep what it keeps then."""
+    """Request to interrupt the job ``number``, as ctrl-C does."""
 
     number: int
 
 
 @dataclass(frozen=True)
 class Response:
-    """What came of the work ``number``.
+    """Message about the job ``number``.
 
-    ``kind`` is progress (``value`` a stage and its fraction), done (``value`` is the result),
-    refused (a sentence), broken (a sentence on a defect) or stopped.
+    ``kind`` is progress (``value`` is a stage and its fraction), done (``value`` is the result),
+    refused (a sentence), broken (a sentence on an error in the program) or stopped.
     """
 
     number: int
@@ -51,27 +51,27 @@ class Response:
 
 
 def serve(connection: Connection) -> None:
-    """Do what comes through ``connection`` until its other end is closed or gone."""
+    """Do the jobs that come through ``connection`` until its other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     work: queue.SimpleQueue[Request] = queue.SimpleQueue()
     current: list[int] = []
     listener = threading.Thread(target=_listen, args=(connection, work, current), daemon=True)
     listener.start()
     while True:
-        ask = work.get()
-        current[:] = [ask.number]
-        answer = _done(connection, ask)
+        request = work.get()
+        current[:] = [request.number]
+        answer = _done(connection, request)
         current.clear()
         connection.send(answer)
 
 
 def _listen(connection: Connection, work: queue.SimpleQueue[Request], current: list[int]) -> None:
-    """Take messages while the main thread works."""
+    """Receive messages while the main thread works."""
     while True:
         try:
             message = connection.recv()
         except (EOFError, OSError):
-            # nobody is left to work for; whatever is under way writes its files as a whole
+            # the window is gone; unfinished jobs leave no partial files
             os._exit(0)
         if isinstance(message, Request):
             work.put(message)
@@ -80,36 +80,36 @@ def _listen(connection: Connection, work: queue.SimpleQueue[Request], current: l
 
 
 def _interrupt() -> None:
-    """As ctrl-C at a keyboard: the way to end early that all work has."""
+    """Interrupt the main thread as ctrl-C does; every job can end early in this way."""
     if sys.platform == "win32":
         signal.raise_signal(signal.SIGINT)
     else:
-        # to the very thread, which may be waiting
+        # to the main thread itself, which may be blocked in a call
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
 
 
-def _done(connection: Connection, ask: Request) -> Response:
+def _done(connection: Connection, request: Request) -> Response:
     last = ("", -1.0)
 
     def report(stage: str, fraction: float) -> None:
         nonlocal last
         if stage != last[0] or fraction - last[1] >= _STEP:
             last = (stage, fraction)
-            connection.send(Response(ask.number, "progress", last))
+            connection.send(Response(request.number, "progress", last))
 
     try:
         try:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-            value = ask.function(*ask.given, progress=report)
+            value = request.function(*request.given, progress=report)
         finally:
-            # no message is torn by a late one
+            # a late interrupt must not cut the next message
             signal.signal(signal.SIGINT, signal.SIG_IGN)
     except KeyboardInterrupt:
-        return Response(ask.number, "stopped", None)
+        return Response(request.number, "stopped", None)
     except DearigError as error:
-        return Response(ask.number, "refused", str(error))
-    except Exception as error:  # noqa: BLE001  (a defect must reach the person who waits)
+        return Response(request.number, "refused", str(error))
+    except Exception as error:  # noqa: BLE001  (an error must reach the person who waits)
         traceback.print_exc(file=sys.stderr)
-        words = f"a defect of the program ended this work ({type(error).__name__}: {error})"
-        return Response(ask.number, "broken", words)
-    return Response(ask.number, "done", value)
+        words = f"an error in the program ended this work ({type(error).__name__}: {error})"
+        return Response(request.number, "broken", words)
+    return Response(request.number, "done", value)

@@ -195,7 +195,7 @@ class TestOutputs:
         instead(monkeypatch, finding())
         answer = done("diagnose", bench / "thesis.h5", "--json", "-")
         assert answer.json["format"] == "dearig-diagnosis/1"
-        assert "Found and explained." in answer.err
+        assert "Residual explained." in answer.err
 
     def test_an_interruption_keeps_what_was_found(self, bench, tmp_path, monkeypatch):
         def search(records, base, *, progress, stop, thorough):

@@ -67,12 +67,12 @@ def page(request, tmp_path_factory):
 def test_no_model_of_a_film_is_asked_to_reach_the_noise():
     outcome = film_diagnosis()
     for verdict, words in (
-        ("explained", "with that, only noise, or 0.5 % of the largest stress, is left."),
+        ("explained", "With it, only noise, or 0.5 % of the largest stress, is left."),
         ("nothing_missing", "down to the noise, or 0.5 % of the largest stress, and no other"),
     ):
         told = summary(replace(outcome, finding=replace(outcome.finding, verdict=verdict)))
         assert words in told[0]
-    assert summary(diagnose_outcome())[0].endswith("with that, only noise is left.")
+    assert summary(diagnose_outcome())[0].endswith("With it, only noise is left.")
     assert "down to the noise, and no other" in summary(nothing_missing())[0]
 
 
@@ -80,7 +80,7 @@ class TestPage:
     def test_the_verdict_stands_on_top(self, page):
         outcome, read = page
         top = read.words.index(HEADLINES[outcome.finding.verdict])
-        assert top < read.words.index("The error before and after")
+        assert top < read.words.index("Error before and after")
 
     def test_errors_before_and_after_of_every_recording(self, page):
         outcome, read = page
@@ -101,7 +101,7 @@ class TestPage:
             for e in step.estimates:
                 assert f"{step.effect}: {e.name.replace('_', ' ')}" in read.cells
         for family in (f for s in outcome.finding.steps for f in s.indistinguishable_from):
-            assert f"explained as well by {family}" in read.words
+            assert f"Evidence against: {family} would explain these data equally well" in read.words
         for candidate in (c for r in outcome.finding.rounds for c in r.candidates):
             assert candidate.effect in read.cells
 
@@ -113,7 +113,7 @@ class TestPage:
 
     def test_roles_and_measures_are_explained(self, page):
         outcome, read = page
-        for words in ("Three roles are kept apart", "How to read the errors", "RMS / noise"):
+        for words in ("Data have three separate roles", "How to read the errors", "RMS / noise"):
             assert words in read.words
         assert ("not normalised" in read.words) == (outcome.kind == "actuator")
 
@@ -138,10 +138,10 @@ class TestWords:
         words = " ".join(summary(outcome))
         first, last = significant(before.rms * 1e6), significant(after.rms * 1e6)
         assert f"falls from {first} to {last}" in words
-        assert "cannot tell sensor lag from amplifier" in words
+        assert "cannot separate sensor lag from amplifier" in words
 
     def test_without_untouched_recordings_it_says_so(self):
-        assert "No untouched recordings were given" in " ".join(summary(nothing_missing()))
+        assert "No validation recordings were given" in " ".join(summary(nothing_missing()))
 
     def test_an_interruption_is_told(self):
         words = " ".join(summary(diagnose_outcome(finding=finding(interrupted=True))))
@@ -151,10 +151,10 @@ class TestWords:
         early = finding(interrupted=True, rounds=())
         assert early.steps
         assert "all effects were tried" in headline(early)
-        assert "did best until then" in " ".join(summary(diagnose_outcome(finding=early)))
+        assert "is the best so far" in " ".join(summary(diagnose_outcome(finding=early)))
         nothing = replace(early, steps=())
-        assert "anything was tried" in headline(nothing)
-        assert "nothing is known yet" in " ".join(summary(diagnose_outcome(finding=nothing)))
+        assert "any effect was tried" in headline(nothing)
+        assert "there is no result yet" in " ".join(summary(diagnose_outcome(finding=nothing)))
 
     def test_quality_and_notes_are_warnings(self):
         said = warnings(diagnose_outcome(finding=finding(notes=("it was odd",))))
@@ -166,7 +166,9 @@ class TestWords:
         assert dropped_effects(diagnose_outcome()) == ""
         other = replace(ROUND, chosen="load inertia")
         said = dropped_effects(diagnose_outcome(finding=finding(rounds=(other, ROUND))))
-        assert said.startswith("load inertia was the best alone and is not in the final model")
+        assert said.startswith(
+            "load inertia was the best single effect but is not in the final model"
+        )
 
 
 class TestPooled:
@@ -219,8 +221,8 @@ class TestTables:
     def test_ranking(self):
         whole, brief = ranking_table(ROUND), ranking_table(ROUND, 3)
         assert len(whole.rows) == len(ROUND.candidates)
-        assert [r.cells[-1] for r in brief.rows] == ["chosen", "not told apart", "helps, but less"]
-        assert "9 more did worse" in brief.note
+        assert [r.cells[-1] for r in brief.rows] == ["chosen", "not separable", "explains less"]
+        assert "9 more candidates are worse" in brief.note
         assert whole.rows[0].detail == ROUND.candidates[0].note
 
     @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
@@ -233,7 +235,7 @@ class TestTables:
 
     def test_nothing_is_cut_off_at_80_columns(self):
         text = shown(diagnosis_tables(diagnose_outcome()), 80)
-        for words in ("sensor lag: time constant", "0.00910 to 0.00990", "not told apart"):
+        for words in ("sensor lag: time constant", "0.00910 to 0.00990", "not separable"):
             assert words in text
 
 
@@ -283,6 +285,16 @@ class TestJson:
         assert found["experiment"]["separates"] == ["sensor_lag", "amplifier"]
         assert found["residual_after"]["is_noise"] is True
         assert found["rounds"][0]["candidates"][1]["behind"] == 2.5
+
+    def test_plain_keys_stand_beside_the_older_ones(self):
+        found = diagnosis_json(diagnose_outcome())
+        assert found["experiment_summary"] == found["experiment_words"]
+        for signature in found["residual_before"].values():
+            assert signature["remarks"] == signature["words"]
+        for candidate in found["rounds"][0]["candidates"]:
+            assert candidate["predicted_share"] == candidate["promised"]
+            assert candidate["explained_share"] == candidate["gained"]
+            assert candidate["criterion_behind_best"] == candidate["behind"]
 
 
 class TestFigures:

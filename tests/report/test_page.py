@@ -118,7 +118,7 @@ class TestPages:
 
     def test_says_what_is_odd_about_the_thesis_measures(self, demo):
         assert "e_rms is not normalised" in demo.words
-        assert "over the range of the model , not" in demo.words
+        assert "divided by the range of the model , not" in demo.words
         assert "82 mm" in demo.words.replace("\xa0", " ")
 
     def test_says_what_is_not_determined(self, demo):
@@ -151,7 +151,7 @@ class TestPages:
         assert "thesis" not in page.words.lower()
         assert "e_rms" not in page.words
         assert "Number of branches" in page.words
-        assert "not known, so there is nothing to measure that against" in page.words
+        assert "not known, so the error cannot be compared with it" in page.words
         assert page.seen.count("svg") == 3 * 2 + 2 + 2 * 3
 
     def test_names_are_escaped(self, tmp_path):
@@ -254,7 +254,7 @@ class TestTables:
         assert rows["μ₂"].cells == ("μ₂", "45.77", "kPa", "45.65 to 45.89", "40.04")
         assert rows["μ₁"].cells[1] == "(20)"
         assert rows["μ₁"].muted
-        assert rows["μ₀"].cells[3] == "follows"
+        assert rows["μ₀"].cells[3] == "derived"
 
     def test_tables_of_other_rows_do_not_join(self):
         one, two = (error_table("x", (actuator_comparison(n),)) for n in ("a", "b"))
@@ -278,10 +278,10 @@ class TestWords:
     @pytest.mark.parametrize(
         ("noise", "words"),
         [
-            (None, "nothing to measure that against"),
+            (None, "the error cannot be compared with it"),
             (1e-6, "the model does not describe"),
-            (2.0e-6, "most of what is left is noise"),
-            (5e-6, "hardly anything but noise"),
+            (2.0e-6, "most of the residual is noise"),
+            (5e-6, "the residual is almost only noise"),
         ],
     )
     def test_against_the_noise(self, noise, words):

@@ -149,7 +149,7 @@ def views(window: MainWindow) -> Iterator[str]:
 
     window.show_page(study)
     yield "study"
-    study.tick([folder / "thesis-004.h5"], [folder / "a-0.6-001.h5"])
+    study.recordings.check([folder / "thesis-004.h5"], [folder / "a-0.6-001.h5"])
     study.begin()
     until(lambda: study.bar.value() > 250, "the search")
     yield "study-searching"

@@ -91,7 +91,7 @@ def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
         assert float(number) == pytest.approx(1.0, abs=0.2)  # the simulated noise
     assert set(cells(page, "State").values()) == {"✓ finished"}
     qtbot.waitUntil(lambda: len(page.plot.shown) == 1, timeout=_PATIENCE)
-    assert rows(page.about)["ended"] == ["finished"]
+    assert rows(page.details)["ended"] == ["finished"]
 
     # words find a recording
     qtbot.keyClicks(page.filter, "grace film")
@@ -129,7 +129,7 @@ def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
 
     # export, with a word where it went or why not
     page.export(folder / "low.h5", "csv", folder / "low.csv")
-    qtbot.waitUntil(lambda: "was written" in page.message.text(), timeout=_PATIENCE)
+    qtbot.waitUntil(lambda: "Wrote " in page.message.text(), timeout=_PATIENCE)
     assert (folder / "low.csv").read_text().startswith("time_s,")
     page.export(folder / "low.h5", "csv", folder / "gone" / "low.csv")
     qtbot.waitUntil(lambda: "there is no folder" in page.message.text(), timeout=_PATIENCE)
@@ -138,7 +138,7 @@ def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
     page.choose([folder / "low.h5"])
     drawn(page, qtbot, "low")
     with qtbot.waitSignal(page.open_sequence) as told:
-        click(qtbot, page.again_button)
+        click(qtbot, page.sequence_button)
     assert 'name = "lobes of 4.0 kV"' in told.args[0]
 
     # at night

@@ -55,7 +55,7 @@ def test_a_look_at_the_instruments_is_told_in_words(qtbot: QtBot, page: RigPage)
     assert page.outcome.summary == page.summary.text()
     page.session.set_address("sim:3")  # what was found there says nothing of this one
     assert page.findings.rowCount() == 0
-    assert "not looked at" in page.summary.text()
+    assert "not checked yet" in page.summary.text()
     qtbot.mouseClick(page.check_button, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: page.outcome is not None, timeout=60_000)
     assert page.outcome is not None
@@ -70,7 +70,7 @@ def test_a_card_that_is_not_there_is_told(qtbot: QtBot, page: RigPage) -> None:
     assert page.outcome is not None
     assert page.outcome.wrong
     assert "wrong" in page.summary.text()
-    assert "✗ wrong" in [page.findings.item(r, 0).text() for r in range(page.findings.rowCount())]
+    assert "✗ Wrong" in [page.findings.item(r, 0).text() for r in range(page.findings.rowCount())]
 
 
 def test_a_wrong_value_is_said_beside_its_field_and_not_used(qtbot: QtBot, page: RigPage) -> None:

@@ -275,7 +275,7 @@ def test_a_defect_of_the_program_leaves_nothing_taken_for_safe(
         with qtbot.waitSignal(run_page.runner.ended, timeout=RUN_MS):
             click(qtbot, run_page.start_button)
         qtbot.waitUntil(lambda: bool(caught))
-    assert "a fault of the program" in run_page.result.text()
+    assert "an error in the program" in run_page.result.text()
     assert run_page.runner.state is HighVoltage.UNCONFIRMED
     assert not run_page.session.running
 

@@ -44,7 +44,7 @@ def click(qtbot: QtBot, widget: QWidget) -> None:
 
 def studied(page: StudyPage, qtbot: QtBot) -> Study:
     """Press Start, and wait for what is found."""
-    with qtbot.waitSignal(page.found, timeout=_PATIENCE) as told:
+    with qtbot.waitSignal(page.study_finished, timeout=_PATIENCE) as told:
         click(qtbot, page.start)
     found: Study = told.args[0]
     return found
@@ -57,10 +57,10 @@ def words(widget: QWidget) -> str:
 def test_a_fit_with_its_check_from_ticks_to_files(session, keep, qtbot, tmp_path):
     low, high = made(session.folder, "low", 4.0), made(session.folder, "high", 7.0)
     page = open_page(session, keep, qtbot)
-    assert not page.start.isEnabled()  # nothing is ticked
-    page.tick([low], [high])
+    assert not page.start.isEnabled()  # nothing is checked
+    page.recordings.check([low], [high])
     # a recording is fitted or checked, never both
-    page.tick([low, high], [high])
+    page.recordings.check([low, high], [high])
     assert page.task().train == (low,)
     assert page.task().validation == (high,)
     page.identify.setChecked(True)
@@ -69,13 +69,13 @@ def test_a_fit_with_its_check_from_ticks_to_files(session, keep, qtbot, tmp_path
     found = studied(page, qtbot)
     assert not page.cancel.isEnabled()
     assert page.headline.text() == "lobes of 4.0 kV, 1 branch"
-    assert "which the fit never saw" in words(page.verdict)
+    assert "not used in the fit" in words(page.verdict)
     # what only a diagnosis has is not there
     assert [page.tabs.tabText(i) for i in range(5) if page.tabs.isTabVisible(i)] == [
-        "Verdict", "Curves", "Residual",
+        "Result", "Curves", "Residual",
     ]  # fmt: skip
     assert [page.curves.record.itemText(i) for i in range(2)] == [
-        "high (untouched)", "low (fitted)",
+        "high (validation)", "low (training)",
     ]  # fmt: skip
     assert len(page.residual.time.listDataItems()) == 1
     assert found.report.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
@@ -99,12 +99,12 @@ def test_what_cannot_be_studied_is_said_and_leaves_nothing(session, keep, qtbot)
     copy.write_bytes(path.read_bytes())
     page = open_page(session, keep, qtbot)
     qtbot.waitUntil(lambda: page.recordings.rowCount() == 2, timeout=_PATIENCE)
-    page.tick([path], [copy])
+    page.recordings.check([path], [copy])
     click(qtbot, page.start)
     qtbot.waitUntil(lambda: "is a copy of" in page.message.text(), timeout=_PATIENCE)
     assert not list(session.folder.glob("study-*"))
     # the page is ready for the next
-    page.tick([path], [])
+    page.recordings.check([path], [])
     assert page.start.isEnabled()
 
     # a search that is cancelled at once leaves nothing either
@@ -113,7 +113,7 @@ def test_what_cannot_be_studied_is_said_and_leaves_nothing(session, keep, qtbot)
     assert page.message.text() == ""
     click(qtbot, page.cancel)
     click(qtbot, page.cancel)
-    assert page.message.text() == "Cancelled: nothing was kept."
+    assert page.message.text() == "Cancelled; nothing was saved."
     assert not list(session.folder.glob("study-*"))
     assert page.start.isEnabled()
 
@@ -131,7 +131,7 @@ def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
     window.show_page(page)
     page._library.refresh()
     listed(page, qtbot)
-    page.tick([path], [])
+    page.recordings.check([path], [])
     outcome = studied(page, qtbot).outcome
     assert isinstance(outcome, DiagnoseOutcome)
     assert outcome.finding.steps

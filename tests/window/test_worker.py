@@ -110,7 +110,7 @@ def test_a_defect_is_told_and_the_next_job_runs(qtbot, worker):
     qtbot.waitUntil(lambda: after != [], timeout=_PATIENCE)
     ((kind, words),) = seen
     assert kind == "failed"
-    assert "a defect of the program" in words
+    assert "an error in the program" in words
     assert "mu_0" in words
     assert after == [("done", 2)]
 
@@ -120,7 +120,7 @@ def test_a_process_that_dies_is_told_and_replaced(qtbot, worker):
     after = ended(worker.submit(doubled, 1))
     qtbot.waitUntil(lambda: after != [], timeout=_PATIENCE)
     assert seen[0][0] == "failed"
-    assert "ended by itself" in seen[0][1]
+    assert "ended unexpectedly" in seen[0][1]
     assert after == [("done", 2)]
 
 

@@ -1,0 +1,151 @@
+"""Table of recordings with a check box each for training and for validation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal, Slot
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QTableWidget,
+    QTableWidgetItem,
+    QWidget,
+)
+
+from dearig.analysis.summary import RecordingSummary
+from dearig.report.numbers import seconds
+from dearig.window.library import Library
+
+__all__ = ["TrainingTable"]
+
+_NAME, _TRAIN, _VALIDATE = range(3)
+_HEADS = (
+    ("Recording", "Recordings of the folder, newest first"),
+    ("Train", "The model is fitted to these recordings"),
+    ("Validate", "Compared once, at the end; no fit and no selection uses them"),
+)
+
+
+class TrainingTable(QTableWidget):
+    """Lists the recordings of a library; ``changed``: other check marks, or other recordings."""
+
+    changed = Signal()
+
+    def __init__(self, library: Library, parent: QWidget | None = None) -> None:
+        super().__init__(0, len(_HEADS), parent)
+        self._library = library
+        self.setAccessibleName("Recordings for training and validation")
+        for column, (name, tip) in enumerate(_HEADS):
+            head = QTableWidgetItem(name)
+            head.setToolTip(tip)
+            self.setHorizontalHeaderItem(column, head)
+        header = self.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(_NAME, QHeaderView.ResizeMode.Stretch)
+        header.setHighlightSections(False)
+        self.verticalHeader().hide()
+        self.verticalHeader().setDefaultSectionSize(26)
+        self.setShowGrid(False)
+        # only the check marks matter; a selected row would look checked
+        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.setAlternatingRowColors(True)
+        self.setTabKeyNavigation(False)
+        self.itemChanged.connect(self._item_changed)
+        library.listed.connect(self.refresh)
+        library.summarised.connect(self._summarised)
+        self.refresh()
+
+    @property
+    def train(self) -> tuple[Path, ...]:
+        """Recordings checked for training."""
+        return self._checked(_TRAIN)
+
+    @property
+    def validation(self) -> tuple[Path, ...]:
+        """Recordings checked for validation."""
+        return self._checked(_VALIDATE)
+
+    def check(self, train: list[Path], validation: list[Path]) -> None:
+        """Check the recordings for training and for validation."""
+        for row, path in enumerate(self._paths()):
+            self._item(row, _TRAIN).setCheckState(_state(path in train))
+            self._item(row, _VALIDATE).setCheckState(_state(path in validation))
+
+    @Slot()
+    def refresh(self) -> None:
+        """List the recordings of the library; their check marks stay."""
+        train, validation, files = self.train, self.validation, self._library.files
+        paths = sorted(files, key=lambda path: (-files[path][0], path.name))
+        self.blockSignals(True)
+        self.setRowCount(len(paths))
+        for row, path in enumerate(paths):
+            item = QTableWidgetItem(path.stem)
+            item.setData(Qt.ItemDataRole.UserRole, path)
+            item.setFlags(Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable)
+            self.setItem(row, _NAME, item)
+            for column, checked in ((_TRAIN, path in train), (_VALIDATE, path in validation)):
+                box = QTableWidgetItem()
+                box.setFlags(
+                    Qt.ItemFlag.ItemIsEnabled
+                    | Qt.ItemFlag.ItemIsUserCheckable
+                    | Qt.ItemFlag.ItemIsSelectable
+                )
+                box.setCheckState(_state(checked))
+                self.setItem(row, column, box)
+            self._describe(row, self._library.summaries.get(path))
+        self.blockSignals(False)
+        self.changed.emit()
+
+    @Slot(Path)
+    def _summarised(self, path: Path) -> None:
+        paths = self._paths()
+        if path in paths:
+            self._describe(paths.index(path), self._library.summaries.get(path))
+
+    def _describe(self, row: int, summary: RecordingSummary | None) -> None:
+        if summary is None:
+            return
+        item = self._item(row, _NAME)
+        film = f", {summary.film}" if summary.film else ""
+        about = f"{summary.path}\n{summary.title}, {seconds(summary.duration)}{film}"
+        item.setToolTip(summary.trouble or about)
+        if not summary.trouble:
+            return
+        self.blockSignals(True)
+        item.setFlags(Qt.ItemFlag.NoItemFlags)
+        for column in (_TRAIN, _VALIDATE):
+            box = self._item(row, column)
+            box.setFlags(Qt.ItemFlag.NoItemFlags)
+            box.setCheckState(Qt.CheckState.Unchecked)
+            box.setToolTip(summary.trouble)
+        self.blockSignals(False)
+
+    @Slot(QTableWidgetItem)
+    def _item_changed(self, item: QTableWidgetItem) -> None:
+        if item.column() in (_TRAIN, _VALIDATE) and item.checkState() == Qt.CheckState.Checked:
+            # an error on training data is no validation: a recording is one or the other
+            other = self._item(item.row(), _VALIDATE + _TRAIN - item.column())
+            other.setCheckState(Qt.CheckState.Unchecked)
+        self.changed.emit()
+
+    def _checked(self, column: int) -> tuple[Path, ...]:
+        return tuple(
+            path
+            for row, path in enumerate(self._paths())
+            if self._item(row, column).checkState() == Qt.CheckState.Checked
+        )
+
+    def _paths(self) -> list[Path]:
+        items = (self._item(row, _NAME) for row in range(self.rowCount()))
+        return [item.data(Qt.ItemDataRole.UserRole) for item in items]
+
+    def _item(self, row: int, column: int) -> QTableWidgetItem:
+        found = self.item(row, column)
+        if found is None:
+            raise LookupError(f"no cell at row {row}, column {column}")
+        return found
+
+
+def _state(checked: bool) -> Qt.CheckState:
+    return Qt.CheckState.Checked if checked else Qt.CheckState.Unchecked
