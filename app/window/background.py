@@ -29,7 +29,7 @@ class _Thread(QThread):
 
 
 class Background(QObject):
-    """Runs one function at a time, and then the newest of those that came while it was busy.
+    """Run one function at a time, then the newest of those submitted meanwhile.
 
     ``done`` carries the function's result, ``failed`` the message of its ``DearigError``. A result
     is dropped when a newer function waits. ``close`` waits for the thread.

@@ -835,10 +835,10 @@ class Bench:
             bounds = q.bounds
             low, high = max(float(low), bounds[0]), min(float(high), bounds[1])
             sure = is_determined(low, high)
-            note = "" if sure else "these data hardly determine it"
+            note = "" if sure else "poorly determined by these data"
             if end:
                 # a law that would go further there is not quite the one that acts
-                note = "at the end of the range that it may have"
+                note = "at the end of its search range"
             found.append(Estimate(q.name, q.unit, float(value), low, high, sure, note))
         return (*found, *self._own_estimates(trial))
 
@@ -858,7 +858,7 @@ class Bench:
         for (record, name), value, s in zip(whose, sizes, spread, strict=True):
             low, high = float(value - s), float(value + s)
             sure = is_determined(low, high)
-            note = "" if sure else "these data hardly determine it"
+            note = "" if sure else "poorly determined by these data"
             yield Estimate(f"{name} in {record.name}", "m", float(value), low, high, sure, note)
 
 

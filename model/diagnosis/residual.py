@@ -1,4 +1,4 @@
-"""What a residual looks like: is it noise, and if not, what does it go with?"""
+"""Describe residuals: whether they are noise, and which quantities they depend on."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ __all__ = ["signatures"]
 
 _LAGS = 20  # of the Ljung-Box test
 _BINS = 24
-_SHARE = 0.03  # of the residual's variance, beyond what noise gives: less is no dependence
-_TELLING = 0.1  # the same, for a sentence
+_SHARE = 0.03  # of the residual's variance beyond chance: below, there is no dependence
+_REPORTED_SHARE = 0.1  # the same, for a sentence
 
 
 def signatures(records: Sequence[Record], trial: Trial) -> tuple[Signature, ...]:
-    """The residual of each of ``records`` under the fitted model of ``trial``."""
+    """Return the signature of the residual of each of ``records`` under the model of ``trial``."""
     found, start = [], 0
     for record in records:
         part = slice(start, start + record.measured.size)
         start = part.stop
         sigma = trial.problem.sigma[part]
         good = np.isfinite(sigma)
-        # what must not be used is shown as nothing, and does not count
+        # masked readings show as zero and do not count
         residual = np.where(good, -trial.residuals[part] * record.noise, 0.0)
         found.append(_signature(record, residual, good))
     return tuple(found)
@@ -40,7 +40,7 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
     time, noise = record.time, record.noise
     step = float(np.median(np.diff(time)))
     model = record.measured - residual
-    # slow enough to tell up from down in a noisy reading
+    # wide enough for the sign of the rate in a noisy reading
     window = max(3, round(0.02 / step)) if isinstance(record, ActuatorRecord) else 3
     smooth = np.convolve(np.pad(model, window // 2, mode="edge"), np.ones(window) / window, "valid")
     rate = np.gradient(smooth[: time.size], time)
@@ -60,7 +60,7 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
             ("stress", "kPa", model * 1e-3),
             ("time", "s", time),
         ]
-    # standing still is neither loading nor unloading
+    # at rest there is neither loading nor unloading
     moving = np.abs(up) > 0.02 * float(np.max(np.abs(up)) or 1.0)
     used = residual[good]
     dependences = tuple(
@@ -76,11 +76,11 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
     difference = along.loading - along.unloading
     loops = float(np.nanmean(difference)) if np.isfinite(difference).any() else 0.0
     repeats = _first_less_repeats(record, residual, good)
-    # of a film, what a model may be off is no noise
+    # the noise of a film record is a tolerance, whose spectrum need not be flat
     sensed = isinstance(record, ActuatorRecord)
     uneven = unevenness(used, NOT_BY_CHANCE) if sensed else 0.0
-    goes_with_nothing = all(d.explained < _SHARE for d in dependences)
-    is_noise = rms < NOISE_RMS * noise and goes_with_nothing and uneven == 0.0
+    is_independent = all(d.explained < _SHARE for d in dependences)
+    is_noise = rms < NOISE_RMS * noise and is_independent and uneven == 0.0
     return Signature(
         record=record.name,
         time=time,
@@ -104,7 +104,7 @@ def _signature(record: Record, residual: np.ndarray, good: np.ndarray) -> Signat
 
 
 def _ljung_box(residual: np.ndarray) -> float:
-    """Probability that white noise is as correlated over the first lags."""
+    """Return the probability that white noise is as correlated over the first lags."""
     n = residual.size
     lags = min(_LAGS, n // 4)
     centred = residual - residual.mean()
@@ -117,7 +117,7 @@ def _ljung_box(residual: np.ndarray) -> float:
 
 
 def _runs(residual: np.ndarray) -> float:
-    """Probability that white noise changes its sign as seldom (Wald and Wolfowitz)."""
+    """Return the probability that white noise changes sign as rarely (Wald and Wolfowitz)."""
     up = residual > np.median(residual)
     a, b = int(np.count_nonzero(up)), int(np.count_nonzero(~up))
     if a < 2 or b < 2:
@@ -158,16 +158,16 @@ def _dependence(
 
 
 def _means(index: np.ndarray, residual: np.ndarray, which: np.ndarray) -> np.ndarray:
-    """Mean of the residual in each bin over the samples ``which`` (N,), NaN where there is none."""
+    """Return the mean residual in each bin over the samples ``which`` (N,); NaN where empty."""
     count = np.bincount(index[which], minlength=_BINS)
     total = np.bincount(index[which], residual[which], _BINS)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _first_less_repeats(record: Record, residual: np.ndarray, good: np.ndarray) -> float:
-    """RMS of the residual's change from the first period of the drive to the second.
+    """Return the RMS change of the residual from the first period of the drive to the second.
 
-    Less what noise gives; NaN where the drive does not repeat itself.
+    The part of noise is subtracted. NaN where the drive is not periodic.
     """
     drive = record.drive.voltage if isinstance(record, ActuatorRecord) else record.stretch - 1.0
     active = np.flatnonzero(np.abs(drive) > 1e-3 * float(np.max(np.abs(drive)) or 1.0))
@@ -178,7 +178,7 @@ def _first_less_repeats(record: Record, residual: np.ndarray, good: np.ndarray) 
     n = x.size
     lags = np.arange(n // 5, n // 2 + 2)
     lags = lags[lags < n]
-    # mean square of x(t + lag) - x(t): a correlation alone would be led astray by the ends
+    # mean square of x(t + lag) - x(t): a correlation is biased by the ends
     energy = np.concatenate([[0.0], np.cumsum(x**2)])
     match = np.fft.irfft(np.abs(np.fft.rfft(x, 2 * n)) ** 2)[lags]
     apart = (energy[n] - energy[lags] + energy[n - lags] - 2.0 * match) / (n - lags)
@@ -206,32 +206,30 @@ def _words(
     unit, scale = ("um", 1e6) if isinstance(record, ActuatorRecord) else ("kPa", 1e-3)
     words = [
         f"{rms * scale:.3g} {unit} RMS, {rms / record.noise:.3g} times the noise floor of "
-        f"{record.noise * scale:.3g} {unit}" + (": noise is all that is left" if is_noise else "")
+        f"{record.noise * scale:.3g} {unit}" + (": only noise is left" if is_noise else "")
     ]
     if is_noise:
         return tuple(words)
-    telling = [d for d in dependences if d.explained > _TELLING]
+    reported = [d for d in dependences if d.explained > _REPORTED_SHARE]
     words += [
-        f"{100 * d.explained:.0f} % of it goes with {d.quantity} alone"
-        for d in sorted(telling, key=lambda d: -d.explained)
+        f"{100 * d.explained:.0f} % of its variance depends on {d.quantity} alone"
+        for d in sorted(reported, key=lambda d: -d.explained)
     ]
     if abs(loops) > 0.3 * rms:
         higher = "higher" if loops > 0.0 else "lower"
-        words.append(
-            f"{abs(loops) * scale:.3g} {unit} {higher} on loading than on unloading at one place"
-        )
+        words.append(f"{abs(loops) * scale:.3g} {unit} {higher} on loading than on unloading")
     if repeats > 0.5 * rms:
         words.append(
             f"the second period differs from the first by {repeats * scale:.3g} {unit} RMS: "
-            f"something remembers"
+            f"the film has memory"
         )
     peak = int(np.argmax(density[1:])) + 1
     floor = 2.0 * record.noise**2 * step
     if frequency[peak] > 2.0 and density[peak] > 20.0 * floor:
-        words.append(f"a line stands in its spectrum at {frequency[peak]:.3g} Hz")
+        words.append(f"its spectrum has a line at {frequency[peak]:.3g} Hz")
     elif uneven:
         words.append(
-            f"{100 * uneven:.0f} % of it or more stands out of a spectrum of noise, which is "
-            f"highest near {frequency[peak]:.3g} Hz"
+            f"at least {100 * uneven:.0f} % of its power is not white noise; the spectrum peaks at "
+            f"{frequency[peak]:.3g} Hz"
         )
     return tuple(words)

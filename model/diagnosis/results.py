@@ -1,4 +1,4 @@
-"""What a diagnosis finds: immutable values, from which reports, windows and files are made.
+"""Results of a diagnosis: immutable values for reports, windows and files.
 
 Quantities are in SI units: displacement in m or stress in Pa, whichever was measured.
 """
@@ -32,12 +32,12 @@ __all__ = [
     "Unnamed",
 ]
 
-#: Residual over noise that still is noise: the noise itself is known to some per cent.
+#: Residual over noise up to which it counts as noise: the noise is known to some per cent.
 NOISE_RMS = 1.08
-#: Mean square of residual over noise from which it matters what is missing, not yet by which law,
-#: and what is sought shows in rough simulations, too.
+#: Mean square of residual over noise above which the family of the missing effect is sought before
+#: its law, in rough simulations.
 MUCH_LEFT = 25.0
-#: Probability below which a spectrum that noise might have by chance is called that of no noise.
+#: Significance level of the test for a white spectrum.
 NOT_BY_CHANCE = 1e-3
 
 NOTHING_MISSING = "nothing_missing"
@@ -67,13 +67,13 @@ class Dependence:
 
 @dataclass(frozen=True)
 class Signature:
-    """What the residual of one record looks like.
+    """Description of the residual of one record.
 
     ``time``, ``residual`` (N,): measured less model, in the measured unit. ``noise`` is the floor
     of one of these samples. ``ljung_box_p`` and ``runs_p`` are the probabilities that noise alone
-    would be as correlated, and change its sign as seldom. ``frequency`` Hz and ``density`` (F,)
-    are its power spectral density (unit^2/Hz), ``floor_density`` that of the noise. ``words`` says
-    the remarkable in sentences.
+    is as correlated, and changes its sign as rarely. ``frequency`` Hz and ``density`` (F,)
+    are its power spectral density (unit^2/Hz), ``floor_density`` that of the noise. ``words`` are
+    sentences on what is remarkable.
     """
 
     record: str
@@ -96,7 +96,7 @@ class Signature:
 
 @dataclass(frozen=True)
 class MissingStress:
-    """The stress in Pa that the model lacks, sample by sample (N,), with what it may depend on.
+    """Stress in Pa that the model lacks, sample by sample (N,), and what it may depend on.
 
     ``band`` is the upper frequency in Hz to which it was kept; ``scale`` the RMS of the Maxwell
     stress (or of the measured stress of a film) to compare it with. ``voltage`` is zero for films.
@@ -114,15 +114,15 @@ class MissingStress:
 
 @dataclass(frozen=True)
 class Stage:
-    """A fitted model and how well it does: ``cost`` is the mean square of residual over noise.
+    """A fitted model and its errors: ``cost`` is the mean square of residual over noise.
 
     ``train_rms``, and ``selection_rms`` and ``selection_max`` (each segment of time predicted by a
     fit to the others), are pooled over the training records, in the measured unit. ``criterion`` is
-    the Bayesian information criterion, counting correlated residuals as what they are worth; only
-    differences mean something. ``estimates`` are the model's numbers with their intervals.
-    ``for_others`` is the model by which other recordings are predicted: the same without what
-    happened in these recordings only, fitted again. ``models`` are those of the training records,
-    each with the walk that it has of its own.
+    the Bayesian information criterion with correlated residuals counted as fewer readings; only
+    differences have a meaning. ``estimates`` are the model's parameters with their intervals.
+    ``for_others`` is the model that predicts other recordings, refitted without the effects that
+    are specific to these recordings. ``models`` are those of the training records, each with its
+    own drift.
     """
 
     model: Actuator | Strip
@@ -136,25 +136,25 @@ class Stage:
     models: tuple[Actuator | Strip, ...] = ()
 
     def of_each(self, records: int) -> tuple[Actuator | Strip, ...]:
-        """The models of so many training ``records``."""
+        """Return the models of so many training ``records``."""
         return self.models or (self.model,) * records
 
     @property
     def predicting(self) -> Actuator | Strip:
-        """The model by which other recordings are predicted."""
+        """Model that predicts other recordings."""
         return self.for_others or self.model
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect, tried in full: the base model refitted with it.
+    """One effect and the base model refitted with it.
 
-    ``promised`` is the share of the residual's mean square that its sensitivity promises to
-    first order (the score test), ``gained`` the share that the refit took away. ``gain`` is the
-    fall of the information criterion against the base, ``behind`` how far it lies behind the best
-    candidate of its round (0 for the best). ``verdict`` is one of chosen, indistinguishable
-    (explains as much as the best, be it with more numbers), better (than nothing, but not the
-    best), worthless, failed. ``note`` says why in words.
+    ``promised`` is the share of the residual's mean square that the score test predicts to first
+    order, ``gained`` the share that the refit removed. ``gain`` is the
+    decrease of the information criterion from the base, ``behind`` its distance to the best
+    candidate of the round (0 for the best). ``verdict`` is one of chosen, indistinguishable
+    (explains as much as the best, possibly with more parameters), better (than the base, but not
+    the best), worthless, failed. ``note`` gives the reason.
     """
 
     effect: str
@@ -171,7 +171,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Round:
-    """One pass over all candidates on top of the effects ``base``; ``candidates`` best first."""
+    """One pass over all candidates beside the effects ``base``; ``candidates`` best first."""
 
     base: tuple[str, ...]
     candidates: tuple[Candidate, ...]
@@ -181,11 +181,11 @@ class Round:
 
 @dataclass(frozen=True)
 class Step:
-    """One effect that the diagnosis put into the model, the model with it, and the evidence.
+    """One effect that the diagnosis added to the model, the model with it, and the evidence.
 
     ``stage`` is the model with this and all earlier steps' effects. ``estimates`` are this
-    effect's own numbers with 95 % intervals in the final model. ``indistinguishable_from`` names
-    the families that explain these data as well. ``evidence`` are sentences, for and against.
+    effect's parameters with 95 % intervals in the final model. ``indistinguishable_from`` names
+    the families that explain these data as well. ``evidence`` are sentences for and against.
     """
 
     effect: str
@@ -200,7 +200,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Unnamed:
-    """Something that no effect covers: where it acts, a formula if one was found, and its look."""
+    """A residual that no effect explains: where it acts, a formula if found, and a description."""
 
     acts_on: str
     expression: str
@@ -209,13 +209,13 @@ class Unnamed:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """All that was found. ``verdict`` is one of the four constants of this module.
+    """Result of a diagnosis. ``verdict`` is one of the four constants of this module.
 
-    ``rivals`` are fitted models that the data cannot tell from the final one, by family, for the
-    choice of an experiment. ``interrupted`` is True where the operator ended it early: everything
-    found until then is here. ``held`` is True where the records call the voltage linear between
-    samples, and the data show that it stands until the next. ``notes`` are sentences for the
-    operator.
+    ``rivals`` are fitted models that these data do not distinguish from the final one, by family,
+    for the choice of an experiment. ``interrupted`` is True where the operator stopped the search;
+    everything found until then is kept. ``held`` is True where the records declare the voltage
+    linear between samples, but the data show that it is held until the next. ``notes`` are
+    sentences for the operator.
     """
 
     verdict: str

@@ -336,7 +336,9 @@ class _Search:
             samples = self.bench.samples / correlation
             law = min(tried, key=lambda t: akaike(t.trial.cost, t.trial.free, samples))
             if law.name != name:
-                self._record(tried, correlation, law, "should foretell other recordings better")
+                self._record(
+                    tried, correlation, law, "predicts other recordings better in cross-validation"
+                )
                 best = law.trial
         return best
 
@@ -366,7 +368,7 @@ class _Search:
         due = [t for t in laws if self.last.get(frozenset(t.trial.effects)) is not t.trial]
         if len(laws) < 2 or not due:
             return best
-        self.report("telling laws apart", 0.92)
+        self.report("comparing effects", 0.92)
         fresh = {t.name: t.trial for t in due}
         for some in _abreast(list(fresh)):
             trials = self.bench.parallel_map(lambda n: self.bench.to_the_last(fresh[n]), some)
@@ -376,7 +378,7 @@ class _Search:
                 self.last[key] = self.found[key]
         fitted, correlation = self._ranked(best, laws)
         if fitted[0].name != name:
-            self._record(fitted, correlation, fitted[0], "fitted to the last explains more")
+            self._record(fitted, correlation, fitted[0], "explains more after its fit converged")
         return fitted[0].trial
 
     def _replaced(self, best: Trial, span: tuple[float, float], laws: bool = False) -> Trial:
@@ -398,7 +400,10 @@ class _Search:
         if gain <= 0.0 or same:
             return self._ended(leader.trial if same else best)
         self._record(
-            fitted, correlation, leader, "beside the others explains more than what it replaces"
+            fitted,
+            correlation,
+            leader,
+            "explains more beside the other effects than the one that it replaces",
         )
         return self._ended(leader.trial)
 
@@ -490,19 +495,19 @@ class _Search:
                 reason = f"gains {gain:.0f} of the information criterion"
             elif significant:
                 reason = (
-                    "what the best effect explains it does not foretell from one time to another"
+                    "the best effect does not predict the parts of the record left out of its fit"
                 )
             elif gain > self._asked(fitted[0].name):
-                reason = "what the best effect explains is too little to matter"
+                reason = "the best effect explains too little to matter"
             else:
                 reason = (
                     f"no effect explains significantly more (the best gains {gain:.1f} of the "
-                    f"information criterion, {self._asked(fitted[0].name):g} are asked for)"
+                    f"information criterion; the threshold is {self._asked(fitted[0].name):g})"
                 )
             hopeless = bool(best.effects) or best.is_noise or leader.cost > _HOPE * best.cost
             last = depth + 1 == _EFFECTS_MAX
             if not taken and not (looking_on or hopeless or last):
-                reason += "; the leading ones are tried together with others"
+                reason += "; the best effects are tried in pairs with others"
             self._record(fitted, correlation, fitted[0] if taken else None, reason)
             if taken:
                 best, looking_on = self._restarted(self._ended(leader)), False
@@ -974,7 +979,12 @@ class _Search:
         found = min([best, *(t.trial for t in tried)], key=lambda t: self._demerit(t, correlation))
         for one in tried:
             if one.trial is found:
-                self._record([one], correlation, one, "explains more than what it refines")
+                self._record(
+                    [one],
+                    correlation,
+                    one,
+                    "explains more than the simpler effect that it generalises",
+                )
         return found
 
     def _refining(self, trial: Trial) -> list[_Tried]:
@@ -1530,29 +1540,30 @@ class _Search:
             unnamed = describe_unnamed(missing_after, after, steps)
         notes = []
         if self.ran_out:
-            notes.append(
-                "the search was ended when it had taken the work that it may; a thorough one would "
-                "go on"
-            )
+            notes.append("the search stopped at its computing budget; --thorough searches further")
         if self.interrupted and not (self.rounds or best.effects):
-            notes.append("interrupted before any round was over: what is missing was not found out")
+            notes.append(
+                "interrupted before the first round ended: it is not known what is missing"
+            )
         gone = [n for n in best.effects if n not in {name for name, _ in others.effects}]
         if gone and doubtful:
             notes.append(
-                "what was found explains too little, or does worse in one of these recordings than "
-                "nothing does, to be trusted elsewhere: other recordings are predicted without it"
+                "the effects found explain too little, or raise the error of one of these "
+                "recordings: other recordings are predicted without them"
             )
         elif gone:
             notes.append(
-                f"{', '.join(gone)}: of these recordings alone, as far as they can show; other "
+                f"{', '.join(gone)}: specific to these recordings as far as they show; other "
                 "recordings are predicted without it"
             )
         if not is_noise and verdict in (NOTHING_MISSING, EXPLAINED):
-            notes.append("what is left is not quite white noise, but too small to name")
+            notes.append(
+                "the residual is not quite white noise, but too small to attribute to an effect"
+            )
         if self.held:
             notes.append(
-                "the voltage stands between samples, as a converter's does, although the records "
-                "call it linear: half a sample's delay, and no effect of the rig"
+                "the voltage is held between samples, as by a converter, although the records "
+                "declare it linear: half a sample of delay, not an effect of the rig"
             )
         self.report("final fits", 1.0)
         return Diagnosis(
@@ -1613,7 +1624,7 @@ class _Search:
             evidence = [
                 f"without it the residual is {np.sqrt(without.cost):.3g} times the noise, with it "
                 f"{np.sqrt(best.cost):.3g} times",
-                f"leaving it out costs {worth:.0f} of the information criterion",
+                f"without it the information criterion is worse by {worth:.0f}",
                 *(f"{n} explains these data as well" for n, _ in alike),
             ]
             steps.append(
@@ -1792,5 +1803,5 @@ def _stage(parent: Trial, what: str) -> str:
 def _note(tried: _Tried, parent: Trial) -> str:
     gained = 1.0 - tried.trial.cost / parent.cost
     if tried.promised < 0.1 < gained:
-        return "the baseline's own numbers hide it: it shows only when all are fitted anew"
+        return "the baseline's parameters absorb it: it shows only when all are refitted"
     return ""

@@ -1,10 +1,10 @@
-"""The stress that a model lacks, read off the measurement sample by sample, without deconvolution.
+"""Stress that a model lacks, sample by sample from the measurement, without deconvolution.
 
-The stretch is measured. With the branches driven by it, every term of the equation of motion is
-known but one: p = network stress - F/(L2 Z) - eps (phi/Z)^2 lam + M lam''. The same is computed for
-what the model itself predicts, and the difference is what the model lacks: smoothing bends both
-alike, and the effects that are in the model already cancel. It is a lens, not a measure: effects on
-the voltage or the sensor show in disguise, so every reported error comes from simulation.
+The stretch is measured. With it imposed on the branches, every term of the equation of motion is
+known except one: p = network stress - F/(L2 Z) - eps (phi/Z)^2 lam + M lam''. The same is computed
+for the stretch that the model predicts. The difference is the missing stress: smoothing affects
+both alike, and effects in the model cancel. It only shows where to look: effects on the voltage or
+the sensor appear as a stress, so every reported error comes from simulation.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _BAND = 10.0  # Hz
 
 
 def missing_stress(records: Sequence[Record], model: Actuator | Strip) -> tuple[MissingStress, ...]:
-    """What ``model`` lacks in each record; records that it cannot follow are left out."""
+    """Return the stress that ``model`` lacks in each record that it can simulate."""
     found = []
     for record in records:
         if isinstance(record, ActuatorRecord) and isinstance(model, Actuator):
@@ -45,7 +45,7 @@ def missing_stress(records: Sequence[Record], model: Actuator | Strip) -> tuple[
 
 
 def _bridged(record: Record, residual: np.ndarray) -> np.ndarray:
-    """``residual`` (N,) straight across readings that must not be used."""
+    """Return ``residual`` (N,) interpolated across masked readings."""
     if record.valid is None or not record.valid.any():
         return residual
     return np.interp(record.time, record.time[record.valid], residual[record.valid])
@@ -72,7 +72,7 @@ def _of_actuator(record: ActuatorRecord, model: Actuator) -> MissingStress | Non
     response = model.simulate(record.drive, record.lag)
     if not response.ok:
         return None
-    # even in time, as filters want it; records are of a sample clock
+    # filters need even sampling, which the sample clock provides
     time = record.time
     step = float(np.median(np.diff(time)))
     c = model.coefficients()

@@ -1,4 +1,4 @@
-"""What no effect of the library covers: where it acts, what it looks like, and a formula if any.
+"""Describe a residual that no effect explains by a short formula.
 
 Sparse regression (orthogonal matching pursuit) of the missing stress on a small dictionary of terms
 in stretch, rate, voltage, time and delayed copies. The formula is fitted on one part of the time
@@ -17,8 +17,8 @@ from dearig.model.effects import EFFECTS
 __all__ = ["describe_unnamed"]
 
 _TERMS_MAX = 3
-_WORTH = 0.05  # of the variance in the part left out: what a term must explain
-_WHOLE = 0.3  # of it: less is no formula
+_TERM_SHARE_MIN = 0.05  # of the variance in the part left out: what each term must explain
+_FORMULA_SHARE_MIN = 0.3  # of it: what a formula must explain
 _BLOCKS = 8  # of time, every other one left out
 _DELAYS = (0.05, 0.2, 1.0)  # s
 
@@ -26,28 +26,28 @@ _DELAYS = (0.05, 0.2, 1.0)  # s
 def describe_unnamed(
     missing: Sequence[MissingStress], after: Sequence[Signature], steps: Sequence[Step]
 ) -> Unnamed | None:
-    """The part of the residual that no family explains; None where there is no record to look at.
+    """Return a description of the residual that no family explains; None without records.
 
-    An effect of the family ``unknown`` that is in the model is described by its own formula.
+    An effect of the family ``unknown`` in the model is described by its own formula.
     """
     own = [s for s in steps if s.family == "unknown"]
     look = "; ".join(f"{s.record}: {', '.join(s.words)}" for s in after)
     if own:
         numbers = "; ".join(f"{s.effect} ({_values(s)})" for s in own)
         words = "; ".join(EFFECTS[s.effect].summary for s in own)
-        return Unnamed(own[0].acts_on, numbers, f"{words}. What is left: {look}")
+        return Unnamed(own[0].acts_on, numbers, f"{words}. Residual: {look}")
     if not missing:
         return None
     largest = max(missing, key=lambda m: float(np.var(m.stress)))
     terms, share = _pursuit(largest)
-    if share < _WHOLE:
+    if share < _FORMULA_SHARE_MIN:
         return Unnamed(_where(after), "", f"no short formula explains it. {look}")
     formula = " ".join(f"{c:+.3g} {name}" for name, c in terms)
     return Unnamed(
         _where(after),
         f"p/Pa = {formula}",
-        f"the formula explains {100 * share:.0f} % of the missing stress in stretches of time that "
-        f"it was not fitted to. {look}",
+        f"the formula explains {100 * share:.0f} % of the missing stress in the parts of the time "
+        f"that it was not fitted to. {look}",
     )
 
 
@@ -56,7 +56,7 @@ def _values(step: Step) -> str:
 
 
 def _where(after: Sequence[Signature]) -> str:
-    """The place of the signal path that the residual points to, by what it goes with most."""
+    """Return the place in the signal path of the quantity that explains most of the residual."""
     shares: dict[str, float] = {}
     for s in after:
         for d in s.dependences:
@@ -111,7 +111,7 @@ def _dictionary(m: MissingStress) -> dict[str, np.ndarray]:
 
 
 def _pursuit(m: MissingStress) -> tuple[list[tuple[str, float]], float]:
-    """Terms with their coefficients, and the share of the variance explained where left out."""
+    """Return terms with coefficients, and the share of variance explained in the part left out."""
     terms = _dictionary(m)
     block = (np.arange(m.time.size) * _BLOCKS // m.time.size) % 2
     fit, check = block == 0, block == 1
@@ -132,7 +132,7 @@ def _pursuit(m: MissingStress) -> tuple[list[tuple[str, float]], float]:
         if not trials:
             break
         _, share, name, size = min(trials, key=lambda t: t[0])
-        if share < best_share + _WORTH:
+        if share < best_share + _TERM_SHARE_MIN:
             break
         names.append(name)
         best_share, best_size = share, size

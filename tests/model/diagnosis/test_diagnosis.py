@@ -1646,7 +1646,7 @@ def test_what_no_family_covers_is_described():
     assert found.unnamed.acts_on == "load"
     # one recording does not show that it will happen again
     assert found.final.predicting.effects == ()
-    assert any("of these recordings alone" in n for n in found.notes)
+    assert any("specific to these recordings" in n for n in found.notes)
 
 
 def test_a_slack_strip_is_found():
@@ -1680,7 +1680,7 @@ def test_a_voltage_that_stands_between_samples_is_recognised():
     found = diagnose([replace(record, drive=drive)], PLAIN, workers=1)
     require_nothing(found)
     assert found.held
-    assert any("stands between samples" in n for n in found.notes)
+    assert any("held between samples" in n for n in found.notes)
     # and where it is known, there is nothing to recognise
     assert not diagnose([record], PLAIN, workers=1).held
 
@@ -1747,7 +1747,7 @@ def test_a_search_ends_when_it_has_taken_the_work_that_it_may(monkeypatch):
     require_consistent(found)
     assert not found.interrupted
     assert found.simulations < whole.simulations
-    assert "ended when it had taken the work" in found.notes[0]
+    assert "stopped at its computing budget" in found.notes[0]
     # by what is simulated, not by a clock: the same again, on as many threads as there are
     again = diagnose([record], PLAIN, workers=1)
     assert (again.simulations, again.final.cost) == (found.simulations, found.final.cost)

@@ -148,4 +148,4 @@ def test_a_step_of_the_unknown_family_is_told_by_its_own_numbers():
     assert unnamed.expression == f"{name} (stiffness = 2.123e+04 Pa, onset = 0.00105 m)"
     assert unnamed.acts_on == "load"
     assert EFFECTS[name].summary in unnamed.signature
-    assert "noise is all that is left" in unnamed.signature
+    assert "only noise is left" in unnamed.signature
