@@ -2,12 +2,17 @@
 
 import os
 import signal
+import tempfile
+from pathlib import Path
 
 from hypothesis import settings
 
 # What a shell runs in the background ignores ctrl-C, and hands that down: the tests send it.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# The commands that the tests run must not write to the log of the person who runs the tests.
+os.environ["DEARIG_LOG_DIR"] = str(Path(tempfile.gettempdir()) / "dearig-tests-log")
 
 # No example is timed: the machine may be busy, or a kernel still to be compiled. The same answer
 # twice, for whoever runs the tests; DEARIG_EXPLORE=1 lets hypothesis look further.

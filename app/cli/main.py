@@ -9,24 +9,32 @@ from __future__ import annotations
 import io
 import logging
 import os
+import platform
 import re
+import shlex
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Annotated
 
 import typer
 from typer.exceptions import TyperException
 
+from dearig import log_file
 from dearig.cli import files, fit, run, tools
-from dearig.errors import DearigError, InputError
+from dearig.cli.output import version
+from dearig.errors import DearigError, InputError, Interrupted
 
 __all__ = ["app", "main"]
+
+log = logging.getLogger(__name__)
 
 app = typer.Typer(
     name="dearig",
     help="Run a dielectric-elastomer actuator rig, record it, and find out what its physical "
     "model is missing.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -34,17 +42,48 @@ for _group in (run, files, fit, tools):
     app.add_typer(_group.commands)
 
 
+def _show_version(asked: bool) -> None:
+    if asked:
+        sys.stdout.write(f"dearig {version()}\n")
+        raise typer.Exit
+
+
 @app.callback()
 def _options(
     verbose: Annotated[
         int, typer.Option("--verbose", "-v", count=True, help="Show more messages; -vv shows all.")
     ] = 0,
+    _version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_show_version, is_eager=True, help="Show the version and exit."
+        ),
+    ] = False,
 ) -> None:
-    level = (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
-    logging.basicConfig(level=level, format="%(levelname)s: %(message)s", stream=sys.stderr)
-    # messages of other packages do not help an operator
-    logging.getLogger("numba").setLevel(logging.WARNING)
-    logging.getLogger("matplotlib").setLevel(logging.WARNING)
+    root = logging.getLogger()
+    for handler in root.handlers:
+        if isinstance(handler, _Terminal):
+            handler.show(verbose)
+    if verbose > 1:
+        root.setLevel(logging.DEBUG)
+    log.info("started: %s", shlex.join(["dearig", *sys.argv[1:]]))
+
+
+class _Terminal(logging.StreamHandler):
+    """Log messages on standard error: warnings, and more with ``--verbose``."""
+
+    def __init__(self) -> None:
+        super().__init__(sys.stderr)
+        self.setFormatter(logging.Formatter("%(levelname)s: %(message)s"))
+        self.show(0)
+
+    def show(self, verbose: int) -> None:
+        self.setLevel((logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)])
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        # a traceback is for the log file
+        wanted = record.exc_info is None or self.level < logging.WARNING
+        return wanted and bool(super().filter(record))
 
 
 def main() -> None:
@@ -53,30 +92,52 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):
             # characters that the terminal's encoding lacks are escaped; they raise nothing
             stream.reconfigure(errors="backslashreplace")
+    with log_file.attached() as written, _terminal(), _unexpected_errors_told(written):
+        status = _run(written)
+        if written.stream is not None:  # a command has started, not only --help
+            log.info("ended with exit code %d", status)
+    sys.exit(status)
+
+
+@contextmanager
+def _terminal() -> Iterator[None]:
+    handler = _Terminal()
+    # messages of other packages do not help an operator
+    for name in ("numba", "matplotlib"):
+        logging.getLogger(name).setLevel(logging.WARNING)
+    logging.getLogger().addHandler(handler)
+    try:
+        yield
+    finally:
+        logging.getLogger().removeHandler(handler)
+
+
+def _run(written: log_file.LogFile) -> int:
+    """Run the command and return its exit code."""
     try:
         status: object = app(prog_name="dearig", standalone_mode=False)
-        if status == _INTERRUPTED:  # typer returns it for a KeyboardInterrupt
+        if status == Interrupted.exit_code:  # typer returns it for a KeyboardInterrupt
             _say("interrupted")
         sys.stdout.flush()
     except DearigError as error:
         if isinstance(error.__cause__, BrokenPipeError):
-            status = _reader_left()
-        else:
-            _say(str(error))
-            status = error.exit_code
+            return _reader_left()
+        _say(str(error))
+        return error.exit_code
     except TyperException as error:
         _say(_usage(error))
-        status = InputError.exit_code
+        return InputError.exit_code
     except KeyboardInterrupt:
         _say("interrupted")
-        status = _INTERRUPTED
+        return Interrupted.exit_code
     except (BrokenPipeError, SystemExit):
         # rich and typer both turn a broken pipe into a SystemExit; nothing else here raises one
-        status = _reader_left()
-    sys.exit(status if isinstance(status, int) else 0)
-
-
-_INTERRUPTED = 130
+        # with a code that is not 0
+        return _reader_left()
+    except Exception as error:  # noqa: BLE001  (the last resort: it is logged with its traceback)
+        _tell_unexpected(error, written)
+        return DearigError.exit_code
+    return status if isinstance(status, int) else 0
 
 
 def _reader_left() -> int:
@@ -96,7 +157,46 @@ def _usage(error: TyperException) -> str:
 
 
 def _say(message: str) -> None:
+    log.info("message: %s", message)
     sys.stderr.write(f"dearig: {message}\n")
+
+
+# ---------------------------------------------------------------- unexpected errors
+
+
+def _tell_unexpected(error: BaseException, written: log_file.LogFile) -> None:
+    """Log ``error`` with its traceback, and say in one sentence where that is."""
+    log.error(
+        "unexpected error in dearig %s, Python %s, %s",
+        version(), platform.python_version(), platform.platform(),
+        exc_info=(type(error), error, error.__traceback__),
+    )  # fmt: skip
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    if written.problem is None:
+        where = f"the details are in {written.baseFilename}; send that file with a report of this"
+    else:
+        where = (
+            f"the log file {written.baseFilename} cannot be written ({written.problem}); "
+            f"dearig -v shows the details"
+        )
+    sys.stderr.write(f"dearig: unexpected error, a mistake in this program ({what}); {where}\n")
+
+
+@contextmanager
+def _unexpected_errors_told(written: log_file.LogFile) -> Iterator[None]:
+    """Tell errors in threads and in Qt's slots too, which no ``except`` reaches."""
+    in_main, in_threads = sys.excepthook, threading.excepthook
+
+    def thread_ended(args: threading.ExceptHookArgs) -> None:
+        if args.exc_value is not None:
+            _tell_unexpected(args.exc_value, written)
+
+    sys.excepthook = lambda _, error, __: _tell_unexpected(error, written)
+    threading.excepthook = thread_ended
+    try:
+        yield
+    finally:
+        sys.excepthook, threading.excepthook = in_main, in_threads
 
 
 if __name__ == "__main__":

@@ -15,7 +15,25 @@ if TYPE_CHECKING:
 
     from dearig.progress import Progress
 
-__all__ = ["check_files", "console_for", "optional", "print_line", "working", "write_result"]
+__all__ = [
+    "check_files",
+    "console_for",
+    "optional",
+    "print_line",
+    "version",
+    "working",
+    "write_result",
+]
+
+
+def version() -> str:
+    """Return the version of the installed package, "unknown" where it is not installed."""
+    from importlib import metadata
+
+    try:
+        return metadata.version("dearig")
+    except metadata.PackageNotFoundError:
+        return "unknown"
 
 
 def optional(path: Path | None) -> list[Path]:

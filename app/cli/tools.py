@@ -1,4 +1,4 @@
-"""Commands that help to set up: rig-file, presets, docs."""
+"""Commands that help to set up: rig-file, presets, doctor, docs."""
 
 from __future__ import annotations
 
@@ -44,6 +44,18 @@ def presets(json: Json = None, force: Force = False) -> None:
         for name, s in found.items()
     ]
     write_result({"format": "dearig-presets/1", "presets": listed}, json)
+
+
+@commands.command(rich_help_panel=_PANEL)
+def doctor(json: Json = None, force: Force = False) -> None:
+    """Show versions, folders, instruments' drivers and plug-ins, and what is missing."""
+    from dearig.cli.doctor import doctor_json, doctor_table, examine
+
+    check_files(force, (), json=json)
+    items = examine()
+    if json != "-":
+        console_for().print(doctor_table(items), highlight=False)
+    write_result(doctor_json(items), json)
 
 
 commands.command("docs", rich_help_panel=_PANEL)(docs)

@@ -11,7 +11,7 @@ from pathlib import Path
 from dearig.drivers.processes import child_environment
 from dearig.errors import InputError
 
-__all__ = ["run_window"]
+__all__ = ["require_qt", "require_screen", "run_window"]
 
 # a closed terminal or a stopped service must not leave a voltage on
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
@@ -32,8 +32,8 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     Recordings are written to ``folder``. Raises ``InputError`` if Qt, a screen or the rig file is
     missing.
     """
-    _require_qt()
-    _require_screen()
+    require_qt()
+    require_screen()
 
     from PySide6.QtCore import QSettings, QTimer
     from PySide6.QtWidgets import QApplication
@@ -75,7 +75,7 @@ def _run_interpreter() -> None:
     """Do nothing: the call alone lets Python handle signals."""
 
 
-def _require_qt() -> None:
+def require_qt() -> None:
     """Raise ``InputError`` if Qt, or a system library that it needs, is missing."""
     try:
         import PySide6.QtGui  # first: the message of pyqtgraph names another package
@@ -95,7 +95,7 @@ def _require_qt() -> None:
         ) from error
 
 
-def _require_screen() -> None:
+def require_screen() -> None:
     """Raise ``InputError`` if Qt would abort the program because there is no screen."""
     asked = os.environ.get("QT_QPA_PLATFORM", "")
     if asked.startswith(_NO_SCREEN) or not sys.platform.startswith("linux"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import logging
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -53,20 +54,39 @@ class Answer:
 
 
 def dearig(*arguments: str | Path) -> Answer:
-    """Run the command in this process. Anything but its own exit comes through as it is."""
+    """Run the command in this process. An unexpected error is raised here, not only logged."""
     out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8", newline="\n") for _ in range(2))
     argv = ["dearig", *(str(a) for a in arguments)]
-    with patch.object(sys, "argv", argv), redirect_stdout(out), redirect_stderr(err):
+    unexpected = _Unexpected()
+    with patch.object(sys, "argv", argv), redirect_stdout(out), redirect_stderr(err), unexpected:
         try:
             main()
         except SystemExit as end:
             code = end.code
+    if unexpected.error is not None:
+        raise unexpected.error
     texts = []
     for stream in (out, err):
         stream.flush()
         texts.append(stream.buffer.getvalue().decode())  # type: ignore[attr-defined]
     assert isinstance(code, int)
     return Answer(code, *texts)
+
+
+class _Unexpected(logging.Handler):
+    """Keeps the exception that the command reported to its log file."""
+
+    error: BaseException | None = None
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.levelno >= logging.ERROR and record.exc_info:
+            self.error = record.exc_info[1]
+
+    def __enter__(self) -> None:
+        logging.getLogger("dearig.cli").addHandler(self)
+
+    def __exit__(self, *_: object) -> None:
+        logging.getLogger("dearig.cli").removeHandler(self)
 
 
 def done(*arguments: str | Path) -> Answer:
