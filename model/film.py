@@ -12,9 +12,9 @@ from dearig.model.coefficients import EFFECTS_AT, MODULUS, REST, WIDTH
 from dearig.model.effects import MEMORY, NEUTRAL, PARAMETER_COUNT, EffectValues
 from dearig.model.errors import ModelError
 from dearig.model.film_kernel import add_effects, drive_by_stretch
-from dearig.model.kinematics import KINEMATICS
 from dearig.model.material import Network
 from dearig.model.network import HEAD
+from dearig.model.specimen import KINEMATICS
 
 __all__ = ["StressResponse", "Strip", "stress_of", "unit_stresses"]
 

@@ -18,7 +18,6 @@ import numpy as np
 from dearig.model.jit import allocating, jit
 
 __all__ = [
-    "KINEMATICS",
     "directions",
     "electric",
     "electric_along",
@@ -29,9 +28,6 @@ __all__ = [
     "thinning_squared",
     "thinning_squared_slope",
 ]
-
-#: Names in the order of the integer codes that the kernels use.
-KINEMATICS: tuple[str, ...] = ("constrained-width", "uniaxial", "equibiaxial")
 
 
 @jit

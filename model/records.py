@@ -6,19 +6,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import median_filter
-from scipy.optimize import minimize_scalar
 
 from dearig.model.actuator import Drive
 from dearig.model.errors import ModelError
 
-__all__ = ["ActuatorRecord", "FilmRecord", "Record", "counted", "noise_at_rest", "noise_of"]
+__all__ = ["ActuatorRecord", "FilmRecord", "Record", "counted"]
 
 _MATCHING = 10  # rounds; each leaves a third of what the one before did
-_READINGS_MIN = 4  # to read a noise from
-_READINGS_A_LINE = 4  # a periodic line takes three numbers away, of many more
-_SLOWEST_LINE = 15.0  # Hz; what is slower may be a drift, or noise that a sensor has averaged
-_STANDS_OUT = 30.0  # of the spectrum's median about it: by chance once in a million readings
 
 
 def counted(displacement: np.ndarray, lead_in: int) -> np.ndarray:
@@ -233,73 +227,3 @@ def _check(name: str, values: np.ndarray, time: np.ndarray, noise: float) -> Non
         )
     if not (math.isfinite(noise) and noise > 0.0):
         raise ModelError(f"{name}: noise = {noise!r} must be a finite number above 0")
-
-
-def noise_of(values: np.ndarray) -> float:
-    """Standard deviation of the noise on a slowly changing quantity ``values`` (N,), N >= 4.
-
-    From second differences, which no drift or slope disturbs: their variance is six times that of
-    white noise.
-    """
-    _require_readings(values)
-    return float(np.sqrt(np.mean(np.diff(values, 2) ** 2) / 6.0))
-
-
-def noise_at_rest(time: np.ndarray, values: np.ndarray) -> float:
-    """Standard deviation of the noise on readings (N,) at ``time`` (N,) of what hangs still.
-
-    N >= 4. About a straight line, and without what is periodic: mains on a cable is no noise, but
-    something to be found; taken for noise, it would hide everything that is smaller.
-    """
-    _require_readings(values)
-    n = values.size
-    t = time - time.mean()
-    left = _level(t, values)
-    given = 2
-    steps = np.diff(time)
-    even = float(steps.max()) < 1.01 * float(steps.min())
-    while even and given + 3 < n / _READINGS_A_LINE:
-        line = _strongest_line(t, left)
-        if line is None:
-            break
-        left = _level(t, left - line)  # a line that ends in mid-period looked like a slope
-        given += 3
-    return math.sqrt(float(left @ left) / (n - given))
-
-
-def _require_readings(values: np.ndarray) -> None:
-    if values.size < _READINGS_MIN:
-        raise ModelError(
-            f"{values.size} samples are too few to read a noise from; {_READINGS_MIN} are needed"
-        )
-
-
-def _level(t: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """``values`` (N,) about their straight line, at times ``t`` (N,) about their mean."""
-    level = values - values.mean()
-    return np.asarray(level - t * (float(t @ level) / float(t @ t)))
-
-
-def _strongest_line(t: np.ndarray, values: np.ndarray) -> np.ndarray | None:
-    """The sine (N,) that stands out most from the spectrum of ``values`` (N,), or None."""
-    n = values.size
-    power = np.abs(np.fft.rfft(values)) ** 2
-    about = median_filter(power, 2 * (power.size // 16) + 9, mode="nearest")
-    bin_width = 1.0 / (n * float(t[1] - t[0]))
-    power[: math.ceil(_SLOWEST_LINE / bin_width)] = 0.0
-    peak = int(np.argmax(power))
-    if not power[peak] > _STANDS_OUT * about[peak]:
-        return None
-
-    def sine(frequency: float) -> np.ndarray:
-        turn = 2.0 * np.pi * frequency * t
-        waves = np.array([np.cos(turn), np.sin(turn)])
-        return np.asarray(np.linalg.solve(waves @ waves.T, waves @ values) @ waves)
-
-    best = minimize_scalar(
-        lambda f: float(np.sum((values - sine(f)) ** 2)),
-        bounds=((peak - 1.0) * bin_width, (peak + 1.0) * bin_width),
-        method="bounded",
-        options={"xatol": 1e-5 * bin_width},
-    )
-    return sine(float(best.x))

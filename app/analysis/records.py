@@ -21,7 +21,8 @@ from dearig.model.errors import ModelError
 from dearig.model.excitation import Lobes
 from dearig.model.film import Strip
 from dearig.model.measures import errors
-from dearig.model.records import ActuatorRecord, FilmRecord, Record, counted, noise_of
+from dearig.model.noise import noise_of
+from dearig.model.records import ActuatorRecord, FilmRecord, Record, counted
 from dearig.recording.reader import open_recording
 from dearig.recording.recording import Recording
 from dearig.recording.rest_noise import MIN_QUIET, noise_floor

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from dearig.model.material import Film, Load
+from dearig.model.specimen import Film, Load
 
 __all__ = ["RunMetadata"]
 

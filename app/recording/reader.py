@@ -10,7 +10,7 @@ import numpy as np
 from dearig.drivers.rig import Instrument
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
-from dearig.model.kinematics import KINEMATICS
+from dearig.model.specimen import KINEMATICS
 from dearig.recording.arrays import Arrays
 from dearig.recording.files import old_of
 from dearig.recording.layout import (

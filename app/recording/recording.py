@@ -12,7 +12,7 @@ import numpy as np
 from dearig.drivers.channels import Channel
 from dearig.drivers.rig import Instrument
 from dearig.extras import import_extra
-from dearig.model.material import Film, Load
+from dearig.model.specimen import Film, Load
 from dearig.recording.arrays import Arrays, Overview
 from dearig.recording.files import file_sha256
 from dearig.recording.layout import SIGNALS, UNITS, variable_attributes

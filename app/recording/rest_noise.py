@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from dearig.model.records import noise_at_rest
+from dearig.model.noise import noise_at_rest
 
 __all__ = ["MIN_QUIET", "NEGLIGIBLE", "lead_in", "mean_beyond_noise", "noise_floor"]
 

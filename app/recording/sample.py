@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import h5py
 
-from dearig.model.material import Film, Load
+from dearig.model.specimen import Film, Load
 from dearig.recording.metadata import RunMetadata
 from dearig.recording.safe import dataset, group
 from dearig.recording.text import fixed, put_text, text_of

@@ -32,7 +32,8 @@ from dearig.model.fitting.parameters import Estimate, Layout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import moving_starts, voltage_misfit, voltage_starts
 from dearig.model.fitting.thinning import thinned
-from dearig.model.records import ActuatorRecord, FilmRecord, Record, noise_at_rest
+from dearig.model.noise import noise_at_rest
+from dearig.model.records import ActuatorRecord, FilmRecord, Record
 
 __all__ = [
     "FILM_MODEL_ERROR",

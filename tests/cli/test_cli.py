@@ -85,25 +85,6 @@ def run(code: str, *arguments: str, **options: object) -> subprocess.CompletedPr
 COMMAND = "from dearig.cli.main import main; main()"
 
 
-@pytest.mark.parametrize(
-    "arguments", [["--help"], ["record", "--help"], ["identify", "-h"], ["diagnose", "-h"]]
-)
-def test_help_answers_without_anything_heavy(arguments: list[str]) -> None:
-    ended = run(
-        "import sys\n"
-        "from dearig.cli.main import main\n"
-        "try:\n"
-        "    main()\n"
-        "except SystemExit as end:\n"
-        "    heavy = {'numpy', 'numba', 'matplotlib', 'h5py', 'nidaqmx', 'PySide6', 'scipy'}\n"
-        "    print('heavy:', sorted(heavy & set(sys.modules)), end.code)\n",
-        *arguments,
-    )
-    assert "heavy: [] 0" in ended.stdout
-    assert "Usage: dearig" in ended.stdout
-    assert ended.stderr == ""
-
-
 def test_without_arguments_it_shows_its_commands_and_fails() -> None:
     ended = run(COMMAND)
     assert ended.returncode == 2

@@ -8,7 +8,6 @@ import pytest
 
 from dearig.model import springs
 from dearig.model.kinematics import (
-    KINEMATICS,
     directions,
     electric,
     electric_slope,
@@ -18,6 +17,7 @@ from dearig.model.kinematics import (
 )
 from dearig.model.material import Branch, Network, Spring
 from dearig.model.network import network_stress, nominal_pull, nominal_pull_slope
+from dearig.model.specimen import KINEMATICS
 from dearig.model.springs import SPRINGS, arruda_boyce
 from tests.tools.model_oracle import (
     invariant,

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from dearig.model.errors import ModelError
-from dearig.model.kinematics import KINEMATICS
-from dearig.model.material import Film, Load
+from dearig.model.specimen import KINEMATICS, Film, Load
 from dearig.recording.layout import FORMAT, ZERO_ORDER
 
 __all__ = ["Exported", "exported"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from dearig.drivers.rig import Event
 from dearig.errors import InputError
-from dearig.model.kinematics import KINEMATICS
+from dearig.model.specimen import KINEMATICS
 from dearig.recording.files import check_output, file_sha256, in_words
 from dearig.recording.importers.chosen import Chosen
 from dearig.recording.importers.csv_file import CsvFile

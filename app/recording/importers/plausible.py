@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from dearig.model.material import Film
+from dearig.model.specimen import Film
 
 __all__ = ["doubts"]
 
