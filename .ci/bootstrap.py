@@ -1,4 +1,4 @@
-"""Makes the environment in .venv that the README's two commands run in; standard library only."""
+"""Make the environment that the README's two commands run in; standard library only."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
-SCRIPTS = VENV / ("Scripts" if os.name == "nt" else "bin")
 CONSTRAINTS = ROOT / ".ci" / "constraints.txt"
-#: Debian's names of what Qt loads at run time, and of a screen in memory.
+#: Debian's names of the libraries that Qt loads at run time, and of a screen in memory.
 SCREEN = [
     "libgl1", "libegl1", "libxkbcommon0", "libglib2.0-0", "libfontconfig1", "libdbus-1-3",
     "xvfb", "xauth", "libxcb-cursor0", "libxkbcommon-x11-0", "libxcb-icccm4", "libxcb-keysyms1",
@@ -22,26 +21,26 @@ SCREEN = [
 ]  # fmt: skip
 
 
-def prepare(extras: str = "") -> Path:
-    """Install the project with ``extras`` into .venv if need be; returns that Python."""
+def prepare(extras: str = "", venv: Path = VENV) -> Path:
+    """Install the project with ``extras`` into ``venv`` unless it is there; return its Python."""
     if not (3, 11) <= sys.version_info[:2] <= (3, 14):
         sys.exit(f"dearig needs Python 3.11 to 3.14; this is {sys.version.split()[0]}")
-    python = SCRIPTS / ("python.exe" if os.name == "nt" else "python")
+    python = venv / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     wanted = hashlib.sha256(
         CONSTRAINTS.read_bytes()
         + (ROOT / "pyproject.toml").read_bytes()
         + f"{extras} {sys.version}".encode()
     ).hexdigest()
-    stamp = VENV / "installed"
+    stamp = venv / "installed"
     if stamp.is_file() and stamp.read_text().strip() == wanted and python.exists():
         return python
     if importlib.util.find_spec("ensurepip") is None:
         _install_venv_package()
     if not python.exists():
-        print("Making the environment .venv ...", flush=True)
+        print(f"Making the environment {venv.name} ...", flush=True)
         # by a new interpreter: one that was here before ensurepip was installed may not see it
-        subprocess.run([sys.executable, "-m", "venv", "--clear", str(VENV)], check=True)
-    print("Installing dearig and what it needs into .venv ...", flush=True)
+        subprocess.run([sys.executable, "-m", "venv", "--clear", str(venv)], check=True)
+    print(f"Installing dearig and its requirements into {venv.name} ...", flush=True)
     project = str(ROOT) + (f"[{extras}]" if extras else "")
     subprocess.run(
         [
@@ -63,7 +62,7 @@ _LOADS = (
 
 
 def prepare_screen(python: Path) -> None:
-    """Install what windows need without a screen, and a screen in memory, where Debian lacks it."""
+    """Install the libraries that windows need, and a screen in memory, where Debian lacks them."""
     if not sys.platform.startswith("linux"):
         return
     loads = [str(python), "-c", _LOADS]
@@ -75,7 +74,7 @@ def prepare_screen(python: Path) -> None:
 
 
 def _install_venv_package() -> None:
-    """Debian keeps what venv needs in a package of its own."""
+    """Install Debian's package with the modules that venv needs."""
     package = f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"
     _install_packages([package], "This Python cannot make virtual environments")
 
@@ -94,9 +93,11 @@ def _install_packages(packages: list[str], why: str) -> None:
     subprocess.run([*become, apt, "install", "-y", "-qq", *packages], check=True, env=environment)
 
 
-def run(arguments: list[str]) -> int:
-    """Exit code of a command in the project's folder."""
+def run(arguments: list[str], **environment: str) -> int:
+    """Run a command in the project's folder and return its exit code."""
     try:
-        return subprocess.run(arguments, cwd=ROOT, check=False).returncode
+        return subprocess.run(
+            arguments, cwd=ROOT, check=False, env={**os.environ, **environment}
+        ).returncode
     except KeyboardInterrupt:
         return 130

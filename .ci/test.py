@@ -1,10 +1,16 @@
-"""The tests, from a fresh checkout: installs what they need and runs them all."""
+"""Run all tests from a fresh checkout; installs what they need first."""
 
 import sys
+from pathlib import Path
 
 from bootstrap import prepare, prepare_screen, run
 
-if __name__ == "__main__":
-    python = prepare("test")
+
+def test(python: Path, *arguments: str) -> int:
+    """Run pytest with ``python`` on two processes, and return its exit code."""
     prepare_screen(python)
-    sys.exit(run([str(python), "-m", "pytest", "-n", "2", *sys.argv[1:]]))
+    return run([str(python), "-m", "pytest", "-n", "2", *arguments])
+
+
+if __name__ == "__main__":
+    sys.exit(test(prepare("test"), *sys.argv[1:]))

@@ -1,0 +1,178 @@
+"""The distribution: one complete wheel with one import name, deaf to the working folder's files."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+import venv
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from dearig.recording import open_recording
+from tests.tools.command import LOBE, SLOW_RIG, write
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+#: Folders of the checkout and the packages that they are imported as.
+FOLDERS: dict[str, str] = {
+    folder: name for name, folder in PROJECT["tool"]["setuptools"]["package-dir"].items()
+}
+#: Names of our folders, and of modules of the standard library that our code or NumPy's imports.
+DECOYS = ("app", "model", "drivers", "sim_backend", "numbers", "queue", "random", "statistics")
+
+
+def files_in(folder: Path) -> Iterator[Path]:
+    """Every file that belongs to the project."""
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            yield path
+
+
+def test_every_folder_with_an_init_is_a_listed_package() -> None:
+    found = {
+        ".".join((name, *path.parent.relative_to(ROOT / folder).parts))
+        for folder, name in FOLDERS.items()
+        for path in files_in(ROOT / folder)
+        if path.name == "__init__.py"
+    }
+    assert found == set(PROJECT["tool"]["setuptools"]["packages"])
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel, built from a copy so that nothing is left in the checkout."""
+    source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
+    for folder in FOLDERS:
+        shutil.copytree(
+            ROOT / folder, source / folder, ignore=shutil.ignore_patterns("__pycache__")
+        )
+    for name in ("pyproject.toml", PROJECT["project"]["readme"], "LICENSE"):
+        shutil.copy(ROOT / name, source / name)
+    built = subprocess.run(
+        [
+            sys.executable, "-P", "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index",
+            "--no-build-isolation", "--wheel-dir", str(out), str(source),
+        ],
+        capture_output=True, text=True, check=False, timeout=200,
+    )  # fmt: skip
+    assert built.returncode == 0, built.stderr
+    (path,) = out.glob("*.whl")
+    return path
+
+
+def test_the_wheel_has_one_top_level_name_and_every_file(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        names = {name for name in archive.namelist() if not name.endswith("/")}
+    packed = {name for name in names if ".dist-info/" not in name}
+    assert {name.partition("/")[0] for name in packed} == {"dearig"}
+    expected = {
+        "/".join((*name.split("."), *path.relative_to(ROOT / folder).parts))
+        for folder, name in FOLDERS.items()
+        for path in files_in(ROOT / folder)
+    }
+    assert packed == expected
+    assert "dearig/py.typed" in packed
+    for ending in (".j2", ".css", ".png", ".md"):
+        assert any(name.endswith(ending) for name in packed), ending
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The Python of an environment with the wheel; dependencies are those of this environment."""
+    folder = tmp_path_factory.mktemp("installed") / "venv"
+    venv.create(folder, with_pip=False, symlinks=os.name != "nt")
+    python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    subprocess.run(
+        [
+            sys.executable, "-P", "-m", "pip", "--python", str(python), "install", "--quiet",
+            "--no-deps", "--no-index", "--disable-pip-version-check", str(wheel),
+        ],
+        check=True, timeout=200,
+    )  # fmt: skip
+    # a folder named in a .pth file is searched, but its own .pth files are not read: the editable
+    # install of the checkout stays unknown
+    packages = [path for path in sys.path if Path(path).name in ("site-packages", "dist-packages")]
+    purelib = subprocess.run(
+        [str(python), "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"],
+        capture_output=True, text=True, check=True,
+    ).stdout.strip()  # fmt: skip
+    write(Path(purelib) / "dependencies.pth", "\n".join(packages) + "\n")
+    return python
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A working folder with a sequence, a rig file, and files named after modules."""
+    for name in DECOYS:
+        write(tmp_path / f"{name}.py", "raise SystemExit(f'{__file__} was imported')\n")
+    write(tmp_path / "lobe.toml", LOBE)
+    write(tmp_path / "rig.toml", SLOW_RIG + '[film]\nname = "F 3"\n')
+    return tmp_path
+
+
+def environment(tmp_path: Path) -> dict[str, str]:
+    # a compilation for this one installation would take a minute
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    return {**kept, "NUMBA_DISABLE_JIT": "1", "DEARIG_LOG_DIR": str(tmp_path / "log")}
+
+
+def run(folder: Path, *command: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [str(word) for word in command], capture_output=True, text=True, check=False, cwd=folder,
+        env=environment(folder), timeout=200,
+    )  # fmt: skip
+
+
+def test_it_is_the_installed_package_that_runs(installed: Path, folder: Path) -> None:
+    """Otherwise the tests below would prove nothing."""
+    ended = run(folder, installed, "-P", "-c", "import dearig; print(dearig.__file__)")
+    assert Path(ended.stdout.strip()).is_relative_to(installed.parents[1])
+
+
+@pytest.mark.parametrize("way", ["command", "python -m"])
+def test_it_records_beside_files_named_after_modules(
+    installed: Path, folder: Path, way: str
+) -> None:
+    command: list[str | Path] = [installed, "-m", "dearig"]
+    if way == "command":
+        command = [installed.with_name("dearig.exe" if os.name == "nt" else "dearig")]
+    ended = run(
+        folder, *command, "record", "lobe.toml", "--rig-file", "rig.toml", "--out", "run.h5"
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+    recording = open_recording(folder / "run.h5")
+    assert recording.complete
+    assert recording.samples == 301
+
+
+def test_it_records_from_a_card_with_its_guardian_beside_such_files(
+    installed: Path, folder: Path
+) -> None:
+    """The guardian is a process of its own, which Python starts in the same working folder."""
+    command = [str(installed), "-m", "dearig"]
+    # the card of this test waits for its client, so it may be as slow as it is
+    serve = [*command, "serve-daqmx", "--fast", "--rig-file", "rig.toml", "--client-timeout", "60"]
+    with subprocess.Popen(
+        [*serve, "--link-timeout", "60"],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=folder,
+        env=environment(folder),
+    ) as server:  # fmt: skip
+        try:
+            assert server.stdout is not None
+            line = server.stdout.readline()
+            assert "simulated card at" in line
+            rig = line.partition("--rig ")[2].partition(";")[0]
+            ended = run(
+                folder, *command, "record", "lobe.toml", "--rig", rig, "--rig-file", "rig.toml",
+                "--out", "run.h5",
+            )  # fmt: skip
+        finally:
+            server.terminate()
+    assert ended.returncode == 0, ended.stderr
+    assert open_recording(folder / "run.h5").complete
