@@ -146,14 +146,30 @@ def _reader_left() -> int:
     return 0
 
 
+#: Wording of the libraries that read the command line, and what an operator reads instead.
+_REWORDED = (
+    (r"Value error, ", ""),
+    (r": Input should be ", ": it must be "),
+    (r"it must be a valid integer, unable .*", "it must be a whole number"),
+    (r"it must be a valid number, unable .*", "it must be a number"),
+    (r"it must be greater than or equal to ", "it must be at least "),
+    (r"it must be less than or equal to ", "it must be at most "),
+    (r"Got unexpected extra argument\(?s?\)? \((.*)\)", r"too many arguments, from \1 on"),
+    (r"\. Choose from:\s*", "; choose from "),
+    (r",\s+", ", "),
+)
+
+
 def _usage(error: TyperException) -> str:
     """Return Typer's complaint about the command line as a sentence."""
     context = getattr(error, "ctx", None)
-    command = "dearig" if context is None else context.command_path
-    # wording of the library that checks the values
-    words = error.format_message().replace("Value error, ", "").strip().rstrip(".")
-    words = re.sub(r"(.*): Input should be ", r"\1: it must be ", words)
-    return f"{words}; {command} --help shows what it takes" if words else f"try {command} --help"
+    # an option without its value is reported without the command that it belongs to
+    command = sys.argv[1] if len(sys.argv) > 1 and not sys.argv[1].startswith("-") else ""
+    path = f"dearig {command}".strip() if context is None else context.command_path
+    words = error.format_message().strip().rstrip(".")
+    for theirs, ours in _REWORDED:
+        words = re.sub(theirs, ours, words)
+    return f"{words}; {path} --help shows what it takes" if words else f"try {path} --help"
 
 
 def _say(message: str) -> None:

@@ -20,11 +20,13 @@ _PANEL = "Set-up and help"
 @commands.command("rig-file", rich_help_panel=_PANEL)
 def rig_file_command(
     out: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.")],
+    force: Force = False,
 ) -> None:
     """Write a rig file with every key, its default and its meaning."""
     from dearig.config.rigfile import write_default
 
-    write_default(out)
+    check_files(force, (), out, json=None)
+    write_default(out, overwrite=force)
     print_line(console_for(), f"{out}: edit it, then give it to commands with --rig-file {out}")
 
 

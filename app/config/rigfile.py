@@ -110,10 +110,10 @@ def load_rig_file(path: Path | str | None) -> RigFile:
         raise InputError(f"rig file {path}: {_sentence(error)}") from error
 
 
-def write_default(path: Path | str) -> None:
+def write_default(path: Path | str, overwrite: bool = False) -> None:
     """Write a rig file that holds every key with its default, what it means and what it may be.
 
-    Raises ``InputError`` where the file exists already or cannot be written.
+    Raises ``InputError`` where the file cannot be written, or exists and is not to be overwritten.
     """
     path = Path(path)
     lines = [
@@ -125,7 +125,7 @@ def write_default(path: Path | str) -> None:
     for name in ("film", "load", *(n for n in sections if n not in ("film", "load"))):
         lines.extend(_section_lines(name, sections[name]))
     try:
-        with path.open("x", encoding="utf-8", newline="\n") as file:
+        with path.open("w" if overwrite else "x", encoding="utf-8", newline="\n") as file:
             file.write("\n".join(lines))
     except FileExistsError as error:
         raise InputError(f"rig file {path} exists already; it is not overwritten") from error
