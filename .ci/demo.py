@@ -1,4 +1,4 @@
-"""The main job, from a fresh checkout: installs what it needs and runs ``dearig demo``."""
+"""Run ``dearig demo`` from a fresh checkout; installs what it needs first."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Makes .links/dearig, the package as it is imported, out of links to the folders of the checkout.
+"""Make .links/dearig, the package as it is imported, out of links to the folders of the checkout.
 
 The import name is ``dearig`` and the folders are ``app/``, ``drivers/``, ``model/`` and
 ``sim_backend/``. Python finds them through the editable install. A tool that reads files instead of
@@ -18,7 +18,7 @@ LINKS = ROOT / ".links"
 
 
 def make() -> Path:
-    """Make the links afresh; returns the folder to search for packages."""
+    """Make the links anew, and return the folder to search for packages."""
     package = LINKS / "dearig"
     if package.exists():
         for entry in package.iterdir():
@@ -41,7 +41,10 @@ def _link(source: Path, link: Path) -> None:
 
         _winapi.CreateJunction(str(source), str(link))
     else:
-        os.link(source, link)
+        try:
+            link.symlink_to(source)
+        except OSError:
+            os.link(source, link)
 
 
 def _remove(entry: Path) -> None:

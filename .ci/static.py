@@ -1,0 +1,34 @@
+"""Check the code without running it: linter, formatter, types, layers.
+
+The Python that runs this is used. The links of .ci/links.py are made anew first: on Windows they
+are hard links where the system allows no symbolic ones, and a program that saves a file by
+replacing it leaves them stale.
+"""
+
+import sys
+from pathlib import Path
+
+from bootstrap import run
+from links import make
+
+#: The commands, each with its name.
+CHECKS = {
+    "linter": ["-m", "ruff", "check", "."],
+    "formatter": ["-m", "ruff", "format", "--check", "."],
+    "types": ["-m", "mypy"],
+    # lint-imports as a call, which is the same on every system
+    "layers": ["-c", "from importlinter.cli import lint_imports_command; lint_imports_command()"],
+}
+
+
+def check(python: Path, *names: str) -> int:
+    """Run the checks of these ``names``, or all; return the exit code of the first that fails."""
+    links = make()
+    for name in names or CHECKS:
+        if code := run([str(python), *CHECKS[name]], PYTHONPATH=str(links)):
+            return code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(check(Path(sys.executable), *sys.argv[1:]))
