@@ -82,7 +82,7 @@ def test_an_error_in_a_thread_is_told_too(
 ) -> None:
     from threading import Thread
 
-    def in_a_thread(*_: object) -> None:
+    def in_a_thread(*_: object, **__: object) -> None:
         thread = Thread(target=broken)
         thread.start()
         thread.join()
