@@ -124,7 +124,7 @@ def _packages() -> Iterator[Item]:
         lacking = _lacking(requirement)
         if lacking:
             yield Item(
-                "packages", name, lacking, "wrong", f"pip install '{name}{requirement.specifier}'"
+                "packages", name, lacking, "wrong", f'pip install "{name}{requirement.specifier}"'
             )
         else:
             yield Item("packages", name, metadata.version(name))
@@ -138,7 +138,7 @@ def _extras() -> Iterator[Item]:
         lacking = [why for why in map(_lacking, wanted.values()) if why]
         if lacking:
             yield Item(
-                "extras", extra, ", ".join(lacking), "missing", f"pip install 'dearig[{extra}]'"
+                "extras", extra, ", ".join(lacking), "missing", f'pip install "dearig[{extra}]"'
             )
         else:
             versions = ", ".join(f"{name} {metadata.version(name)}" for name in wanted)
@@ -226,7 +226,7 @@ def _card() -> Iterator[Item]:
     except ModuleNotFoundError as error:
         yield Item(
             "card", "NI-DAQmx", f"the package {error.name} is not installed", "missing",
-            "pip install 'dearig[rig]'",
+            'pip install "dearig[rig]"',
         )  # fmt: skip
     except LookupError:
         yield Item(
@@ -268,20 +268,42 @@ def _window() -> Iterator[Item]:
 # ---------------------------------------------------------------- plug-ins
 
 
+def _left_out() -> dict[str, tuple[str, ...]]:
+    """Return the sentences of each registry on the entries that it cannot use, by group."""
+    from dearig.config.segments import SEGMENT_KINDS
+
+    return {"segments": SEGMENT_KINDS.left_out}
+
+
 def _plugins() -> Iterator[Item]:
+    left_out = _left_out()
     for group in PLUGIN_GROUPS:
         for point in sorted(metadata.entry_points(group=f"dearig.{group}"), key=lambda p: p.name):
+            refusal = _refusal(point, left_out.get(group))
             origin = f" of {point.dist.name} {point.dist.version}" if point.dist else ""
-            try:
-                point.load()
-            except Exception as error:  # noqa: BLE001  (another distribution's code)
-                yield Item(
-                    "plug-ins", f"{group}: {point.name}",
-                    f"{point.value}{origin} cannot be loaded: {type(error).__name__}: {error}",
-                    "wrong", "repair or uninstall that package",
-                )  # fmt: skip
-            else:
-                yield Item("plug-ins", f"{group}: {point.name}", f"{point.value}{origin}")
+            yield Item(
+                "plug-ins", f"{group}: {point.name}", refusal or f"{point.value}{origin}",
+                "wrong" if refusal else "ok",
+            )  # fmt: skip
+
+
+def _refusal(point: metadata.EntryPoint, left_out: tuple[str, ...] | None) -> str:
+    """Return why ``point`` cannot be used; "" where it can.
+
+    ``left_out`` are the sentences of its registry; without one the entry is only loaded.
+    """
+    if left_out is not None:
+        known = (point.name, point.dist.name if point.dist else "")
+        return next((s for s in left_out if all(word in s for word in known)), "")
+    try:
+        point.load()
+    except Exception as error:  # noqa: BLE001  (another distribution's code)
+        whose = point.dist.name if point.dist else "its package"
+        return (
+            f"{point.value} cannot be loaded: {type(error).__name__}: {error}; update or "
+            f"uninstall {whose}"
+        )
+    return ""
 
 
 # ---------------------------------------------------------------- shown

@@ -1,4 +1,4 @@
-"""Commands that help to set up: rig-file, presets, doctor, docs."""
+"""Commands that help to set up: rig-file, sequence-file, presets, doctor, docs."""
 
 from __future__ import annotations
 
@@ -28,6 +28,21 @@ def rig_file_command(
     check_files(force, (), out, json=None)
     write_default(out, overwrite=force)
     print_line(console_for(), f"{out}: edit it, then give it to commands with --rig-file {out}")
+
+
+@commands.command("sequence-file", rich_help_panel=_PANEL)
+def sequence_file(
+    out: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.")],
+    force: Force = False,
+) -> None:
+    """Write a sequence file with every kind of segment, its keys and their meaning."""
+    from dearig.config.sequence_example import example
+    from dearig.recording.files import replaced_when_done
+
+    check_files(force, (), out, json=None)
+    with replaced_when_done(out) as partial:
+        partial.write_text(example(), encoding="utf-8", newline="\n")
+    print_line(console_for(), f"{out}: edit it, then run it with dearig record {out} --out FILE.h5")
 
 
 @commands.command(rich_help_panel=_PANEL)

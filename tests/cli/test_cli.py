@@ -278,6 +278,19 @@ def test_a_rig_file_is_written_to_be_edited(tmp_path: Path) -> None:
     assert kept == path.read_text(encoding="utf-8")
 
 
+def test_a_sequence_file_is_written_to_be_edited_and_can_be_played(tmp_path: Path) -> None:
+    path = tmp_path / "my.toml"
+    assert f"dearig record {path}" in done("sequence-file", path).out
+    text = path.read_text(encoding="utf-8")
+    loaded = load_sequence(path)
+    assert len(loaded.sequence.segments) > 1
+    again = dearig("sequence-file", path)
+    assert (again.code, "my.toml exists already" in again.err) == (2, True)
+    write(path, "edited")
+    done("sequence-file", path, "--force")
+    assert path.read_text(encoding="utf-8") == text
+
+
 def test_brackets_in_names_and_notes_are_shown_as_they_are(tmp_path: Path) -> None:
     csv = tmp_path / "data [red].csv"
     write(csv, "time_s,voltage_V,displacement_mm,temperature [/C]\n0,0,0,1\n1,0,1,2\n2,0,1,3\n")

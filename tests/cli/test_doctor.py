@@ -46,7 +46,7 @@ def test_a_missing_extra_comes_with_the_command_that_installs_it(
 
     hide(monkeypatch, version=version)
     gui = items("extras")["gui"]
-    assert (gui["verdict"], gui["advice"]) == ("missing", "pip install 'dearig[gui]'")
+    assert (gui["verdict"], gui["advice"]) == ("missing", 'pip install "dearig[gui]"')
     assert gui["found"] == "pyqtgraph is not installed"
     assert done("doctor", "--json", "-").json["ok"] is True
 
@@ -57,7 +57,7 @@ def test_a_package_that_is_too_old_is_wrong(monkeypatch: pytest.MonkeyPatch) -> 
     h5py = items("packages")["h5py"]
     assert h5py["verdict"] == "wrong"
     assert h5py["found"].startswith("h5py is 2.0, and >=")
-    assert "pip install 'h5py>=" in h5py["advice"]
+    assert 'pip install "h5py>=' in h5py["advice"]
     assert done("doctor", "--json", "-").json["ok"] is False
 
 
