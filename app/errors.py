@@ -1,4 +1,4 @@
-"""The ways a command can end early, each with its exit code and one sentence for a person."""
+"""Errors that end a command early, each with its exit code and a sentence for the operator."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ __all__ = [
 
 
 class DearigError(Exception):
-    """Something to tell the operator: what, where, and what to do; never a traceback."""
+    """An error whose text tells the operator what happened, where, and what to do."""
 
     exit_code = 1
 
 
 class InputError(DearigError):
-    """Bad input or usage; nothing was touched."""
+    """Wrong input or usage; nothing was changed."""
 
     exit_code = 2
 
@@ -32,25 +32,25 @@ class SafetyStop(DearigError):  # noqa: N818  (the name of what happened)
 
 
 class InstrumentFault(DearigError):  # noqa: N818
-    """An instrument failed or is not there."""
+    """An instrument failed or is missing."""
 
     exit_code = 4
 
 
 class NotSafe(InstrumentFault):
-    """The voltage may still be up: neither the run nor its guardian could bring it down."""
+    """The voltage may still be on: neither the run nor its guardian could bring it to 0 V."""
 
 
 class DiskFault(DearigError):  # noqa: N818
-    """The disk took no more during a run; the rig was made safe.
+    """The disk could not be written during a run; the rig was made safe.
 
-    It counts with the instruments: the input was good, and something that records failed.
+    It has the exit code of an instrument fault: the input was right and the equipment failed.
     """
 
     exit_code = 4
 
 
 class Interrupted(DearigError):  # noqa: N818
-    """The operator ended a run; the rig was made safe."""
+    """The operator stopped the work; after a run the rig was made safe."""
 
     exit_code = 130

@@ -1,4 +1,4 @@
-"""How long work tells how far it is."""
+"""The callback by which long work reports its progress."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 __all__ = ["Progress", "quiet"]
 
-#: Called with the name of a stage and the part of it that is done, 0 to 1.
+#: Called with the name of a stage and the fraction of it that is done, 0 to 1.
 Progress = Callable[[str, float], None]
 
 
 def quiet(stage: str, fraction: float) -> None:
-    """Progress that nobody watches."""
+    """Ignore the progress."""

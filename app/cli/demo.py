@@ -1,4 +1,4 @@
-"""The main job on simulated rigs: from excitation to error tables, and to what a model lacks."""
+"""Run the main job on simulated rigs: record, identify, validate, diagnose."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from dearig.report.html import write_demo_report
 
 __all__ = ["HIDDEN", "DemoResult", "run_demo"]
 
-#: A simulated rig that hides an effect which nobody declares to the diagnosis.
+#: A simulated rig with a hidden effect, which the diagnosis is not told.
 HIDDEN = "sim:8"
 
 
 @dataclass(frozen=True)
 class DemoResult:
-    """What the demonstration found, and where its reports lie."""
+    """Results of the demonstration, and the paths of its reports."""
 
     identified: IdentifyOutcome
     validated: ValidateOutcome
@@ -52,11 +52,11 @@ def run_demo(
     clock: Callable[[], float],
     progress: Progress = quiet,
 ) -> DemoResult:
-    """Record the thesis's runs, identify, validate, report; then diagnose a rig with a secret.
+    """Record the thesis's runs, identify, validate, report; then diagnose another rig.
 
-    Everything goes into the folder ``out``: recordings, ``model.toml``, ``report.html`` and
-    ``overview.png`` of the rig that obeys the model; ``hidden-*.h5``, ``improved.toml`` and
-    ``diagnosis.html`` of the other. Raises ``InputError`` where the folder holds something, unless
+    Everything is written to the folder ``out``: recordings, ``model.toml``, ``report.html`` and
+    ``overview.png`` of the rig that follows the model; ``hidden-*.h5``, ``improved.toml`` and
+    ``diagnosis.html`` of the other. Raises ``InputError`` where the folder is not empty, unless
     ``overwrite``.
     """
     started = clock()
@@ -65,7 +65,7 @@ def run_demo(
     presets = ("thesis", *VALIDATION_A, *VALIDATION_B)
     files = {preset: out / f"{preset}.h5" for preset in presets}
     for n, (preset, path) in enumerate(files.items()):
-        # another seed a run: the noise of two runs has nothing in common
+        # a seed for each run: the noise of two runs is independent
         record(
             load_sequence(preset), "sim", rig_file, path,
             RunOptions(seed=seed * len(presets) + n, overwrite=overwrite),

@@ -16,12 +16,12 @@ __all__ = ["progress"]
 def progress(
     description: str, console: Console | None = None, whole: bool = False
 ) -> Iterator[Callable[[str, float], None]]:
-    """A progress bar on standard error while the body runs.
+    """Show a progress bar on standard error while the body runs.
 
-    Gives a callback ``(stage, fraction)`` with the fraction of that stage that is done; the bar
-    starts anew with every stage, the time elapsed does not. With ``whole`` the fraction is of all
-    the work, and the bar only changes its words. Where standard error is no terminal, nothing is
-    written.
+    Gives a callback ``(stage, fraction)`` with the fraction of that stage that is done. The bar
+    restarts with every stage; the elapsed time does not. With ``whole`` the fraction is of all the
+    work, and a new stage only changes the bar's text. Nothing is written where standard error is
+    no terminal.
     """
     console = Console(stderr=True) if console is None else console
     if not console.is_terminal:
@@ -48,7 +48,7 @@ def progress(
             current = stage
             bar.update(task, description=f"{description}: {stage}")
         elif stage != current:
-            # a new stage has another speed, by which the remaining time is reckoned
+            # the remaining time is estimated from the speed, which differs between stages
             current = stage
             began = bar.tasks[0].start_time
             bar.reset(task, total=1.0, description=f"{description}: {stage}")
@@ -60,4 +60,4 @@ def progress(
 
 
 def _unseen(stage: str, fraction: float) -> None:
-    """Progress that nobody watches."""
+    """Show nothing."""

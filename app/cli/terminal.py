@@ -1,4 +1,4 @@
-"""What the terminal shows of an outcome, and of the work towards it."""
+"""Lay out results as text and tables for the terminal."""
 
 from __future__ import annotations
 
@@ -49,16 +49,18 @@ __all__ = [
     "validate_tables",
 ]
 
-_NAME_MAX = 28  # of a row; longer names are cut in the middle, where they differ least
+_NAME_MAX = (
+    28  # characters of a row's name; longer ones are cut in the middle, where names differ least
+)
 _GAP = 2  # between columns
-# rich's own substitute on such terminals is full of vertical bars
+# rich's own substitute on ASCII terminals has many vertical bars
 _ASCII_HEAD = Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
 
 
 def identify_table(outcome: IdentifyOutcome) -> RenderableType:
-    """What an identification found: in sentences, then its parameters, then its errors.
+    """Return an identification as sentences, parameters and errors.
 
-    How other numbers of branches did is ``branch_table``'s to show.
+    ``branch_table`` shows the other numbers of branches.
     """
     published = outcome.published_fit if len(outcome.train) == 1 else None
     return _Fitted(
@@ -73,7 +75,7 @@ def identify_table(outcome: IdentifyOutcome) -> RenderableType:
 
 
 def validate_tables(outcome: ValidateOutcome) -> RenderableType:
-    """Errors of every recording, beside the thesis's Tables 4 and 5 where it belongs to them."""
+    """Return the errors of every recording, beside the thesis's Tables 4 and 5 where they apply."""
     return _Fitted(
         [*validate_summary(outcome), *_grouped("By recording", outcome.comparisons)],
         warnings_of(outcome),
@@ -81,7 +83,7 @@ def validate_tables(outcome: ValidateOutcome) -> RenderableType:
 
 
 def branch_table(outcome: IdentifyOutcome) -> RenderableType:
-    """What each number of branches did; nothing where only one was tried."""
+    """Return the fit of each number of branches; empty where only one was tried."""
     if not outcome.trials:
         return Group()
     return _Fitted([branch_trials(outcome.trials, outcome.kind)], ())
@@ -91,7 +93,7 @@ _RANKED = 6  # candidates of a round that a terminal shows
 
 
 def diagnosis_tables(outcome: DiagnoseOutcome) -> RenderableType:
-    """The verdict in words, errors before and after, what was found, and what was tried."""
+    """Return the verdict, errors before and after, effects found, and candidates tried."""
     finding = outcome.finding
     pieces: list[_Piece] = [f"{headline(finding)}.", *summary(outcome)]
     for heading, before, after in (
@@ -134,7 +136,7 @@ _Piece = str | Table | tuple[Table, Table]
 
 
 class _Fitted:
-    """Pieces laid out once it is known how wide the terminal is and what it can show."""
+    """Pieces that are laid out for the width and the characters of the terminal."""
 
     def __init__(self, pieces: list[_Piece], warnings: tuple[str, ...]) -> None:
         self._pieces = pieces
@@ -169,7 +171,7 @@ class _Fitted:
 
 
 def _in_per_cent(table: Table) -> Table:
-    """The same table with the unit in its head, for where its title is lost."""
+    """Return the table with its unit in the head, for use without its title."""
     head = tuple((name, f"% {unit}" if unit else "") for name, unit in table.head)
     return Table(table.title, head, table.rows, table.note)
 
@@ -207,7 +209,7 @@ def _laid_out(table: Table, show: Callable[[str], str], width: int) -> Iterator[
 
 
 def _listed(table: Table, show: Callable[[str], str]) -> Iterator[RenderableType]:
-    """A table too wide for the terminal, as one line for each row, to be wrapped."""
+    """Give a line for each row of a table that is too wide for the terminal."""
     for row in table.rows:
         cells = [
             " ".join(part for part in (*head, cell) if part)
