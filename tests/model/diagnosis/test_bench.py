@@ -57,7 +57,7 @@ def aged(softening):
     return bench, model, start, held
 
 
-def test_what_is_far_from_the_noise_is_simulated_roughly():
+def test_rough_simulations_serve_far_from_the_noise():
     bench, model, start, held = aged(0.015)
     # all held: it stays as far away as it is
     far = bench.fit(model, [(start, None)], np.ones_like(held))
@@ -73,7 +73,7 @@ def test_what_is_far_from_the_noise_is_simulated_roughly():
     assert bench.fit(model, [(near.x, None)], held).problem.fidelity == kernel.QUICK
 
 
-def test_what_follows_no_path_is_simulated_alike_near_and_far():
+def test_models_without_hysteresis_use_one_fidelity():
     bench = bench_of(record_of(replace(PLAIN, effects=effect("linear drag", drag=4e3))))
     layout = bench.problem(PLAIN).layout
     start = layout.coordinates(layout.initial())
@@ -85,7 +85,7 @@ def test_what_follows_no_path_is_simulated_alike_near_and_far():
 # --- no further than it takes
 
 
-def test_who_lies_behind_a_leader_is_followed_as_far_as_it_may_come_near():
+def test_a_candidate_is_refined_while_it_may_reach_the_leader():
     # a lag, and no lag in the model: branches make up for some of it, slowly
     records = record_of(replace(PLAIN, effects=effect("sensor lag", time_constant=0.02)))
     bench = bench_of(records)
@@ -144,7 +144,7 @@ def test_thinning_reads_the_noise_of_a_sensor_that_averages():
     assert thin.noise == pytest.approx(np.std(left), rel=0.1)
 
 
-def test_what_thinning_took_is_put_back_where_errors_are_told():
+def test_reported_errors_are_of_all_readings():
     record = record_of(DRAGGED, thesis_drive(1000.0))
     bench = bench_of(record)
     trial = fitted(bench, DRAGGED)
@@ -156,7 +156,7 @@ def test_what_thinning_took_is_put_back_where_errors_are_told():
 
 
 @pytest.mark.parametrize(("most", "iterations"), [(0.0, 0), (1.0, 1), (math.inf, 8), (1e12, 8)])
-def test_the_last_fit_goes_as_far_as_there_is_work_for_it(monkeypatch, most, iterations):
+def test_the_final_fit_is_bounded_by_its_budget(monkeypatch, most, iterations):
     bench = bench_of(record_of(DRAGGED))
     trial = fitted(bench, DRAGGED)
     asked: list[int] = []
@@ -200,7 +200,7 @@ def test_a_spare_branch_finds_its_work(moduli, times):
 # --- branches that stand in for an effect
 
 
-def test_a_branch_that_stands_in_for_creep_is_relieved():
+def test_a_branch_that_imitates_creep_is_replaced():
     truth = replace(
         PLAIN,
         network=Network.gent((45e3, 45e3, 45e3), (1e4,) * 3, (0.25, 0.5)),
@@ -278,7 +278,7 @@ LATE = replace(
 )
 
 
-def test_the_measured_stretch_tells_what_branches_imitate():
+def test_branch_misfit_shows_effects_that_branches_imitate():
     bench = bench_of(record_of(LATE, thesis_drive(200.0)))
     bare = bench.baseline(replace(LATE, effects=()), lambda *_: None)
     # a lag is not seen while branches do its work
@@ -314,7 +314,7 @@ def test_the_measured_stretch_tells_what_branches_imitate():
     assert bench.sought(sought, sought.x[None]).cost == pytest.approx(sought.cost, rel=0.02)
 
 
-def test_the_measured_stretch_tells_a_mass_that_has_bent_everything():
+def test_a_moving_mass_is_found_from_the_measured_stretch():
     mass = 0.2
     chirp = Chirp(1500.0, 0.2, 12.0, 20.0)
     swept = Sequence("swept", (Ramp(3500.0, 2.0), chirp, Ramp(0.0, 2.0)))
@@ -373,7 +373,7 @@ def test_limits_of_a_film_are_free_where_its_springs_are_seen_to_stiffen(limit, 
     assert trial.cost < 0.01  # of what a model of a film may be off
 
 
-def test_films_have_no_voltage_to_account_for():
+def test_branch_misfit_needs_a_voltage():
     bench = bench_of(film_record_of(STRIP))
     trial = fitted(bench, STRIP)
     assert bench.unaccounted(trial.problem, trial.x[None]) == [math.inf]
@@ -418,7 +418,7 @@ def test_the_costs_of_records_are_those_of_each_alone():
     assert trial.record_costs == pytest.approx([4.0, 9.0])
 
 
-def test_a_number_at_the_end_of_its_range_is_said_to_be_there():
+def test_a_parameter_at_the_end_of_its_range_is_reported():
     # pushed along instead of held back: no drag does that
     record = record_of(PLAIN)
     rate = PLAIN.simulate(record.drive).rate
@@ -473,7 +473,7 @@ def test_intervals_agree_with_those_of_the_fit():
             assert e.high - e.low == pytest.approx(there.high - there.low, rel=0.2)
 
 
-def test_what_is_not_explained_widens_them():
+def test_unexplained_residuals_widen_intervals():
     noisy = record_of(DRAGGED, noise=3e-6)
     said = replace(noisy, noise=NOISE)
     widths = []
@@ -498,7 +498,7 @@ def bad_readings(record, *spans):
 
 
 @pytest.mark.parametrize("rate", [100.0, 1000.0])
-def test_rubbish_changes_no_fit(rate):
+def test_masked_readings_change_no_fit(rate):
     record = record_of(DRAGGED, thesis_drive(rate))
     bad = bad_readings(record, (5.0, 5.3), (9.0, 9.1))
     spoilt = bench_of(masked(record, bad))
@@ -514,7 +514,7 @@ def test_rubbish_changes_no_fit(rate):
     assert stages[0].selection_max < 6e-6
 
 
-def test_rubbish_in_the_lead_in_is_not_taken_for_noise():
+def test_masked_readings_in_the_lead_in_do_not_count_as_noise():
     record = record_of(PLAIN, thesis_drive(1000.0))
     bad = bad_readings(record, (0.5, 0.51))
     (thin,) = bench_of(masked(record, bad)).records
@@ -522,7 +522,7 @@ def test_rubbish_in_the_lead_in_is_not_taken_for_noise():
     assert thin.noise == pytest.approx(clean.noise, rel=0.1)
 
 
-def test_rubbish_is_not_taken_for_the_size_of_a_films_stress():
+def test_masked_readings_do_not_count_in_the_stress_of_a_film():
     record = film_record_of(STRIP)
     valid = np.ones(record.time.size, dtype=bool)
     valid[300:310] = False
@@ -544,7 +544,7 @@ def test_the_criterion_asks_what_an_effect_explains():
     assert information(2.0, 4, n) - information(1.0, 5, n) == pytest.approx(gain)
 
 
-def test_it_counts_correlated_residuals_as_what_they_are_worth():
+def test_the_criterion_counts_correlated_residuals_as_fewer():
     bench = bench_of(record_of(PLAIN))
     trial = fitted(bench, PLAIN)
     one, ten = (bench.stage(trial, c).criterion for c in (1.0, 10.0))

@@ -62,7 +62,7 @@ SIZES = [
 
 
 @pytest.mark.parametrize(("name", "numbers", "off", "missed"), SIZES, ids=[s[0] for s in SIZES])
-def test_sizes_and_shares_are_as_promised(name, numbers, off, missed):
+def test_predicted_amplitudes_and_gains_are_those_of_a_refit(name, numbers, off, missed):
     best, found = promised(name, **numbers)
     for number, value in numbers.items():
         assert found[number] == pytest.approx(value, rel=off)
@@ -70,7 +70,7 @@ def test_sizes_and_shares_are_as_promised(name, numbers, off, missed):
 
 
 @pytest.mark.parametrize(("name", "numbers", "off", "missed"), SIZES, ids=[s[0] for s in SIZES])
-def test_the_share_is_what_a_refit_takes_away(name, numbers, off, missed):
+def test_the_predicted_gain_is_that_of_a_refit(name, numbers, off, missed):
     # with the noise in, which nothing explains
     truth = replace(PLAIN, effects=effect(name, **numbers))
     bench, trial, screen = screened(truth, quiet=False)
@@ -96,7 +96,7 @@ def test_the_sensitivities_are_those_of_the_model():
     assert there < 0.1 * trial.cost
 
 
-def test_branches_that_relax_alike_do_not_lead_a_start_away():
+def test_branches_of_equal_times_do_not_displace_a_start():
     # one relaxation, and two branches for it
     one = Network.gent((45e3, 60e3), (1e4, 1e4), (4.0,))
     two = Network.gent((45e3, 40e3, 20e3), (1e4,) * 3, (4.0, 4.0001))
@@ -115,7 +115,7 @@ def test_branches_that_relax_alike_do_not_lead_a_start_away():
     assert there < 0.1 * trial.cost
 
 
-def test_of_noise_little_is_promised():
+def test_little_gain_is_predicted_on_noise():
     _, trial, screen = screened(PLAIN, quiet=False)
     readings = trial.residuals.size
     for e in EFFECTS.values():
@@ -127,7 +127,7 @@ def test_of_noise_little_is_promised():
             assert promises[0].share < least * len(e.amplitudes) / readings, e.name
 
 
-def test_what_the_baseline_can_imitate_promises_nothing():
+def test_no_gain_is_predicted_for_what_the_baseline_imitates():
     # a branch as slow as one that the network has
     base = replace(PLAIN, network=Network.gent((45e3, 60e3), (1e4, 1e4), (4.0,)))
     truth = replace(base, effects=effect("slow branch", modulus=8e2, relaxation_time=4.0))
@@ -148,7 +148,7 @@ def test_what_the_baseline_can_imitate_promises_nothing():
         ("sudden loss of field", {"loss": 2e-3, "moment": 7.77}),
     ],
 )
-def test_moments_are_found(name, numbers):
+def test_instants_are_found(name, numbers):
     best, found = promised(name, **numbers)
     assert found["moment"] == pytest.approx(numbers["moment"], abs=0.03)
     size = next(iter(numbers))
@@ -197,7 +197,7 @@ def test_the_mains_are_told_from_their_third_harmonic_that_folds_beside_them():
         assert found[name] == pytest.approx(number, rel=1e-4, abs=3e-6)
 
 
-def test_a_line_and_its_mirror_image_are_both_promised():
+def test_a_line_and_its_alias_are_both_screened():
     # at 200 Hz, three times 50.0073 Hz shows at 49.978, and plays a line there
     numbers = {
         "cosine": -3e-6, "sine": 8e-6, "third_cosine": -9e-7, "third_sine": -2e-7,
@@ -216,7 +216,7 @@ def test_a_line_and_its_mirror_image_are_both_promised():
     assert line.share > image.share > 0.9
 
 
-def test_the_right_one_promises_most():
+def test_the_true_effect_has_the_largest_predicted_gain():
     # of those that have no shape to be searched for
     for name, numbers, *_ in SIZES[:4]:
         _, _, screen = screened(replace(PLAIN, effects=effect(name, **numbers)))
@@ -240,7 +240,7 @@ def test_sizes_stay_within_their_bounds():
     assert best.start[-1] == 0.0
 
 
-def test_rubbish_does_not_move_where_shapes_are_sought():
+def test_masked_readings_do_not_influence_shape_parameters():
     record = record_of(PLAIN)
     bad = (record.time > 5.0) & (record.time < 5.1)
     onsets = []
@@ -252,7 +252,7 @@ def test_rubbish_does_not_move_where_shapes_are_sought():
     np.testing.assert_allclose(onsets[1], onsets[0], rtol=0.01)
 
 
-def test_which_effects_make_sense():
+def test_only_applicable_effects_are_screened():
     drive = thesis_drive()
     cold = Bench([record_of(PLAIN)], PLAIN, workers=1)
     warm = Bench([record_of(PLAIN, replace(drive, warmth=0.01 * drive.time))], PLAIN, workers=1)
@@ -266,7 +266,7 @@ def test_which_effects_make_sense():
     assert not is_of(EFFECTS["sensor lag"], film)
 
 
-def test_what_shows_on_the_way_back_is_not_asked_of_a_film_that_is_only_held():
+def test_unloading_effects_are_not_screened_without_unloading():
     let_go = film_record_of(STRIP)
     held = np.maximum.accumulate(let_go.stretch)
     only_held = Bench([replace(let_go, stretch=held)], STRIP, workers=1)
