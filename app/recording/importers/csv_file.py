@@ -1,15 +1,16 @@
 """Columns of a CSV file: comma, semicolon or tab, with a line of names.
 
-The numbers are parsed by Arrow. Wherever that does not give a finite number in every place, the
-text is gone through again line by line, more slowly, to say in which line and column and why.
+NumPy parses the numbers. Where that does not give a finite number in every place, the text is read
+again line by line, more slowly, to say in which line and column and why.
 """
 
 from __future__ import annotations
 
 import csv
-import io
 import math
+import re
 from collections.abc import Sequence
+from itertools import repeat
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,8 @@ from dearig.recording.importers.source import no_such_column
 __all__ = ["CsvFile"]
 
 DELIMITERS = (";", "\t", ",")
+#: A line without data: blank, or a comment. It begins with a plain character, so that it is fast.
+NO_DATA = re.compile(r"\n[^\S\n]*[#\n]")
 #: A cell is quoted in messages up to this length.
 SHOWN = 30
 
@@ -31,26 +34,30 @@ class CsvFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.about: dict[str, str] = {}
-        lines = _decoded(path).replace("\r\n", "\n").replace("\r", "\n").split("\n")
-        #: line number in the file (from 1) and text of every line that is neither blank nor comment
-        self._rows = [
-            (number, line)
-            for number, line in enumerate(lines, 1)
-            if line.strip() and not line.lstrip().startswith("#")
-        ]
-        if not self._rows:
+        text = _decoded(path)
+        if "\r" in text:
+            text = text.replace("\r\n", "\n").replace("\r", "\n")
+        lines = text.split("\n")
+        while lines and not lines[-1].strip():
+            lines.pop()
+        #: number in the file, from 1, of every line that is neither blank nor comment
+        self._numbers: Sequence[int] = range(1, len(lines) + 1)
+        if NO_DATA.search(text) or not all(map(_holds_data, lines[:1])):
+            self._numbers = [n for n, line in enumerate(lines, 1) if _holds_data(line)]
+            lines = [lines[number - 1] for number in self._numbers]
+        if not lines:
             raise InputError(f"{path} is empty")
-        header = self._rows[0][1]
+        header, self._lines = lines[0], lines[1:]
         self._delimiter = max(DELIMITERS, key=header.count)
         if header.count(self._delimiter) == 0:
             self._delimiter = ","
-        self.names = [name.strip() for name in self._cells(*self._rows[0])]
+        self.names = [name.strip() for name in self._cells(self._numbers[0], header)]
         if all(_number(name, False) is not None for name in self.names):
             raise InputError(
-                f"{path}, line {self._rows[0][0]}: there are numbers where the names of the "
+                f"{path}, line {self._numbers[0]}: there are numbers where the names of the "
                 f"columns should be; put a line such as time_s,voltage_V,displacement_mm above"
             )
-        if len(self._rows) == 1:
+        if not self._lines:
             raise InputError(f"{path} has a line of names and no data")
 
     def _cells(self, number: int, line: str) -> list[str]:
@@ -65,7 +72,7 @@ class CsvFile:
 
     def row(self, index: int) -> str:
         """The line of sample ``index``."""
-        return f"line {self._rows[index + 1][0]}"
+        return f"line {self._numbers[index + 1]}"
 
     def check(self, name: str) -> None:
         """See ``Source``."""
@@ -82,48 +89,46 @@ class CsvFile:
         return columns if columns is not None else self._read_slowly(wanted)
 
     def _read_fast(self, names: list[str]) -> dict[str, np.ndarray] | None:
-        import pyarrow
-        from pyarrow import csv as arrow_csv
-
-        # a comma in a row separated by semicolons is a decimal one; both kinds are looked at slowly
-        decimal = "."
-        body = "\n".join(line for _, line in self._rows[1:])
-        if self._delimiter != "," and "," in body:
-            if "." in body:
+        """Return the columns as NumPy parses them; None if they need a closer look."""
+        lines, places = self._lines, [self.names.index(name) for name in names]
+        if set(places) == set(range(len(self.names))):
+            wanted = None
+        else:
+            wanted = places
+            # NumPy skips what it is not asked for, so a row of another length would go unnoticed
+            separators = {len(self.names) - 1}
+            if set(map(str.count, lines, repeat(self._delimiter))) != separators:
                 return None
-            decimal = ","
-        places = [f"column{i}" for i in range(len(self.names))]
-        wanted = {name: places[self.names.index(name)] for name in names}
+        if self._delimiter != "," and any("," in line for line in lines):
+            # decimal commas; where there are points too, both need a closer look
+            if any("." in line for line in lines):
+                return None
+            lines = [line.replace(",", ".") for line in lines]
         try:
-            table = arrow_csv.read_csv(
-                io.BytesIO(body.encode("utf-8", "replace")),
-                read_options=arrow_csv.ReadOptions(column_names=places),
-                parse_options=arrow_csv.ParseOptions(
-                    delimiter=self._delimiter, ignore_empty_lines=False
-                ),
-                convert_options=arrow_csv.ConvertOptions(
-                    column_types=dict.fromkeys(places, pyarrow.float64()),
-                    include_columns=list(wanted.values()),
-                    decimal_point=decimal,
-                ),
+            table = np.loadtxt(
+                lines,
+                delimiter=self._delimiter,
+                comments=None,
+                usecols=wanted,
+                ndmin=2,
             )
-        except pyarrow.ArrowException:
+        except ValueError:
             return None
-        columns = {}
-        for name, place in wanted.items():
-            column = table.column(place)
-            values = column.to_numpy()
-            whole = column.null_count == 0 and len(values) == len(self._rows) - 1
-            if not (whole and np.isfinite(values).all()):
+        columns = np.ascontiguousarray(table.T)
+        if wanted is None:
+            if len(columns) != len(self.names):
                 return None
-            columns[name] = values
-        return columns
+            columns = columns[places]
+        if columns.shape[1] != len(lines) or not np.isfinite(columns).all():
+            return None
+        return dict(zip(names, columns, strict=True))
 
     def _read_slowly(self, names: list[str]) -> dict[str, np.ndarray]:
         places = [self.names.index(name) for name in names]
-        columns = np.empty((len(names), len(self._rows) - 1))
+        columns = np.empty((len(names), len(self._lines)))
         comma = self._delimiter != ","
-        for index, (number, line) in enumerate(self._rows[1:]):
+        for index, line in enumerate(self._lines):
+            number = self._numbers[index + 1]
             cells = self._cells(number, line)
             if len(cells) != len(self.names):
                 raise InputError(
@@ -139,6 +144,11 @@ class CsvFile:
                     )
                 columns[i, index] = value
         return dict(zip(names, columns, strict=True))
+
+
+def _holds_data(line: str) -> bool:
+    text = line.strip()
+    return bool(text) and not text.startswith("#")
 
 
 def _number(cell: str, decimal_comma: bool) -> float | None:
