@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 
 from dearig.cli.options import (
-    ExportFormat,
     FilmName,
     Force,
     Json,
@@ -32,6 +31,19 @@ __all__ = ["commands"]
 
 commands = typer.Typer()
 _PANEL = "Recordings"
+
+
+def _export_formats() -> list[str]:
+    from dearig.recording.exporters import EXPORTS
+
+    return list(EXPORTS)
+
+
+def _check_export_format(to: str) -> str:
+    known = _export_formats()
+    if to not in known:
+        raise typer.BadParameter(f"{to!r} is not one of {', '.join(map(repr, known))}.")
+    return to
 
 
 @commands.command("import", rich_help_panel=_PANEL)
@@ -189,7 +201,15 @@ def _verify(path: Path, json: str | None) -> None:
 @commands.command(rich_help_panel=_PANEL)
 def export(
     path: Recording,
-    to: Annotated[ExportFormat, typer.Option(help="File format.")],
+    to: Annotated[
+        str,
+        typer.Option(
+            metavar="csv|mat|parquet",
+            help="File format; other distributions can add some.",
+            autocompletion=_export_formats,
+            callback=_check_export_format,
+        ),
+    ],
     out: Annotated[
         Path | None,
         typer.Option(
@@ -203,13 +223,13 @@ def export(
     from dearig.recording.exporters import export_recording
 
     check_files(force, (path,), *optional(out), json=json)
-    written = export_recording(path, to.value, out, force)
+    written = export_recording(path, to, out, force)
     print_line(console_for(json), str(written))
     write_result(
         {
             "format": "dearig-export/1",
             "recording": str(path),
-            "to": to.value,
+            "to": to,
             "out": str(written),
         },
         json,

@@ -13,7 +13,6 @@ __all__ = [
     "Branches",
     "Drive",
     "DriveChannel",
-    "ExportFormat",
     "Faults",
     "FilmName",
     "Force",
@@ -52,14 +51,6 @@ class DriveChannel(StrEnum):
 
     command = "command"
     monitor = "monitor"
-
-
-class ExportFormat(StrEnum):
-    """File formats that recordings are exported to."""
-
-    csv = "csv"
-    mat = "mat"
-    parquet = "parquet"
 
 
 class Kinematics(StrEnum):

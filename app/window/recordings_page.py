@@ -169,7 +169,7 @@ class RecordingsPage(QWidget):
         )
         menu = QMenu(self.export_button)
         for form in EXPORTS:
-            action = menu.addAction(form.upper() if form != "parquet" else "Parquet")
+            action = menu.addAction(EXPORTS[form].title)
             action.triggered.connect(lambda _=False, form=form: self._ask_export(form))
         self.export_button.setMenu(menu)
         self.recover_button = button(

@@ -34,7 +34,7 @@ def test_the_estimate_is_near_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: int, long: bool
 ) -> None:
     if long:
-        for module in ("finish", "room"):
+        for module in ("finish", "disk_space"):
             monkeypatch.setattr(f"dearig.recording.{module}.PHYSICAL_MAX", 1000)
     path = tmp_path / "run.h5"
     write_run(path, run_counts(samples), block=10_000)

@@ -1,7 +1,13 @@
-"""Importers of measured data: one small module for each format, one for what they share."""
+"""Importers of measured data: one file for each format, one line here.
+
+Another distribution adds a format through an entry point in the group ``dearig.importers``.
+``README.md`` beside this file shows how.
+"""
 
 from __future__ import annotations
 
+from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.importing import import_file
+from dearig.recording.importers.registry import IMPORTERS
 
-__all__ = ["import_file"]
+__all__ = ["IMPORTERS", "Importer", "import_file"]

@@ -17,9 +17,11 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.recording.files import in_words
+from dearig.recording.importers.columns import TARGETS
+from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import no_such_column
 
-__all__ = ["CsvFile"]
+__all__ = ["IMPORTER", "CsvFile"]
 
 DELIMITERS = (";", "\t", ",")
 #: A line without data: blank, or a comment. It begins with a plain character, so that it is fast.
@@ -196,3 +198,15 @@ def _decoded(path: Path) -> str:
     except UnicodeDecodeError:
         # numbers are ASCII in any case; only a column name may look odd
         return raw.decode("latin-1")
+
+
+def _sniff(head: bytes) -> bool:
+    """Return True for text whose first line of data has the name of a column of recordings."""
+    text = head.decode("utf-16" if head[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8", "replace")
+    line = next((line for line in text.splitlines() if _holds_data(line)), "")
+    return "\0" not in text and not TARGETS.keys().isdisjoint(
+        name.strip(' "\ufeff') for name in re.split(r"[;,\t]", line)
+    )
+
+
+IMPORTER = Importer("CSV", (".csv", ".txt", ".tsv"), CsvFile, _sniff)

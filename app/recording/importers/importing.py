@@ -12,20 +12,16 @@ import numpy as np
 from dearig.drivers.rig import Event
 from dearig.errors import InputError
 from dearig.model.specimen import KINEMATICS
-from dearig.recording.files import check_output, file_sha256, in_words
+from dearig.recording.files import check_output, file_sha256
 from dearig.recording.importers.chosen import Chosen
-from dearig.recording.importers.csv_file import CsvFile
 from dearig.recording.importers.exported import exported
-from dearig.recording.importers.mat_file import MatFile
-from dearig.recording.importers.parquet_file import ParquetFile
 from dearig.recording.importers.plausible import doubts
-from dearig.recording.importers.source import Source
-from dearig.recording.importers.tdms_file import TdmsChannels
+from dearig.recording.importers.registry import source_at
 from dearig.recording.metadata import RunMetadata
 from dearig.recording.rest_noise import lead_in, mean_beyond_noise
 from dearig.recording.save import save_recording
 
-__all__ = ["import_file", "source_at"]
+__all__ = ["import_file"]
 
 
 def import_file(
@@ -40,7 +36,7 @@ def import_file(
     overwrite: bool = False,
     now: Callable[[], float] = time.time,
 ) -> list[str]:
-    """Bring the CSV, MAT, Parquet or TDMS file ``source`` in as the recording ``out``.
+    """Import the CSV, MAT, Parquet or TDMS file ``source`` as the recording ``out``.
 
     ``columns`` maps names such as ``voltage_kV`` to what the file calls them: a CSV column, a MAT
     path (``data.xdata[0]``), a TDMS ``group/channel``; columns that have such a name already need
@@ -109,29 +105,6 @@ def import_file(
         now=now,
     )
     return warnings
-
-
-def source_at(path: Path) -> Source:
-    """What the file at ``path`` offers, by the ending of its name. Raises ``InputError``."""
-    try:
-        if not path.is_file():
-            raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")
-        if path.stat().st_size == 0:
-            raise InputError(f"{path} is empty")
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {in_words(error)}") from error
-    suffix = path.suffix.lower()
-    if suffix in (".csv", ".txt", ".tsv"):
-        return CsvFile(path)
-    if suffix == ".mat":
-        return MatFile(path)
-    if suffix == ".parquet":
-        return ParquetFile(path)
-    if suffix == ".tdms":
-        return TdmsChannels(path)
-    raise InputError(
-        f"{path}: files named .csv, .mat, .parquet and .tdms can be imported, not {suffix!r}"
-    )
 
 
 def _from_rest(values: dict[str, np.ndarray]) -> tuple[float, tuple[Event, ...]]:

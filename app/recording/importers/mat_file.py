@@ -14,10 +14,11 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.recording.files import in_words
+from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.mat5 import Damaged, Value, columns, variables
 from dearig.recording.importers.source import no_such_column, printable
 
-__all__ = ["MatFile"]
+__all__ = ["IMPORTER", "MatFile"]
 
 
 class MatFile:
@@ -76,3 +77,10 @@ def _load(path: Path) -> dict[str, Value]:
         raise InputError(f"{path} cannot be read: {in_words(error)}") from error
     except Damaged as error:
         raise InputError(f"{path} {error}") from error
+
+
+def _sniff(head: bytes) -> bool:
+    return head.startswith(b"MATLAB 5.0 MAT-file")
+
+
+IMPORTER = Importer("MATLAB MAT", (".mat",), MatFile, _sniff)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from dearig.errors import InputError
+from dearig.extras import import_extra
 from dearig.recording.files import one_line
+from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import PARSER_FAILURES, no_such_column
 
-__all__ = ["ParquetFile"]
+__all__ = ["IMPORTER", "ParquetFile"]
 
 #: Bytes that are unpacked at most, beside so many times the file's own size.
 UNPACKED_MAX, PACKED_MAX = 2**28, 100
@@ -21,8 +24,7 @@ class ParquetFile:
     """The Parquet file at ``path``. Raises ``InputError`` if it is none or has no numbers."""
 
     def __init__(self, path: Path) -> None:
-        import pyarrow
-        from pyarrow import parquet
+        pyarrow, parquet = _library()
 
         self.path = path
         try:
@@ -66,8 +68,7 @@ class ParquetFile:
 
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Columns by name; see ``Source``."""
-        import pyarrow
-        from pyarrow import parquet
+        pyarrow, parquet = _library()
 
         wanted = list(dict.fromkeys(names))
         found = {}
@@ -86,3 +87,18 @@ class ParquetFile:
         except (*PARSER_FAILURES, pyarrow.ArrowException) as error:
             raise self._unreadable(error) from error
         return found
+
+
+def _library() -> tuple[Any, Any]:
+    purpose = "a Parquet file"
+    return (
+        import_extra("pyarrow", "parquet", purpose),
+        import_extra("pyarrow.parquet", "parquet", purpose),
+    )
+
+
+def _sniff(head: bytes) -> bool:
+    return head.startswith(b"PAR1")
+
+
+IMPORTER = Importer("Parquet", (".parquet",), ParquetFile, _sniff)

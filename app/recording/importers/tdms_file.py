@@ -13,12 +13,13 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.recording.files import one_line
+from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import PARSER_FAILURES, no_such_column, printable
 
 if TYPE_CHECKING:
     from nptdms import TdmsFile
 
-__all__ = ["TdmsChannels"]
+__all__ = ["IMPORTER", "TdmsChannels"]
 
 
 #: Every segment begins with this, its contents, a version, and the sizes of all and of the head.
@@ -122,3 +123,10 @@ def _load(path: Path) -> tuple[dict[str, np.ndarray], set[tuple[float, float, in
     except PARSER_FAILURES as error:
         raise InputError(f"{path} cannot be read as a TDMS file: {one_line(error)}") from error
     return columns, timing
+
+
+def _sniff(head: bytes) -> bool:
+    return head.startswith(b"TDSm")
+
+
+IMPORTER = Importer("TDMS", (".tdms",), TdmsChannels, _sniff)

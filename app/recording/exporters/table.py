@@ -1,0 +1,73 @@
+"""What every export holds: columns by name with unit, and what the recording says of itself."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from dearig.recording.layout import FORMAT, LINEAR, UNITS, ZERO_ORDER
+from dearig.recording.recording import Recording
+
+__all__ = ["Exporter", "columns_of", "description_of", "units_of"]
+
+#: Names of the exported columns, in the recording's own units so that not a bit is lost.
+COLUMNS = MappingProxyType(
+    {
+        "time": "time_s",
+        "displacement": "displacement_m",
+        "voltage_command": "voltage_V",
+        "voltage_monitor": "voltage_monitor_V",
+        "current_monitor": "current_A",
+        "temperature": "temperature_C",
+        "displacement_model": "displacement_model_m",
+        "stretch": "stretch",
+        "nominal_stress": "nominal_stress_Pa",
+    }
+)
+
+
+@dataclass(frozen=True)
+class Exporter:
+    """A file format that recordings are written in; its name in the registry is the suffix.
+
+    Attributes
+    ----------
+    title : str
+        Name of the format for menus and messages.
+    write : callable
+        Writes a recording to a path, which does not exist yet. May raise ``InputError``.
+    """
+
+    title: str
+    write: Callable[[Recording, Path], None]
+
+
+def columns_of(recording: Recording) -> dict[str, np.ndarray]:
+    """Return the values (N,) by the names of the exported columns, ``time_s`` first."""
+    return {COLUMNS[name]: values for name, values in recording.values.items()}
+
+
+def units_of(recording: Recording) -> dict[str, str]:
+    """Return the unit of each exported column by its name."""
+    return {COLUMNS[name]: UNITS[name] for name in recording.values}
+
+
+def description_of(recording: Recording) -> dict[str, str]:
+    """Return what an import reads back of the recording beside its values, as texts by name."""
+    return {
+        "format": FORMAT,
+        "name": recording.name,
+        "kind": recording.kind,
+        "kinematics": recording.kinematics,
+        "hold": ZERO_ORDER if recording.hold else LINEAR,
+        "complete": str(recording.complete).lower(),
+        "film": json.dumps(asdict(recording.film)) if recording.film else "",
+        "load": json.dumps(asdict(recording.load)) if recording.load else "",
+        "sequence": recording.sequence_toml,
+        "provenance": json.dumps(recording.provenance),
+    }

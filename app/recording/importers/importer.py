@@ -1,0 +1,37 @@
+"""An importer: what a file format of measured data has to bring."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from dearig.recording.importers.source import Source
+
+__all__ = ["HEAD_BYTES", "Importer"]
+
+#: Bytes from the start of a file by which an importer recognises its format.
+HEAD_BYTES = 4096
+
+
+@dataclass(frozen=True)
+class Importer:
+    """A file format that measured data are read from.
+
+    Attributes
+    ----------
+    title : str
+        Name of the format for messages.
+    suffixes : tuple of str
+        Endings of its files, in small letters, such as ``(".csv", ".txt")``.
+    open : callable
+        Returns the columns of the file at a path, as a ``Source``. Raises ``InputError`` with a
+        sentence for a file that it cannot read; no other exception.
+    sniff : callable
+        Returns True if the first ``HEAD_BYTES`` of a file are of this format.
+    """
+
+    title: str
+    suffixes: tuple[str, ...]
+    open: Callable[[Path], Source]
+    sniff: Callable[[bytes], bool]

@@ -1,0 +1,66 @@
+"""The importers that are installed, and the choice of one for a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from dearig.errors import InputError
+from dearig.plugins import Registry
+from dearig.recording.files import in_words
+from dearig.recording.importers.importer import HEAD_BYTES, Importer
+from dearig.recording.importers.source import Source
+
+__all__ = ["IMPORTERS", "source_at"]
+
+_OWN = MappingProxyType(
+    {
+        "csv": "dearig.recording.importers.csv_file:IMPORTER",
+        "mat": "dearig.recording.importers.mat_file:IMPORTER",
+        "parquet": "dearig.recording.importers.parquet_file:IMPORTER",
+        "tdms": "dearig.recording.importers.tdms_file:IMPORTER",
+    }
+)
+
+
+def _check(name: str, importer: Any) -> None:  # noqa: ARG001  (one signature for all registries)
+    """Raise an error with a sentence unless ``importer`` can be used."""
+    if not isinstance(importer, Importer):
+        raise TypeError("it is not a dearig.recording.importers.Importer")
+    wrong = [s for s in importer.suffixes if not s.startswith(".") or s != s.lower()]
+    if wrong or not importer.suffixes:
+        raise ValueError(f"its suffixes {importer.suffixes} must be small letters after a point")
+
+
+#: Every importer by name.
+IMPORTERS: Registry[Importer] = Registry("dearig.importers", _OWN, _check)
+
+
+def source_at(path: Path) -> Source:
+    """Return the columns of the file at ``path``. Raises ``InputError``.
+
+    The suffix chooses the importer. Where several take it, or none does, the one that recognises
+    the first bytes is used.
+    """
+    try:
+        if not path.is_file():
+            raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")
+        with path.open("rb") as stream:
+            head = stream.read(HEAD_BYTES)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {in_words(error)}") from error
+    if not head:
+        raise InputError(f"{path} is empty")
+    suffix = path.suffix.lower()
+    named = [importer for importer in IMPORTERS.values() if suffix in importer.suffixes]
+    candidates = named or list(IMPORTERS.values())
+    chosen = next((importer for importer in candidates if importer.sniff(head)), None)
+    if chosen is None and named:
+        chosen = named[0]  # it says in its own words what is wrong
+    if chosen is None:
+        *most, last = (importer.suffixes[0] for importer in IMPORTERS.values())
+        raise InputError(
+            f"{path}: files named {', '.join(most)} and {last} can be imported, not {suffix!r}"
+        )
+    return chosen.open(path)

@@ -1,0 +1,233 @@
+"""Registries of importers and exporters: contracts, and formats of other distributions."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from nptdms import ChannelObject, TdmsWriter
+
+from dearig.errors import InputError
+from dearig.plugins import ContractError
+from dearig.recording import EXPORTS, export_recording, open_recording
+from dearig.recording.exporters import Exporter
+from dearig.recording.exporters import contract as exporters_contract
+from dearig.recording.exporters.contract import check_exporter
+from dearig.recording.importers import IMPORTERS, Importer, import_file
+from dearig.recording.importers.contract import check_importer
+from dearig.recording.importers.source import Source
+from tests.tools.plugins import run_with_distribution
+from tests.tools.recordings import Clock, run_counts, write_run
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("run") / "run.h5"
+    write_run(path, run_counts(300, quiet=100))
+    return path
+
+
+def sample_of(name: str, run: Path, folder: Path) -> Path:
+    path = folder / f"sample.{name}"
+    if name == "tdms":
+        with TdmsWriter(path) as writer:
+            writer.write_segment(
+                [ChannelObject("rig", n, np.arange(100.0)) for n in ("time_s", "voltage_V")]
+            )
+        return path
+    return export_recording(run, name, path)
+
+
+@pytest.mark.parametrize("name", IMPORTERS)
+def test_every_importer_keeps_the_contract(tmp_path: Path, run: Path, name: str) -> None:
+    (tmp_path / "copies").mkdir()
+    check_importer(name, IMPORTERS[name], sample_of(name, run, tmp_path), tmp_path / "copies")
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_every_exporter_keeps_the_contract(tmp_path: Path, run: Path, name: str) -> None:
+    check_exporter(name, run, tmp_path, now=Clock())
+
+
+def failing(path: Path) -> Source:
+    if not path.read_bytes().endswith(b"\n"):
+        raise RuntimeError("unexpected")
+    return IMPORTERS["csv"].open(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"sniff": bool}, "takes zeros for its format"),
+        ({"sniff": lambda head: not head}, "does not recognise the sample"),
+        ({"suffixes": (".txt",)}, "has none of its suffixes"),
+        ({"open": failing}, "raises RuntimeError: unexpected"),
+    ],
+)
+def test_the_importers_contract_finds_a_fault(
+    tmp_path: Path, run: Path, change: dict[str, object], match: str
+) -> None:
+    (tmp_path / "copies").mkdir()
+    sample = sample_of("csv", run, tmp_path)
+    with pytest.raises(ContractError, match=match):
+        check_importer("csv", replace(IMPORTERS["csv"], **change), sample, tmp_path / "copies")
+
+
+def test_the_exporters_contract_finds_values_that_do_not_come_back(
+    tmp_path: Path, run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def rounded(path: Path, to: str, out: Path) -> Path:
+        written = export_recording(path, to, out)
+        lines = written.read_text().splitlines()
+        cut = [",".join(cell[:6] for cell in line.split(",")) for line in lines[1:]]
+        written.write_text("\n".join([lines[0], *cut]) + "\n")
+        return written
+
+    monkeypatch.setattr(exporters_contract, "export_recording", rounded)
+    with pytest.raises(ContractError, match="comes back with other values"):
+        check_exporter("csv", run, tmp_path, now=Clock())
+
+
+@pytest.mark.parametrize("name", IMPORTERS)
+def test_a_file_with_another_suffix_is_known_by_its_first_bytes(
+    tmp_path: Path, run: Path, name: str
+) -> None:
+    sample = sample_of(name, run, tmp_path)
+    renamed = sample.rename(tmp_path / "measured.dat")
+    if name == "tdms":
+        with pytest.raises(InputError, match="displacement"):  # read, and not an actuator's data
+            import_file(renamed, tmp_path / "out.h5", now=Clock())
+        return
+    import_file(renamed, tmp_path / "out.h5", now=Clock())
+    found, expected = open_recording(tmp_path / "out.h5"), open_recording(run)
+    np.testing.assert_array_equal(found.voltage_command, expected.voltage_command)
+
+
+@pytest.mark.parametrize("what", ["import", "export"])
+def test_parquet_without_pyarrow_is_a_sentence(
+    tmp_path: Path, run: Path, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    source = tmp_path / "in.parquet"
+    source.write_bytes(b"PAR1")
+    call = {
+        "import": lambda: import_file(source, tmp_path / "out.h5"),
+        "export": lambda: export_recording(run, "parquet", tmp_path / "out.parquet"),
+    }[what]
+    with pytest.raises(InputError, match=r'not installed: pip install "dearig\[parquet\]"'):
+        call()
+    assert {path.name for path in tmp_path.iterdir()} == {"in.parquet"}
+
+
+SPACED = """
+import numpy as np
+
+from dearig.errors import InputError
+from dearig.recording.exporters import Exporter
+from dearig.recording.exporters.table import columns_of
+from dearig.recording.importers import Importer
+from dearig.recording.importers.source import no_such_column
+
+MAGIC = "%spaced"
+
+
+class Columns:
+    about = {}
+
+    def __init__(self, path):
+        self.path = path
+        try:
+            head, names, *rows = path.read_text("utf-8").splitlines()
+            if head != MAGIC:
+                raise ValueError("its first line is not %spaced")
+            self.names = names.split()
+            self.table = np.array([[float(c) for c in row.split()] for row in rows], ndmin=2)
+            if self.table.shape[1:] != (len(self.names),) or not self.table.size:
+                raise ValueError("its rows have different lengths, or there are none")
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path} cannot be read: {error}") from error
+
+    def named(self, name):
+        return [n for n in self.names if n == name]
+
+    def check(self, name):
+        if name not in self.names:
+            raise no_such_column(self, name)
+
+    def read(self, names):
+        return {n: self.table[:, self.names.index(n)] for n in names}
+
+    def row(self, index):
+        return f"line {index + 3}"
+
+
+def write(recording, path):
+    columns = columns_of(recording)
+    lines = [MAGIC, " ".join(columns)]
+    lines += [" ".join(map(repr, row)) for row in zip(*(c.tolist() for c in columns.values()))]
+    path.write_text("\\n".join(lines) + "\\n", "utf-8")
+
+
+IMPORTER = Importer("Spaced", (".spaced",), Columns, lambda head: head.startswith(b"%spaced"))
+EXPORTER = Exporter("Spaced", write)
+"""
+
+
+def test_a_format_of_another_distribution_is_imported_and_exported(
+    tmp_path: Path, run: Path
+) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "copies").mkdir()
+    found = run_with_distribution(
+        tmp_path,
+        {"spaced.py": SPACED},
+        {
+            "dearig.importers": {"spaced": "spaced:IMPORTER"},
+            "dearig.exporters": {"spaced": "spaced:EXPORTER"},
+        },
+        f"""
+        from pathlib import Path
+        from dearig.recording import EXPORTS, export_recording
+        from dearig.recording.exporters.contract import check_exporter
+        from dearig.recording.importers import IMPORTERS
+        from dearig.recording.importers.contract import check_importer
+        run, folder = Path({str(run)!r}), Path({str(tmp_path)!r})
+        sample = export_recording(run, "spaced", folder / "sample.spaced")
+        check_importer("spaced", IMPORTERS["spaced"], sample, folder / "copies")
+        check_exporter("spaced", run, folder / "out")
+        print(*EXPORTS, *IMPORTERS.left_out, *EXPORTS.left_out)
+        """,
+    )
+    assert found.split() == ["csv", "mat", "parquet", "spaced"]
+
+
+def test_formats_that_cannot_be_used_are_left_out(tmp_path: Path) -> None:
+    found = run_with_distribution(
+        tmp_path,
+        {"bad.py": "from dearig.recording.exporters import Exporter\nOK = Exporter('x', print)\n"},
+        {
+            "dearig.importers": {"odd": "bad:OK", "csv": "bad:OK"},
+            "dearig.exporters": {"Two-Words": "bad:OK"},
+        },
+        """
+        from dearig.recording import EXPORTS
+        from dearig.recording.importers import IMPORTERS
+        print(len(IMPORTERS), len(EXPORTS))
+        print(*IMPORTERS.left_out, *EXPORTS.left_out, sep="\\n")
+        """,
+    )
+    counts, *sentences = found.splitlines()
+    assert counts == f"{len(IMPORTERS)} {len(EXPORTS)}"
+    assert [s.split(" is left out: ")[1].split(";")[0] for s in sentences] == [
+        "the name 'csv' is already taken",
+        "it is not a dearig.recording.importers.Importer",
+        "its name must be the suffix of its files: small letters and digits",
+    ]
+
+
+def test_the_kinds_of_entry_are_told_apart() -> None:
+    assert all(isinstance(importer, Importer) for importer in IMPORTERS.values())
+    assert all(isinstance(exporter, Exporter) for exporter in EXPORTS.values())
