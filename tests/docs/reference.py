@@ -18,6 +18,7 @@ from typing import Any
 from typer.main import get_command
 
 from dearig.cli.main import app
+from dearig.config import sequence_example
 from dearig.config.rigfile import write_default
 
 FOLDER = Path(__file__).parents[2] / "app" / "docs" / "reference"
@@ -61,7 +62,11 @@ def rig_file() -> str:
         return f"{_RIG_FILE}```toml\n{path.read_text(encoding='utf-8').rstrip()}\n```\n"
 
 
-PAGES: dict[str, Callable[[], str]] = {"commands.md": commands, "rig-file.md": rig_file}
+PAGES: dict[str, Callable[[], str]] = {
+    "commands.md": commands,
+    "rig-file.md": rig_file,
+    "sequences.md": sequence_example.page,
+}
 
 
 def main() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import importlib
 import importlib.util
 import re
 import subprocess
@@ -18,6 +20,7 @@ from typer.main import get_command
 from dearig.cli.main import app
 from dearig.config.modelfile import load_model
 from dearig.config.rigfile import load_rig_file
+from dearig.config.segments import SEGMENT_KINDS
 from dearig.config.sequencefile import parse_sequence
 from dearig.docs import pages
 from dearig.docs.site import anchors
@@ -102,7 +105,10 @@ def test_every_toml_example_is_accepted(block: Block, tmp_path: Path) -> None:
 def accept_toml(text: str, folder: Path) -> None:
     """Fail unless the reader that such a file is for takes it."""
     content = tomllib.loads(text)
-    if "segment" in content:
+    if "segment" in content and "name" not in content:  # a part of a sequence
+        for table in content["segment"]:
+            SEGMENT_KINDS[table["kind"]].model_validate(table)
+    elif "segment" in content:
         parse_sequence(text, "example", folder)
     elif content.get("format", "").startswith("dearig-model/"):
         load_model(write(folder / "model.toml", text))
@@ -131,6 +137,15 @@ def test_python_examples_run(path: str, tmp_path: Path) -> None:
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert ran.returncode == 0, ran.stderr
+
+
+@pytest.mark.parametrize("block", of_language("python"), ids=str)
+def test_every_python_example_uses_names_that_exist(block: Block) -> None:
+    tree = ast.parse(block.text)
+    for node in ast.walk(tree):
+        owner = node.value if isinstance(node, ast.Attribute) else None
+        if isinstance(owner, ast.Name) and owner.id == "dearig":
+            assert hasattr(importlib.import_module("dearig"), node.attr), node.attr
 
 
 @pytest.mark.parametrize("name", reference.PAGES)
