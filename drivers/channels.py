@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["CHANNEL_NAMES", "Channel", "Scaling"]
+__all__ = ["CHANNEL_NAMES", "RESERVED_NAMES", "Channel", "Scaling"]
 
-#: Every channel a rig may deliver, in the order in which blocks hold them.
+#: The channels that this program knows, in the order in which blocks hold them. Those that a rig
+#: file declares come after them.
 CHANNEL_NAMES = (
     "voltage_command",
     "voltage_monitor",
@@ -16,6 +17,9 @@ CHANNEL_NAMES = (
     "displacement",
     "temperature",
 )
+
+#: Names that a rig file cannot give a channel: recordings use them for something else.
+RESERVED_NAMES = (*CHANNEL_NAMES, "time", "displacement_model", "stretch", "nominal_stress")
 
 COUNT_MIN, COUNT_MAX = -32768, 32767
 
@@ -67,7 +71,10 @@ class Scaling:
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel: its ``name`` (of ``CHANNEL_NAMES``), SI ``unit``, scaling and timing.
+    """One channel: its ``name``, SI ``unit``, scaling and timing.
+
+    ``name`` is one of ``CHANNEL_NAMES`` or one that the rig file declares; ``label`` is what a
+    person reads, and empty where the name does.
 
     ``skew`` is the time in s after the sample clock's tick at which this channel is converted (a
     multiplexed converter takes one channel after another). ``delay`` is the known lag in s of the
@@ -81,3 +88,4 @@ class Channel:
     skew: float = 0.0
     delay: float = 0.0
     delay_error: float = 0.0
+    label: str = ""

@@ -63,6 +63,7 @@ class Interlocks:
                 f"one for each is needed"
             )
         scalings = {channel.name: channel.scaling for channel in channels}
+        self._scalings = scalings
         self._rows = {channel.name: row for row, channel in enumerate(channels)}
         self._command = scalings["voltage_command"]
         self._monitor = scalings["voltage_monitor"]
@@ -106,6 +107,7 @@ class Interlocks:
                 ("displacement", locks.displacement_debounce_ms * 1e-3),
                 ("jump", 0.0),
                 ("following", locks.following_debounce_ms * 1e-3),
+                *((f"channel {c.name}", c.limit_debounce_ms * 1e-3) for c in settings.channel),
             )
         }
 
@@ -133,6 +135,7 @@ class Interlocks:
             *self._watch_displacement(reading),
             *self._watch_jump(reading),
             *self._watch_following(command, reading),
+            *self._watch_declared(block.counts),
         ]
         self._last_command = int(command[-1])
         self._watched += command.size
@@ -358,6 +361,28 @@ class Interlocks:
                 f"the rig file says",
             )
 
+    def _watch_declared(self, counts: np.ndarray) -> Iterator[Trip]:
+        """Watch the channels that the rig file declares with limits."""
+        for channel in self._settings.channel:
+            interlock = f"channel {channel.name}"
+            if not channel.limited or not self._live(interlock):
+                continue
+            row = counts[self._rows[channel.name]]
+            values = self._scalings[channel.name].physical(row)
+            low = -math.inf if channel.limit_min is None else channel.limit_min
+            high = math.inf if channel.limit_max is None else channel.limit_max
+            # at the end of what the input can read, it may be any value
+            clipped = (row == COUNT_MIN) | (row == COUNT_MAX)
+            at = self._broken[interlock].first((values < low) | (values > high) | clipped)
+            if at is not None:
+                yield self._trip(
+                    interlock,
+                    at,
+                    channel.limit_action,
+                    f"{channel.shown} read {values[at]:.4g} {channel.unit}, "
+                    f"{_allowed(low, high, channel.unit)} is allowed",
+                )
+
     def _live(self, name: str) -> bool:
         return name not in self._tripped
 
@@ -386,7 +411,11 @@ def would_trip(
     stands still tells nothing here, where it has no noise.
     """
     locks = settings.interlocks.model_copy(update={"laser_stuck_s": 0.0})
-    settings = settings.model_copy(update={"interlocks": locks})
+    # nothing is foreseen of the channels that the rig file declares
+    free = tuple(
+        c.model_copy(update={"limit_min": None, "limit_max": None}) for c in settings.channel
+    )
+    settings = settings.model_copy(update={"interlocks": locks, "channel": free})
     channels = settings.channels(dict.fromkeys(settings.channel_names, _NOMINAL))
     still = np.zeros(voltage.size)
     shown = {"voltage_command": voltage, "voltage_monitor": voltage, "displacement": displacement}
@@ -455,6 +484,13 @@ class _Still:
     def _forget(self) -> None:
         self._samples = 0
         self._low, self._high = COUNT_MAX, COUNT_MIN
+
+
+def _allowed(low: float, high: float, unit: str) -> str:
+    """Return the range from ``low`` to ``high``, of which one end may be infinite, in words."""
+    if low == -math.inf:
+        return f"{high:.4g} {unit} or less"
+    return f"{low:.4g} {unit} or more" if high == math.inf else f"{low:.4g} to {high:.4g} {unit}"
 
 
 def _physical(scaling: Scaling, count: float | np.integer) -> float:

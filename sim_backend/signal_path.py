@@ -134,6 +134,9 @@ class SignalPath:
         if self._settings.thermometer is not None:
             at, _ = self._converted("temperature", samples)
             counts[4] = self._temperature(self._settings.thermometer, motion.heating[at], chunk)
+        declared = self._settings.channel
+        if declared:
+            counts[-len(declared) :] = self._declared(chunk, samples)
 
         events = [
             *self._amplifier_events(first, rows.settled, state.settled),
@@ -253,6 +256,18 @@ class SignalPath:
         celsius = thermometer.room_celsius + heating + noise
         volts = (celsius - thermometer.celsius_at_0_V) / thermometer.celsius_per_V
         return self._card.convert("temperature", volts)
+
+    def _declared(self, chunk: int, samples: int) -> np.ndarray:
+        """Return counts (channels, samples) of the channels that the rig file declares."""
+        channels = self._settings.channel
+        noise = self._streams.of_chunk("channels", self._run, chunk)
+        drawn = noise.standard_normal((len(channels), CHUNK))[:, :samples]
+        return np.array(
+            [
+                self._card.convert(c.name, c.volts(c.simulated_value + c.simulated_noise * row))
+                for c, row in zip(channels, drawn, strict=True)
+            ]
+        )
 
     def _amplifier_events(self, first: int, settled: np.ndarray, before: bool) -> list[Event]:
         return [

@@ -12,7 +12,7 @@ import numpy as np
 
 __all__ = ["Streams"]
 
-_INSTRUMENTS = ("card", "amplifier", "laser", "thermometer", "film")
+_INSTRUMENTS = ("card", "amplifier", "laser", "thermometer", "film", "channels")
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,18 @@ from dearig.drivers.settings import RigSettings, Section
 from dearig.errors import InputError
 from dearig.model.material import Film, Load
 
-__all__ = ["FilmSection", "LoadSection", "RigFile", "load_rig_file", "write_default"]
+__all__ = [
+    "REPEATED",
+    "FilmSection",
+    "LoadSection",
+    "RigFile",
+    "fault_sentence",
+    "load_rig_file",
+    "write_default",
+]
+
+#: Tables that a rig file may hold any number of times: ``[[channel]]``.
+REPEATED = ("channel",)
 
 
 class FilmSection(Section):
@@ -136,13 +147,15 @@ def write_default(path: Path | str, overwrite: bool = False) -> None:
 def _section_lines(name: str, info: FieldInfo) -> Iterator[str]:
     section = _section_class(info)
     # a section that is absent by default stands there as a comment, to be switched on
-    off = "" if info.default is not None else "# "
+    off = "# " if info.default is None or name in REPEATED else ""
     doc = (section.__doc__ or "").splitlines()[0]
     yield f"# {doc}" if not off else f"# {doc} {(info.description or '').capitalize()}."
-    yield f"{off}[{name}]"
+    yield f"{off}[[{name}]]" if name in REPEATED else f"{off}[{name}]"
     for key, field in section.model_fields.items():
         about = f"# {field.description} ({allowed(field)})"
         value = field.get_default(call_default_factory=True)
+        if field.is_required() and field.examples:
+            value = field.examples[0]
         if value is None:
             yield about
             yield f"# {key} ="
@@ -166,18 +179,26 @@ def _sentence(error: ValidationError) -> str:
     first = min(faults, key=lambda fault: fault["type"] != "extra_forbidden")
     more = len(faults) - 1
     tail = f" ({more} more fault{'s' if more > 1 else ''} after that)" if more else ""
-    return _fault(first) + tail
+    return fault_sentence(first) + tail
 
 
-def _fault(fault: ErrorDetails) -> str:
-    place = [str(part) for part in fault["loc"]]
+def fault_sentence(fault: ErrorDetails) -> str:
+    """Return one sentence for a fault that pydantic found: the key, its value, what is allowed."""
+    # which of several tables it is, counted from 1, is part of the key that is shown
+    place = [str(part) for part in fault["loc"] if isinstance(part, str)]
     value = fault["input"]
     if fault["type"] == "extra_forbidden":
         return _unknown(place)
     if not place:
         return str(fault["ctx"]["error"])
-    key = ".".join(place)
+    key = ".".join(str(p) if isinstance(p, str) else f"[{p + 1}]" for p in fault["loc"])
+    key = key.replace(".[", "[")
     info = RigFile.model_fields[place[0]]
+    if fault["type"] == "tuple_type":
+        return (
+            f"{key} = {shown(value)} is not a list of tables: write [[{key}]] and its keys below, "
+            f"once for each"
+        )
     if fault["type"] in ("model_type", "model_attributes_type"):
         return f"{key} = {shown(value)} is not a table: write [{key}] and its keys below"
     if len(place) == 1:
@@ -185,6 +206,8 @@ def _fault(fault: ErrorDetails) -> str:
         return str(fault["ctx"]["error"])
     info = _section_class(info).model_fields[place[1]]
     may = allowed(info)
+    if fault["type"] == "missing":
+        return f"{key} is missing: it is {may} ({info.description})"
     if fault["type"] == "value_error":
         return f"{key} = {shown(value)} is not allowed: {fault['ctx']['error']}"
     return f"{key} = {shown(value)} is not allowed, but {may} ({info.description})"

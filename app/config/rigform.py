@@ -8,7 +8,7 @@ from typing import Any, get_args
 import tomli_w
 from pydantic import BaseModel, ValidationError
 
-from dearig.config.rigfile import RigFile
+from dearig.config.rigfile import REPEATED, RigFile, fault_sentence
 from dearig.config.toml_input import allowed, parse_toml, shown
 from dearig.errors import InputError
 
@@ -26,11 +26,12 @@ def _table(name: str) -> type[BaseModel]:
     )
 
 
-#: The tables of a rig file, the operator's own first.
+#: The tables of a rig file that a form can show, the operator's own first. Tables that may be
+#: repeated have no form: they are written in the file.
 SECTIONS: dict[str, type[BaseModel]] = {
     name: _table(name)
     for name in (
-        "film", "load", *(n for n in RigFile.model_fields if n not in ("film", "load"))
+        "film", "load", *(n for n in RigFile.model_fields if n not in ("film", "load", *REPEATED))
     )
 }  # fmt: skip
 
@@ -55,6 +56,9 @@ def faults_of(text: str) -> dict[tuple[str, str], str]:
         found: dict[tuple[str, str], str] = {}
         for fault in error.errors(include_url=False):
             place = [str(part) for part in fault["loc"]]
+            if place[:1] and place[0] in REPEATED:
+                found.setdefault((place[0], ".".join(place[1:])), fault_sentence(fault))
+                continue
             table, key = [*place, "", ""][:2]
             words = str(fault["ctx"]["error"]) if fault["type"] == "value_error" else ""
             if not key and words:

@@ -79,7 +79,7 @@ def allowed(info: FieldInfo, item: bool = False) -> str:
             return f"a list such as [6.0, 6.5], each {_bounded('a number', inner)}"
     words = {float: "a number", int: "a whole number", str: "a text"}
     text = words.get(kind, "a table") if isinstance(kind, type) else "a table"
-    return _bounded(text, metadata)
+    return _bounded(text, metadata, info.examples)
 
 
 def _bare(kind: Any, metadata: list[Any]) -> tuple[Any, list[Any]]:
@@ -93,7 +93,7 @@ def _bare(kind: Any, metadata: list[Any]) -> tuple[Any, list[Any]]:
     return kind, metadata
 
 
-def _bounded(text: str, metadata: list[Any]) -> str:
+def _bounded(text: str, metadata: list[Any], examples: list[Any] | None = None) -> str:
     bounds: dict[str, Any] = {}
     for constraint in metadata:
         for name in ("gt", "ge", "lt", "le", "pattern", "min_length"):
@@ -107,7 +107,8 @@ def _bounded(text: str, metadata: list[Any]) -> str:
     if "le" in bounds:
         text += f" to {bounds['le']:g}" if "ge" in bounds else f", at most {bounds['le']:g}"
     if "pattern" in bounds:
-        text += f" such as {'ao0' if 'ao' in bounds['pattern'] else 'ai0'}"
+        usual = "ao0" if "ao" in bounds["pattern"] else "ai0"
+        text += f" such as {examples[0] if examples else usual}"
     if "min_length" in bounds:
         text += " that is not empty"
     return text

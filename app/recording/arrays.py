@@ -51,7 +51,9 @@ class Arrays:
         self.path = path
         self.samples = samples
         self.stored = stored
-        self.names = tuple(n for n in UNITS if n in stored or n in derived)
+        known = tuple(n for n in UNITS if n in stored or n in derived)
+        declared = dict.fromkeys(n for n in (*stored, *derived) if n not in UNITS)
+        self.names = (*known, *declared)
         self._derived = derived
         self._rest = rest
         self._read: dict[str, np.ndarray] = {}

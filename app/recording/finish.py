@@ -100,7 +100,7 @@ def _write_physical(entry: h5py.Group) -> int:
         for c in counts.channels
     }
     for name in counts.names:
-        field = _write_field(data, name, samples, timing.get(name, {}))
+        field = _write_field(data, name, samples, timing.get(name, {}), *counts.described(name))
         for start in range(0, samples, SLICE):
             stop = min(start + SLICE, samples)
             field[start:stop] = counts.window(name, start, stop)
@@ -135,13 +135,19 @@ def _write_overview(entry: h5py.Group, counts: Counts) -> None:
         time, low, high = counts.overview(name, 0, counts.samples, OVERVIEW)
         if "time" not in group:
             _write_field(group, "time", 2 * time.size, {})[:] = np.repeat(time, 2)
-        _write_field(group, name, 2 * low.size, {})[:] = np.stack((low, high), axis=1).reshape(-1)
+        field = _write_field(group, name, 2 * low.size, {}, *counts.described(name))
+        field[:] = np.stack((low, high), axis=1).reshape(-1)
 
 
 def _write_field(
-    data: h5py.Group, name: str, samples: int, attributes: Mapping[str, float]
+    data: h5py.Group,
+    name: str,
+    samples: int,
+    attributes: Mapping[str, float],
+    unit: str = "",
+    label: str = "",
 ) -> h5py.Dataset:
-    dataset = create_field(data, name, samples)
+    dataset = create_field(data, name, samples, unit, label)
     for key, value in attributes.items():
         dataset.attrs[key] = value
     return dataset

@@ -43,6 +43,7 @@ __all__ = [
     "attach_time",
     "counts_name",
     "create_field",
+    "declared_names",
     "describe_field",
     "iso_time",
     "lay_out",
@@ -127,24 +128,48 @@ def iso_time(moment: float) -> str:
     return datetime.fromtimestamp(moment, tz=UTC).isoformat(timespec="milliseconds")
 
 
-def variable_attributes(name: str) -> dict[str, str]:
-    """Return ``units`` of the physical values ``name`` and, where it says more, ``long_name``."""
-    found = {"units": UNITS[name]}
-    if name in LONG_NAMES:
-        found["long_name"] = LONG_NAMES[name]
+def declared_names(data: h5py.Group) -> tuple[str, ...]:
+    """Return the names of the channels in /entry/data that the rig file declared, in their order.
+
+    They have counts like the others, and a number ``declared`` that says which comes first.
+    """
+    suffix = counts_name("")
+    found = []
+    for name in data:
+        if name.endswith(suffix) and name.removesuffix(suffix) not in UNITS:
+            attrs = data[name].attrs
+            if "declared" in attrs:
+                found.append((int(attrs["declared"]), name.removesuffix(suffix)))
+    return tuple(name for _, name in sorted(found))
+
+
+def variable_attributes(name: str, unit: str = "", label: str = "") -> dict[str, str]:
+    """Return ``units`` of the physical values ``name`` and, where it says more, ``long_name``.
+
+    ``unit`` and ``label`` are those of a channel that the rig file declared.
+    """
+    found = {"units": UNITS.get(name, unit)}
+    if long_name := LONG_NAMES.get(name, label):
+        found["long_name"] = long_name
     return found
 
 
-def describe_field(dataset: h5py.Dataset, name: str) -> None:
+def describe_field(dataset: h5py.Dataset, name: str, unit: str = "", label: str = "") -> None:
     """Give a physical dataset its ``units`` and, where it says more, a name for plots."""
-    for key, text in variable_attributes(name).items():
+    found = variable_attributes(name, unit, label)
+    for key, text in found.items():
         # viewers show a long name instead of name and unit
-        with_unit = f"{text} ({UNITS[name]})" if key == "long_name" else text
+        with_unit = f"{text} ({found['units']})" if key == "long_name" else text
         dataset.attrs[key] = fixed(with_unit)
 
 
-def create_field(data: h5py.Group, name: str, samples: int) -> h5py.Dataset:
-    """Make the physical dataset ``name``, to be filled; HDF5 keeps a checksum of every chunk."""
+def create_field(
+    data: h5py.Group, name: str, samples: int, unit: str = "", label: str = ""
+) -> h5py.Dataset:
+    """Make the physical dataset ``name``, to be filled; HDF5 keeps a checksum of every chunk.
+
+    ``unit`` and ``label`` are those of a channel that the rig file declared.
+    """
     dataset = data.create_dataset(
         name,
         shape=(samples,),
@@ -153,7 +178,7 @@ def create_field(data: h5py.Group, name: str, samples: int) -> h5py.Dataset:
         chunks=(-(-samples // -(-samples // CHUNK)),) if samples else None,
         fletcher32=bool(samples),
     )
-    describe_field(dataset, name)
+    describe_field(dataset, name, unit, label)
     return dataset
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from dearig.drivers.channels import CHANNEL_NAMES, Channel, Scaling
 from dearig.recording.flushes import flush_notes
-from dearig.recording.layout import UNITS, counts_name
+from dearig.recording.layout import UNITS, counts_name, declared_names
 from dearig.recording.pyramid import levels, reduced
 from dearig.recording.rest_noise import NEGLIGIBLE
 from dearig.recording.text import fixed, text_of
@@ -45,8 +45,11 @@ class Rest:
     samples: int
 
 
-def write_channel(counts: h5py.Dataset, channel: Channel) -> None:
-    """Give a dataset of counts what is needed to read it without this program."""
+def write_channel(counts: h5py.Dataset, channel: Channel, place: int) -> None:
+    """Give a dataset of counts what is needed to read it without this program.
+
+    ``place`` is the channel's in a block.
+    """
     attrs = counts.attrs
     attrs["units"] = fixed("counts")
     attrs["physical_units"] = fixed(channel.unit)
@@ -57,12 +60,15 @@ def write_channel(counts: h5py.Dataset, channel: Channel) -> None:
     attrs["skew_s"] = float(channel.skew)
     attrs["delay_s"] = float(channel.delay)
     attrs["delay_error_s"] = float(channel.delay_error)
+    if channel.name not in CHANNEL_NAMES:
+        attrs["declared"] = place
+        attrs["label"] = fixed(channel.label)
 
 
 def read_channels(data: h5py.Group) -> tuple[Channel, ...]:
-    """Channels whose counts stand in /entry/data, in the order of ``CHANNEL_NAMES``."""
+    """Channels whose counts stand in /entry/data, in the order in which blocks held them."""
     found = []
-    for name in CHANNEL_NAMES:
+    for name in (*CHANNEL_NAMES, *declared_names(data)):
         if counts_name(name) not in data:
             continue
         attrs = data[counts_name(name)].attrs
@@ -75,6 +81,7 @@ def read_channels(data: h5py.Group) -> tuple[Channel, ...]:
                 skew=float(attrs["skew_s"]),
                 delay=float(attrs["delay_s"]),
                 delay_error=float(attrs.get("delay_error_s", 0.0)),
+                label=text_of(attrs.get("label", "")),
             )
         )
     return tuple(found)
@@ -153,7 +160,13 @@ class Counts:
     @property
     def names(self) -> tuple[str, ...]:
         """What there are values of, ``time`` among them, in the order of the layout."""
-        return tuple(n for n in UNITS if n == "time" or n in self._by_name)
+        known = tuple(n for n in UNITS if n == "time" or n in self._by_name)
+        return (*known, *(n for n in self._by_name if n not in UNITS))
+
+    def described(self, name: str) -> tuple[str, str]:
+        """Return unit and label of ``name`` as its counts say them; empty for ``time``."""
+        channel = self._by_name.get(name)
+        return ("", "") if channel is None else (channel.unit, channel.label)
 
     @property
     def rest(self) -> Rest:

@@ -21,6 +21,7 @@ from dearig.recording.layout import (
     UNITS,
     ZERO_ORDER,
     counts_name,
+    declared_names,
 )
 from dearig.recording.opening import opened, read_from
 from dearig.recording.physical import Counts, Rest, read_channels, resolution
@@ -219,7 +220,11 @@ class _Reader:
     def _stored(self, data: h5py.Group) -> tuple[str, ...]:
         """Names of the physical values that are there."""
         found = []
-        for name, unit in UNITS.items():
+        declared = {
+            name: text_of(data[counts_name(name)].attrs["physical_units"])
+            for name in declared_names(data)
+        }
+        for name, unit in {**UNITS, **declared}.items():
             row = item(data, name)
             if row is None:
                 continue

@@ -128,6 +128,26 @@ class Recording:
         """Pa."""
         return self._row("nominal_stress")
 
+    @property
+    def declared(self) -> dict[str, str]:
+        """Names of the channels that the rig file declared, and what a person calls them."""
+        labels = {c.name: c.label or c.name.replace("_", " ") for c in self.channels}
+        return {n: labels.get(n, n) for n in self.arrays.names if n not in UNITS}
+
+    def unit(self, name: str) -> str:
+        """Return the unit in which the values of ``name`` are.
+
+        Raises ``ValueError`` for a channel that is not there.
+        """
+        self._check_channel(name)
+        if name in UNITS:
+            return UNITS[name]
+        return next(c.unit for c in self.channels if c.name == name)
+
+    def _attributes(self, name: str) -> dict[str, str]:
+        label = next((c.label for c in self.channels if c.name == name), "")
+        return variable_attributes(name, self.unit(name), label)
+
     def _row(self, name: str) -> np.ndarray | None:
         return self.arrays.read(name) if name in self.arrays.names else None
 
@@ -221,7 +241,7 @@ class Recording:
             "outcome": self.outcome, "start_time": str(self.provenance.get("start_time", "")),
         }  # fmt: skip
         columns = {
-            name: ("time", values.copy(), variable_attributes(name))
+            name: ("time", values.copy(), self._attributes(name))
             for name, values in self.values.items()
         }
         coordinate = {"time": columns.pop("time")}
@@ -238,7 +258,7 @@ class Recording:
         columns = {name: values.copy() for name, values in self.values.items()}
         index = lib.Index(columns.pop("time"), name="time")
         frame: pandas.DataFrame = lib.DataFrame(columns, index=index)
-        frame.attrs["units"] = {name: UNITS[name] for name in self.arrays.names}
+        frame.attrs["units"] = {name: self.unit(name) for name in self.arrays.names}
         return frame
 
     @cached_property

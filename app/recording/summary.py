@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dearig.recording.layout import FORMAT, LINEAR, UNITS, ZERO_ORDER
+from dearig.recording.layout import FORMAT, LINEAR, ZERO_ORDER
 from dearig.recording.recording import Recording
 
 __all__ = ["describe", "describe_rows"]
@@ -92,7 +92,10 @@ def _channel(recording: Recording, name: str) -> dict[str, Any]:
     low = high = None
     if known.any():
         low, high = float(whole.low[known].min()), float(whole.high[known].max())
-    return {"name": name, "unit": UNITS[name], "min": low, "max": high}
+    told = {"name": name, "unit": recording.unit(name), "min": low, "max": high}
+    if name in recording.declared:
+        told["label"] = recording.declared[name]
+    return told
 
 
 #: Units in which a person reads them: what they are multiplied by, and the name.
@@ -128,10 +131,11 @@ def describe_rows(recording: Recording) -> list[tuple[str, str]]:
             ("rate", f"uneven, steps of {timing['step_min_s']:.4g} to {timing['step_max_s']:.4g} s")
         )
     for channel in d["channels"]:
-        scale, unit = _READABLE[channel["name"]]
+        scale, unit = _READABLE.get(channel["name"], (1.0, channel["unit"]))
         if channel["min"] is not None:
             span = f"{channel['min'] * scale:.6g} to {channel['max'] * scale:.6g} {unit}"
-            rows.append((channel["name"].replace("_", " "), span.rstrip()))
+            shown = channel.get("label", channel["name"].replace("_", " "))
+            rows.append((shown, span.rstrip()))
     if d["noise_floor_m"] is not None:
         floor = f"{d['noise_floor_m'] * 1e6:.3g} um, over {d['quiet_samples']} samples at 0 V"
         rows.append(("noise floor", floor))

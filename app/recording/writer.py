@@ -24,7 +24,7 @@ from types import TracebackType
 import h5py
 import numpy as np
 
-from dearig.drivers.channels import CHANNEL_NAMES, Channel
+from dearig.drivers.channels import CHANNEL_NAMES, RESERVED_NAMES, Channel
 from dearig.drivers.rig import Block, Event, RigIdentity
 from dearig.errors import DearigError, DiskFault, InputError, InstrumentFault
 from dearig.recording.checksums import ChecksumWriter
@@ -140,7 +140,7 @@ class RecordingWriter:
         # about a second: a chunk is written again by every flush that finds it changed
         chunk = int(min(max(self._rate, 1024), 65536))
         self._counts = []
-        for channel in self._channels:
+        for place, channel in enumerate(self._channels):
             counts = data.create_dataset(
                 counts_name(channel.name),
                 shape=(0,),
@@ -148,7 +148,7 @@ class RecordingWriter:
                 chunks=(chunk,),
                 dtype="<i2",
             )
-            write_channel(counts, channel)
+            write_channel(counts, channel, place)
             if channel.name == "voltage_command":
                 counts.attrs["hold"] = fixed(ZERO_ORDER)
             self._counts.append(counts)
@@ -425,9 +425,14 @@ def _check_channels(channels: tuple[Channel, ...]) -> None:
             raise ValueError(f"a run is recorded with a channel {needed}; there are {names}")
     if len(set(names)) != len(names):
         raise ValueError(f"two channels have one name: {names}")
+    known = [name for name in names if name in CHANNEL_NAMES]
+    if known != [n for n in CHANNEL_NAMES if n in names] or names[: len(known)] != known:
+        raise ValueError(f"channels come as {', '.join(CHANNEL_NAMES)}, then others, not {names}")
     for channel in channels:
         if channel.name not in CHANNEL_NAMES:
-            raise ValueError(f"channel {channel.name!r} is not one of {', '.join(CHANNEL_NAMES)}")
+            if channel.name in RESERVED_NAMES:
+                raise ValueError(f"channel {channel.name!r}: recordings use this name themselves")
+            continue
         units = TEMPERATURE_UNITS if channel.name == "temperature" else (UNITS[channel.name],)
         if channel.unit not in units:
             raise ValueError(f"channel {channel.name} is in {channel.unit!r}, not in {units[0]}")

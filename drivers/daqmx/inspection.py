@@ -89,12 +89,12 @@ def _card(name: str, card: Any, settings: RigSettings) -> list[Finding]:
     lines = ["/".join(line.split("/")[-2:]) for line in card.do_lines.channel_names]
     for channel, terminal in settings.terminals().items():
         there = outputs if channel == "voltage_command" else inputs
-        key = "card.ao_command" if channel == "voltage_command" else f"card.ai_{channel}"
+        key = settings.keys(channel)[0]
         found.append(_has(name, f"{key} = {terminal}", terminal in there, "the card's terminals"))
     for channel, limit in settings.ranges().items():
         pairs = card.ao_voltage_rngs if channel == "voltage_command" else card.ai_voltage_rngs
         offered = sorted({high for low, high in zip(pairs[::2], pairs[1::2], strict=True)})
-        key = "card.ao_range_V" if channel == "voltage_command" else f"card.range_{channel}_V"
+        key = settings.keys(channel)[1]
         ranges = "one of " + ", ".join(f"{high:g}" for high in offered)
         found.append(_has(name, f"{key} = {limit:g}", limit in offered, ranges))
     if wanted.do_hv_enable is None:

@@ -139,6 +139,9 @@ class Behind:
             "current_monitor": noise[1],
             "displacement": np.full(samples, self._laser_volts(laser)),
             "temperature": np.full(samples, self._room()),
+            **{
+                c.name: c.volts(np.full(samples, c.simulated_value)) for c in self._settings.channel
+            },
         }
         card = self._card(inputs)
         read = np.zeros((len(inputs), samples), dtype=np.int16)
@@ -175,11 +178,14 @@ class Behind:
         self, inputs: Sequence[AnalogInput], conversions: tuple[float, ...]
     ) -> _TaskSettings:
         """The settings with the ranges of ``inputs``, which a task may choose for itself."""
-        ranges = {
-            f"range_{self._names[c.terminal]}_V": c.range
-            for c in inputs
-            if c.terminal in self._names
-        }
-        card = self._settings.card.model_copy(update=ranges)
+        ranges = {self._names[c.terminal]: c.range for c in inputs if c.terminal in self._names}
+        declared = tuple(
+            c.model_copy(update={"range_V": ranges.pop(c.name, c.range_V)})
+            for c in self._settings.channel
+        )
+        card = self._settings.card.model_copy(
+            update={f"range_{name}_V": limit for name, limit in ranges.items()}
+        )
         parts = {name: getattr(self._settings, name) for name in RigSettings.model_fields}
-        return _TaskSettings.model_construct(**{**parts, "card": card, "conversions": conversions})
+        changed = {"card": card, "channel": declared, "conversions": conversions}
+        return _TaskSettings.model_construct(**{**parts, **changed})

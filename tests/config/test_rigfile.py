@@ -1,10 +1,13 @@
 """The rig file: what it gives, and what it says about every kind of mistake."""
 
+import re
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from dearig.config.rigfile import RigFile, load_rig_file, write_default
+from dearig.config.rigform import faults_of
 from dearig.drivers.gate import admit
 from dearig.drivers.settings import LaserSettings, RigSettings, ThermometerSettings
 from dearig.errors import InputError
@@ -195,3 +198,40 @@ def rounded_steps():
 def test_default_limits_let_the_thesis_and_fast_steps_pass(waveform):
     # a film of 1 mm at the greatest stretch of the thesis, 1.25
     admit(waveform, 1000.0, RigFile().gate_limits(), foreseen(waveform.size))
+
+
+def test_declared_channels_of_the_default_file_are_commented_and_valid(tmp_path, rig_file):
+    path = tmp_path / "default.toml"
+    write_default(path)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    start = lines.index("# [[channel]]")
+    end = start + lines[start:].index("")
+    keys = [line for line in lines[start:end] if re.match(r"# (\w+ = |\[)", line)]
+    (channel,) = load_rig_file(rig_file("\n".join(k.removeprefix("# ") for k in keys))).channel
+    assert (channel.name, channel.terminal, channel.unit) == ("load_cell", "ai4", "N")
+
+
+CHANNEL = '[[channel]]\nname = "a"\nterminal = "ai4"\nunit = "N"\nunit_per_V = 2.0\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[channel]\nname = "a"', r"not a list of tables: write \[\[channel\]\]"),
+        ('[[channel]]\nname = "a"', r"channel\[1\].terminal is missing: it is a text such as ai4"),
+        (CHANNEL.replace('"a"', '"time"'), "recordings use this name for something else"),
+        (CHANNEL.replace('"a"', '"b_counts"'), "recordings use this name for something else"),
+        (CHANNEL.replace('"a"', '"Load cell"'), r"channel\[1\].name = .* text such as load_cell"),
+        (CHANNEL.replace("2.0", "0.0"), "with 0 every voltage would read the same"),
+        (CHANNEL.replace('"ai4"', '"ai0"'), "input ai0 is wired to two channels"),
+        (CHANNEL.replace('"ai4"', '"ai9"'), 'channel a: terminal = "ai9" with .* differential'),
+        (CHANNEL + CHANNEL.replace("ai4", "ai5"), "channel a: the name is given to two channels"),
+        (CHANNEL + "limit_max = 30.0", "limit_max = 30 is not within -20 to 20 N"),
+        (CHANNEL + "limit_min = 2.0\nlimit_max = 1.0", "limit_min = 2 is not below limit_max = 1"),
+        (CHANNEL + "gain = 2.0", r"channel.gain is not a key"),
+    ],
+)
+def test_what_is_wrong_with_a_declared_channel(rig_file, text, words):
+    with pytest.raises(InputError, match=words):
+        load_rig_file(rig_file(text))
+    assert any(re.search(words, told) for told in faults_of(text).values())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from dearig.recording.layout import FORMAT, LINEAR, UNITS, ZERO_ORDER
+from dearig.recording.layout import FORMAT, LINEAR, ZERO_ORDER
 from dearig.recording.recording import Recording
 
 __all__ = ["Exporter", "columns_of", "description_of", "units_of"]
@@ -49,12 +50,17 @@ class Exporter:
 
 def columns_of(recording: Recording) -> dict[str, np.ndarray]:
     """Return the values (N,) by the names of the exported columns, ``time_s`` first."""
-    return {COLUMNS[name]: values for name, values in recording.values.items()}
+    return {_column(recording, name): values for name, values in recording.values.items()}
 
 
 def units_of(recording: Recording) -> dict[str, str]:
     """Return the unit of each exported column by its name."""
-    return {COLUMNS[name]: UNITS[name] for name in recording.values}
+    return {_column(recording, name): recording.unit(name) for name in recording.values}
+
+
+def _column(recording: Recording, name: str) -> str:
+    """Return the name of the exported column; a declared channel's is made like the others."""
+    return COLUMNS.get(name) or f"{name}_{re.sub(r'[^A-Za-z0-9]+', '_', recording.unit(name))}"
 
 
 def description_of(recording: Recording) -> dict[str, str]:

@@ -1,0 +1,28 @@
+"""Settings of the instruments as a rig file holds them, each with its unit in its name.
+
+Defaults are the rig of the thesis (section 4.1) with its makers' figures, which are from memory:
+check them against the manuals of the instruments at hand. Values marked "simulated rig only" say
+how an instrument misbehaves; a real one needs no telling.
+"""
+
+from dearig.drivers.settings.amplifier import AmplifierSettings
+from dearig.drivers.settings.card import CardSettings
+from dearig.drivers.settings.channel import ChannelSettings, ThermometerSettings
+from dearig.drivers.settings.laser import LaserSettings
+from dearig.drivers.settings.limits import GuardianSettings, InterlockSettings, LimitsSettings
+from dearig.drivers.settings.rig import RigSettings
+from dearig.drivers.settings.section import Action, Section
+
+__all__ = [
+    "Action",
+    "AmplifierSettings",
+    "CardSettings",
+    "ChannelSettings",
+    "GuardianSettings",
+    "InterlockSettings",
+    "LaserSettings",
+    "LimitsSettings",
+    "RigSettings",
+    "Section",
+    "ThermometerSettings",
+]

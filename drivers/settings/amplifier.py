@@ -1,0 +1,49 @@
+"""Settings of the high-voltage amplifier."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from dearig.drivers.settings.section import Section
+
+__all__ = ["AmplifierSettings"]
+
+
+class AmplifierSettings(Section):
+    """The high-voltage amplifier between the card's output and the electrodes."""
+
+    model: str = Field(default="TREK 10/40A-HS", description="as it stands on the front panel")
+    serial: str = Field(default="", description="serial number, kept with every recording")
+    gain_V_per_V: float = Field(
+        default=1000.0, ge=1.0, le=1e5, description="volts at the film per volt at the input"
+    )
+    offset_V: float = Field(
+        default=0.0,
+        ge=-100.0,
+        le=100.0,
+        description="measured output at 0 V input; commands are corrected for it",
+    )
+    range_kV: float = Field(
+        default=10.0, gt=0.0, le=100.0, description="output range, plus and minus"
+    )
+    current_limit_mA: float = Field(
+        default=40.0, gt=0.0, le=1000.0, description="output current limit"
+    )
+    monitor_V_per_kV: float = Field(
+        default=1.0, gt=0.0, le=100.0, description="voltage monitor: volts per kilovolt at the film"
+    )
+    current_monitor_V_per_mA: float = Field(
+        default=0.25, gt=0.0, le=100.0, description="current monitor: volts per milliampere"
+    )
+    slew_V_per_us: float = Field(
+        default=900.0, gt=0.0, le=1e5, description="slew rate without load"
+    )
+    bandwidth_kHz: float = Field(
+        default=25.0,
+        ge=0.1,
+        le=1e4,
+        description="small-signal bandwidth (-3 dB), taken as first order",
+    )
+    monitor_noise_mV: float = Field(
+        default=1.0, ge=0.0, le=100.0, description="simulated rig only: RMS noise of either monitor"
+    )

@@ -1,0 +1,123 @@
+"""Settings of the channels beside the amplifier's and the laser's: declared ones, thermometer."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from dearig.drivers.channels import RESERVED_NAMES
+from dearig.drivers.settings.section import Action, AnalogInput, InputRange, Section, Wiring
+
+__all__ = ["ChannelSettings", "ThermometerSettings"]
+
+
+class ChannelSettings(Section):
+    """A further input of the card: a load cell, a second laser, a thermometer, a trigger."""
+
+    name: str = Field(
+        pattern=r"^[a-z][a-z0-9_]{0,39}$",
+        examples=["load_cell"],
+        description="name in recordings and exports, in lower case with underscores",
+    )
+    label: str = Field(
+        default="", max_length=60, description="name on the screen; left empty, the name is shown"
+    )
+    terminal: AnalogInput = Field(examples=["ai4"], description="input of the card")
+    wiring: Wiring = Field(default="DIFF", description="as [card] terminals_displacement")
+    range_V: InputRange = Field(default=10.0, description="input range, plus and minus")
+    unit: str = Field(
+        pattern=r"^[A-Za-z0-9%µ][A-Za-z0-9%µ*/^.-]{0,15}$",
+        examples=["N"],
+        description="SI unit of the scaled value, such as N, m, Pa, K or V",
+    )
+    unit_per_V: float = Field(
+        ge=-1e12,
+        le=1e12,
+        examples=[50.0],
+        description="scaling: change of the value per volt at the input, not 0",
+    )
+    value_at_0_V: float = Field(
+        default=0.0, ge=-1e12, le=1e12, description="scaling: the value at 0 V"
+    )
+    delay_ms: float = Field(
+        default=0.0, ge=0.0, le=1e5, description="known lag of the instrument, kept with recordings"
+    )
+    limit_min: float | None = Field(
+        default=None, description="interlock: lowest value allowed during a run; left out, none"
+    )
+    limit_max: float | None = Field(
+        default=None, description="interlock: highest value allowed during a run; left out, none"
+    )
+    limit_debounce_ms: float = Field(
+        default=5.0, ge=0.0, le=1e4, description="interlock: out of its limits for so long"
+    )
+    limit_action: Action = Field(default="ramp", description="interlock: what is done")
+    simulated_value: float = Field(
+        default=0.0, ge=-1e12, le=1e12, description="simulated rig only: what it reads"
+    )
+    simulated_noise: float = Field(
+        default=0.0, ge=0.0, le=1e12, description="simulated rig only: RMS noise of a reading"
+    )
+
+    @property
+    def shown(self) -> str:
+        """The name that a person reads."""
+        return self.label or self.name.replace("_", " ")
+
+    @property
+    def limited(self) -> bool:
+        """Whether an interlock watches it."""
+        return self.limit_min is not None or self.limit_max is not None
+
+    def volts(self, values: np.ndarray) -> np.ndarray:
+        """Return the volts at the input for ``values`` in the channel's unit, any shape."""
+        return (values - self.value_at_0_V) / self.unit_per_V
+
+    @field_validator("name")
+    @classmethod
+    def _is_free(cls, value: str) -> str:
+        if value in RESERVED_NAMES or value.endswith("_counts"):
+            raise ValueError("recordings use this name for something else; choose another one")
+        return value
+
+    @field_validator("unit_per_V")
+    @classmethod
+    def _scales(cls, value: float) -> float:
+        if value == 0.0:
+            raise ValueError("with 0 every voltage would read the same")
+        return value
+
+    @model_validator(mode="after")
+    def _limits_are_within_the_range(self) -> ChannelSettings:
+        reach = abs(self.unit_per_V) * self.range_V
+        low, high = self.value_at_0_V - reach, self.value_at_0_V + reach
+        for key in ("limit_min", "limit_max", "simulated_value"):
+            value = getattr(self, key)
+            if value is not None and not low <= value <= high:
+                raise ValueError(
+                    f"channel {self.name}: {key} = {value:g} is not within {low:g} to {high:g} "
+                    f"{self.unit}, which range_V, unit_per_V and value_at_0_V can read"
+                )
+        least, most = self.limit_min, self.limit_max
+        if least is not None and most is not None and least >= most:
+            raise ValueError(
+                f"channel {self.name}: limit_min = {least:g} is not below limit_max = {most:g}"
+            )
+        return self
+
+
+class ThermometerSettings(Section):
+    """An optional thermometer with a voltage output, near the film."""
+
+    model: str = Field(default="Pt100 transmitter", description="type of thermometer")
+    serial: str = Field(default="", description="serial number, kept with every recording")
+    celsius_per_V: float = Field(default=10.0, gt=0.0, le=1000.0, description="scaling")
+    celsius_at_0_V: float = Field(
+        default=0.0, ge=-273.15, le=1000.0, description="temperature at 0 V"
+    )
+    room_celsius: float = Field(
+        default=22.0, ge=-50.0, le=200.0, description="simulated rig only: temperature of the room"
+    )
+    noise_mK: float = Field(
+        default=10.0, ge=0.0, le=1e5, description="simulated rig only: RMS noise"
+    )
