@@ -380,7 +380,7 @@ class Interlocks:
                     at,
                     channel.limit_action,
                     f"{channel.shown} read {values[at]:.4g} {channel.unit}, "
-                    f"{_allowed(low, high, channel.unit)} is allowed",
+                    f"{channel.limits_shown} is allowed",
                 )
 
     def _live(self, name: str) -> bool:
@@ -484,13 +484,6 @@ class _Still:
     def _forget(self) -> None:
         self._samples = 0
         self._low, self._high = COUNT_MAX, COUNT_MIN
-
-
-def _allowed(low: float, high: float, unit: str) -> str:
-    """Return the range from ``low`` to ``high``, of which one end may be infinite, in words."""
-    if low == -math.inf:
-        return f"{high:.4g} {unit} or less"
-    return f"{low:.4g} {unit} or more" if high == math.inf else f"{low:.4g} to {high:.4g} {unit}"
 
 
 def _physical(scaling: Scaling, count: float | np.integer) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -72,6 +72,7 @@ class Block:
     events: tuple[Event, ...] = field(default=())
 
 
+@runtime_checkable
 class Rig(Protocol):
     """A rig is loaded, armed, started, read until it returns None, and ends safe.
 

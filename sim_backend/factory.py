@@ -15,12 +15,7 @@ from dearig.sim_backend.plant import Plant
 from dearig.sim_backend.rig import SimulatedRig
 from dearig.sim_backend.truth import cases
 
-__all__ = ["is_simulated", "open_simulated_rig", "plant_of"]
-
-
-def is_simulated(address: str) -> bool:
-    """True for addresses of simulated rigs, well-formed or not: ``sim`` and ``sim:...``."""
-    return address == "sim" or address.startswith("sim:")
+__all__ = ["open_simulated_rig", "plant_of"]
 
 
 def open_simulated_rig(

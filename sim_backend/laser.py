@@ -49,7 +49,7 @@ def _partial_sum(
     n = float(count)
     s1 = 0.5 * n * (n - 1.0)
     s2 = s1 * (2.0 * n - 1.0) / 3.0
-    return k0 * n + k1 * s1 + k2 * s2 + k3 * s1 * s1
+    return float(k0 * n + k1 * s1 + k2 * s2 + k3 * s1 * s1)
 
 
 @jit
@@ -69,7 +69,7 @@ def _sum_up_to(
     Before the first node the film stood still where it is there: the sum then counts backwards.
     """
     if instant < numbers[0]:
-        return -position[0] * (numbers[0] - 1 - instant)
+        return float(-position[0] * (numbers[0] - 1 - instant))
     node = int((phase + instant * period) / spacing) - first_node
     node = min(max(node, 0), numbers.shape[0] - 2)
     while numbers[node] > instant:
@@ -79,7 +79,7 @@ def _sum_up_to(
     number = numbers[node]
     into = phase + number * period - (first_node + node) * spacing
     count = instant - number + 1
-    return sums[node] + _partial_sum(position, velocity, node, spacing, into, period, count)
+    return float(sums[node] + _partial_sum(position, velocity, node, spacing, into, period, count))
 
 
 @allocating

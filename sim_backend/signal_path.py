@@ -246,7 +246,9 @@ class SignalPath:
     ) -> np.ndarray:
         """Current (n,) A into the film: its charge is C V, and both change; and the leakage."""
         growth = np.diff(motion.capacitance)[at] / self._spacing
-        return motion.capacitance[:-1][at] * slope + growth * voltage + motion.leakage[:-1][at]
+        charging, leakage = motion.capacitance[:-1][at] * slope, motion.leakage[:-1][at]
+        current: np.ndarray = charging + growth * voltage + leakage
+        return current
 
     def _temperature(
         self, thermometer: ThermometerSettings, heating: np.ndarray, chunk: int

@@ -4,34 +4,23 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import metadata
 from itertools import groupby
 from typing import Any
 
-import numpy as np
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from dearig.acquisition.rigs import kind_of, options_of
 from dearig.config.rigfile import RigFile
-from dearig.drivers.channels import Channel
-from dearig.drivers.errors import AddressError, RigError
+from dearig.drivers.errors import AddressError
 from dearig.drivers.findings import Finding
-from dearig.drivers.gate import Prediction, admit
-from dearig.drivers.keyence import LaserInspection, analog_findings
-from dearig.drivers.keyence import inspect as inspect_laser
-from dearig.drivers.rig import Rig, RigIdentity
-from dearig.drivers.trek import Monitors, scaling_findings, zero_findings
 from dearig.errors import InputError, InstrumentFault
-from dearig.sim_backend.factory import is_simulated, open_simulated_rig
-from dearig.sim_backend.faults import FaultKind, FaultPlan
-from dearig.sim_backend.keyence import SimulatedController, SimulatedLine
+from dearig.sim_backend.faults import FaultPlan
 
 __all__ = ["CheckOutcome", "check_json", "check_rig", "check_table"]
-
-_SECONDS = 0.2  # of samples at 0 V
-_SAMPLES_MIN = 16
 
 
 @dataclass(frozen=True)
@@ -74,136 +63,16 @@ def check_rig(rig: str, rig_file: RigFile, faults: FaultPlan | None = None) -> C
     controller is asked through the driver; ``faults`` go wrong in it. What is wrong with
     instruments is in the outcome. Raises ``InputError`` for an address that names no rig.
     """
-    simulated = is_simulated(rig)
-    if simulated:
-        instruments = _simulated(rig, rig_file, faults or FaultPlan())
-    elif rig.startswith("daqmx:"):
-        instruments = _real(rig, rig_file)
-    else:
-        raise InputError(
-            f"rig {rig!r} is not known: write sim, sim:SEED such as sim:7, daqmx:Dev1 or "
-            f"daqmx:Dev1@HOST:PORT"
-        )
-    findings = (*_programs(), *instruments, *_limits(rig_file, simulated))
-    return CheckOutcome(rig, simulated, findings)
-
-
-# ---------------------------------------------------------------- a real rig
-
-
-def _real(rig: str, rig_file: RigFile) -> tuple[Finding, ...]:
-    # not everybody who simulates has what a card needs
-    from dearig.drivers.daqmx import inspect
-    from dearig.drivers.daqmx.address import Address
-
+    kind = kind_of(rig)
+    options = replace(options_of(rig_file), faults=faults)
     try:
-        address = Address.parse(rig)
-    except AddressError as error:
-        raise InputError(str(error)) from error
-    card = inspect(address.device, address.server, rig_file)
-    laser = inspect_laser(rig_file.laser)
-    return (
-        *card.findings,
-        *_amplifier(rig_file, card.monitors),
-        *_laser(rig_file, card.displacement_volts, laser),
-    )
-
-
-def _amplifier(rig_file: RigFile, monitors: Monitors | None) -> tuple[Finding, ...]:
-    scaling = scaling_findings(rig_file)
-    if monitors is not None:
-        return (*scaling, *zero_findings(monitors, rig_file))
-    unread = Finding(
-        rig_file.amplifier.model, "monitors at 0 V", "not read", verdict="warning",
-        advice="mend what is wrong with the card first",
-    )  # fmt: skip
-    return (*scaling, unread)
-
-
-def _laser(
-    rig_file: RigFile, volts: float | None, controller: LaserInspection
-) -> tuple[Finding, ...]:
-    if volts is not None:
-        return (*controller.findings, *analog_findings(rig_file.laser, volts, controller))
-    unread = Finding(
-        rig_file.laser.model, "analog output", "not read", verdict="warning",
-        advice="mend what is wrong with the card first",
-    )  # fmt: skip
-    return (*controller.findings, unread)
-
-
-# ---------------------------------------------------------------- a simulated rig
-
-
-def _simulated(rig: str, rig_file: RigFile, faults: FaultPlan) -> tuple[Finding, ...]:
-    serial = faults.of(FaultKind.SERIAL_GARBAGE)
-    others = FaultPlan(tuple(fault for fault in faults.faults if fault not in serial))
-    try:
-        opened = open_simulated_rig(
-            rig, rig_file, rig_file.as_film(), rig_file.as_load(), faults=others
-        )
+        instruments = kind.inspect(rig, rig_file, options)
     except AddressError as error:
         raise InputError(str(error)) from error
     except ValueError as error:  # a film that cannot hang at rest
         raise InputError(f"rig {rig!r} with this rig file: {error}") from error
-    try:
-        identity = opened.identify()
-        rate, channels = _at_zero(opened, rig_file, identity.channels)
-    except RigError as error:
-        broken = Finding(rig_file.card.model, "samples at 0 V", str(error), verdict="wrong")
-        return (broken, *_amplifier(rig_file, None), *_laser(rig_file, None, LaserInspection(())))
-    finally:
-        opened.close()
-    monitors = Monitors(channels["voltage_monitor"], channels["current_monitor"])
-    displacement, settings = channels["displacement"], rig_file.laser
-    if settings.port:
-        settings = settings.model_copy(update={"port": f"{settings.port} (simulated)"})
-    controller = SimulatedController(
-        settings, lambda _: displacement, faults=FaultPlan(tuple(serial))
-    )
-    line = SimulatedLine(controller, settings.baud_rate)
-    laser = inspect_laser(settings, lambda _: line, line.now)
-    volts = settings.direction * displacement * 1e3 / settings.mm_per_V
-    return (
-        *_simulated_card(rig_file, identity, rate),
-        *_amplifier(rig_file, monitors),
-        *_laser(rig_file, volts, laser),
-    )
-
-
-def _at_zero(
-    rig: Rig, rig_file: RigFile, channels: tuple[Channel, ...]
-) -> tuple[float, dict[str, float]]:
-    """Sample rate in Hz, and means of ``channels`` in SI units, with 0 V at the output."""
-    limits, film = rig_file.gate_limits(), rig_file.as_film()
-    rate = float(rig_file.card.sample_rate_Hz)
-    zero = np.zeros(max(_SAMPLES_MIN, round(_SECONDS * rate)))
-    # at 0 V any film is well
-    prediction = Prediction(
-        np.full(zero.size, 1.0 / film.thickness), film.electric_volume, film=limits.film
-    )
-    rate = rig.load(admit(zero, rate, limits, prediction))
-    rig.arm()
-    rig.start()
-    blocks = []
-    while (block := rig.read()) is not None:
-        blocks.append(block.counts)
-    counts = np.concatenate(blocks, axis=1)
-    return rate, {
-        channel.name: float(np.mean(channel.scaling.physical(row)))
-        for channel, row in zip(channels, counts, strict=True)
-    }
-
-
-def _simulated_card(rig_file: RigFile, identity: RigIdentity, rate: float) -> Iterator[Finding]:
-    name = rig_file.card.model
-    yield Finding(name, "type", f"simulated, at {identity.address}")
-    yield Finding(name, "sample rate", f"{rate:.6g} Hz", f"{rig_file.card.sample_rate_Hz:g} Hz")
-    ranges = rig_file.ranges()
-    for channel, terminal in rig_file.terminals().items():
-        yield Finding(name, channel.replace("_", " "), f"{terminal}, +-{ranges[channel]:g} V")
-    if rig_file.card.do_hv_enable is None:
-        yield Finding(name, "high-voltage enable", "no line in the rig file", verdict="not wired")
+    findings = (*_programs(), *instruments, *_limits(rig_file, kind.simulated))
+    return CheckOutcome(rig, kind.simulated, findings)
 
 
 # ---------------------------------------------------------------- what holds for both

@@ -7,13 +7,13 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from dearig.acquisition.rigs import is_simulated
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
 from dearig.config.toml_input import parse_toml
 from dearig.errors import InputError
 from dearig.model.material import Film, Load
 from dearig.recording.reader import open_recording
-from dearig.sim_backend.factory import is_simulated
 
 __all__ = ["Original", "original_of"]
 

@@ -6,14 +6,16 @@ import logging
 import shutil
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from dearig.acquisition.check import check_rig
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.overlay import Overlay, OverlayModel
 from dearig.acquisition.plan import Plan, plan
+from dearig.acquisition.rigs import is_simulated, kind_of, options_of
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
 from dearig.drivers.errors import AddressError, RefusedWaveform, RigError
@@ -36,7 +38,6 @@ from dearig.recording.disk_space import check_room
 from dearig.recording.files import check_output
 from dearig.recording.metadata import RunMetadata
 from dearig.recording.writer import RecordingWriter
-from dearig.sim_backend.factory import is_simulated, open_simulated_rig
 from dearig.sim_backend.faults import FaultPlan
 
 __all__ = ["RunObserver", "RunOptions", "RunResult", "open_rig", "record"]
@@ -112,40 +113,39 @@ def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) ->
     names no rig and for options that it does not take, ``InstrumentFault`` where the instruments
     are not there.
     """
+    kind = kind_of(address)
     if options.actuator is not None and address != "sim":
         raise InputError(f"rig {address!r} has a film of its own; only sim takes a model")
-    faults = options.faults or FaultPlan()
+    if not kind.simulated:
+        if options.faults is not None and options.faults.faults:
+            raise InputError(f"rig {address!r} is not simulated; faults are for simulated rigs")
+        if not rig_file.film.name:
+            raise InputError(
+                f"rig {address!r}: no film is declared; give a --rig-file whose [film] has a name, "
+                f"so that its limits are those of the film that hangs there"
+            )
+        check_rig(address, rig_file).refuse()
+    wanted = replace(
+        options_of(rig_file),
+        actuator=options.actuator,
+        seed=options.seed,
+        paced=options.paced,
+        faults=options.faults,
+    )
     try:
-        if is_simulated(address):
-            return open_simulated_rig(
-                address, rig_file, rig_file.as_film(), rig_file.as_load(), seed=options.seed,
-                paced=options.paced, actuator=options.actuator, faults=faults,
-            )  # fmt: skip
+        rig = kind.open(address, rig_file, wanted)
     except AddressError as error:
         raise InputError(str(error)) from error
     except ValueError as error:  # a film that cannot hang at rest
         raise InputError(f"rig {address!r} with this rig file: {error}") from error
-    if faults.faults:
-        raise InputError(f"rig {address!r} is not simulated; faults are for simulated rigs")
-    if not address.startswith("daqmx:"):
-        raise InputError(
-            f"rig {address!r} is not known: write sim, sim:SEED such as sim:7, daqmx:Dev1 or "
-            f"daqmx:Dev1@HOST:PORT"
-        )
-    if not rig_file.film.name:
-        raise InputError(
-            f"rig {address!r}: no film is declared; give a --rig-file whose [film] has a name, so "
-            f"that its limits are those of the film that hangs there"
-        )
-    # nidaqmx is an optional dependency: a simulated rig must not import it
-    from dearig.acquisition.check import check_rig
-    from dearig.drivers.daqmx import open_daqmx_rig
-
-    check_rig(address, rig_file).refuse()
-    try:
-        return open_daqmx_rig(address, rig_file)
     except RigError as error:
         raise InstrumentFault(str(error)) from error
+    if not isinstance(rig, Rig):
+        raise InstrumentFault(
+            f"rig {address!r}: its driver returned a {type(rig).__name__}, which is not a rig; "
+            f"nothing was started"
+        )
+    return rig
 
 
 def record(

@@ -185,8 +185,8 @@ def check(
     Says what is connected, what is wrong and which limits apply. The output stays at 0 V.
     """
     from dearig.acquisition.check import check_json, check_rig, check_table
+    from dearig.acquisition.rigs import is_simulated
     from dearig.config.rigfile import load_rig_file
-    from dearig.sim_backend.factory import is_simulated
 
     check_files(force, (rig_file,), json=json)
     settings = load_rig_file(rig_file)

@@ -27,11 +27,11 @@ from PySide6.QtWidgets import (
 )
 
 from dearig.acquisition.check import CheckOutcome, check_rig
+from dearig.acquisition.rigs import is_simulated
 from dearig.config.rigform import SECTIONS, faults_of, parse_rig_file, section_values, with_value
 from dearig.config.toml_input import read_text
 from dearig.errors import InputError
 from dearig.recording.files import check_output, replaced_when_done
-from dearig.sim_backend.factory import is_simulated
 from dearig.window.background import Background
 from dearig.window.fields import form_fields
 from dearig.window.form import Form

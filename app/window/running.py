@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject, QThread, Signal, Slot
 
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.overlay import OverlayModel
+from dearig.acquisition.rigs import is_simulated
 from dearig.acquisition.run import RunOptions, RunResult, record
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
@@ -23,7 +24,6 @@ from dearig.errors import (
     NotSafe,
     SafetyStop,
 )
-from dearig.sim_backend.factory import is_simulated
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.hv import HighVoltage
 from dearig.window.live import Live

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from dearig.drivers.amplifier import Monitors
 from dearig.drivers.daqmx.explain import instrument_errors
 from dearig.drivers.daqmx.link import Link
 from dearig.drivers.daqmx.outputs import Outputs
@@ -12,7 +13,6 @@ from dearig.drivers.daqmx.tasks import ClockedTasks
 from dearig.drivers.errors import RigError
 from dearig.drivers.findings import Finding
 from dearig.drivers.settings import RigSettings
-from dearig.drivers.trek import Monitors
 
 __all__ = ["Inspection", "inspect"]
 
@@ -21,12 +21,14 @@ __all__ = ["Inspection", "inspect"]
 class Inspection:
     """What was found on the card and what its inputs read, None where that could not be asked.
 
-    ``displacement_volts`` is the laser's analog output.
+    ``displacement_volts`` is the laser's analog output; ``readings`` are those of the channels
+    that the rig file declares, by name, in their units.
     """
 
     findings: tuple[Finding, ...]
     monitors: Monitors | None = None
     displacement_volts: float | None = None
+    readings: dict[str, float] = field(default_factory=dict)
 
 
 def inspect(device: str, server: str | None, settings: RigSettings) -> Inspection:
@@ -62,7 +64,9 @@ def inspect(device: str, server: str | None, settings: RigSettings) -> Inspectio
         monitors = Monitors.of_volts(
             settings.amplifier, outputs.read("voltage_monitor"), outputs.read("current_monitor")
         )
-        return Inspection(tuple(findings), monitors, outputs.read("displacement"))
+        displacement = outputs.read("displacement")
+        readings = {c.name: c.value(outputs.read(c.name)) for c in settings.channel}
+        return Inspection(tuple(findings), monitors, displacement, readings)
     except RigError as error:
         said = str(error).removeprefix(f"{name}: ")
         findings.append(Finding(name, "state", said, verdict="wrong"))

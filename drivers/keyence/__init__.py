@@ -2,23 +2,17 @@
 
 from dearig.drivers.keyence.compare import ControllerSettings, compare
 from dearig.drivers.keyence.controller import Keyence, LaserError, NoReading, Port, open_port
-from dearig.drivers.keyence.inspection import (
-    LaserInspection,
-    analog_findings,
-    inspect,
-    require_agreement,
-)
+from dearig.drivers.keyence.driver import KeyenceDriver
+from dearig.drivers.keyence.inspection import inspect
 
 __all__ = [
     "ControllerSettings",
     "Keyence",
+    "KeyenceDriver",
     "LaserError",
-    "LaserInspection",
     "NoReading",
     "Port",
-    "analog_findings",
     "compare",
     "inspect",
     "open_port",
-    "require_agreement",
 ]

@@ -4,29 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from dearig.drivers.findings import Finding
-from dearig.drivers.keyence.compare import ControllerSettings, compare, settings_findings
+from dearig.drivers.keyence.compare import settings_findings
 from dearig.drivers.keyence.controller import Keyence, LaserError, NoReading, Port, open_port
+from dearig.drivers.laser import LaserInspection, where_to_look
 from dearig.drivers.settings import LaserSettings
 
-__all__ = ["LaserInspection", "analog_findings", "inspect", "require_agreement"]
-
-_IN_RANGE = 0.999  # of the range: the analog output stays at its end when the film is beyond it
-_AGREEMENT = 0.005  # of the range, between two readings of a film that hangs still
-
-
-@dataclass(frozen=True)
-class LaserInspection:
-    """What was found at the serial port; None what the controller could not be asked.
-
-    ``reading`` is in m, ``metres_per_volt`` the scale of its analog output.
-    """
-
-    findings: tuple[Finding, ...]
-    reading: float | None = None
-    metres_per_volt: float | None = None
+__all__ = ["inspect"]
 
 
 def inspect(
@@ -78,7 +63,7 @@ def _reading_finding(settings: LaserSettings, item: str, reading: float | NoRead
     wanted = f"within +-{settings.range_mm:g} mm"
     if isinstance(reading, NoReading):
         return Finding(
-            settings.model, item, reading.value, wanted, "wrong", _where_to_look(settings)
+            settings.model, item, reading.value, wanted, "wrong", where_to_look(settings)
         )
     millimetres = reading * 1e3
     if abs(millimetres) <= settings.range_mm:
@@ -87,69 +72,3 @@ def _reading_finding(settings: LaserSettings, item: str, reading: float | NoRead
         settings.model, item, f"{millimetres:.5g} mm", wanted, "wrong",
         "move the head so that the film's whole travel lies within its range",
     )  # fmt: skip
-
-
-def require_agreement(
-    settings: LaserSettings,
-    opener: Callable[[LaserSettings], Port] = open_port,
-    clock: Callable[[], float] = time.monotonic,
-) -> ControllerSettings | None:
-    """Refuse a run whose rig file contradicts the controller; returns what is set in it.
-
-    To be called before a run, never during one: the controller does not measure while it is asked.
-    None where ``settings.port`` is empty. Raises ``LaserError`` with every contradiction, or where
-    the controller cannot be asked.
-    """
-    if not settings.port:
-        return None
-    with Keyence(opener(settings), settings, clock) as controller:
-        found = controller.controller_settings()
-    contradictions = compare(settings, found)
-    if contradictions:
-        raise LaserError(
-            "the laser controller is not set as the rig file says: " + "; ".join(contradictions),
-            "nothing was started",
-        )
-    return found
-
-
-def analog_findings(
-    settings: LaserSettings, volts: float, controller: LaserInspection
-) -> tuple[Finding, ...]:
-    """Whether ``volts`` at the card's input is a reading, and the one that the controller gives.
-
-    The second is asked only of a controller that has told its reading: it shows that this OUT is
-    wired to this input, and that the scale it tells is the one it applies.
-    """
-    name = settings.model
-    millimetres = volts * settings.mm_per_V
-    seen = abs(millimetres) < _IN_RANGE * settings.range_mm
-    findings = [
-        Finding(
-            name, "analog output", f"{millimetres + 0.0:.5g} mm ({volts + 0.0:.4g} V)",
-            f"within +-{settings.range_mm:g} mm", "ok" if seen else "wrong",
-            "" if seen else f"{_where_to_look(settings)}; if it does, at the cable and "
-            f"card.ai_displacement",
-        )
-    ]  # fmt: skip
-    if controller.reading is not None and controller.metres_per_volt is not None:
-        analog = volts * controller.metres_per_volt * 1e3
-        off = abs(analog - controller.reading * 1e3)
-        same = off <= _AGREEMENT * settings.range_mm
-        findings.append(
-            Finding(
-                name, "analog output against serial port", f"{off:.3f} mm apart",
-                f"{_AGREEMENT * settings.range_mm:g} mm or less", "ok" if same else "wrong",
-                "" if same else "look whether the film hangs still, card.ai_displacement is wired "
-                f"to the analog output of OUT{settings.output}, and the controller's analog "
-                "scaling is what it shows",
-            )
-        )  # fmt: skip
-    return tuple(findings)
-
-
-def _where_to_look(settings: LaserSettings) -> str:
-    return (
-        f"look whether the laser is on, its spot falls on the target, and the target is "
-        f"{settings.reference_distance_mm:g} mm away"
-    )

@@ -12,6 +12,11 @@ __all__ = ["AmplifierSettings"]
 class AmplifierSettings(Section):
     """The high-voltage amplifier between the card's output and the electrodes."""
 
+    driver: str = Field(
+        default="trek",
+        min_length=1,
+        description="which driver inspects it: dearig doctor lists them",
+    )
     model: str = Field(default="TREK 10/40A-HS", description="as it stands on the front panel")
     serial: str = Field(default="", description="serial number, kept with every recording")
     gain_V_per_V: float = Field(

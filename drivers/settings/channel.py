@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
@@ -68,6 +70,24 @@ class ChannelSettings(Section):
     def limited(self) -> bool:
         """Whether an interlock watches it."""
         return self.limit_min is not None or self.limit_max is not None
+
+    @property
+    def limits_shown(self) -> str:
+        """The values that are allowed, in words; empty where all are."""
+        low, high, unit = self.limit_min, self.limit_max, self.unit
+        if low is None:
+            return "" if high is None else f"{high:.4g} {unit} or less"
+        return f"{low:.4g} {unit} or more" if high is None else f"{low:.4g} to {high:.4g} {unit}"
+
+    def allows(self, value: float) -> bool:
+        """Return whether ``value`` is within the limits; what is not a number is not."""
+        low = -math.inf if self.limit_min is None else self.limit_min
+        high = math.inf if self.limit_max is None else self.limit_max
+        return low <= value <= high
+
+    def value(self, volts: float) -> float:
+        """Return the value in the channel's unit for ``volts`` at the input."""
+        return self.value_at_0_V + self.unit_per_V * volts
 
     def volts(self, values: np.ndarray) -> np.ndarray:
         """Return the volts at the input for ``values`` in the channel's unit, any shape."""

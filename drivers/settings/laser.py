@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from dearig.drivers.settings.section import Section
 
@@ -14,6 +14,11 @@ __all__ = ["LaserSettings"]
 class LaserSettings(Section):
     """The laser displacement sensor below the load, with its controller's analog output."""
 
+    driver: str = Field(
+        default="keyence",
+        min_length=1,
+        description="which driver inspects it: dearig doctor lists them",
+    )
     model: str = Field(
         default="Keyence LK-H152 / LK-G5000", description="sensor head and controller"
     )
@@ -39,7 +44,10 @@ class LaserSettings(Section):
     )
     sampling_us: float = Field(default=20.0, ge=2.55, le=1000.0, description="sampling period")
     averaging: int = Field(
-        default=16, ge=1, le=262144, description="samples in the moving average: a power of 4"
+        default=16,
+        ge=1,
+        le=262144,
+        description="samples in the moving average: a power of 4 for the driver keyence",
     )
     port: str = Field(
         default="",
@@ -74,7 +82,9 @@ class LaserSettings(Section):
 
     @field_validator("averaging")
     @classmethod
-    def _power_of_four(cls, value: int) -> int:
+    def _power_of_four(cls, value: int, info: ValidationInfo) -> int:
+        if info.data.get("driver") != "keyence":
+            return value
         if value.bit_count() != 1 or value.bit_length() % 2 != 1:
             offered = ", ".join(str(4**i) for i in range(10))
             raise ValueError(f"the controller offers {offered}")

@@ -156,7 +156,8 @@ class TruthCase:
             return np.zeros_like(time)
         run, _ = self.plant().renewed(chance).advance(time, voltage, True)
         rest, _ = TruthPlant.at_rest(self._numbers(), repeated).advance(time, voltage, True)
-        return run.displacement - rest.displacement
+        own: np.ndarray = run.displacement - rest.displacement
+        return own
 
     def _numbers(self) -> FilmNumbers:
         return FilmNumbers.of(self.film, self.load, self.network)

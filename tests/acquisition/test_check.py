@@ -9,10 +9,10 @@ import pytest
 
 from dearig.acquisition.check import CheckOutcome, check_rig
 from dearig.config.rigfile import RigFile
+from dearig.drivers.amplifier import Monitors
 from dearig.drivers.daqmx.inspection import Inspection
 from dearig.drivers.findings import Finding
 from dearig.drivers.settings import LaserSettings
-from dearig.drivers.trek import Monitors
 from dearig.errors import InputError
 from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.keyence import Conduct, SimulatedController
@@ -47,7 +47,7 @@ def card(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str | None]]:
         asked.append((device, server))
         return CARD
 
-    monkeypatch.setattr("dearig.drivers.daqmx.inspect", inspect)
+    monkeypatch.setattr("dearig.drivers.daqmx.inspection.inspect", inspect)
     return asked
 
 
@@ -163,7 +163,7 @@ def test_a_command_that_finds_something_wrong(
 
 def test_a_voltage_that_stands_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     high = Inspection((), Monitors(5e3, 0.0), 1.6)
-    monkeypatch.setattr("dearig.drivers.daqmx.inspect", lambda *_: high)
+    monkeypatch.setattr("dearig.drivers.daqmx.inspection.inspect", lambda *_: high)
     outcome = check_rig("daqmx:Dev1", rig_file())
     assert "5.000 kV" in told(outcome, "voltage monitor at 0 V")
     assert "keep away from the film" in outcome.wrong[0].advice
@@ -171,7 +171,7 @@ def test_a_voltage_that_stands_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_what_could_not_be_read_is_not_called_well(monkeypatch: pytest.MonkeyPatch) -> None:
     lost = Inspection((Finding("card Dev1", "driver", "not there", verdict="wrong"),))
-    monkeypatch.setattr("dearig.drivers.daqmx.inspect", lambda *_: lost)
+    monkeypatch.setattr("dearig.drivers.daqmx.inspection.inspect", lambda *_: lost)
     outcome = check_rig("daqmx:Dev1", rig_file())
     assert [f.found for f in outcome.wrong] == ["not there"]
     assert verdicts(outcome)["monitors at 0 V"] == "warning"

@@ -8,11 +8,11 @@ from pydantic import ValidationError
 
 from dearig.config.rigfile import RigFile, load_rig_file, write_default
 from dearig.config.rigform import faults_of
+from dearig.drivers.contract.rig import foreseen
 from dearig.drivers.gate import admit
 from dearig.drivers.settings import LaserSettings, RigSettings, ThermometerSettings
 from dearig.errors import InputError
 from dearig.model.material import THESIS_FILM, THESIS_LOAD
-from tests.tools.rig_contract import foreseen
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ import pytest
 from nidaqmx import GrpcSessionOptions
 
 from dearig.config.rigfile import RigFile
+from dearig.drivers.contract.rig import RigContract, begin, drain, lobes, play
 from dearig.drivers.daqmx import inspect
 from dearig.drivers.daqmx.address import Address
 from dearig.drivers.daqmx.rig import DaqmxRig
@@ -23,7 +24,6 @@ from dearig.sim_backend.daqmx.opening import open_device
 from dearig.sim_backend.daqmx.server import DaqmxServer
 from dearig.sim_backend.factory import open_simulated_rig
 from dearig.sim_backend.faults import FaultPlan
-from tests.tools.rig_contract import RigContract, begin, drain, lobes, play
 
 
 class Watcher:

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import pytest
 import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dearig.drivers.contract.laser import LaserContract
 from dearig.drivers.errors import RigError
 from dearig.drivers.keyence import (
     Keyence,
+    KeyenceDriver,
     LaserError,
     NoReading,
     compare,
     inspect,
     open_port,
-    require_agreement,
 )
 from dearig.drivers.keyence.commands import AVERAGING, COMMANDS, ERRORS, SAMPLING_US
 from dearig.drivers.keyence.controller import POLL
@@ -194,19 +196,26 @@ def test_without_a_port_nothing_is_compared() -> None:
     assert finding.verdict == "not wired"
 
 
-def test_a_run_is_refused_where_the_rig_file_contradicts() -> None:
-    def asked(**there: object) -> object:
-        line = SimulatedLine(SimulatedController(set_to(**there), at(0.0)))
-        try:
-            return require_agreement(SETTINGS, lambda _: line, line.now)
-        finally:
-            assert line.closed
+def test_every_contradiction_to_the_rig_file_is_a_finding_and_the_port_is_given_back() -> None:
+    line = SimulatedLine(SimulatedController(set_to(mm_per_V=5.0, averaging=4), at(0.0)))
+    found = inspect(SETTINGS, lambda _: line, line.now).findings
+    wrong = {f.item: f.found for f in found if f.verdict == "wrong"}
+    assert set(wrong) == {"averaging", "analog scaling"}
+    assert line.closed
 
-    assert asked() is not None
-    with pytest.raises(LaserError, match=r"averaging: 4 samples.*analog scaling: 5 mm/V") as error:
-        asked(mm_per_V=5.0, averaging=4)
-    assert isinstance(error.value, RigError)
-    assert require_agreement(set_to(port="")) is None
+
+class TestKeyence(LaserContract):
+    @contextmanager
+    def connected(
+        self, *, reading: float | None = LaserContract.PLACE, answers: bool = True,
+        agrees: bool = True,
+    ) -> Iterator[tuple[KeyenceDriver, LaserSettings]]:  # fmt: skip
+        there = SETTINGS if agrees else set_to(mm_per_V=5.0)
+        conduct = Conduct.CONTROLLER if answers else Conduct.SILENT
+        controller = SimulatedController(there, at(reading), conduct=conduct)
+        # the line's time goes on from one port to the next
+        line = SimulatedLine(controller)
+        yield KeyenceDriver(lambda _: line, line.now), SETTINGS
 
 
 class Set(Scripted):

@@ -6,8 +6,10 @@ import math
 
 import pytest
 
+from dearig.drivers.amplifier import Monitors, zero_findings
+from dearig.drivers.contract.amplifier import AmplifierContract
 from dearig.drivers.settings import AmplifierSettings, RigSettings
-from dearig.drivers.trek import Monitors, scaling_findings, zero_findings
+from dearig.drivers.trek import TrekDriver
 
 RIG = RigSettings()
 
@@ -46,7 +48,6 @@ def test_the_sentence_names_both_values() -> None:
     )
 
 
-def test_the_scaling_in_force_is_said() -> None:
-    drive, monitors = scaling_findings(RIG)
-    assert "1000 V/V, +-10 kV" in drive.found
-    assert "1 V/kV, 0.25 V/mA" in monitors.found
+class TestTrek(AmplifierContract):
+    def driver(self) -> TrekDriver:
+        return TrekDriver()

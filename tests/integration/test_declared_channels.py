@@ -13,6 +13,7 @@ from scipy.io import loadmat
 
 from dearig.config.rigfile import RigFile
 from dearig.drivers.channels import RESERVED_NAMES
+from dearig.drivers.contract.rig import lobes, play
 from dearig.drivers.interlocks import Interlocks, would_trip
 from dearig.drivers.rig import Block
 from dearig.model.material import THESIS_FILM, THESIS_LOAD
@@ -24,7 +25,6 @@ from dearig.sim_backend.factory import open_simulated_rig
 from tests.drivers.test_daqmx_rig import Bench
 from tests.tools.command import dearig, done
 from tests.tools.recordings import Clock
-from tests.tools.rig_contract import lobes, play
 
 FORCE = {
     "name": "load_cell",
@@ -235,3 +235,9 @@ def test_exports_hold_them(folder, tmp_path, to):
         column = table["load_cell_N"].to_numpy()
     np.testing.assert_array_equal(column, recording.values["load_cell"])
     import_file(out, tmp_path / "again.h5", now=Clock())  # what it does not know it leaves out
+
+
+def test_check_reads_them_at_zero_volts(folder):
+    said = done("check", "--rig", "sim", "--rig-file", folder / "rig.toml").out
+    assert "Load cell" in said
+    assert "1.96 N" in said

@@ -9,8 +9,8 @@ import os
 import pytest
 
 from dearig.config.rigfile import load_rig_file
+from dearig.drivers.contract.rig import RigContract
 from dearig.drivers.daqmx import open_daqmx_rig
-from tests.tools.rig_contract import RigContract
 
 pytestmark = pytest.mark.skipif(
     not os.environ.get("DEARIG_CARD"), reason="DEARIG_CARD names no card"

@@ -221,7 +221,9 @@ def test_what_is_refused_touches_nothing(tmp_path: Path) -> None:
         (CHANNELS[:3], "a channel displacement"),
         (CHANNELS[1:], "a channel voltage_command"),
         ((*CHANNELS, CHANNELS[0]), "one name"),
-        ((*CHANNELS, Channel("humidity", "%", Scaling((0.0, 1.0), 1.0))), "'humidity'"),
+        ((*CHANNELS, Channel("stretch", "1", Scaling((0.0, 1.0), 1.0))), "'stretch'"),
+        ((Channel("humidity", "%", Scaling((0.0, 1.0), 1.0)), *CHANNELS), "then others"),
+        ((CHANNELS[1], CHANNELS[0], *CHANNELS[2:]), "channels come as voltage_command"),
         (
             (*CHANNELS[:3], Channel("displacement", "mm", Scaling((0.0, 1.0), 1.0))),
             "displacement is in 'mm', not in m",

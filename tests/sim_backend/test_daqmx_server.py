@@ -21,6 +21,7 @@ from nidaqmx.system import Device, System, WatchdogTask
 from nidaqmx.types import DOExpirationState
 
 from dearig.config.rigfile import RigFile
+from dearig.drivers.contract.rig import RATE, begin, drain, lobes, play
 from dearig.drivers.gate import ramp_down
 from dearig.sim_backend.factory import open_simulated_rig
 from tests.tools.daqmx import (
@@ -40,7 +41,6 @@ from tests.tools.daqmx import (
     task,
     write,
 )
-from tests.tools.rig_contract import RATE, begin, drain, lobes, play
 
 HIGH, LOW = True, False
 LONG = lobes(peaks=(8000.0,) * 66)  # some chunks long

@@ -15,6 +15,7 @@ import pytest
 from nidaqmx.errors import DaqError, DaqReadError, RpcError
 from nidaqmx.system import Device
 
+from dearig.drivers.contract.rig import RATE
 from dearig.sim_backend.clock import ManualClock
 from tests.tools.command import dearig
 from tests.tools.daqmx import (
@@ -32,7 +33,6 @@ from tests.tools.daqmx import (
     task,
     write,
 )
-from tests.tools.rig_contract import RATE
 
 
 class _Heard(logging.Handler):

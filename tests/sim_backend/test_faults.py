@@ -10,6 +10,7 @@ from dearig.acquisition.plan import Plan, plan
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence
+from dearig.drivers.contract.rig import Record, begin, drain, lobes
 from dearig.drivers.errors import RigError, RigStateError
 from dearig.drivers.interlocks import Interlocks
 from dearig.drivers.rig import RigState
@@ -19,7 +20,6 @@ from dearig.sim_backend.factory import open_simulated_rig
 from dearig.sim_backend.faults import Fault, FaultKind, FaultPlan
 from dearig.sim_backend.rig import OUTPUT_STARVED
 from dearig.sim_backend.signal_path import CHUNK
-from tests.tools.rig_contract import Record, begin, drain, lobes
 
 RATE = 1000.0
 SIGNAL_FAULTS = (

@@ -8,6 +8,16 @@ import numpy as np
 import pytest
 
 from dearig.config.rigfile import RigFile
+from dearig.drivers.contract.rig import (
+    LIMITS,
+    RATE,
+    RigContract,
+    begin,
+    drain,
+    foreseen,
+    lobes,
+    play,
+)
 from dearig.drivers.errors import AddressError, RigError, RigStateError
 from dearig.drivers.gate import admit
 from dearig.drivers.rig import RigState
@@ -17,9 +27,8 @@ from dearig.model.actuator import Actuator, at_rest, initial_state
 from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load, Network
 from dearig.sim_backend.card import INPUT_OVERWRITTEN
 from dearig.sim_backend.clock import ManualClock, PacedClock
-from dearig.sim_backend.factory import is_simulated, open_simulated_rig
+from dearig.sim_backend.factory import open_simulated_rig
 from dearig.sim_backend.signal_path import CHUNK
-from tests.tools.rig_contract import LIMITS, RATE, RigContract, begin, drain, foreseen, lobes, play
 
 
 def open_rig(address="sim", settings=None, **options):
@@ -288,8 +297,6 @@ def test_an_actuator_goes_with_the_plain_rig_only():
 
 
 def test_address_and_seed_are_in_the_identity_and_what_is_hidden_is_not():
-    assert is_simulated("sim:7")
-    assert not is_simulated("daqmx:Dev1")
     identity = open_rig("sim:7").identify()
     assert (identity.address, identity.seed, identity.simulated) == ("sim:7", 7, True)
     assert "inertia" not in repr(identity)

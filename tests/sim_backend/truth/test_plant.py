@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from dearig.drivers.contract.rig import lobes, play
 from dearig.drivers.settings import RigSettings
 from dearig.model.actuator import Actuator
 from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Film, Load, Network, Spring
@@ -14,7 +15,6 @@ from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.effects import drag, load_inertia
 from dearig.sim_backend.truth.film import FilmNumbers, rest_stretch
 from dearig.sim_backend.truth.plant import TruthPlant
-from tests.tools.rig_contract import lobes, play
 
 NUMBERS = FilmNumbers.of(THESIS_FILM, THESIS_LOAD, TABLE_3)
 

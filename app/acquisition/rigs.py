@@ -1,0 +1,56 @@
+"""The kinds of rigs, and the one that an address names."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dearig.config.rigfile import RigFile
+from dearig.drivers.daqmx.kind import DaqmxKind
+from dearig.drivers.instruments import INSTRUMENTS
+from dearig.drivers.registry import Plugin, Registry
+from dearig.drivers.rig_kind import RigKind, RigOptions
+from dearig.errors import InputError
+from dearig.sim_backend.kind import SimulatedKind
+
+__all__ = ["RIGS", "is_simulated", "kind_of", "options_of", "plugins"]
+
+#: One line for each kind of rig; other distributions add theirs by the entry point.
+RIGS: Registry[RigKind] = Registry(
+    "dearig.rigs",
+    RigKind,
+    "scheme",
+    (
+        SimulatedKind(),
+        DaqmxKind(),
+    ),
+)
+
+
+def kind_of(address: str) -> RigKind:
+    """Return the kind of rig that ``address`` names. Raises ``InputError`` where there is none."""
+    scheme = address.partition(":")[0]
+    kind = RIGS.get(scheme)
+    if kind is None:
+        known = [form for one in RIGS.values() for form in one.addresses]
+        failure = RIGS.failure(scheme)
+        raise InputError(
+            f"rig {address!r} is not known: write {', '.join(known[:-1])} or {known[-1]}"
+            + (f" ({failure})" if failure else "")
+        )
+    return kind
+
+
+def is_simulated(address: str) -> bool:
+    """Return whether no instrument is touched at ``address``; False where there is no such rig."""
+    kind = RIGS.get(address.partition(":")[0])
+    return kind is not None and kind.simulated
+
+
+def options_of(rig_file: RigFile) -> RigOptions:
+    """Return the options of a simulated rig with the film and the load of ``rig_file``."""
+    return RigOptions(rig_file.as_film(), rig_file.as_load())
+
+
+def plugins() -> tuple[Plugin[Any], ...]:
+    """Return every rig and instrument that was found, those that cannot be used among them."""
+    return (*RIGS.plugins, *INSTRUMENTS.plugins)

@@ -1,0 +1,40 @@
+"""Rigs on an NI card, as the registry of rigs has them."""
+
+from __future__ import annotations
+
+from dearig.drivers.daqmx import inspection, rig
+from dearig.drivers.daqmx.address import Address
+from dearig.drivers.findings import Finding
+from dearig.drivers.instruments import instrument_findings, reading_findings
+from dearig.drivers.rig import Rig
+from dearig.drivers.rig_kind import RigOptions
+from dearig.drivers.settings import RigSettings
+
+__all__ = ["DaqmxKind"]
+
+
+class DaqmxKind:
+    """A card through NI-DAQmx, in this computer or behind a server; see ``RigKind``."""
+
+    scheme = "daqmx"
+    addresses: tuple[str, ...] = ("daqmx:Dev1", "daqmx:Dev1@HOST:PORT")
+    simulated = False
+
+    def open(self, address: str, settings: RigSettings, options: RigOptions) -> Rig:  # noqa: ARG002
+        """Return the rig at ``address``, with a guardian process beside it."""
+        return rig.open_daqmx_rig(address, settings)
+
+    def inspect(
+        self,
+        address: str,
+        settings: RigSettings,
+        options: RigOptions,  # noqa: ARG002
+    ) -> tuple[Finding, ...]:
+        """Return what the card, amplifier, laser and declared channels say."""
+        where = Address.parse(address)
+        card = inspection.inspect(where.device, where.server, settings)
+        return (
+            *card.findings,
+            *instrument_findings(settings, card.monitors, card.displacement_volts),
+            *reading_findings(settings, card.readings),
+        )

@@ -1,0 +1,89 @@
+"""The instruments' drivers: which there are, and what they find together."""
+
+from __future__ import annotations
+
+from dearig.drivers.amplifier import AmplifierDriver, Monitors
+from dearig.drivers.findings import Finding
+from dearig.drivers.keyence.driver import KeyenceDriver
+from dearig.drivers.laser import LaserDriver, LaserInspection, analog_findings
+from dearig.drivers.registry import Registry
+from dearig.drivers.settings import RigSettings
+from dearig.drivers.trek import TrekDriver
+
+__all__ = ["INSTRUMENTS", "InstrumentDriver", "instrument_findings", "reading_findings"]
+
+
+InstrumentDriver = LaserDriver | AmplifierDriver
+
+#: One line for each driver; other distributions add theirs by the entry point.
+INSTRUMENTS: Registry[InstrumentDriver] = Registry(
+    "dearig.instruments",
+    LaserDriver,  # both kinds of drivers have the same members; ``role`` says which one it is
+    "name",
+    (
+        KeyenceDriver(),
+        TrekDriver(),
+    ),
+)
+
+
+def instrument_findings(
+    settings: RigSettings,
+    monitors: Monitors | None,
+    displacement_volts: float | None,
+    laser: LaserDriver | None = None,
+) -> tuple[Finding, ...]:
+    """Return what the amplifier's and the laser's drivers find, with 0 V commanded.
+
+    ``monitors`` and ``displacement_volts`` are what the card read, None where it could not.
+    ``laser`` takes the place of the driver that the rig file names.
+    """
+    found: list[Finding] = []
+    name = settings.amplifier.driver
+    amplifier = INSTRUMENTS.get(name)
+    if amplifier is not None and amplifier.role == "amplifier":
+        found += amplifier.inspect(settings, monitors)
+    else:
+        found.append(_unknown(settings.amplifier.model, "amplifier", name))
+    name = settings.laser.driver
+    inspection = LaserInspection(())
+    driver = laser or INSTRUMENTS.get(name)
+    if driver is not None and driver.role == "laser":
+        inspection = driver.inspect(settings.laser)
+        found += inspection.findings
+    else:
+        found.append(_unknown(settings.laser.model, "laser", name))
+    return (*found, *analog_findings(settings.laser, displacement_volts, inspection))
+
+
+def reading_findings(settings: RigSettings, readings: dict[str, float]) -> tuple[Finding, ...]:
+    """Return the readings of the channels that the rig file declares, against their limits.
+
+    ``readings`` are by the channels' names, in their units; a channel that is not among them could
+    not be read.
+    """
+    found = []
+    for channel in settings.channel:
+        value = readings.get(channel.name)
+        if value is None:
+            advice = "correct what is wrong with the card first"
+            found.append(Finding(channel.shown, "reading", "not read", "", "warning", advice))
+            continue
+        well = channel.allows(value)
+        found.append(
+            Finding(
+                channel.shown, "reading", f"{value + 0.0:.4g} {channel.unit}", channel.limits_shown,
+                "ok" if well else "wrong",
+                "" if well else f"check what is wired to {channel.terminal}, and its scaling and "
+                f"limits in [[channel]]",
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def _unknown(model: str, role: str, name: str) -> Finding:
+    known = [d.name for d in INSTRUMENTS.values() if d.role == role]
+    return Finding(
+        model, "driver", INSTRUMENTS.failure(name) or f"there is no {role} driver {name!r}",
+        " or ".join(known), "wrong", f"correct {role}.driver, or install what brings it",
+    )  # fmt: skip

@@ -1,0 +1,133 @@
+"""Simulated rigs, as the registry of rigs has them; and what an inspection of one finds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from dearig.drivers.amplifier import Monitors
+from dearig.drivers.channels import Channel
+from dearig.drivers.errors import RigError
+from dearig.drivers.findings import Finding
+from dearig.drivers.gate import Prediction, admit
+from dearig.drivers.instruments import instrument_findings, reading_findings
+from dearig.drivers.keyence.driver import KeyenceDriver
+from dearig.drivers.rig import Rig, RigIdentity
+from dearig.drivers.rig_kind import RigOptions
+from dearig.drivers.settings import LaserSettings, RigSettings
+from dearig.model.material import Film
+from dearig.sim_backend.factory import open_simulated_rig
+from dearig.sim_backend.faults import FaultKind, FaultPlan
+from dearig.sim_backend.keyence import SimulatedController, SimulatedLine
+
+__all__ = ["SimulatedKind"]
+
+_SECONDS = 0.2  # of samples at 0 V
+_SAMPLES_MIN = 16
+
+
+class SimulatedKind:
+    """A rig that obeys the model (``sim``) or hides an effect (``sim:SEED``); see ``RigKind``."""
+
+    scheme = "sim"
+    addresses: tuple[str, ...] = ("sim", "sim:SEED such as sim:7")
+    simulated = True
+
+    def open(self, address: str, settings: RigSettings, options: RigOptions) -> Rig:
+        """Return the rig at ``address``; raises as ``open_simulated_rig``."""
+        return open_simulated_rig(
+            address, settings, options.film, options.load, seed=options.seed, paced=options.paced,
+            actuator=options.actuator, faults=options.faults,
+        )  # fmt: skip
+
+    def inspect(
+        self, address: str, settings: RigSettings, options: RigOptions
+    ) -> tuple[Finding, ...]:
+        """Play 0 V on the rig and read it; ask a simulated controller where ``laser.port`` is set.
+
+        Raises as ``open``.
+        """
+        faults: FaultPlan = options.faults or FaultPlan()
+        serial = faults.of(FaultKind.SERIAL_GARBAGE)
+        others = FaultPlan(tuple(fault for fault in faults.faults if fault not in serial))
+        rig = open_simulated_rig(address, settings, options.film, options.load, faults=others)
+        try:
+            identity = rig.identify()
+            rate, readings = _at_zero(rig, settings, options.film, identity.channels)
+        except RigError as error:
+            broken = Finding(settings.card.model, "samples at 0 V", str(error), verdict="wrong")
+            nobody = settings.model_copy(
+                update={"laser": settings.laser.model_copy(update={"port": ""})}
+            )
+            return (
+                broken,
+                *instrument_findings(nobody, None, None),
+                *reading_findings(settings, {}),
+            )
+        finally:
+            rig.close()
+        laser = settings.laser
+        volts = laser.direction * readings["displacement"] * 1e3 / laser.mm_per_V
+        monitors = Monitors(readings["voltage_monitor"], readings["current_monitor"])
+        shown, driver = _simulated_laser(settings, readings["displacement"], FaultPlan(serial))
+        return (
+            *_card(settings, identity, rate),
+            *instrument_findings(shown, monitors, volts, driver),
+            *reading_findings(settings, readings),
+        )
+
+
+def _simulated_laser(
+    settings: RigSettings, displacement: float, faults: FaultPlan
+) -> tuple[RigSettings, KeyenceDriver | None]:
+    """Return the driver of a simulated controller, and the settings that say so.
+
+    Only the Keyence controller is simulated: another laser is inspected as if it had no port.
+    """
+    laser = settings.laser
+    port = f"{laser.port} (simulated)" if laser.port and laser.driver == "keyence" else ""
+    laser = laser.model_copy(update={"port": port})
+    shown = settings.model_copy(update={"laser": laser})
+    if laser.driver != KeyenceDriver.name:
+        return shown, None
+    controller = SimulatedController(laser, lambda _: displacement, faults=faults)
+    line = SimulatedLine(controller, laser.baud_rate)
+
+    def opened(_: LaserSettings) -> SimulatedLine:
+        return line
+
+    return shown, KeyenceDriver(opened, line.now)
+
+
+def _at_zero(
+    rig: Rig, settings: RigSettings, film: Film, channels: tuple[Channel, ...]
+) -> tuple[float, dict[str, float]]:
+    """Sample rate in Hz, and means of ``channels`` in SI units, with 0 V at the output."""
+    limits = settings.limits.gate_limits()
+    rate = float(settings.card.sample_rate_Hz)
+    zero = np.zeros(max(_SAMPLES_MIN, round(_SECONDS * rate)))
+    # 0 V is within the limits of any film
+    prediction = Prediction(np.full(zero.size, 1.0 / film.thickness), film.electric_volume)
+    rate = rig.load(admit(zero, rate, limits, prediction))
+    rig.arm()
+    rig.start()
+    blocks = []
+    while (block := rig.read()) is not None:
+        blocks.append(block.counts)
+    counts = np.concatenate(blocks, axis=1)
+    return rate, {
+        channel.name: float(np.mean(channel.scaling.physical(row)))
+        for channel, row in zip(channels, counts, strict=True)
+    }
+
+
+def _card(settings: RigSettings, identity: RigIdentity, rate: float) -> Iterator[Finding]:
+    name = settings.card.model
+    yield Finding(name, "type", f"simulated, at {identity.address}")
+    yield Finding(name, "sample rate", f"{rate:.6g} Hz", f"{settings.card.sample_rate_Hz:g} Hz")
+    ranges = settings.ranges()
+    for channel, terminal in settings.terminals().items():
+        yield Finding(name, channel.replace("_", " "), f"{terminal}, +-{ranges[channel]:g} V")
+    if settings.card.do_hv_enable is None:
+        yield Finding(name, "high-voltage enable", "no line in the rig file", verdict="not wired")

@@ -1,0 +1,178 @@
+"""What other distributions bring: found, used, or left out with a sentence."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dearig.acquisition.check import check_rig
+from dearig.acquisition.rigs import RIGS, kind_of, plugins
+from dearig.config.rigfile import RigFile
+from dearig.drivers.daqmx.kind import DaqmxKind
+from dearig.drivers.instruments import INSTRUMENTS
+from dearig.drivers.registry import Registry
+from dearig.drivers.rig_kind import RigKind
+from dearig.errors import InputError
+
+#: A distribution with a rig, a laser and an amplifier, all made of this program's own parts.
+ACME = """
+from dearig.drivers.keyence.driver import KeyenceDriver
+from dearig.drivers.findings import Finding
+from dearig.drivers.laser import LaserInspection
+from dearig.drivers.trek import TrekDriver
+from dearig.sim_backend.kind import SimulatedKind
+
+
+class AcmeKind:
+    scheme = "acme"
+    addresses = ("acme:1",)
+    simulated = False
+
+    def open(self, address, settings, options):
+        if address == "acme:none":
+            return object()
+        return SimulatedKind().open("sim", settings, options)
+
+    def inspect(self, address, settings, options):
+        return SimulatedKind().inspect("sim", settings, options)
+
+
+class AcmeLaser:
+    role = "laser"
+    name = "acme-laser"
+
+    def inspect(self, settings):
+        return LaserInspection((Finding(settings.model, "head", "here is the Acme laser"),))
+
+
+class AcmeAmplifier(TrekDriver):
+    name = "acme-amplifier"
+
+
+class Thief(SimulatedKind):
+    scheme = "daqmx"
+
+
+RIG, LASER, AMPLIFIER, THIEF = AcmeKind(), AcmeLaser(), AcmeAmplifier(), Thief()
+"""
+POINTS = """
+[dearig.rigs]
+acme = acme_rigs:RIG
+broken = acme_broken:RIG
+absent = acme_absent:RIG
+shapeless = acme_rigs:ACME
+wrong = acme_rigs:LASER
+thief = acme_rigs:THIEF
+[dearig.instruments]
+acme-laser = acme_rigs:LASER
+acme-amplifier = acme_rigs:AMPLIFIER
+"""
+RIG_FILE = """
+[film]
+name = "film 3"
+[laser]
+driver = "acme-laser"
+averaging = 10
+[amplifier]
+driver = "acme-amplifier"
+"""
+SEQUENCE = """
+name = "rest"
+lead_in_s = 0.1
+tail_s = 0.1
+[[segment]]
+kind = "hold"
+voltage_kV = 0.0
+duration_s = 0.1
+"""
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which the distribution is installed."""
+    folder = tmp_path_factory.mktemp("site")
+    (folder / "acme_rigs.py").write_text(ACME, encoding="utf-8")
+    (folder / "acme_broken.py").write_text("1 / 0\n", encoding="utf-8")
+    about = folder / "acme_rigs-1.2.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: acme-rigs\nVersion: 1.2\n")
+    (about / "entry_points.txt").write_text(POINTS)
+    return folder
+
+
+def command(installed: Path, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    path = os.pathsep.join((str(installed), *sys.path))
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "dearig", *map(str, arguments)],
+        env={**os.environ, "PYTHONPATH": path, "COLUMNS": "200"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+def test_own_rigs_and_instruments_are_found():
+    assert RIGS.names()[:2] == ("sim", "daqmx")
+    assert INSTRUMENTS.names()[:2] == ("keyence", "trek")
+    assert {p.name for p in plugins() if not p.source} == {"sim", "daqmx", "keyence", "trek"}
+
+
+def test_address_of_no_rig_is_told_what_there_is():
+    with pytest.raises(InputError, match=r"'dev1' is not known: write sim, .* or daqmx:Dev1@HOST"):
+        kind_of("dev1")
+
+
+def test_what_cannot_be_used_is_left_out_with_a_sentence(installed, monkeypatch):
+    monkeypatch.syspath_prepend(str(installed))
+    found = Registry("dearig.rigs", RigKind, "scheme", (DaqmxKind(),))
+    assert found.names() == ("daqmx", "acme")
+    assert found.get("daqmx") is found.plugins[0].value
+    failures = {p.name: p.failure for p in found.plugins if p.value is None}
+    assert set(failures) == {"broken", "absent", "shapeless", "wrong", "daqmx"}
+    assert all("acme-rigs 1.2 is left out: " in failure for failure in failures.values())
+    assert "acme_broken:RIG fails with ZeroDivisionError: division" in failures["broken"]
+    assert "No module named 'acme_absent'" in failures["absent"]
+    assert "AttributeError" in failures["shapeless"]
+    assert "it lacks ['addresses', 'open', 'scheme', 'simulated']" in failures["wrong"]
+    assert "the name is taken" in failures["daqmx"]
+    assert found.failure("broken") == failures["broken"]
+    assert found.failure("acme") == ""
+
+
+def test_a_rig_that_another_distribution_brings_records(installed, tmp_path):
+    (tmp_path / "rig.toml").write_text(RIG_FILE, encoding="utf-8")
+    (tmp_path / "rest.toml").write_text(SEQUENCE, encoding="utf-8")
+    given = ("--rig", "acme:1", "--rig-file", tmp_path / "rig.toml")
+    answer = command(installed, "record", tmp_path / "rest.toml", *given, "--out",
+                     tmp_path / "run.h5")  # fmt: skip
+    assert answer.returncode == 0, answer.stderr
+    assert (tmp_path / "run.h5").exists()
+    checked = command(installed, "check", *given)
+    assert "here is the Acme laser" in checked.stdout
+
+
+def test_what_fails_is_a_sentence_at_the_command_line(installed, tmp_path):
+    (tmp_path / "rest.toml").write_text(SEQUENCE, encoding="utf-8")
+    (tmp_path / "rig.toml").write_text('[film]\nname = "film 3"\n', encoding="utf-8")
+    for address, code, words in (
+        ("broken:1", 2, "broken' of acme-rigs 1.2 is left out"),
+        ("acme:none", 4, "its driver returned a object, which is not a rig"),
+    ):
+        given = ("--rig", address, "--rig-file", tmp_path / "rig.toml")
+        answer = command(
+            installed, "record", tmp_path / "rest.toml", *given, "--out", tmp_path / "n.h5"
+        )
+        assert answer.returncode == code, answer.stderr
+        assert words in " ".join(answer.stderr.split())
+        assert "Traceback" not in answer.stderr
+
+
+def test_driver_that_is_not_there_keeps_a_run_from_starting(tmp_path):
+    rig_file = RigFile.model_validate(
+        {"laser": {"driver": "nowhere"}, "amplifier": {"driver": "keyence"}}
+    )
+    wrong = {finding.instrument: finding for finding in check_rig("sim", rig_file).wrong}
+    assert wrong["Keyence LK-H152 / LK-G5000"].found == "there is no laser driver 'nowhere'"
+    assert wrong["TREK 10/40A-HS"].wanted == "trek"
