@@ -83,7 +83,8 @@ class Curves:
     """One recording as it is plotted: ``(time s, value)`` pairs in SI units, peaks kept.
 
     ``model`` and ``residual`` are None where the model has nothing to say of it, and ``unfit`` says
-    why. ``about`` are lines (what, value) on all that is known of it.
+    why. ``about`` are lines (what, value) on all that is known of it. ``declared`` are label, unit
+    and curve of the channels that the rig file declared.
     """
 
     path: Path
@@ -98,6 +99,7 @@ class Curves:
     about: tuple[tuple[str, str], ...]
     sequence_toml: str
     unfit: str = ""
+    declared: tuple[tuple[str, str, tuple[np.ndarray, np.ndarray]], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -201,6 +203,10 @@ def curves(
         about=tuple((what, readable(value)) for what, value in describe_rows(recording)),
         sequence_toml=recording.sequence_toml,
         unfit=unfit,
+        declared=tuple(
+            (label, recording.unit(name), _short(time, recording.values[name], _COLUMNS))
+            for name, label in recording.declared.items()
+        ),
     )
 
 

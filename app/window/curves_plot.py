@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from dearig.analysis.summary import Curves
 from dearig.units import SHOWN
+from dearig.window.channel_plots import ChannelPlots
 from dearig.window.plotting import add_curve, clear_plot, legend_html, stacked_plots
 from dearig.window.session import Session
 from dearig.window.theme import pen
@@ -20,7 +21,10 @@ __all__ = ["CurvesPlot"]
 
 
 class CurvesPlot(QWidget):
-    """Three plots on one time axis; the model is dashed where several recordings share a plot."""
+    """Three plots on one time axis, and below them the declared channels of a single recording.
+
+    The model is dashed where several recordings share a plot.
+    """
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -40,6 +44,8 @@ class CurvesPlot(QWidget):
         outer.setSpacing(2)
         outer.addWidget(self.key)
         outer.addWidget(self._area, 1)
+        self.channels = ChannelPlots(session)
+        outer.addWidget(self.channels)
         session.theme_changed.connect(self._draw)
         self._draw()
 
@@ -80,6 +86,10 @@ class CurvesPlot(QWidget):
         residual.setVisible(self._with_model)
         both.getAxis("bottom").setStyle(showValues=not self._with_model)
         self.key.setVisible(bool(self._shown))
+        declared = self._shown[0].declared if len(self._shown) == 1 else ()
+        self.channels.show_channels([(name, unit) for name, unit, _ in declared], self.plots[0])
+        for place, (_, _, values) in enumerate(declared):
+            self.channels.show_values(place, *values)
         if not self._shown:
             return
         named: list[tuple[str, str, str]] = []

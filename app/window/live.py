@@ -17,7 +17,7 @@ import numpy as np
 from dearig.acquisition.overlay import Overlay, OverlayModel
 from dearig.acquisition.plan import Plan
 from dearig.acquisition.run import RunObserver
-from dearig.drivers.channels import Channel
+from dearig.drivers.channels import CHANNEL_NAMES, Channel
 from dearig.drivers.rig import Block, Event, RigIdentity
 from dearig.model.errors import ModelError
 from dearig.recording.rest_noise import lead_in
@@ -33,6 +33,11 @@ _SIGNALS = {
 }
 _READOUT = 0.01  # s, averaging time of a readout, so that it can be read
 _RECENT = 1.0  # s, window of the recent RMS error
+
+
+def _signal(channel: str) -> str:
+    """Return the name of a channel's curve; empty for one that has none."""
+    return _SIGNALS.get(channel, "" if channel in CHANNEL_NAMES else f"channel {channel}")
 
 
 @dataclass(frozen=True)
@@ -105,8 +110,9 @@ class Live(RunObserver):
     def view(self, name: str, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
         """Return time in s and values in SI units of a signal, (m,) each, ``first`` to ``last`` s.
 
-        ``name`` is command, monitor, current, displacement, or model, residual, rms with the
-        number of the model (``model 0``). Unknown names give empty arrays.
+        ``name`` is command, monitor, current, displacement, channel with the name of a declared one
+        (``channel load_cell``), or model, residual, rms with the number of the model (``model 0``).
+        Unknown names give empty arrays.
         """
         run = self._run
         if run is None:
@@ -171,7 +177,8 @@ class _Run:
         self.total = total
         self.channels = channels
         self.rate = rate
-        self.curves = {_SIGNALS[c.name]: Pyramid(total) for c in channels if c.name in _SIGNALS}
+        self._signals = {c.name: signal for c in channels if (signal := _signal(c.name))}
+        self.curves = {signal: Pyramid(total) for signal in self._signals.values()}
         self._blocks: list[Block] = []
         self._models: tuple[_Model, ...] = ()
         self._rest = _RestReference()
@@ -204,9 +211,9 @@ class _Run:
         """Convert a block to SI units and advance the models; the slow part."""
         self._blocks.append(block)
         values = {
-            _SIGNALS[c.name]: c.scaling.physical(block.counts[i])
+            self._signals[c.name]: c.scaling.physical(block.counts[i])
             for i, c in enumerate(self.channels)
-            if c.name in _SIGNALS
+            if c.name in self._signals
         }
         if "displacement" in values:
             step = abs(self.channels[0].scaling.gain * self.channels[0].scaling.coefficients[1])

@@ -16,7 +16,9 @@ from PySide6.QtWidgets import (
 )
 
 from dearig.acquisition.overlay import OverlayModel
+from dearig.drivers.settings import ChannelSettings
 from dearig.sim_backend.faults import FaultPlan
+from dearig.window.channel_plots import ChannelPlots
 from dearig.window.hv import HighVoltage
 from dearig.window.live import Live
 from dearig.window.overlay_chooser import OverlayChooser
@@ -56,6 +58,7 @@ class RunPage(QWidget):
         self._runs = 0
         self._segments: tuple[tuple[str, float, float], ...] = ()
         self._last_recording: Path | None = None
+        self._channels: tuple[ChannelSettings, ...] = ()  # declared, of the run that is drawn
 
         self.controls = RunControls(session)
         self.badge = self.controls.badge
@@ -64,6 +67,7 @@ class RunPage(QWidget):
         self.stop_button = self.controls.stop_button
         self.overlays = OverlayChooser(session)
         self.plots = RunPlots(session)
+        self.channel_plots = ChannelPlots(session)
         self._build()
         self._connect()
         self._disarm = QTimer(self, singleShot=True, interval=_ARMED)
@@ -97,6 +101,8 @@ class RunPage(QWidget):
         self.live, self._drawn, self._segments = live, _NOT_DRAWN, preview.segments
         self.plots.show_prediction(preview)
         self.plots.start()
+        self._channels = session.rig_file.channel
+        self.channel_plots.show_channels([(c.shown, c.unit) for c in self._channels])
         self.log.clear()
         self.result.show_text("")
         self.show_button.hide()
@@ -217,7 +223,10 @@ class RunPage(QWidget):
         if frame == self._drawn:
             return
         self._drawn = frame
-        self.plots.draw(live, now.samples / now.rate)
+        end = now.samples / now.rate
+        self.plots.draw(live, end)
+        names = [channel.name for channel in self._channels]
+        self.channel_plots.draw(live, names, self.plots.window, end)
 
     @Slot()
     def _update_readouts(self) -> None:
@@ -310,6 +319,7 @@ class RunPage(QWidget):
         right.addWidget(self.overlays.message)
         right.addWidget(self.overlay_failures)
         right.addWidget(self.plots, 1)
+        right.addWidget(self.channel_plots)
         right.addLayout(self._end_row())
         outer.addLayout(right, 1)
 
