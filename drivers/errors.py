@@ -1,4 +1,4 @@
-"""What a rig or its gate can refuse or report."""
+"""Errors of rigs and of the gate."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ __all__ = ["AddressError", "RefusedWaveform", "RigError", "RigStateError"]
 
 
 class RigError(Exception):
-    """An instrument fault: what failed, its code if it has one, the likely cause, what to do."""
+    """A fault of an instrument: what failed, its code if any, the likely cause, what to do."""
 
     def __init__(self, message: str, code: int | None = None) -> None:
         super().__init__(message)
@@ -14,15 +14,15 @@ class RigError(Exception):
 
 
 class RigStateError(RigError):
-    """A call that the rig cannot take in the state it is in."""
+    """A call that the rig cannot take in its present state."""
 
 
 class AddressError(ValueError):
-    """A rig address that no driver understands; the message says what is understood."""
+    """An address that names no rig; the message says how addresses are written."""
 
 
 class RefusedWaveform(ValueError):  # noqa: N818  (it is a refusal, and reads as one)
-    """A waveform that the gate does not let pass; ``reasons`` has one sentence for each limit."""
+    """A waveform that the gate refuses; ``reasons`` has one sentence for each broken limit."""
 
     def __init__(self, reasons: tuple[str, ...]) -> None:
         super().__init__("; ".join(reasons))

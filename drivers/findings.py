@@ -1,4 +1,4 @@
-"""What a look at an instrument found, against what the rig file wants."""
+"""Findings of an inspection: what an instrument has, against what the rig file wants."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Verdict = Literal["ok", "warning", "wrong", "not wired"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One ``item`` of one ``instrument``, in words: ``found``, ``wanted``, ``advice`` what to do.
+    """One ``item`` of one ``instrument``: what was ``found`` and ``wanted``, and what to do.
 
     ``wrong`` keeps a run from starting, ``warning`` does not. ``not wired`` is what the rig file
-    does not have and nobody has looked at.
+    does not have, so that it was not inspected.
     """
 
     instrument: str

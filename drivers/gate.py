@@ -22,7 +22,7 @@ _PIECE = 2**20  # samples judged at a time: a run of hours must not need its mem
 
 @dataclass(frozen=True)
 class Limits:
-    """What the film and the amplifier may see, in SI units.
+    """Limits of the film and the amplifier, in SI units.
 
     ``voltage_min`` and ``voltage_max`` in V bound the voltage at the film (their signs are the
     polarity that is allowed), ``slew`` in V/s its rate, ``field`` in V/m the true electric field,
@@ -56,7 +56,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a model foresees of the film under a waveform of N samples; this layer has no model.
+    """Prediction of the film under a waveform of N samples; this layer has no model.
 
     ``field_per_volt`` (M,) 1/m is the reciprocal of the film's thickness, so that the true field is
     its product with the voltage: one number for each ``stride`` samples, M = ceil(N/stride), as a
@@ -75,7 +75,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Margin:
-    """How near a waveform comes to one limit: ``reached`` and ``allowed`` in ``unit``."""
+    """How close a waveform comes to one limit: ``reached`` and ``allowed`` in ``unit``."""
 
     quantity: str
     reached: float
@@ -141,7 +141,7 @@ class GatedWaveform:
 
     @property
     def margins(self) -> tuple[Margin, ...]:
-        """How near it comes to each limit."""
+        """How close it comes to each limit."""
         return self._margins
 
     def check_within(self, limits: Limits) -> None:
@@ -161,9 +161,9 @@ class GatedWaveform:
 def admit(
     voltage: np.ndarray, rate: float, limits: Limits, prediction: Prediction
 ) -> GatedWaveform:
-    """Let a waveform pass, or raise ``RefusedWaveform`` with a sentence for every limit it breaks.
+    """Return the admitted waveform, or raise ``RefusedWaveform`` with a sentence per broken limit.
 
-    ``voltage`` is (N,) V at the film, ``rate`` Hz, ``prediction`` what the film will do under it.
+    ``voltage`` is (N,) V at the film, ``rate`` Hz, ``prediction`` how the film will respond.
 
     Slew is judged sample to sample, as the converter steps; the steps from and to the 0 V before
     and after the run are none, because the waveform must start and end at 0 V.

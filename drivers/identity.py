@@ -1,4 +1,4 @@
-"""The instruments of a rig as they are kept with every recording."""
+"""Descriptions of a rig's instruments, kept with every recording."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ __all__ = ["instruments"]
 def instruments(
     settings: RigSettings, *, card_model: str, card_serial: str, unnamed: str
 ) -> tuple[Instrument, ...]:
-    """Card, amplifier, laser and thermometer; ``unnamed`` stands where the rig file has no serial.
+    """Return card, amplifier, laser and thermometer; ``unnamed`` is a missing serial number.
 
-    The card says itself what it is; of the others the rig file tells.
+    The card reports its own model and serial number; those of the others are the rig file's.
     """
     amplifier, laser, card = settings.amplifier, settings.laser, settings.card
     found = [

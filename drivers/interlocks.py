@@ -1,7 +1,7 @@
-"""Interlocks: what ends a run while it goes on, judged sample by sample from what the rig reads.
+"""Interlocks: conditions that end a run, judged sample by sample from what the rig reads.
 
-They take blocks and answer with trips; they read no clock and move no output. What they remember
-from block to block makes the answer independent of where the samples are cut.
+They take blocks and return trips; they read no clock and move no output. Their state from block to
+block makes the result independent of where the samples are cut.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class Trip:
 class Interlocks:
     """The interlocks of one run on a rig with ``settings`` whose ``channels`` run at ``rate`` Hz.
 
-    ``predicted`` (N,) m is the displacement from the loaded rest state that a model foresees under
-    the voltage ``planned`` (N,) V, NaN where it foresees none: whether the film follows is judged
+    ``predicted`` (N,) m is the displacement from the loaded rest state that a model predicts under
+    the voltage ``planned`` (N,) V, NaN where it predicts none: whether the film follows is judged
     by it for as long as the command is the planned one. Without ``predicted`` that is not judged;
     without ``planned`` the command is taken for the planned one to the end. Each interlock trips at
     most once.
@@ -355,7 +355,7 @@ class Interlocks:
                 "following",
                 at,
                 locks.following_action,
-                f"the film had moved {moved[at] * 1e3:.2f} mm where the model foresees "
+                f"the film had moved {moved[at] * 1e3:.2f} mm where the model predicts "
                 f"{predicted[at] * 1e3:.2f} mm, less than {locks.following_fraction:.0%} of it: an "
                 f"electrode or its lead is open, the laser is stuck, or it is another film than "
                 f"the rig file says",
@@ -404,14 +404,14 @@ def would_trip(
     displacement: np.ndarray,
     predicted: np.ndarray | None = None,
 ) -> tuple[str, ...]:
-    """Names of the interlocks that would end a run at ``rate`` Hz in which all goes as foreseen.
+    """Names of the interlocks that would end a run at ``rate`` Hz in which all goes as planned.
 
     The amplifier follows ``voltage`` (N,) V, and the film moves by ``displacement`` (N,) m.
     ``predicted`` is what the run would be judged by, as ``Interlocks`` takes it. That a reading
     stands still tells nothing here, where it has no noise.
     """
     locks = settings.interlocks.model_copy(update={"laser_stuck_s": 0.0})
-    # nothing is foreseen of the channels that the rig file declares
+    # there is no prediction of the channels that the rig file declares
     free = tuple(
         c.model_copy(update={"limit_min": None, "limit_max": None}) for c in settings.channel
     )

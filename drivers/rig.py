@@ -1,4 +1,4 @@
-"""What every rig can do, whether it is simulated, a local card, or a card behind a server."""
+"""The interface of every rig: simulated, a local card, or a card behind a server."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["Block", "Event", "Instrument", "Rig", "RigIdentity", "RigState", "ex
 
 
 class RigState(Enum):
-    """Where a rig stands. ``SAFE`` is 0 V with nothing loaded, and where every path ends."""
+    """State of a rig. ``SAFE`` is 0 V with nothing loaded; every path ends there."""
 
     SAFE = "safe"
     LOADED = "loaded"
@@ -35,7 +35,7 @@ def expect(state: RigState, call: str, *allowed: RigState) -> None:
 
 @dataclass(frozen=True)
 class Instrument:
-    """One instrument as it identifies itself; ``settings`` are name, value and unit in words."""
+    """One instrument; ``settings`` are pairs of text, name and value with unit."""
 
     role: str
     model: str
@@ -82,11 +82,11 @@ class Rig(Protocol):
 
     @property
     def state(self) -> RigState:
-        """Where the rig stands."""
+        """State of the rig."""
         ...
 
     def identify(self) -> RigIdentity:
-        """Say what is there; moves nothing."""
+        """Return what the rig is made of; the output does not move."""
         ...
 
     def load(self, waveform: GatedWaveform) -> float:
@@ -94,7 +94,7 @@ class Rig(Protocol):
         ...
 
     def arm(self) -> None:
-        """Make ready to start at once; the output is still at 0 V."""
+        """Get ready to start without delay; the output stays at 0 V."""
         ...
 
     def start(self) -> None:
@@ -102,20 +102,20 @@ class Rig(Protocol):
         ...
 
     def read(self) -> Block | None:
-        """Next block, waiting for it if need be; None when the waveform has been played."""
+        """Return the next block, waiting for it; None when the waveform has been played."""
         ...
 
     @property
     def waiting(self) -> float:
-        """How late the reader is: samples that were acquired and not read, in s."""
+        """Delay of the reader in s: samples that were acquired and not read."""
         ...
 
     def stop(self) -> None:
-        """End the run early: ramp down to 0 V in the set time; what was acquired stays readable."""
+        """End the run early: ramp to 0 V in the set time; acquired samples stay readable."""
         ...
 
     def make_safe(self) -> None:
-        """Take the output to 0 V, now, and forget the waveform."""
+        """Take the output to 0 V at once and discard the waveform."""
         ...
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Clocks that a simulated rig runs on: the only place that reads the time or waits for it."""
+"""Clocks of a simulated rig: the only place that reads the time or waits."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Clock(Protocol):
 
 
 class ManualClock:
-    """A clock that stands still until somebody waits for it, and then is there at once.
+    """A clock that stands still until a caller waits for it, and then jumps there.
 
     A rig on it runs as fast as it can, and a test moves it by hand with ``advance``.
     """

@@ -1,4 +1,4 @@
-"""From an address to a simulated rig: ``sim`` obeys the model, ``sim:SEED`` hides something."""
+"""Open a simulated rig by its address: ``sim`` obeys the model, ``sim:SEED`` hides an effect."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def open_simulated_rig(
 def plant_of(
     address: str, film: Film, load: Load, actuator: Actuator | None = None
 ) -> tuple[Plant, int | None]:
-    """What hangs at the rig at ``address``, at rest, and the seed of what it hides, if it does.
+    """Return the plant of the rig at ``address``, at rest, and the seed of its hidden effect.
 
     Raises as ``open_simulated_rig``.
     """

@@ -1,4 +1,4 @@
-"""Faults on purpose: what goes wrong in a simulated rig, and when."""
+"""Faults that a simulated rig has on purpose: which, and when."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Fault", "FaultKind", "FaultPlan"]
 
 
 class FaultKind(StrEnum):
-    """Everything that can be made to go wrong."""
+    """The faults that a simulated rig can have."""
 
     # in the high voltage and on the film
     ARC = "arc"

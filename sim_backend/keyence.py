@@ -16,14 +16,14 @@ from dearig.drivers.keyence.controller import POLL
 from dearig.drivers.settings import LaserSettings
 from dearig.sim_backend.faults import FaultKind, FaultPlan
 
-__all__ = ["Answers", "Conduct", "SimulatedController", "SimulatedLine"]
+__all__ = ["Behaviour", "Responder", "SimulatedController", "SimulatedLine"]
 
 _REPLY_DELAY = 0.003  # s
 _COMMAND_MAX = 200  # bytes
 _UNIT = 1  # number of the display unit: 0.001 mm, which leaves room for +-999.999 mm
 
 
-class Conduct(StrEnum):
+class Behaviour(StrEnum):
     """What sits at the end of the line."""
 
     CONTROLLER = "controller"
@@ -32,7 +32,7 @@ class Conduct(StrEnum):
     BABBLING = "babbling"  # sends all the time, unasked, and never comes to an end
 
 
-class Answers(Protocol):
+class Responder(Protocol):
     """Something at the end of a serial line; ``now`` is in s and does not go back."""
 
     def receive(self, data: bytes, now: float) -> None:
@@ -61,7 +61,7 @@ class SimulatedController:
         settings: LaserSettings,
         reading: Callable[[float], float | None],
         *,
-        conduct: Conduct = Conduct.CONTROLLER,
+        behaviour: Behaviour = Behaviour.CONTROLLER,
         faults: FaultPlan | None = None,
         seed: int = 0,
         mode_change: float = 0.6,
@@ -70,7 +70,7 @@ class SimulatedController:
         self._mode_change = mode_change
         self._settings = settings
         self._reading = reading
-        self._conduct = conduct
+        self._behaviour = behaviour
         self._faults = (faults or FaultPlan()).of(FaultKind.SERIAL_GARBAGE)
         self._noise = random.Random(seed)  # noqa: S311  (noise on a line, no secret)
         self._zero = 0.0
@@ -93,7 +93,7 @@ class SimulatedController:
         """What has been sent by ``now``, once."""
         sent = b"".join(reply for at, reply in self._pending if at <= now)
         self._pending = [(at, reply) for at, reply in self._pending if at > now]
-        if self._conduct is Conduct.BABBLING:
+        if self._behaviour is Behaviour.BABBLING:
             sent += self._noise.randbytes(64).replace(b"\r", b"\n")
         return sent
 
@@ -106,9 +106,9 @@ class SimulatedController:
 
     def _reply(self, command: str, now: float) -> tuple[bytes, float]:
         """Reply to a command, and after how many s it comes."""
-        if self._conduct in (Conduct.SILENT, Conduct.BABBLING):
+        if self._behaviour in (Behaviour.SILENT, Behaviour.BABBLING):
             return b"", 0.0
-        if self._conduct is Conduct.OTHER:
+        if self._behaviour is Behaviour.OTHER:
             return b"?SYNTAX\r\n", _REPLY_DELAY
         delay = self._mode_change if command in ("Q0", "R0") else _REPLY_DELAY
         main, *parameters = command.split(",")
@@ -190,13 +190,13 @@ class SimulatedController:
 
 
 class SimulatedLine:
-    """The driver's end of a line to ``answers``, in one process, on a time of its own.
+    """The driver's end of a line to ``responder``, in one process, on a time of its own.
 
     Time passes only while the driver waits, and is read by ``now``.
     """
 
-    def __init__(self, answers: Answers, baud_rate: int = 115200) -> None:
-        self._answers = answers
+    def __init__(self, responder: Responder, baud_rate: int = 115200) -> None:
+        self._responder = responder
         self._seconds_per_byte = 10.0 / baud_rate
         self._now = 0.0
         self._came = b""
@@ -209,23 +209,23 @@ class SimulatedLine:
     @property
     def in_waiting(self) -> int:
         """Bytes that can be read at once."""
-        self._came += self._answers.due(self._now)
+        self._came += self._responder.due(self._now)
         return len(self._came)
 
     def read(self, size: int = 1, /) -> bytes:
         """Up to ``size`` bytes; waits for them for as long as a port does."""
         if not self.in_waiting:
             until = self._now + POLL
-            due = self._answers.next_due()
+            due = self._responder.next_due()
             self._now = until if due is None else min(until, max(due, self._now))
-            self._came += self._answers.due(self._now)
+            self._came += self._responder.due(self._now)
         data, self._came = self._came[:size], self._came[size:]
         self._now += len(data) * self._seconds_per_byte
         return data
 
     def write(self, data: bytes, /) -> int:
         """Send."""
-        self._answers.receive(data, self._now)
+        self._responder.receive(data, self._now)
         return len(data)
 
     def close(self) -> None:

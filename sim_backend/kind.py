@@ -57,12 +57,12 @@ class SimulatedKind:
             rate, readings = _at_zero(rig, settings, options.film, identity.channels)
         except RigError as error:
             broken = Finding(settings.card.model, "samples at 0 V", str(error), verdict="wrong")
-            nobody = settings.model_copy(
+            unasked = settings.model_copy(
                 update={"laser": settings.laser.model_copy(update={"port": ""})}
             )
             return (
                 broken,
-                *instrument_findings(nobody, None, None),
+                *instrument_findings(unasked, None, None),
                 *reading_findings(settings, {}),
             )
         finally:

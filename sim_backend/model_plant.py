@@ -1,4 +1,4 @@
-"""A film that obeys the model exactly: what identification should find again, and nothing else."""
+"""A film that obeys the model exactly, so that identification should recover its parameters."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ class ModelPlant:
         """Present capacitance in F."""
         return float(self.actuator.film.capacitance(self.state[:1])[0])
 
-    def renewed(self, chance: np.random.Generator) -> ModelPlant:  # noqa: ARG002
-        """The same: nothing of a model is left to chance."""
+    def renewed(self, generator: np.random.Generator) -> ModelPlant:  # noqa: ARG002
+        """The same: nothing of a model is left to generator."""
         return self
 
     def advance(

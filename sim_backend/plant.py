@@ -1,4 +1,4 @@
-"""What stands between amplifier and laser: the film under its load, whatever computes it."""
+"""The plant: the film under its load, between amplifier and laser, whatever computes it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Plant(Protocol):
         """Present capacitance in F."""
         ...
 
-    def renewed(self, chance: np.random.Generator) -> Plant:
+    def renewed(self, generator: np.random.Generator) -> Plant:
         """The film at rest as another run finds it: what is of one run alone is drawn anew."""
         ...
 

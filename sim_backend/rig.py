@@ -1,4 +1,4 @@
-"""The simulated rig: the instruments put together, behind the interface that every rig has."""
+"""The simulated rig: the simulated instruments behind the interface of every rig."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _CARD_ERRORS = {
 
 
 class _Run:
-    """One waveform on its way: what has been played, computed, and handed over."""
+    """One waveform being played: what was played, computed and delivered."""
 
     def __init__(
         self, waveform: GatedWaveform, counts: np.ndarray, path: SignalPath, state: PathState
@@ -148,7 +148,7 @@ class SimulatedRig:
 
     @property
     def state(self) -> RigState:
-        """Where the rig stands."""
+        """State of the rig."""
         return self._state
 
     @property
@@ -162,7 +162,7 @@ class SimulatedRig:
             return float(self._card.channels[0].scaling.physical(run.command[at : at + 1])[0])
 
     def identify(self) -> RigIdentity:
-        """Say what is there; moves nothing."""
+        """Return what the rig is made of; the output does not move."""
         with self._lock:
             self._expect("identify", *(s for s in RigState if s is not RigState.CLOSED))
         return RigIdentity(
@@ -204,7 +204,7 @@ class SimulatedRig:
             return rate
 
     def arm(self) -> None:
-        """Make ready to start at once; the output is still at 0 V."""
+        """Get ready to start without delay; the output stays at 0 V."""
         with self._lock:
             self._expect("arm", RigState.LOADED)
             self._state = RigState.ARMED
@@ -217,7 +217,7 @@ class SimulatedRig:
             self._state = RigState.RUNNING
 
     def read(self) -> Block | None:
-        """Next block, waiting for it if need be; None when the waveform has been played.
+        """Return the next block, waiting for it; None when the waveform has been played.
 
         Raises ``RigError`` with DAQmx's code -200279 when the reader came so late that samples were
         overwritten, or for a planned fault of the card; the output is at 0 V then. Raises
@@ -249,7 +249,7 @@ class SimulatedRig:
 
     @property
     def waiting(self) -> float:
-        """How late the reader is: s of samples that were acquired and not read."""
+        """Delay of the reader in s: samples that were acquired and not read."""
         with self._lock:
             run = self._run
             if self._state is not RigState.RUNNING or run is None:
@@ -257,7 +257,7 @@ class SimulatedRig:
             return (min(self._ticks(run), run.total) - run.delivered) / self._rate
 
     def stop(self) -> None:
-        """End the run early: ramp down to 0 V in the set time; what was acquired stays readable."""
+        """End the run early: ramp to 0 V in the set time; acquired samples stay readable."""
         with self._lock:
             if self._state is RigState.DONE:
                 return  # it ended by itself in the same moment
@@ -281,7 +281,7 @@ class SimulatedRig:
             self._wake.set()
 
     def make_safe(self) -> None:
-        """Take the output to 0 V, now, and forget the waveform."""
+        """Take the output to 0 V at once and discard the waveform."""
         with self._lock:
             if self._state is RigState.CLOSED:
                 return

@@ -1,4 +1,4 @@
-"""A serial port that is not there: a pseudo-terminal where there are such, else a loopback port."""
+"""A simulated serial port: a pseudo-terminal where the system has them, else a loopback port."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 from dearig.sim_backend.clock import Clock, PacedClock
-from dearig.sim_backend.keyence import Answers
+from dearig.sim_backend.keyence import Responder
 
 __all__ = ["serve_on_pty", "serve_on_socket"]
 
@@ -19,22 +19,22 @@ _LONGEST_WAIT = 3600.0  # s
 
 
 @contextmanager
-def serve_on_socket(answers: Answers, clock: Clock | None = None) -> Iterator[str]:
-    """Let ``answers`` be reached at a loopback port while the body runs.
+def serve_on_socket(responder: Responder, clock: Clock | None = None) -> Iterator[str]:
+    """Let ``responder`` be reached at a loopback port while the body runs.
 
     Gives its name as pyserial takes it, ``socket://127.0.0.1:PORT``. One caller after another.
     """
     with socket.create_server(("127.0.0.1", 0)) as listener:
         address = f"socket://127.0.0.1:{listener.getsockname()[1]}"
-        with _thread(_Calls(answers, clock or PacedClock(), listener)):
+        with _thread(_Calls(responder, clock or PacedClock(), listener)):
             yield address
 
 
 @contextmanager
 def serve_on_pty(
-    answers: Answers, clock: Clock | None = None, baud_rate: int | None = None
+    responder: Responder, clock: Clock | None = None, baud_rate: int | None = None
 ) -> Iterator[str]:
-    """Let ``answers`` be reached on a pseudo-terminal while the body runs; gives its name.
+    """Let ``responder`` be reached on a pseudo-terminal while the body runs; gives its name.
 
     With ``baud_rate``, a caller who sets another one is not understood, as on a wire. Raises
     ``OSError`` on Windows, which has none; ``serve_on_socket`` works everywhere.
@@ -55,7 +55,7 @@ def serve_on_pty(
             set_by_caller = termios.tcgetattr(theirs)[5]
             return baud_rate is None or set_by_caller == getattr(termios, f"B{baud_rate}")
 
-        with _thread(_Line(answers, clock or PacedClock(), ours, same_speed)):
+        with _thread(_Line(responder, clock or PacedClock(), ours, same_speed)):
             yield os.ttyname(theirs)
     finally:
         os.close(ours)
@@ -63,10 +63,10 @@ def serve_on_pty(
 
 
 class _Served:
-    """A loop in a thread that carries bytes until it is told to end."""
+    """A loop in a thread that carries bytes until it is closed."""
 
-    def __init__(self, answers: Answers, clock: Clock) -> None:
-        self._answers = answers
+    def __init__(self, responder: Responder, clock: Clock) -> None:
+        self._responder = responder
         self._clock = clock
         # select on Windows takes sockets only
         self._told, self._tell = socket.socketpair()
@@ -86,7 +86,7 @@ class _Served:
 
     def _wait(self, *sources: socket.socket | int) -> list[socket.socket | int] | None:
         """Sources that can be read, none when a reply is due; None when it is time to end."""
-        due = self._answers.next_due()
+        due = self._responder.next_due()
         seconds = _LONGEST_WAIT if due is None else max(0.0, due - self._clock.now())
         ready, _, _ = select.select([self._told, *sources], [], [], seconds)
         return None if self._told in ready else ready
@@ -95,15 +95,15 @@ class _Served:
 class _Calls(_Served):
     """Callers at a listening socket."""
 
-    def __init__(self, answers: Answers, clock: Clock, listener: socket.socket) -> None:
-        super().__init__(answers, clock)
+    def __init__(self, responder: Responder, clock: Clock, listener: socket.socket) -> None:
+        super().__init__(responder, clock)
         self._listener = listener
 
     def run(self) -> None:
         """Serve one caller after another."""
         while (ready := self._wait(self._listener)) is not None:
-            if not ready:  # a reply to somebody who has left
-                self._answers.due(self._clock.now())
+            if not ready:  # a reply to a client that has left
+                self._responder.due(self._clock.now())
                 continue
             caller, _ = self._listener.accept()
             with caller:
@@ -118,8 +118,8 @@ class _Calls(_Served):
                     data = caller.recv(4096)
                     if not data:
                         return True
-                    self._answers.receive(data, self._clock.now())
-                caller.sendall(self._answers.due(self._clock.now()))
+                    self._responder.receive(data, self._clock.now())
+                caller.sendall(self._responder.due(self._clock.now()))
             except ConnectionError:  # it left in the middle
                 return True
         return False
@@ -129,19 +129,19 @@ class _Line(_Served):
     """The instrument's end of a pseudo-terminal."""
 
     def __init__(
-        self, answers: Answers, clock: Clock, line: int, same_speed: Callable[[], bool]
+        self, responder: Responder, clock: Clock, line: int, same_speed: Callable[[], bool]
     ) -> None:
-        super().__init__(answers, clock)
+        super().__init__(responder, clock)
         self._line = line
         self._same_speed = same_speed
 
     def run(self) -> None:
-        """Serve whoever opens the other end."""
+        """Serve the program that opens the other end."""
         while (ready := self._wait(self._line)) is not None:
             if ready:
-                self._answers.receive(self._heard(os.read(self._line, 4096)), self._clock.now())
-            data = self._heard(self._answers.due(self._clock.now()))
-            # what nobody takes from a serial line is lost
+                self._responder.receive(self._heard(os.read(self._line, 4096)), self._clock.now())
+            data = self._heard(self._responder.due(self._clock.now()))
+            # what is not read from a serial line is lost
             with suppress(BlockingIOError):
                 while data:
                     data = data[os.write(self._line, data) :]

@@ -1,4 +1,4 @@
-"""The way of a sample through the rig: converter, amplifier, film, laser, converter."""
+"""The signal path of the rig: converter, amplifier, film, laser, converter."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _DEAD = (*_SHORTED, FaultKind.AMPLIFIER_TRIP)
 
 @dataclass(frozen=True)
 class PathState:
-    """All that the rig remembers between two chunks.
+    """State of the rig between two chunks.
 
     ``torn`` is where the load was in m, and how fast it was in m/s, when the film ruptured;
     ``stuck`` the count at which the laser got stuck. Either is None while that has not happened.

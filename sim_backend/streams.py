@@ -22,15 +22,15 @@ class Streams:
     seed: tuple[int, ...]
 
     def of_instrument(self, instrument: str) -> np.random.Generator:
-        """For what an instrument is born with, such as its calibration."""
+        """Return the generator of what an instrument always has, such as its calibration."""
         return self._generator(_INSTRUMENTS.index(instrument))
 
     def before_run(self, instrument: str, run: int) -> np.random.Generator:
-        """For the state in which a run finds an instrument."""
+        """Return the generator of an instrument's state at the start of a run."""
         return self._generator(_INSTRUMENTS.index(instrument), run, 0)
 
     def of_chunk(self, instrument: str, run: int, chunk: int) -> np.random.Generator:
-        """For the noise of chunk 0, 1, 2, .. of a run."""
+        """Return the generator of the noise in chunk 0, 1, 2, .. of a run."""
         return self._generator(_INSTRUMENTS.index(instrument), run, 1 + chunk)
 
     def _generator(self, *place: int) -> np.random.Generator:

@@ -1,4 +1,4 @@
-"""A look at a rig before it is used: what is there, what is wrong, which limits hold, at 0 V."""
+"""Inspection of a rig before it is used: what is there, what is wrong, which limits apply."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ __all__ = ["CheckOutcome", "check_json", "check_rig", "check_table"]
 
 @dataclass(frozen=True)
 class CheckOutcome:
-    """Everything that was looked at on the rig at address ``rig``."""
+    """The findings on the rig at address ``rig``."""
 
     rig: str
     simulated: bool
@@ -47,17 +47,15 @@ class CheckOutcome:
         """All of it in one sentence."""
         counts = {
             "wrong": len(self.wrong),
-            "to be looked at": sum(f.verdict == "warning" for f in self.findings),
+            "to check": sum(f.verdict == "warning" for f in self.findings),
             "not wired": sum(f.verdict == "not wired" for f in self.findings),
         }
         others = ", ".join(f"{n} {what}" for what, n in counts.items() if n)
-        return f"{len(self.findings)} things looked at" + (
-            f": {others}" if others else ", all well"
-        )
+        return f"{len(self.findings)} checks: {others or 'all OK'}"
 
 
 def check_rig(rig: str, rig_file: RigFile, faults: FaultPlan | None = None) -> CheckOutcome:
-    """Look at the instruments of the rig at address ``rig``, as ``rig_file`` wants them.
+    """Inspect the instruments of the rig at address ``rig`` against ``rig_file``.
 
     A simulated rig plays 0 V and is read, and where ``laser.port`` is not empty a simulated
     controller is asked through the driver; ``faults`` go wrong in it. What is wrong with
@@ -115,7 +113,7 @@ _LOOKS = {"ok": "green", "warning": "yellow", "wrong": "bold red", "not wired": 
 
 
 def check_table(outcome: CheckOutcome) -> RenderableType:
-    """The findings, instrument by instrument, and what to do about those that are not well."""
+    """The findings, instrument by instrument, and what to do about those that are not OK."""
     pieces: list[RenderableType] = []
     for instrument, group in groupby(outcome.findings, key=lambda finding: finding.instrument):
         table = Table(
@@ -140,6 +138,7 @@ def check_json(outcome: CheckOutcome) -> dict[str, Any]:
         "format": "dearig-check/1",
         "rig": outcome.rig,
         "simulated": outcome.simulated,
-        "well": not outcome.wrong,
+        "ok": not outcome.wrong,
+        "well": not outcome.wrong,  # as "ok": the name in earlier versions
         "findings": [asdict(finding) for finding in outcome.findings],
     }

@@ -1,4 +1,4 @@
-"""The simulated card as a server, until somebody ends it."""
+"""Serve the simulated card until ctrl-C."""
 
 from __future__ import annotations
 
@@ -63,8 +63,8 @@ def serve(
     """
     if not (anywhere or _is_loopback(host)):
         raise InputError(
-            f"--host {host} is not this computer alone: whoever reaches the port can drive the "
-            f"rig; if that is meant, add --anywhere"
+            f"--host {host} can be reached from other computers: every program that reaches the "
+            f"port can drive the rig; if that is intended, add --anywhere"
         )
     try:
         from dearig.sim_backend.daqmx.opening import open_device

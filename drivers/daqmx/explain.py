@@ -1,4 +1,4 @@
-"""What NI-DAQmx reports, as one sentence with its code, the likely cause and what to do.
+"""NI-DAQmx's errors as one sentence each: the code, the likely cause and what to do.
 
 Codes and their meaning are those of ``nidaqmx.error_codes.DAQmxErrors``.
 """
@@ -76,13 +76,13 @@ _KNOWN: dict[int, tuple[str, str]] = {
         "it does not answer: unplugged, without power, or lost its bus",
         "see that the card is there in NI MAX",
     ),
-    -88708: ("it was removed or reset in the midst of a task", "see that nobody else uses it"),
-    -88709: ("it was removed or reset in the midst of a task", "see that nobody else uses it"),
+    -88708: ("it was removed or reset during a task", "check that no other program uses it"),
+    -88709: ("it was removed or reset during a task", "check that no other program uses it"),
 }
 
 
 def explained(device: str, code: int, said: str) -> str:
-    """``code`` on ``device`` as a sentence; what DAQmx ``said`` stands in for an unknown one."""
+    """Return ``code`` on ``device`` as a sentence; for an unknown code, what DAQmx ``said``."""
     if code in _KNOWN:
         why, do = _KNOWN[code]
         return f"card {device}: {why} (DAQmx {code}); {do}"

@@ -1,7 +1,7 @@
 """The run's side of the guardian: a process that takes the output to 0 V when the run does not.
 
-It sees the run die (the pipe between them closes), freeze (no beat comes), and is told when there
-is nothing to guard. It has an interpreter and a connection to the card of its own.
+It notices when the run dies (the pipe between them closes) or freezes (no beat comes). The run says
+when there is nothing to guard. It has its own interpreter and its own connection to the card.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ _LINE_MAX = 2000  # characters of one of them
 
 
 class Guardian(Protocol):
-    """Who takes over when a run dies or freezes."""
+    """What takes over when a run dies or freezes."""
 
     def arm(self) -> None:
-        """From now on, silence means trouble. Raises ``RigError`` where nobody guards."""
+        """Watch from now on: silence means a frozen run. Raises ``RigError`` if it has ended."""
         ...
 
     def beat(self) -> bool:
-        """Say that the run is alive; False when the guardian is not."""
+        """Report that the run is alive; returns False when the guardian is not."""
         ...
 
     def last_error(self) -> str:
@@ -51,11 +51,11 @@ class Guardian(Protocol):
         ...
 
     def disarm(self) -> None:
-        """The output is at 0 V: nothing to guard."""
+        """Stop watching: the output is at 0 V."""
         ...
 
     def take_over(self) -> None:
-        """Ask for 0 V now, because the run cannot bring it about."""
+        """Request 0 V now, because the run cannot set it."""
         ...
 
     def close(self) -> None:
@@ -118,16 +118,16 @@ class GuardianProcess:
         return self._process.pid
 
     def arm(self) -> None:
-        """From now on, silence means trouble. Raises ``RigError`` where nobody guards."""
+        """Watch from now on: silence means a frozen run. Raises ``RigError`` if it has ended."""
         if not self._tell("arm"):
             raise RigError(
-                f"the guardian process has ended ({self.last_error()}): nobody would take the "
+                f"the guardian process has ended ({self.last_error()}): nothing would take the "
                 f"output to 0 V if this program died; start the run again"
             )
         self._guards = True
 
     def beat(self) -> bool:
-        """Say that the run is alive; False when the guardian is not."""
+        """Report that the run is alive; returns False when the guardian is not."""
         return self._tell("beat")
 
     def last_error(self) -> str:
@@ -139,13 +139,13 @@ class GuardianProcess:
         return f"exit code {self._process.returncode}" + (f", {lines[-1]}" if lines else "")
 
     def disarm(self) -> None:
-        """The output is at 0 V: nothing to guard."""
+        """Stop watching: the output is at 0 V."""
         if self._guards:
             self._guards = False
             self._tell("disarm")
 
     def take_over(self) -> None:
-        """Ask for 0 V now. Raises ``RigError`` where the guardian does not bring it about."""
+        """Request 0 V now. Raises ``RigError`` where the guardian does not set it."""
         if self._trying:
             raise RigError("the guardian process is still trying to reach the card")
         if not self._tell("take over"):

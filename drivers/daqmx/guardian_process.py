@@ -30,10 +30,10 @@ _GIVE_UP = 20.0  # s of trying to reach a card that does not answer
 
 @dataclass
 class Guard:
-    """What the guardian does with each word, or with silence; ``zero`` takes the output to 0 V.
+    """The guardian's response to each word, and to silence; ``zero`` takes the output to 0 V.
 
     ``say`` answers the run, ``tell`` the person at the terminal. After a take-over it is not armed
-    until it is told so again: a run that wakes up finds its tasks gone and makes itself safe.
+    until the run arms it again: a run that continues finds its tasks gone and makes itself safe.
     """
 
     zero: Callable[[], None]
@@ -130,7 +130,7 @@ def _say(word: str) -> None:
 
 
 def _tell(sentence: str) -> None:
-    with contextlib.suppress(OSError):  # nobody is at the terminal any more
+    with contextlib.suppress(OSError):  # the terminal is closed
         print(sentence, flush=True)
 
 

@@ -1,4 +1,4 @@
-"""A look at the card and at what is wired to it, without putting out a volt."""
+"""Inspection of the card and of what is wired to it, without putting out a volt."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["Inspection", "inspect"]
 
 @dataclass(frozen=True)
 class Inspection:
-    """What was found on the card and what its inputs read, None where that could not be asked.
+    """Findings on the card, and the readings of its inputs, None where they could not be read.
 
     ``displacement_volts`` is the laser's analog output; ``readings`` are those of the channels
     that the rig file declares, by name, in their units.
@@ -32,9 +32,9 @@ class Inspection:
 
 
 def inspect(device: str, server: str | None, settings: RigSettings) -> Inspection:
-    """Look at the card ``device``, in this computer or behind ``server``, as ``settings`` need it.
+    """Inspect the card ``device``, in this computer or behind ``server``, against ``settings``.
 
-    Never raises ``RigError``: what cannot be reached is a finding.
+    Never raises ``RigError``: a card that cannot be reached is a finding.
     """
     name = f"card {device}"
     try:
@@ -76,7 +76,7 @@ def inspect(device: str, server: str | None, settings: RigSettings) -> Inspectio
 
 
 def _card(name: str, card: Any, settings: RigSettings) -> list[Finding]:
-    """What the card itself says it has, against what the rig file wants of it."""
+    """Return what the card reports of itself, against what the rig file needs of it."""
     wanted = settings.card
     model = card.product_type
     same = model.split()[-1] == wanted.model.split()[-1]
@@ -125,13 +125,13 @@ def _card(name: str, card: Any, settings: RigSettings) -> list[Finding]:
 
 def _has(name: str, item: str, there: bool, wanted: str) -> Finding:
     return Finding(
-        name, item, "found" if there else "the card has no such thing", wanted,
+        name, item, "found" if there else "the card does not have it", wanted,
         "ok" if there else "wrong", "" if there else "correct the rig file",
     )  # fmt: skip
 
 
 def _timing(name: str, link: Link, device: str, settings: RigSettings) -> Finding:
-    """Reserve the card as a run does, which fails where somebody uses it; nothing is put out."""
+    """Reserve the card as a run does, which fails where it is in use; nothing is put out."""
     tasks = ClockedTasks(link, device, settings)
     try:
         skews = [channel.skew for channel in tasks.channels()[1:]]

@@ -1,4 +1,4 @@
-"""The way to the driver: the library in this computer, or a server that answers in time or not."""
+"""The connection to the driver: the library in this computer, or a server with a deadline."""
 
 from __future__ import annotations
 

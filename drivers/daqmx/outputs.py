@@ -1,6 +1,6 @@
-"""One value at a time, without a clock: the output to 0 V, the enable line, a look at an input.
+"""Single values without a clock: the output to 0 V, the enable line, the reading of an input.
 
-Both the run and its guardian go this way, each through a connection of its own.
+The run and its guardian both use this, each with its own connection.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _LOOKS = 20  # at the monitor: the amplifier's output falls in less than a milli
 class Outputs:
     """The card ``device`` behind ``link``, of a rig with ``settings``.
 
-    Every method raises ``RigError`` where the card or its server does not do what it is told.
+    Every method raises ``RigError`` where the card or its server fails.
     """
 
     def __init__(self, link: Link, device: str, settings: RigSettings) -> None:
@@ -31,7 +31,7 @@ class Outputs:
     def zero(self, *, force: bool = False) -> None:
         """0 V at the output, seen on the voltage monitor.
 
-        With ``force``, whoever holds the card loses it: it is reset, which aborts every task and
+        With ``force``, a card that is in use is reset, which aborts every task and
         takes outputs and lines down in one step.
         """
         try:
@@ -44,7 +44,7 @@ class Outputs:
         self.check_zero()
 
     def shut(self) -> None:
-        """0 V and the enable line low, whoever holds the card: what a guardian does."""
+        """Set 0 V and the enable line low, also on a card in use: what a guardian does."""
         try:
             self.zero(force=True)
         finally:
@@ -57,7 +57,7 @@ class Outputs:
                 self._disable()
 
     def reset(self) -> None:
-        """Abort every task on the card, whoever's it is; its outputs go to 0 V in one step."""
+        """Abort every task of every program on the card; its outputs go to 0 V in one step."""
         with instrument_errors(self._device, self._link.server):
             from nidaqmx.system import Device
 

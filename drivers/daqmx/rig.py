@@ -1,4 +1,4 @@
-"""A rig on a DAQmx card: output and inputs on one sample clock, with a guardian beside it."""
+"""A rig on a DAQmx card: output and inputs on one sample clock, guarded by a second process."""
 
 from __future__ import annotations
 
@@ -82,19 +82,19 @@ class DaqmxRig:
 
     @property
     def state(self) -> RigState:
-        """Where the rig stands."""
+        """State of the rig."""
         return self._state
 
     @property
     def waiting(self) -> float:
-        """How late the reader is: samples that were acquired and not read, in s."""
+        """Delay of the reader in s: samples that were acquired and not read."""
         with self._lock:
             if self._state is not RigState.RUNNING or self._run is None or self._tasks is None:
                 return 0.0
             return self._tasks.waiting() / self._run.rate
 
     def identify(self) -> RigIdentity:
-        """Say what is there; moves nothing."""
+        """Return what the rig is made of; the output does not move."""
         with self._lock:
             expect(self._state, "identify", *(s for s in RigState if s is not RigState.CLOSED))
         return RigIdentity(
@@ -137,7 +137,7 @@ class DaqmxRig:
             return rate
 
     def arm(self) -> None:
-        """Make ready to start at once; the output is still at 0 V, and from now on guarded."""
+        """Get ready to start without delay; the output is at 0 V, and guarded from now on."""
         with self._lock:
             expect(self._state, "arm", RigState.LOADED)
             self._guardian.arm()
@@ -155,7 +155,7 @@ class DaqmxRig:
             self._state = RigState.RUNNING
 
     def read(self) -> Block | None:
-        """Next block, waiting for it if need be; None when the waveform has been played.
+        """Return the next block, waiting for it; None when the waveform has been played.
 
         Raises ``RigError`` where the card faults, where no sample comes, and, after a ramp to 0 V,
         where the guardian process has died. Raises ``RigStateError`` when the rig was made safe.
@@ -183,7 +183,7 @@ class DaqmxRig:
                 return block
 
     def stop(self) -> None:
-        """End the run early: ramp down to 0 V in the set time; what was acquired stays readable."""
+        """End the run early: ramp to 0 V in the set time; acquired samples stay readable."""
         with self._lock:
             if self._state is RigState.DONE:
                 return  # it ended by itself in the same moment
@@ -191,7 +191,7 @@ class DaqmxRig:
             self._stop(*self._loaded())
 
     def make_safe(self) -> None:
-        """Take the output to 0 V, now, see it on the monitor, and forget the waveform.
+        """Take the output to 0 V at once, check it on the monitor, and discard the waveform.
 
         Raises ``RigError`` where neither this program nor the guardian could.
         """

@@ -1,4 +1,4 @@
-"""The card's tasks of one run: made, owned and cleared here and nowhere else.
+"""The card's tasks of one run: created, owned and cleared here and nowhere else.
 
 Inputs are converted on the ticks of the output's sample clock: two clocks would drift apart. So the
 inputs are started first and wait; they stand still whenever the output does, and the number of
@@ -32,7 +32,7 @@ _ODD_BUFFER = 4095  # samples: an output buffer of exactly this size misbehaved 
 
 @dataclass(frozen=True)
 class Card:
-    """What a card says of itself.
+    """A card as it reports itself.
 
     ``channels`` in the order of blocks, with the card's own scaling and the timing it really has.
     """
@@ -81,7 +81,7 @@ class ClockedTasks:
     def channels(self) -> tuple[Channel, ...]:
         """The rig's channels with the card's own scaling and the skew it really has.
 
-        The inputs and the output are reserved for it: a card that somebody uses is noticed here.
+        The inputs and the output are reserved for it: a card in use is noticed here.
         """
         from nidaqmx.constants import TaskMode
 

@@ -95,11 +95,11 @@ _DIFFERS = (
 _OLDER = "an older LK-G, whose commands are others, answers so"
 #: What an error code means, and what to do.
 ERRORS = {
-    0: ("command error or no head", f"look at the head's cable; {_OLDER}"),
-    1: ("status error or fault of head 1", f"look at the head's cable; {_OLDER}"),
-    2: ("fault of head 2", "look at the head's cable"),
+    0: ("command error or no head", f"check the head's cable; {_OLDER}"),
+    1: ("status error or fault of head 1", f"check the head's cable; {_OLDER}"),
+    2: ("fault of head 2", "check the head's cable"),
     13: ("fault of the controller", "switch it off and on; if it stays, ask its maker"),
-    15: ("fault of the controller's memory", "switch it off and on, and look at its settings"),
+    15: ("fault of the controller's memory", "switch it off and on, and check its settings"),
     20: ("command length error", _OLDER),
     21: ("parameter count error", _OLDER),
     22: ("invalid parameter", _OLDER),
@@ -110,7 +110,7 @@ ERRORS = {
     ),
     60: ("command length error", _DIFFERS),
     61: ("parameter count error", _DIFFERS),
-    62: ("parameter out of range", "look at laser.output: the controller may not have that OUT"),
+    62: ("parameter out of range", "check laser.output: the controller may not have that OUT"),
     88: ("timeout in the controller", "try again; a controller that waits for a trigger does not"),
-    99: ("other error", "look at the controller's display"),
+    99: ("other error", "read the controller's display"),
 }

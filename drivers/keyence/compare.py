@@ -52,7 +52,7 @@ class ControllerSettings:
 def compare(settings: LaserSettings, found: ControllerSettings) -> list[str]:
     """One sentence for each setting that falsifies a recording made with ``settings``.
 
-    Nothing is said where ``settings.port`` is empty: then nobody can have asked a controller.
+    Nothing is compared where ``settings.port`` is empty: then no controller was asked.
     """
     if not settings.port:
         return []

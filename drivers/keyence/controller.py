@@ -183,7 +183,7 @@ class Keyence:
         self._port.close()
 
     def program(self) -> int:
-        """Number of the program that is active; ends a setting mode that somebody left behind."""
+        """Return the number of the active program; ends a setting mode that was left on."""
         try:
             return int(self._ask("program")[0])
         except LaserError as error:
@@ -329,7 +329,7 @@ class Keyence:
         except OSError as error:
             raise LaserError(
                 f"serial port {self._settings.port} fails: {error}",
-                "look at the cable and the adapter",
+                "check the cable and the adapter",
             ) from error
         raise self._unanswered(text, seen)
 
@@ -399,7 +399,7 @@ class Keyence:
             )
         return LaserError(
             f"what comes on {where} is no text: {shown}",
-            "set laser.baud_rate as in the controller; if it is, look at the cable and for "
+            "set laser.baud_rate as in the controller; if it is, check the cable and "
             "interference from the high voltage",
         )
 

@@ -1,4 +1,4 @@
-"""A look at the laser controller: is it there, set as the rig file says, does it see the film."""
+"""Inspection of the laser controller: it answers, agrees with the rig file, sees the film."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def inspect(
     opener: Callable[[LaserSettings], Port] = open_port,
     clock: Callable[[], float] = time.monotonic,
 ) -> LaserInspection:
-    """Look at the controller at ``settings.port``; faults are findings.
+    """Inspect the controller at ``settings.port``; faults are findings.
 
     With an empty ``settings.port`` nothing is asked, and one finding says so.
     """

@@ -1,4 +1,4 @@
-"""One run of the card's inputs: which samples there are, and what the rig says at each of them."""
+"""One run of the card's inputs: which samples there are, and what the rig reads at each."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class OwnTicks:
         return max(0, math.floor((now - self.start) * self.rate + TICK_TOLERANCE))
 
     def due(self, samples: int, now: float) -> float | None:  # noqa: ARG002
-        """When ``samples`` will be complete in s; None where nobody knows."""
+        """When ``samples`` will be complete in s; None where that is not known."""
         return None if self.start is None else self.start + samples / self.rate
 
     def times(self, first: int, last: int) -> np.ndarray:
@@ -47,7 +47,7 @@ class _Piece:
     first: int
     generation: Generation
     tick: int
-    row: int | None  # of the output that the rig hangs on
+    row: int | None  # of the output that the rig is wired to
 
 
 class SharedTicks:
@@ -73,7 +73,7 @@ class SharedTicks:
         return piece.first + max(0, piece.generation.ticks(now) - piece.tick)
 
     def due(self, samples: int, now: float) -> float | None:
-        """When ``samples`` will be complete in s; None where nobody knows."""
+        """When ``samples`` will be complete in s; None where that is not known."""
         if not self._pieces:
             return None
         piece = self._pieces[-1]
@@ -81,7 +81,7 @@ class SharedTicks:
         generation = piece.generation
         if generation.finished(now) or (generation.total is not None and tick > generation.total):
             return None
-        # it may run out of samples before that: then this is when somebody should look again
+        # it may run out of samples before that: then this is when a reader should check again
         return generation.due(tick)
 
     def times(self, first: int, last: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Who is at the other end of the link: a client that left a voltage up does not go unnoticed."""
+"""The clients of the server: one that vanishes with a voltage up is noticed."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Clients:
         context.add_callback(ended)
 
     def gone(self, name: str) -> None:
-        """The connection of ``name`` has ended: its tasks are cleared as well."""
+        """The connection of ``name`` has ended: its tasks are cleared too."""
         with self._lock:
             client = self._clients.pop(name, None)
         tasks = self._device.tasks_of(name)

@@ -162,7 +162,7 @@ class Device(TimingEngine):
         """Volts over counts of the input called ``name``; counts over volts of an output."""
         for channel in task.inputs:
             if channel.name == name:
-                return self._behind.coefficients(channel)
+                return self._wiring.coefficients(channel)
         for output in task.outputs:
             if output.name == name:
                 return (0.0, (COUNT_MAX + 1) / output.range)

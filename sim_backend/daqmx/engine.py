@@ -1,7 +1,7 @@
 """The simulated card at work: clocks, buffers and reserved resources, on an injected clock.
 
-It has no thread of its own: whoever asks finds it as it is at that moment, and everything that
-happened since it was last asked is computed then.
+It has no thread of its own: a call sees the card as it is at that moment, and everything that
+happened since the call before is computed then.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from dearig.sim_backend.daqmx.output import Generation, Waveform
 from dearig.sim_backend.daqmx.setup import LINES, OUTPUTS, Setup
 from dearig.sim_backend.daqmx.tasks import Kind, SampleClock, State, Task, Watchdog
 from dearig.sim_backend.daqmx.wire import Wire
-from dearig.sim_backend.daqmx.wiring import Behind
+from dearig.sim_backend.daqmx.wiring import Wiring
 from dearig.sim_backend.faults import Fault, FaultKind, FaultPlan
 from dearig.sim_backend.plant import Plant
 
@@ -58,9 +58,9 @@ class TimingEngine(Setup):
         self._clock = clock
         self._born = clock.now()
         self._faults = faults or FaultPlan()
-        self._behind = Behind(settings, plant, noise_seed, self._faults)
-        self._behind.warm_up()
-        self._wire = Wire(self._card, self._behind, OUTPUTS, LINES, self._born)
+        self._wiring = Wiring(settings, plant, noise_seed, self._faults)
+        self._wiring.warm_up()
+        self._wire = Wire(self._card, self._wiring, OUTPUTS, LINES, self._born)
         self._waiting: set[threading.Event] = set()
         self._tasks: dict[str, Task] = {}
         self._numbered = 0
@@ -146,7 +146,7 @@ class TimingEngine(Setup):
         return oldest
 
     def _looks_back(self, now: float) -> float:
-        """The earliest time in s whose output somebody may still ask for."""
+        """The earliest time in s whose output a task may still read."""
         earliest = now
         for task in self._tasks.values():
             if task.ticks is not None and task.running and task.ticks.passed(now):
@@ -279,7 +279,7 @@ class TimingEngine(Setup):
             self._run_start = now
 
     def _abort(self, task: Task, now: float) -> None:
-        """End ``task`` whatever it does; who goes on with it is told."""
+        """End ``task`` whatever it does; its client sees that in its next call."""
         busy = task.state is not State.VERIFIED
         self._end(task, now)
         self._release(task)
@@ -330,8 +330,8 @@ class TimingEngine(Setup):
         if self._wire.switched:
             output = ticks.commands(first, last, self._wire.track)
         task.delivered = last
-        self._laser = self._behind.laser_reading(counts, task.inputs)
-        return Reading(self._behind.as_read(counts, output, task.inputs), complete)
+        self._laser = self._wiring.laser_reading(counts, task.inputs)
+        return Reading(self._wiring.as_read(counts, output, task.inputs), complete)
 
     def _new_run(self, task: Task) -> Run:
         ticks = task.ticks
@@ -341,7 +341,7 @@ class TimingEngine(Setup):
         first, step = self.delay_ticks(task) / us, self.convert_ticks(task) / us
         skews = [(first + place * step) * 1e-6 for place in range(len(task.inputs))]
         rate = ticks.rate
-        path, state = self._behind.run(task.run_number, rate, task.inputs, skews)
+        path, state = self._wiring.run(task.run_number, rate, task.inputs, skews)
         wire = self._wire
 
         def command(start: int, end: int) -> np.ndarray:
@@ -356,7 +356,7 @@ class TimingEngine(Setup):
         self._check_free(task)
         self._readings += 1
         film, output = self._wire.film_voltage(now), self._wire.track.standing(now)
-        counts = self._behind.still(task.inputs, samples, self._readings, film, output, self._laser)
+        counts = self._wiring.still(task.inputs, samples, self._readings, film, output, self._laser)
         return Reading(counts, True)
 
     def _write_still(self, task: Task, counts: np.ndarray, auto_start: bool, now: float) -> int:

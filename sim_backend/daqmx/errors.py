@@ -1,4 +1,4 @@
-"""What the card refuses: NI-DAQmx's codes, each with the wording of the driver, short."""
+"""Errors of the simulated card: NI-DAQmx's codes with the driver's wording, shortened."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the address of a simulated rig to the card that it hangs on."""
+"""Open the simulated card of a rig by the rig's address."""
 
 from __future__ import annotations
 

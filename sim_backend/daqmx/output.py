@@ -1,4 +1,4 @@
-"""What stands on the card's analog outputs and when: generations of samples, and still values."""
+"""The card's analog outputs over time: generations of samples, and single values."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ __all__ = ["DaqmxServer"]
 
 log = logging.getLogger(__name__)
 
-_THREADS = 32  # calls at a time; an event that somebody listens to is one
+_THREADS = 32  # calls at a time; an event that a client listens to is one
 _LOOK_S = 0.05  # how often silent clients are looked for
 _OPTIONS = (
     ("grpc.max_send_message_length", -1),
@@ -117,7 +117,7 @@ class DaqmxServer:
 
 
 def _pings(timeout: float) -> tuple[tuple[str, int], ...]:
-    """Options that notice within ``timeout`` s that nobody answers."""
+    """Options that notice within ``timeout`` s that the other end does not answer."""
     answer = max(50, round((timeout - _PING_S) * 1e3))
     return (
         ("grpc.keepalive_time_ms", round(_PING_S * 1e3)),

@@ -1,4 +1,4 @@
-"""NI's gRPC device protocol on one side, the simulated card on the other; no rule of it here."""
+"""NI's gRPC device protocol, translated to calls of the simulated card; it has no rules itself."""
 
 # ruff: noqa: N802, ARG002  (names, arguments and messages are the protocol's)
 
@@ -277,7 +277,7 @@ class Servicer(pb_grpc.NiDAQmxServicer):
         self._device.control_watchdog(self._task(request), clear=action == 1)
         return pb.ControlWatchdogTaskResponse()
 
-    # events: each holds a thread for as long as somebody listens
+    # events: each holds a thread for as long as a client listens
 
     def RegisterDoneEvent(self, request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
         task = self._task(request)

@@ -1,4 +1,4 @@
-"""What a program may set up on the card, channels and timing, and what the card has not."""
+"""Set-up of the card's channels and timing, and refusal of what the card does not have."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a program has set up on the card: tasks, their channels and their timing."""
+"""Tasks on the card with their channels and their timing."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class Task:
     state: State = State.VERIFIED
     kept: State = State.VERIFIED  # where it goes back to when it stops
     failed: Code | None = None
-    listened: bool = False  # somebody listens to its events
+    listened: bool = False  # a client listens to its events
     # an output task's own
     waveform: Waveform | None = None
     first_write: int = 0  # samples; they make the buffer where no size was set

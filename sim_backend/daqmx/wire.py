@@ -1,4 +1,4 @@
-"""What the card put out, and what of it reached the film: outputs and lines over time."""
+"""Outputs and digital lines of the card over time, and the voltage that reached the film."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from dearig.drivers.settings import CardSettings
 from dearig.sim_backend.daqmx.output import Generation, Track
-from dearig.sim_backend.daqmx.wiring import Behind
+from dearig.sim_backend.daqmx.wiring import Wiring
 
 __all__ = ["Change", "Wire"]
 
@@ -30,7 +30,7 @@ class Change:
 
 
 class Wire:
-    """The ``outputs`` and digital ``lines`` of a card with ``behind`` at its terminals.
+    """The ``outputs`` and digital ``lines`` of a card with ``wiring`` at its terminals.
 
     Times are in s since ``born`` on the clock. ``client`` is who moved the wired output last.
     """
@@ -38,13 +38,13 @@ class Wire:
     def __init__(
         self,
         card: CardSettings,
-        behind: Behind,
+        wiring: Wiring,
         outputs: Sequence[str],
         lines: Sequence[str],
         born: float,
     ) -> None:
         self._wired = card.ao_command
-        self._behind = behind
+        self._wiring = wiring
         self._born = born
         self._tracks = {terminal: Track() for terminal in outputs}
         self.levels = dict.fromkeys(lines, False)
@@ -64,18 +64,18 @@ class Wire:
 
     @property
     def track(self) -> Track:
-        """The output that the amplifier hangs on."""
+        """The output that the amplifier is wired to."""
         return self._tracks[self._wired]
 
     def film_voltage(self, now: float) -> float:
         """V at the film."""
         if not self._enabled[-1][1]:
             return 0.0
-        return self._behind.film_voltage(self.track.standing(now))
+        return self._wiring.film_voltage(self.track.standing(now))
 
     def output_voltage(self, now: float) -> float:
         """V at the output's terminal."""
-        return self._behind.output_volts(self.track.standing(now))
+        return self._wiring.output_volts(self.track.standing(now))
 
     def row(self, generation: Generation) -> int | None:
         """Row of ``generation`` that is on the wired output; None: it is not there."""
@@ -100,7 +100,7 @@ class Wire:
         self._tracks[terminal].set(now, counts)
         if terminal == self._wired:
             self.client = client
-            self._away = abs(counts - self._behind.zero) > 1
+            self._away = abs(counts - self._wiring.zero) > 1
             self._trace(now, counts)
 
     def set_line(self, line: str, level: bool, now: float) -> None:
@@ -118,7 +118,7 @@ class Wire:
     def follow(self, now: float, oldest: Callable[[Generation], int]) -> None:
         """Take into the history what was put out up to ``now``.
 
-        ``oldest`` gives the first tick of a generation that somebody may still ask for; what was
+        ``oldest`` gives the first tick of a generation that a task may still read; what was
         before is forgotten.
         """
         if self._following is None:
@@ -132,7 +132,7 @@ class Wire:
         while self._traced < end:
             last = min(end, self._traced + _AT_ONCE)
             counts = generation.at_ticks(np.arange(self._traced, last))[row].astype(np.int64)
-            away = np.abs(counts - self._behind.zero) > 1
+            away = np.abs(counts - self._wiring.zero) > 1
             for at in np.flatnonzero(np.diff(away, prepend=self._away)):
                 self._trace(generation.due(self._traced + int(at)), int(counts[at]))
             self._away = bool(away[-1])
@@ -151,9 +151,9 @@ class Wire:
         since = np.array([time for time, _ in self._enabled])
         level = np.array([level for _, level in self._enabled])
         enabled = level[np.searchsorted(since, times, side="right") - 1]
-        return np.where(enabled, counts, np.int16(self._behind.zero))
+        return np.where(enabled, counts, np.int16(self._wiring.zero))
 
     def _trace(self, now: float, counts: int) -> None:
-        output = self._behind.output_volts(counts)
-        wire = self._behind.film_voltage(counts) if self._enabled[-1][1] else 0.0
+        output = self._wiring.output_volts(counts)
+        wire = self._wiring.film_voltage(counts) if self._enabled[-1][1] else 0.0
         self.history.append(Change(self._born + now, output, wire))

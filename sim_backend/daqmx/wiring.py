@@ -1,4 +1,4 @@
-"""What is behind the card's terminals: amplifier, film and laser, wired as the rig file says."""
+"""The instruments at the card's terminals, wired as the rig file says."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dearig.sim_backend.plant import Plant
 from dearig.sim_backend.signal_path import PathState, SignalPath
 from dearig.sim_backend.streams import Streams
 
-__all__ = ["OUTPUT_MONITOR", "Behind"]
+__all__ = ["OUTPUT_MONITOR", "Wiring"]
 
 #: The card's internal way from its output back to its inputs.
 OUTPUT_MONITOR = "_{}_vs_aognd"
@@ -32,7 +32,7 @@ class _TaskSettings(RigSettings):
         return self.conversions[place] if self.conversions else super().skew(place)
 
 
-class Behind:
+class Wiring:
     """The instruments of ``settings``, the film ``plant`` at rest, noise of ``noise_seed``."""
 
     def __init__(
@@ -50,7 +50,7 @@ class Behind:
         self.zero = int(self._output.counts(np.zeros(1))[0])
 
     def warm_up(self) -> None:
-        """Compute two samples: the kernels are compiled now, not while somebody waits for 0 V."""
+        """Compute two samples: the kernels are compiled now, not while a client waits for 0 V."""
         rate = self._settings.card.sample_rate_Hz
         wired = [t for n, t in self._settings.terminals().items() if n != "voltage_command"]
         inputs = [AnalogInput(t, t, (-10.0, 10.0), 10.0, 0) for t in wired]

@@ -1,4 +1,4 @@
-"""Which rig hides what: a case for every seed, always the same one."""
+"""Hidden effects by seed: a case for every seed, always the same one."""
 
 from __future__ import annotations
 
@@ -145,16 +145,16 @@ class TruthCase:
         return float(np.sqrt(np.mean((hiding.displacement - plain.displacement) ** 2)))
 
     def of_one_run(
-        self, time: np.ndarray, voltage: np.ndarray, chance: np.random.Generator
+        self, time: np.ndarray, voltage: np.ndarray, generator: np.random.Generator
     ) -> np.ndarray:
-        """What the run that draws from ``chance`` has of its own in what the sensor sees, (N,) m.
+        """Return what the sensor sees only in the run that draws from ``generator``, (N,) m.
 
-        That is what no other run can tell of it, under ``voltage`` (N,) V at ``time`` (N,) s.
+        No other run of the rig contains it; under ``voltage`` (N,) V at ``time`` (N,) s.
         """
-        repeated = [effect for effect in self.effects if effect.anew is None]
+        repeated = [effect for effect in self.effects if effect.redrawn is None]
         if len(repeated) == len(self.effects):
             return np.zeros_like(time)
-        run, _ = self.plant().renewed(chance).advance(time, voltage, True)
+        run, _ = self.plant().renewed(generator).advance(time, voltage, True)
         rest, _ = TruthPlant.at_rest(self._numbers(), repeated).advance(time, voltage, True)
         own: np.ndarray = run.displacement - rest.displacement
         return own

@@ -1,4 +1,4 @@
-"""What one hidden effect is: a name for the score, and the place of the signal path it acts on."""
+"""A hidden effect: its name for the score, and the place of the signal path it acts on."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Course = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class TruthEffect:
-    """One effect that the rig has and nobody declared.
+    """One hidden effect of a simulated rig.
 
     ``family`` is one of the diagnosis's families, or ``unknown`` for what is in none of them;
     ``description`` says form and size. It acts through one or more of
@@ -36,7 +36,7 @@ class TruthEffect:
     * ``on_voltage``: a stage on the voltage (N,) V that reaches the film, held from node to node;
     * ``on_motion``: a stage on what the sensor sees, rows (2, N): displacement m, velocity m/s.
 
-    ``anew`` draws it as another run has it, where a part of it is of one run alone.
+    ``redrawn`` draws it for another run, where a part of it differs from run to run.
     """
 
     family: str
@@ -46,7 +46,7 @@ class TruthEffect:
     on_course: Course | None = None
     on_voltage: Stage | None = None
     on_motion: Stage | None = None
-    anew: Callable[[np.random.Generator], TruthEffect] | None = None
+    redrawn: Callable[[np.random.Generator], TruthEffect] | None = None
 
 
 #: Draws one effect in one form for a film under the load.

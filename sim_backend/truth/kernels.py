@@ -1,4 +1,4 @@
-"""Compiled loops of the stages that remember: they take numbers and arrays, and call nobody."""
+"""Compiled loops of the stages that have a state; they take numbers and arrays."""
 
 from __future__ import annotations
 

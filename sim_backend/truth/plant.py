@@ -61,9 +61,9 @@ class TruthPlant:
             plain, tuple(effects), numbers, rest, state, on_course, on_voltage, on_motion, carries
         )
 
-    def renewed(self, chance: np.random.Generator) -> TruthPlant:
+    def renewed(self, generator: np.random.Generator) -> TruthPlant:
         """See ``dearig.sim_backend.plant.Plant.renewed``."""
-        effects = [e if e.anew is None else e.anew(chance) for e in self.effects]
+        effects = [e if e.redrawn is None else e.redrawn(generator) for e in self.effects]
         return TruthPlant.at_rest(self.plain, effects)
 
     @property

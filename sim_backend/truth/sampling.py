@@ -1,4 +1,4 @@
-"""Sizes drawn by chance."""
+"""Random sizes of effects."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from dearig.drivers.findings import Finding
 from dearig.drivers.settings import LaserSettings
 from dearig.errors import InputError
 from dearig.sim_backend.faults import FaultPlan
-from dearig.sim_backend.keyence import Conduct, SimulatedController
+from dearig.sim_backend.keyence import Behaviour, SimulatedController
 from dearig.sim_backend.serial_port import serve_on_socket
 from tests.tools.command import dearig, done, strict_json, write
 
@@ -91,7 +91,7 @@ def test_a_simulated_controller_is_asked_where_there_is_a_port() -> None:
 @pytest.mark.parametrize(
     ("fault", "item", "said"),
     [
-        ("sensor-out-of-range@0", "analog output", "look whether the laser is on"),
+        ("sensor-out-of-range@0", "analog output", "check that the laser is on"),
         ("serial-garbage@0", "serial port", "is no text"),
     ],
 )
@@ -110,31 +110,31 @@ def test_a_real_rig_that_is_well(card: list[tuple[str, str | None]]) -> None:
         outcome = check_rig("daqmx:Dev1@host:31763", rig_file(port=port))
     assert card == [("Dev1", "host:31763")]
     assert verdicts(outcome) == {}
-    assert outcome.summary.endswith("all well")
+    assert outcome.summary.endswith(": all OK")
     assert not outcome.simulated
     assert "NI-DAQmx 23.5.0" in told(outcome, "driver")
 
 
 @pytest.mark.parametrize(
-    ("instrument", "conduct", "wrong"),
+    ("instrument", "behaviour", "wrong"),
     [
-        ({"mm_per_V": 5.0}, Conduct.CONTROLLER,
+        ({"mm_per_V": 5.0}, Behaviour.CONTROLLER,
          ["analog scaling", "analog output against serial port"]),
-        ({"averaging": 64}, Conduct.CONTROLLER, ["averaging"]),
-        ({"sampling_us": 50.0}, Conduct.CONTROLLER, ["sampling"]),
-        ({"output": 2}, Conduct.CONTROLLER, ["settings"]),
-        ({}, Conduct.SILENT, ["serial port"]),
-        ({}, Conduct.OTHER, ["serial port"]),
+        ({"averaging": 64}, Behaviour.CONTROLLER, ["averaging"]),
+        ({"sampling_us": 50.0}, Behaviour.CONTROLLER, ["sampling"]),
+        ({"output": 2}, Behaviour.CONTROLLER, ["settings"]),
+        ({}, Behaviour.SILENT, ["serial port"]),
+        ({}, Behaviour.OTHER, ["serial port"]),
     ],
 )  # fmt: skip
 def test_a_rig_file_that_contradicts_the_laser(
     card: list[tuple[str, str | None]],
     instrument: dict[str, object],
-    conduct: Conduct,
+    behaviour: Behaviour,
     wrong: list[str],
 ) -> None:
     there = LaserSettings.model_validate(instrument)
-    controller = SimulatedController(there, lambda _: 6.4e-3, conduct=conduct, mode_change=0.0)
+    controller = SimulatedController(there, lambda _: 6.4e-3, behaviour=behaviour, mode_change=0.0)
     with serve_on_socket(controller) as port:
         outcome = check_rig("daqmx:Dev1", rig_file(port=port))
     assert [f.item for f in outcome.wrong] == wrong

@@ -121,7 +121,7 @@ BROKEN = [
     (current, 2, "at once", r"current monitor read -20\.1\d mA, 20 mA is allowed"),
     (laser, 50, "ramp", r"laser read (40|39\.99) mm, the end of its range of \+-40 mm"),
     (displacement, 5, "ramp", r"stood 25\.1 mm from its rest state, -20 to 25 mm is allowed"),
-    (following, 200, "ramp", r"film had moved 0\.\d\d mm where the model foresees \d\.\d\d mm"),
+    (following, 200, "ramp", r"film had moved 0\.\d\d mm where the model predicts \d\.\d\d mm"),
 ]
 
 

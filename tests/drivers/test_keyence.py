@@ -26,7 +26,7 @@ from dearig.drivers.keyence.commands import AVERAGING, COMMANDS, ERRORS, SAMPLIN
 from dearig.drivers.keyence.controller import POLL
 from dearig.drivers.settings import LaserSettings
 from dearig.sim_backend.faults import FaultPlan
-from dearig.sim_backend.keyence import Conduct, SimulatedController, SimulatedLine
+from dearig.sim_backend.keyence import Behaviour, SimulatedController, SimulatedLine
 from dearig.sim_backend.serial_port import serve_on_pty, serve_on_socket
 
 SETTINGS = LaserSettings(port="COM3")
@@ -211,8 +211,8 @@ class TestKeyence(LaserContract):
         agrees: bool = True,
     ) -> Iterator[tuple[KeyenceDriver, LaserSettings]]:  # fmt: skip
         there = SETTINGS if agrees else set_to(mm_per_V=5.0)
-        conduct = Conduct.CONTROLLER if answers else Conduct.SILENT
-        controller = SimulatedController(there, at(reading), conduct=conduct)
+        behaviour = Behaviour.CONTROLLER if answers else Behaviour.SILENT
+        controller = SimulatedController(there, at(reading), behaviour=behaviour)
         # the line's time goes on from one port to the next
         line = SimulatedLine(controller)
         yield KeyenceDriver(lambda _: line, line.now), SETTINGS
@@ -363,15 +363,15 @@ def test_garbage_that_stays_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("conduct", "said"),
+    ("behaviour", "said"),
     [
-        (Conduct.SILENT, "nothing answers PR on COM3 at 115200 Bd"),
-        (Conduct.OTHER, r"says '\?SYNTAX.*another instrument"),
-        (Conduct.BABBLING, "is no text"),
+        (Behaviour.SILENT, "nothing answers PR on COM3 at 115200 Bd"),
+        (Behaviour.OTHER, r"says '\?SYNTAX.*another instrument"),
+        (Behaviour.BABBLING, "is no text"),
     ],
 )
-def test_who_else_may_sit_there_is_told(conduct: Conduct, said: str) -> None:
-    laser, _, line = connected(conduct=conduct)
+def test_who_else_may_sit_there_is_told(behaviour: Behaviour, said: str) -> None:
+    laser, _, line = connected(behaviour=behaviour)
     with pytest.raises(LaserError, match=said):
         laser.program()
     assert line.now() < 10.0
@@ -383,7 +383,7 @@ def test_a_port_that_fails_is_told() -> None:
             raise serial.SerialException("device disconnected")
 
     port = Unplugged([])
-    with pytest.raises(LaserError, match="COM3 fails: device disconnected; look at the cable"):
+    with pytest.raises(LaserError, match="COM3 fails: device disconnected; check the cable"):
         Keyence(port, SETTINGS, port.now).program()
 
 
@@ -420,10 +420,10 @@ def test_any_bytes_give_a_number_a_state_or_an_error(chunks: list[bytes], call: 
     assert port.time < 60.0
 
 
-@given(st.integers(min_value=0), st.sampled_from(list(Conduct)))
-def test_no_line_hangs_the_driver(seed: int, conduct: Conduct) -> None:
+@given(st.integers(min_value=0), st.sampled_from(list(Behaviour)))
+def test_no_line_hangs_the_driver(seed: int, behaviour: Behaviour) -> None:
     laser, _, line = connected(
-        conduct=conduct, seed=seed, faults=FaultPlan.parse(["serial-garbage@0.1+0.8"])
+        behaviour=behaviour, seed=seed, faults=FaultPlan.parse(["serial-garbage@0.1+0.8"])
     )
     try:
         assert laser.read() == pytest.approx(6.4e-3)

@@ -50,9 +50,9 @@ def wander(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: 
     return _walk(log_uniform(generator, *_WANDER), generator)
 
 
-def _walk(size: float, chance: np.random.Generator) -> TruthEffect:
-    omegas = 2.0 * math.pi * np.geomspace(_SLOWEST, _FASTEST, 5) * chance.uniform(0.85, 1.15, 5)
-    phases = chance.uniform(0.0, 2.0 * math.pi, 5)
+def _walk(size: float, generator: np.random.Generator) -> TruthEffect:
+    omegas = 2.0 * math.pi * np.geomspace(_SLOWEST, _FASTEST, 5) * generator.uniform(0.85, 1.15, 5)
+    phases = generator.uniform(0.0, 2.0 * math.pi, 5)
     amplitudes = 1.0 / omegas
     amplitudes *= size * math.sqrt(2.0) / math.sqrt(float(np.sum(amplitudes**2)))
 
@@ -67,5 +67,5 @@ def _walk(size: float, chance: np.random.Generator) -> TruthEffect:
         acts_on="sensor",
         description=f"the reading wanders by {size * 1e6:.3g} um RMS between 10 and 60 mHz",
         on_motion=on_motion,
-        anew=lambda chance: _walk(size, chance),
+        redrawn=lambda generator: _walk(size, generator),
     )
