@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 
@@ -11,8 +12,9 @@ from dearig.drivers.channels import Channel
 from dearig.drivers.errors import RigError
 from dearig.drivers.findings import Finding
 from dearig.drivers.gate import Prediction, admit
-from dearig.drivers.instruments import instrument_findings, reading_findings
+from dearig.drivers.instruments import INSTRUMENTS, instrument_findings, reading_findings
 from dearig.drivers.keyence.driver import KeyenceDriver
+from dearig.drivers.laser import LaserDriver, LaserInspection
 from dearig.drivers.rig import Rig, RigIdentity
 from dearig.drivers.rig_kind import RigOptions
 from dearig.drivers.settings import LaserSettings, RigSettings
@@ -78,26 +80,41 @@ class SimulatedKind:
         )
 
 
+class _NotSimulated:
+    """Stands for a laser's driver whose instrument is not simulated; see ``LaserDriver``."""
+
+    role: Literal["laser"] = "laser"
+    name = ""
+
+    def inspect(self, settings: LaserSettings) -> LaserInspection:
+        """Return that nothing was asked."""
+        unasked = Finding(
+            settings.model, "serial port", f"not asked: {settings.driver} is not simulated",
+            verdict="not wired",
+        )  # fmt: skip
+        return LaserInspection((unasked,))
+
+
 def _simulated_laser(
     settings: RigSettings, displacement: float, faults: FaultPlan
-) -> tuple[RigSettings, KeyenceDriver | None]:
-    """Return the driver of a simulated controller, and the settings that say so.
+) -> tuple[RigSettings, LaserDriver | None]:
+    """Return the driver to inspect a simulated rig's laser with, and the settings that say so.
 
-    Only the Keyence controller is simulated: another laser is inspected as if it had no port.
+    Only the Keyence controller is simulated. The port of the rig file is never opened.
     """
     laser = settings.laser
-    port = f"{laser.port} (simulated)" if laser.port and laser.driver == "keyence" else ""
-    laser = laser.model_copy(update={"port": port})
-    shown = settings.model_copy(update={"laser": laser})
+    if not laser.port or INSTRUMENTS.get(laser.driver) is None:
+        return settings, None
     if laser.driver != KeyenceDriver.name:
-        return shown, None
+        return settings, _NotSimulated()
+    laser = laser.model_copy(update={"port": f"{laser.port} (simulated)"})
     controller = SimulatedController(laser, lambda _: displacement, faults=faults)
     line = SimulatedLine(controller, laser.baud_rate)
 
     def opened(_: LaserSettings) -> SimulatedLine:
         return line
 
-    return shown, KeyenceDriver(opened, line.now)
+    return settings.model_copy(update={"laser": laser}), KeyenceDriver(opened, line.now)
 
 
 def _at_zero(

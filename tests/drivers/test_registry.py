@@ -149,8 +149,13 @@ def test_a_rig_that_another_distribution_brings_records(installed, tmp_path):
                      tmp_path / "run.h5")  # fmt: skip
     assert answer.returncode == 0, answer.stderr
     assert (tmp_path / "run.h5").exists()
-    checked = command(installed, "check", *given)
-    assert "here is the Acme laser" in checked.stdout
+    assert "here is the Acme laser" in command(installed, "check", *given).stdout
+    # a simulated rig never opens the port of a real laser
+    text = RIG_FILE.replace("averaging = 10", 'averaging = 10\nport = "COM3"')
+    (tmp_path / "rig.toml").write_text(text, encoding="utf-8")
+    checked = command(installed, "check", "--rig", "sim", *given[2:]).stdout
+    assert "here is the Acme laser" not in checked
+    assert "not asked: acme-laser is not simulated" in checked
 
 
 def test_what_fails_is_a_sentence_at_the_command_line(installed, tmp_path):
