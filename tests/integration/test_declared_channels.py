@@ -221,6 +221,12 @@ def test_info_shows_them(folder):
     assert "Load cell" in done("info", folder / "run.h5").out
 
 
+def test_notebooks_get_them_with_their_units(folder):
+    recording = open_recording(folder / "run.h5")
+    assert recording.to_xarray()["load_cell"].attrs == {"units": "N", "long_name": "Load cell"}
+    assert recording.to_pandas().attrs["units"]["camera"] == "V"
+
+
 @pytest.mark.parametrize("to", ["csv", "mat", "parquet"])
 def test_exports_hold_them(folder, tmp_path, to):
     recording = open_recording(folder / "run.h5")
