@@ -33,10 +33,9 @@ class Monitors:
 
 @runtime_checkable
 class AmplifierDriver(Protocol):
-    """What every amplifier's driver can do; ``name`` is what ``amplifier.driver`` holds."""
+    """What every amplifier's driver can do; ``amplifier.driver`` is its name in the registry."""
 
     role: Literal["amplifier"]
-    name: str
 
     def inspect(self, settings: RigSettings, monitors: Monitors | None) -> tuple[Finding, ...]:
         """Return what the amplifier says, with 0 V commanded; faults are findings.

@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from dearig.drivers.amplifier import AmplifierDriver, Monitors
 from dearig.drivers.findings import Finding
-from dearig.drivers.keyence.driver import KeyenceDriver
 from dearig.drivers.laser import LaserDriver, LaserInspection, analog_findings
-from dearig.drivers.registry import Registry
 from dearig.drivers.settings import RigSettings
-from dearig.drivers.trek import TrekDriver
+from dearig.plugins import Registry
 
 __all__ = ["INSTRUMENTS", "InstrumentDriver", "instrument_findings", "reading_findings"]
 
 
 InstrumentDriver = LaserDriver | AmplifierDriver
 
+_ROLES = ("laser", "amplifier")
+
+
+def _check(name: str, driver: Any) -> None:
+    # both kinds of drivers have the same members; ``role`` says which one it is
+    if not isinstance(driver, LaserDriver) or driver.role not in _ROLES:
+        raise TypeError(f"{name} is no driver: it needs a role ({' or '.join(_ROLES)}) and inspect")
+
+
 #: One line for each driver; other distributions add theirs by the entry point.
 INSTRUMENTS: Registry[InstrumentDriver] = Registry(
     "dearig.instruments",
-    LaserDriver,  # both kinds of drivers have the same members; ``role`` says which one it is
-    "name",
-    (
-        KeyenceDriver(),
-        TrekDriver(),
-    ),
+    {
+        "keyence": "dearig.drivers.keyence.driver:DRIVER",
+        "trek": "dearig.drivers.trek:DRIVER",
+    },
+    _check,
 )
 
 
@@ -82,8 +90,9 @@ def reading_findings(settings: RigSettings, readings: dict[str, float]) -> tuple
 
 
 def _unknown(model: str, role: str, name: str) -> Finding:
-    known = [d.name for d in INSTRUMENTS.values() if d.role == role]
+    known = [known for known, driver in INSTRUMENTS.items() if driver.role == role]
+    refused = [s for s in INSTRUMENTS.left_out if f"plug-in {name} " in s]
     return Finding(
-        model, "driver", INSTRUMENTS.failure(name) or f"there is no {role} driver {name!r}",
+        model, "driver", refused[0] if refused else f"there is no {role} driver {name!r}",
         " or ".join(known), "wrong", f"correct {role}.driver, or install what brings it",
     )  # fmt: skip

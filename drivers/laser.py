@@ -28,10 +28,9 @@ class LaserInspection:
 
 @runtime_checkable
 class LaserDriver(Protocol):
-    """What every laser's driver can do; ``name`` is what ``laser.driver`` holds."""
+    """What every laser's driver can do; ``laser.driver`` is its name in the registry."""
 
     role: Literal["laser"]
-    name: str
 
     def inspect(self, settings: LaserSettings) -> LaserInspection:
         """Return what the laser at ``settings.port`` says; faults are findings.

@@ -33,12 +33,11 @@ class RigOptions:
 class RigKind(Protocol):
     """A kind of rig.
 
-    ``scheme`` is what its addresses have before the first colon, ``addresses`` how they are
-    written, for messages. ``simulated``: no instrument is touched; then faults and noise can be
+    Its addresses begin with its name in the registry; ``addresses`` are how they are written, for
+    messages. ``simulated``: no instrument is touched; then faults and noise can be
     asked for, and the film needs no name.
     """
 
-    scheme: str
     addresses: tuple[str, ...]
     simulated: bool
 

@@ -11,14 +11,13 @@ from dearig.drivers.amplifier import Monitors, zero_findings
 from dearig.drivers.findings import Finding
 from dearig.drivers.settings import RigSettings
 
-__all__ = ["TrekDriver"]
+__all__ = ["DRIVER", "TrekDriver"]
 
 
 class TrekDriver:
     """An amplifier that is known by its two monitors only; see ``AmplifierDriver``."""
 
     role: Literal["amplifier"] = "amplifier"
-    name = "trek"
 
     def inspect(self, settings: RigSettings, monitors: Monitors | None) -> tuple[Finding, ...]:
         """Return the scaling that is applied, and whether the monitors read 0."""
@@ -43,3 +42,7 @@ class TrekDriver:
             advice="correct what is wrong with the card first",
         )  # fmt: skip
         return (*scaling, unread)
+
+
+#: As the registry has it.
+DRIVER = TrekDriver()

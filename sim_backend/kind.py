@@ -23,7 +23,7 @@ from dearig.sim_backend.factory import open_simulated_rig
 from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.keyence import SimulatedController, SimulatedLine
 
-__all__ = ["SimulatedKind"]
+__all__ = ["KIND", "SimulatedKind"]
 
 _SECONDS = 0.2  # of samples at 0 V
 _SAMPLES_MIN = 16
@@ -32,7 +32,6 @@ _SAMPLES_MIN = 16
 class SimulatedKind:
     """A rig that obeys the model (``sim``) or hides an effect (``sim:SEED``); see ``RigKind``."""
 
-    scheme = "sim"
     addresses: tuple[str, ...] = ("sim", "sim:SEED such as sim:7")
     simulated = True
 
@@ -84,7 +83,6 @@ class _NotSimulated:
     """Stands for a laser's driver whose instrument is not simulated; see ``LaserDriver``."""
 
     role: Literal["laser"] = "laser"
-    name = ""
 
     def inspect(self, settings: LaserSettings) -> LaserInspection:
         """Return that nothing was asked."""
@@ -105,7 +103,7 @@ def _simulated_laser(
     laser = settings.laser
     if not laser.port or INSTRUMENTS.get(laser.driver) is None:
         return settings, None
-    if laser.driver != KeyenceDriver.name:
+    if laser.driver != "keyence":
         return settings, _NotSimulated()
     laser = laser.model_copy(update={"port": f"{laser.port} (simulated)"})
     controller = SimulatedController(laser, lambda _: displacement, faults=faults)
@@ -148,3 +146,7 @@ def _card(settings: RigSettings, identity: RigIdentity, rate: float) -> Iterator
         yield Finding(name, channel.replace("_", " "), f"{terminal}, +-{ranges[channel]:g} V")
     if settings.card.do_hv_enable is None:
         yield Finding(name, "high-voltage enable", "no line in the rig file", verdict="not wired")
+
+
+#: As the registry has it.
+KIND = SimulatedKind()

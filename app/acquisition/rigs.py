@@ -5,24 +5,27 @@ from __future__ import annotations
 from typing import Any
 
 from dearig.config.rigfile import RigFile
-from dearig.drivers.daqmx.kind import DaqmxKind
-from dearig.drivers.instruments import INSTRUMENTS
-from dearig.drivers.registry import Plugin, Registry
 from dearig.drivers.rig_kind import RigKind, RigOptions
 from dearig.errors import InputError
-from dearig.sim_backend.kind import SimulatedKind
+from dearig.plugins import Registry
 
-__all__ = ["RIGS", "is_simulated", "kind_of", "options_of", "plugins"]
+__all__ = ["RIGS", "is_simulated", "kind_of", "options_of"]
 
-#: One line for each kind of rig; other distributions add theirs by the entry point.
+
+def _check(name: str, kind: Any) -> None:
+    if not isinstance(kind, RigKind):
+        raise TypeError(f"{name} is no kind of rig: it needs addresses, simulated, open, inspect")
+
+
+#: One line for each kind of rig, by what its addresses have before the first colon; other
+#: distributions add theirs by the entry point.
 RIGS: Registry[RigKind] = Registry(
     "dearig.rigs",
-    RigKind,
-    "scheme",
-    (
-        SimulatedKind(),
-        DaqmxKind(),
-    ),
+    {
+        "sim": "dearig.sim_backend.kind:KIND",
+        "daqmx": "dearig.drivers.daqmx.kind:KIND",
+    },
+    _check,
 )
 
 
@@ -32,10 +35,10 @@ def kind_of(address: str) -> RigKind:
     kind = RIGS.get(scheme)
     if kind is None:
         known = [form for one in RIGS.values() for form in one.addresses]
-        failure = RIGS.failure(scheme)
+        refused = [sentence for sentence in RIGS.left_out if f"plug-in {scheme} " in sentence]
         raise InputError(
             f"rig {address!r} is not known: write {', '.join(known[:-1])} or {known[-1]}"
-            + (f" ({failure})" if failure else "")
+            + (f" ({refused[0]})" if refused else "")
         )
     return kind
 
@@ -49,8 +52,3 @@ def is_simulated(address: str) -> bool:
 def options_of(rig_file: RigFile) -> RigOptions:
     """Return the options of a simulated rig with the film and the load of ``rig_file``."""
     return RigOptions(rig_file.as_film(), rig_file.as_load())
-
-
-def plugins() -> tuple[Plugin[Any], ...]:
-    """Return every rig and instrument that was found, those that cannot be used among them."""
-    return (*RIGS.plugins, *INSTRUMENTS.plugins)

@@ -30,8 +30,7 @@ class AmplifierContract:
 
     def settings(self, **amplifier: float | str) -> RigSettings:
         """Return the settings of a rig with the driver's amplifier."""
-        chosen = {"driver": self.driver().name, **amplifier}
-        return RigSettings(amplifier=AmplifierSettings.model_validate(chosen))
+        return RigSettings(amplifier=AmplifierSettings.model_validate(amplifier))
 
     def test_driver_can_be_registered(self) -> None:
         driver = self.driver()

@@ -10,13 +10,12 @@ from dearig.drivers.rig import Rig
 from dearig.drivers.rig_kind import RigOptions
 from dearig.drivers.settings import RigSettings
 
-__all__ = ["DaqmxKind"]
+__all__ = ["KIND", "DaqmxKind"]
 
 
 class DaqmxKind:
     """A card through NI-DAQmx, in this computer or behind a server; see ``RigKind``."""
 
-    scheme = "daqmx"
     addresses: tuple[str, ...] = ("daqmx:Dev1", "daqmx:Dev1@HOST:PORT")
     simulated = False
 
@@ -38,3 +37,7 @@ class DaqmxKind:
             *instrument_findings(settings, card.monitors, card.displacement_volts),
             *reading_findings(settings, card.readings),
         )
+
+
+#: As the registry has it.
+KIND = DaqmxKind()

@@ -11,7 +11,7 @@ from dearig.drivers.keyence.inspection import inspect
 from dearig.drivers.laser import LaserInspection
 from dearig.drivers.settings import LaserSettings
 
-__all__ = ["KeyenceDriver"]
+__all__ = ["DRIVER", "KeyenceDriver"]
 
 
 class KeyenceDriver:
@@ -21,7 +21,6 @@ class KeyenceDriver:
     """
 
     role: Literal["laser"] = "laser"
-    name = "keyence"
 
     def __init__(
         self,
@@ -34,3 +33,7 @@ class KeyenceDriver:
     def inspect(self, settings: LaserSettings) -> LaserInspection:
         """Return whether it is there, set as ``settings`` say, and sees the film."""
         return inspect(settings, self._opener, self._clock)
+
+
+#: As the registry has it.
+DRIVER = KeyenceDriver()

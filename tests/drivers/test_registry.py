@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,12 +11,9 @@ from pathlib import Path
 import pytest
 
 from dearig.acquisition.check import check_rig
-from dearig.acquisition.rigs import RIGS, kind_of, plugins
+from dearig.acquisition.rigs import RIGS, kind_of
 from dearig.config.rigfile import RigFile
-from dearig.drivers.daqmx.kind import DaqmxKind
 from dearig.drivers.instruments import INSTRUMENTS
-from dearig.drivers.registry import Registry
-from dearig.drivers.rig_kind import RigKind
 from dearig.errors import InputError
 
 #: A distribution with a rig, a laser and an amplifier, all made of this program's own parts.
@@ -28,7 +26,6 @@ from dearig.sim_backend.kind import SimulatedKind
 
 
 class AcmeKind:
-    scheme = "acme"
     addresses = ("acme:1",)
     simulated = False
 
@@ -43,21 +40,12 @@ class AcmeKind:
 
 class AcmeLaser:
     role = "laser"
-    name = "acme-laser"
 
     def inspect(self, settings):
         return LaserInspection((Finding(settings.model, "head", "here is the Acme laser"),))
 
 
-class AcmeAmplifier(TrekDriver):
-    name = "acme-amplifier"
-
-
-class Thief(SimulatedKind):
-    scheme = "daqmx"
-
-
-RIG, LASER, AMPLIFIER, THIEF = AcmeKind(), AcmeLaser(), AcmeAmplifier(), Thief()
+RIG, LASER, AMPLIFIER = AcmeKind(), AcmeLaser(), TrekDriver()
 """
 POINTS = """
 [dearig.rigs]
@@ -66,10 +54,11 @@ broken = acme_broken:RIG
 absent = acme_absent:RIG
 shapeless = acme_rigs:ACME
 wrong = acme_rigs:LASER
-thief = acme_rigs:THIEF
+daqmx = acme_rigs:RIG
 [dearig.instruments]
 acme-laser = acme_rigs:LASER
 acme-amplifier = acme_rigs:AMPLIFIER
+camera = acme_rigs:RIG
 """
 RIG_FILE = """
 [film]
@@ -105,18 +94,22 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def command(installed: Path, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return python(installed, "-m", "dearig", *arguments)
+
+
+def python(installed: Path, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
     path = os.pathsep.join((str(installed), *sys.path))
     return subprocess.run(
-        [sys.executable, "-P", "-m", "dearig", *map(str, arguments)],
+        [sys.executable, "-P", *map(str, arguments)],
         env={**os.environ, "PYTHONPATH": path, "COLUMNS": "200"},
         capture_output=True, text=True, check=False,
     )  # fmt: skip
 
 
 def test_own_rigs_and_instruments_are_found():
-    assert RIGS.names()[:2] == ("sim", "daqmx")
-    assert INSTRUMENTS.names()[:2] == ("keyence", "trek")
-    assert {p.name for p in plugins() if not p.source} == {"sim", "daqmx", "keyence", "trek"}
+    assert list(RIGS)[:2] == ["sim", "daqmx"]
+    assert [RIGS[name].simulated for name in ("sim", "daqmx")] == [True, False]
+    assert list(INSTRUMENTS)[:2] == ["keyence", "trek"]
 
 
 def test_address_of_no_rig_is_told_what_there_is():
@@ -124,21 +117,22 @@ def test_address_of_no_rig_is_told_what_there_is():
         kind_of("dev1")
 
 
-def test_what_cannot_be_used_is_left_out_with_a_sentence(installed, monkeypatch):
-    monkeypatch.syspath_prepend(str(installed))
-    found = Registry("dearig.rigs", RigKind, "scheme", (DaqmxKind(),))
-    assert found.names() == ("daqmx", "acme")
-    assert found.get("daqmx") is found.plugins[0].value
-    failures = {p.name: p.failure for p in found.plugins if p.value is None}
-    assert set(failures) == {"broken", "absent", "shapeless", "wrong", "daqmx"}
-    assert all("acme-rigs 1.2 is left out: " in failure for failure in failures.values())
-    assert "acme_broken:RIG fails with ZeroDivisionError: division" in failures["broken"]
-    assert "No module named 'acme_absent'" in failures["absent"]
-    assert "AttributeError" in failures["shapeless"]
-    assert "it lacks ['addresses', 'open', 'scheme', 'simulated']" in failures["wrong"]
-    assert "the name is taken" in failures["daqmx"]
-    assert found.failure("broken") == failures["broken"]
-    assert found.failure("acme") == ""
+def test_what_cannot_be_used_is_left_out_with_a_sentence(installed):
+    code = (
+        "from dearig.acquisition.rigs import RIGS\n"
+        "from dearig.drivers.instruments import INSTRUMENTS\n"
+        "print(*RIGS, *INSTRUMENTS)\nprint(*RIGS.left_out, *INSTRUMENTS.left_out, sep='\\n')"
+    )
+    names, *left_out = python(installed, "-c", code).stdout.splitlines()
+    assert names.split()[:3] == ["sim", "daqmx", "acme"]
+    assert {"keyence", "trek", "acme-laser", "acme-amplifier"} <= set(names.split())
+    found = {re.search("plug-in ([a-z]+) ", sentence)[1]: sentence for sentence in left_out}
+    assert set(found) == {"broken", "absent", "shapeless", "wrong", "daqmx", "camera"}
+    assert "division by zero" in found["broken"]
+    assert "No module named 'acme_absent'" in found["absent"]
+    assert "is no kind of rig: it needs addresses" in found["wrong"]
+    assert "already taken" in found["daqmx"]
+    assert "is no driver: it needs a role" in found["camera"]
 
 
 def test_a_rig_that_another_distribution_brings_records(installed, tmp_path):
@@ -162,7 +156,7 @@ def test_what_fails_is_a_sentence_at_the_command_line(installed, tmp_path):
     (tmp_path / "rest.toml").write_text(SEQUENCE, encoding="utf-8")
     (tmp_path / "rig.toml").write_text('[film]\nname = "film 3"\n', encoding="utf-8")
     for address, code, words in (
-        ("broken:1", 2, "broken' of acme-rigs 1.2 is left out"),
+        ("broken:1", 2, "the plug-in broken (dearig.rigs) of acme-rigs is left out"),
         ("acme:none", 4, "its driver returned a object, which is not a rig"),
     ):
         given = ("--rig", address, "--rig-file", tmp_path / "rig.toml")
