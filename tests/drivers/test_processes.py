@@ -1,11 +1,16 @@
 """Child processes in a folder whose files have the names of modules."""
 
+import ast
 import multiprocessing
 import os
 import sys
+from pathlib import Path
 
 import pytest
 
+import dearig.drivers
+import dearig.model
+import dearig.sim_backend
 from dearig.config.rigfile import RigFile
 from dearig.drivers.daqmx.address import Address
 from dearig.drivers.daqmx.guardian import GuardianProcess
@@ -34,8 +39,6 @@ def test_path_of_a_child_lacks_the_working_folder(tmp_path, monkeypatch, entry):
 
 
 def test_working_folder_that_holds_the_program_stays_on_the_path(tmp_path, monkeypatch):
-    import dearig
-
     try:
         (tmp_path / "dearig").symlink_to(dearig.__path__[0], target_is_directory=True)
     except OSError:
@@ -105,3 +108,24 @@ def test_guardian_that_was_killed_is_not_armed_and_says_so():
 def test_guardian_without_a_card_says_what_it_lacks():
     with pytest.raises(RigError, match="cannot do its work: card Dev1: NI-DAQmx"):
         GuardianProcess(Address("Dev1"), RigFile())
+
+
+def test_every_child_process_of_the_program_gets_this_environment():
+    started = []
+    packages = (dearig, dearig.drivers, dearig.model, dearig.sim_backend)
+    folders = [Path(package.__path__[0]) for package in packages]
+    for source in sorted(path for folder in folders for path in folder.rglob("*.py")):
+        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.Call):
+                continue
+            call = ast.unparse(node)
+            if ast.unparse(node.func) in ("subprocess.Popen", "subprocess.run") and (
+                "sys.executable" in call
+            ):
+                started.append(source.name)
+                assert "'-P'" in call, source
+                assert "env=child_environment()" in call, source
+            if ast.unparse(node.func).endswith("get_context"):
+                started.append(source.name)
+                assert "with isolated_spawn():" in source.read_text(encoding="utf-8"), source
+    assert {"guardian.py", "worker.py", "main.py"} <= set(started)
