@@ -4,6 +4,7 @@
 /entry                  NXentry: format, kind, complete, outcome, samples, default="data"
 /entry/title, start_time, end_time
 /entry/data             NXdata: time and the physical values, and beside them NAME_counts
+                        also of the channels that the rig file declares, by their names
 /entry/instrument/*     one NXinstrument for each instrument; channels/NAME links to the counts
 /entry/sample           NXsample: film and load
 /entry/sequence         TOML (runs only)

@@ -175,3 +175,16 @@ def test_driver_that_is_not_there_keeps_a_run_from_starting(tmp_path):
     wrong = {finding.instrument: finding for finding in check_rig("sim", rig_file).wrong}
     assert wrong["Keyence LK-H152 / LK-G5000"].found == "there is no laser driver 'nowhere'"
     assert wrong["TREK 10/40A-HS"].wanted == "trek"
+
+
+def test_simulated_rig_needs_no_library_of_a_card_or_a_serial_port(installed):
+    code = (
+        "import sys\n"
+        "sys.modules.update(dict.fromkeys(('nidaqmx', 'grpc', 'serial'), None))\n"
+        "from dearig.cli.main import main\n"
+        "sys.argv[1:] = ['check', '--rig', 'sim']\n"
+        "main()"
+    )
+    answer = python(installed, "-c", code)
+    assert answer.returncode == 0, answer.stderr
+    assert "simulated, at sim" in answer.stdout
