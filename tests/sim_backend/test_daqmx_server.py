@@ -2,23 +2,18 @@
 
 import threading
 
-import nidaqmx
 import numpy as np
 import pytest
-from nidaqmx import GrpcSessionOptions, SessionInitializationBehavior
 from nidaqmx.constants import (
     AcquisitionType,
     ChannelType,
     DigitalWidthUnits,
-    LineGrouping,
-    TaskMode,
     TerminalConfiguration,
 )
-from nidaqmx.errors import DaqError, DaqReadError, DaqWriteError, RpcError
+from nidaqmx.errors import DaqError, DaqReadError, DaqWriteError
 from nidaqmx.stream_readers import AnalogMultiChannelReader, AnalogUnscaledReader
 from nidaqmx.stream_writers import AnalogUnscaledWriter
-from nidaqmx.system import Device, System, WatchdogTask
-from nidaqmx.types import DOExpirationState
+from nidaqmx.system import Device, System
 
 from dearig.config.rigfile import RigFile
 from dearig.drivers.contract.rig import RATE, begin, drain, lobes, play
@@ -34,50 +29,18 @@ from tests.tools.daqmx import (
     clock_inputs,
     clock_output,
     connected,
-    enabled_rig,
     in_thread,
+    play_finite,
     read,
     served,
     task,
+    the_rig,
+    volts,
     write,
 )
 
 HIGH, LOW = True, False
 LONG = lobes(peaks=(8000.0,) * 66)  # some chunks long
-
-
-@pytest.fixture
-def card():
-    with served() as made:
-        yield made
-
-
-@pytest.fixture
-def session(card):
-    return card.session
-
-
-@pytest.fixture
-def output(session):
-    with task(session) as made:
-        add_output(made)
-        yield made
-
-
-@pytest.fixture
-def inputs(session):
-    with task(session) as made:
-        add_inputs(made)
-        yield made
-
-
-def the_rig(address="sim", seed=0):
-    settings = RigFile()
-    return open_simulated_rig(address, settings, settings.as_film(), settings.as_load(), seed=seed)
-
-
-def volts(waveform):
-    return waveform.voltage / 1000.0
 
 
 # what it says of itself
@@ -149,21 +112,6 @@ def test_an_unset_conversion_rate_leaves_time_to_settle_where_there_is_some(inpu
 
 
 # data
-
-
-def play_finite(session, waveform, kind=AnalogUnscaledReader):
-    with task(session) as ao, task(session) as ai:
-        add_output(ao)
-        add_inputs(ai)
-        clock_output(ao, waveform.rate, waveform.voltage.size)
-        clock_inputs(ai, waveform.rate, waveform.voltage.size)
-        ao.write(volts(waveform))
-        ai.start()
-        ao.start()
-        counts = read(ai, waveform.voltage.size)
-        ao.wait_until_done(0.0)
-        ai.wait_until_done(0.0)
-    return counts
 
 
 @pytest.mark.parametrize("address", ["sim", "sim:7"])
@@ -519,92 +467,6 @@ def test_a_reset_frees_who_waits_for_samples():
         assert caught.value.error_code == -88709
 
 
-def test_the_history_proves_when_zero_was_reached():
-    clock = HandClock()
-    with served(clock=clock) as card, task(card.session) as ao:
-        add_output(ao)
-        clock.advance(2.0)
-        clock_output(ao, RATE, 300)
-        ao.write(np.concatenate((np.zeros(50), np.full(100, 5.0), np.zeros(150))))
-        ao.start()
-        clock.advance(1.0)
-        assert [c.time for c in card.device.history()] == pytest.approx([0.0, 2.05, 2.15])
-        assert [c.wire for c in card.device.history()] == pytest.approx([0.0, 5000.0, 0.0], abs=0.2)
-
-
-@pytest.mark.parametrize("seconds", [None, 0.4])
-def test_without_the_enable_line_the_film_gets_nothing(seconds):
-    """``seconds`` is after how long the watchdog takes the line low."""
-    waveform = lobes()
-    with served(enabled_rig()) as card, task(card.session) as ao, task(card.session) as ai:
-        line = nidaqmx.Task(grpc_options=card.session)
-        line.do_channels.add_do_chan(f"Dev1/{ENABLE}")
-        line.write(HIGH)
-        dog = None
-        if seconds is not None:
-            dog = WatchdogTask("Dev1", timeout=0.1, grpc_options=card.session)
-            dog.cfg_watchdog_do_expir_states(
-                [DOExpirationState(f"Dev1/{ENABLE}", nidaqmx.constants.Level.LOW)]
-            )
-            dog.start()
-        add_output(ao)
-        add_inputs(ai, "ai0", "_ao0_vs_aognd")
-        clock_output(ao, RATE, waveform.voltage.size)
-        clock_inputs(ai, RATE)
-        ao.write(volts(waveform))
-        ai.start()
-        ao.start()
-        parts = []
-        for at in range(90, 300, 90):
-            if dog is not None and at <= 180:
-                dog.reset_timer()
-            parts.append(read(ai, 90))
-        counts = np.concatenate(parts, axis=1)
-        own = play(the_rig(), waveform).counts
-        np.testing.assert_array_equal(counts[1], own[0, :270])
-        if dog is None:
-            line.write(LOW)
-            assert card.device.wire_voltage() == 0.0
-            assert read(ai, 50)[0, 10:].max() < 20
-        else:
-            assert dog.expired
-            assert card.device.line(ENABLE) is LOW
-            assert card.device.wire_voltage() == 0.0
-            # 0.1 s after the last reset at sample 90
-            np.testing.assert_array_equal(counts[0, :190], own[1, :190])
-            assert own[1, 195] > 1000
-            assert np.abs(counts[0, 195:]).max() < 20
-            with pytest.raises(DaqWriteError) as locked:
-                line.write(HIGH)
-            assert locked.value.error_code == -200678
-            with pytest.raises(DaqError) as late:
-                dog.reset_timer()
-            assert late.value.error_code == -200644
-            dog.clear_expiration()
-            line.write(HIGH)
-            assert card.device.line(ENABLE) is HIGH
-            dog.close()
-        line.close()
-
-
-def test_digital_lines_hold_what_was_written(card, session):
-    with task(session) as lines:
-        lines.do_channels.add_do_chan(
-            "Dev1/port0/line1:3", line_grouping=LineGrouping.CHAN_FOR_ALL_LINES
-        )
-        lines.write(0b101 << 1)
-    levels = [card.device.line(f"port0/line{i}") for i in range(5)]
-    assert levels == [False, True, False, True, False]
-    each = LineGrouping.CHAN_PER_LINE
-    with task(session) as lines:
-        lines.do_channels.add_do_chan("Dev1/port0/line1:2", line_grouping=each)
-        lines.write([False, True])
-    assert [card.device.line(f"port0/line{i}") for i in (1, 2, 3)] == [False, True, True]
-
-
-# events
-
-
 def test_a_done_event_comes_when_it_is_done(card, output):
     done = threading.Event()
     told = []
@@ -637,288 +499,6 @@ def test_every_n_samples_an_event_comes(card, inputs):
     assert not three.acquire(blocking=False)
     inputs.stop()
     inputs.register_every_n_samples_acquired_into_buffer_event(100, None)
-
-
-# the rules, a row each: what is tried, and the code with which the card refuses
-
-
-def _same_channel_twice(session):
-    with task(session) as ai:
-        add_inputs(ai, "ai0", "ai0")
-
-
-def _two_kinds(session):
-    with task(session) as made:
-        add_inputs(made)
-        add_output(made)
-
-
-def _reserved(kind):
-    def attempt(session):
-        with task(session) as one, task(session) as other:
-            for made in (one, other):
-                if kind == "ai":
-                    add_inputs(made)
-                    clock_inputs(made, RATE, source="")
-                elif kind == "ao":
-                    add_output(made)
-                    clock_output(made, RATE, 10)
-                else:
-                    made.do_channels.add_do_chan(f"Dev1/{ENABLE}")
-                made.control(TaskMode.TASK_RESERVE)
-
-    return attempt
-
-
-def _ai(*terminals, **options):
-    def attempt(session):
-        with task(session) as ai:
-            for terminal in terminals:
-                ai.ai_channels.add_ai_voltage_chan(terminal, **options)
-
-    return attempt
-
-
-def _ao(terminal, **options):
-    def attempt(session):
-        with task(session) as ao:
-            ao.ao_channels.add_ao_voltage_chan(terminal, **options)
-
-    return attempt
-
-
-def _ai_clock(rate, samples=100, inputs=("ai0", "ai1", "ai2"), **more):
-    def attempt(session):
-        with task(session) as ai:
-            add_inputs(ai, *inputs)
-            ai.timing.cfg_samp_clk_timing(rate, samps_per_chan=samples, **more)
-
-    return attempt
-
-
-def _with_output(act):
-    def attempt(session):
-        with task(session) as ao:
-            add_output(ao)
-            act(ao)
-
-    return attempt
-
-
-def _with_nothing(act):
-    def attempt(session):
-        with task(session) as made:
-            act(made)
-
-    return attempt
-
-
-def _read_output(ao):
-    reader = AnalogUnscaledReader(ao.in_stream)
-    reader.verify_array_shape = False
-    reader.read_int16(np.empty((1, 5), dtype=np.int16), 5)
-
-
-def _with_inputs(act):
-    def attempt(session):
-        with task(session) as ai:
-            add_inputs(ai)
-            act(ai)
-
-    return attempt
-
-
-def _scan_too_long(ai):
-    clock_inputs(ai, 20e3, source="")
-    ai.timing.delay_from_samp_clk_delay = 30e-6
-    ai.start()
-
-
-def _timing_while_running(ao):
-    clock_output(ao, RATE, 100)
-    ao.write(np.zeros(100))
-    ao.start()
-    ao.timing.cfg_samp_clk_timing(RATE)
-
-
-def _buffer_while_running(ai):
-    clock_inputs(ai, RATE, source="")
-    ai.start()
-    ai.in_stream.input_buf_size = 2000
-
-
-def _beyond_the_end(ao):
-    clock_output(ao, RATE, 100, buffer=200)
-    write(ao, np.zeros(150))
-
-
-def _buffer_full(ao):
-    clock_output(ao, RATE, buffer=100)
-    write(ao, np.zeros(150))
-
-
-def _second_write_without_a_size(ao):
-    clock_output(ao, RATE, buffer=None)
-    ao.out_stream.regen_mode = nidaqmx.constants.RegenerationMode.DONT_ALLOW_REGENERATION
-    write(ao, np.zeros(100))
-    write(ao, np.zeros(100))
-
-
-def _empty_buffer(ao):
-    clock_output(ao, RATE, 100)
-    ao.start()
-
-
-def _one_sample(ao):
-    clock_output(ao, RATE, buffer=1)
-    write(ao, np.zeros(1))
-    ao.start()
-
-
-def _read_too_much(ai):
-    clock_inputs(ai, RATE, 100, source="")
-    ai.start()
-    read(ai, 101)
-
-
-def _not_done(ai):
-    clock_inputs(ai, RATE, source="")
-    ai.start()
-    ai.wait_until_done(0.5)
-
-
-def _watchdog(**options):
-    def attempt(session):
-        WatchdogTask("Dev1", grpc_options=session, **options)
-
-    return attempt
-
-
-def _twice_the_same_name(session):
-    new = GrpcSessionOptions(
-        session.grpc_channel,
-        "",
-        initialization_behavior=SessionInitializationBehavior.INITIALIZE_SERVER_SESSION,
-    )
-    with nidaqmx.Task("mine", grpc_options=session), nidaqmx.Task("mine", grpc_options=new):
-        pass
-
-
-RULES = {
-    "a device that is not there": (_ai("Dev2/ai0"), -200220),
-    "a device in a property": (
-        lambda s: Device("Dev7", grpc_options=s).product_type,
-        -200220,
-    ),
-    "an input that is not there": (_ai("Dev1/ai16"), -200170),
-    "an input that is none": (_ai("Dev1/ao0"), -200170),
-    "an output that is not there": (_ao("Dev1/ao2"), -200170),
-    "a line that is not there": (
-        _with_nothing(lambda made: made.do_channels.add_do_chan("Dev1/port0/line31")),
-        -200170,
-    ),
-    "a name without a device": (_ai("ai0"), -200086),
-    "an input range that it has not": (_ai("Dev1/ai0", min_val=-11.0, max_val=11.0), -200077),
-    "an output range that it has not": (_ao("Dev1/ao0", min_val=0.0, max_val=12.0), -200077),
-    "a range upside down": (_ai("Dev1/ai0", min_val=1.0, max_val=-1.0), -200082),
-    "the second of a pair": (
-        _ai("Dev1/ai8", terminal_config=TerminalConfiguration.DIFF),
-        -200077,
-    ),
-    "a wiring that it has not": (
-        _ai("Dev1/ai0", terminal_config=TerminalConfiguration.PSEUDO_DIFF),
-        -200077,
-    ),
-    "the same channel twice": (_same_channel_twice, -200489),
-    "two kinds of channels": (_two_kinds, -200559),
-    "inputs in use": (_reserved("ai"), -50103),
-    "an output in use": (_reserved("ao"), -50103),
-    "a line in use": (_reserved("do"), -50103),
-    "too fast for one input": (_ai_clock(2.1e6, inputs=("ai0",)), -200077),
-    "too fast for three inputs": (_ai_clock(340e3), -200077),
-    "too fast for the output": (_with_output(lambda ao: clock_output(ao, 3e6, 100)), -200077),
-    "too slow": (_ai_clock(0.01), -200077),
-    "no samples": (_ai_clock(1000.0, samples=1), -200077),
-    "a clock from nowhere": (_ai_clock(1000.0, source="/Dev1/ao/Nothing"), -89120),
-    "a clock of another card": (_ai_clock(1000.0, source="/Dev3/ao/SampleClock"), -89120),
-    "a clock that it cannot take": (_ai_clock(1000.0, source="/Dev1/PFI0"), -89136),
-    "a clock without channels": (
-        _with_nothing(lambda made: made.timing.cfg_samp_clk_timing(1000.0)),
-        -200478,
-    ),
-    "a scan longer than a sample": (_with_inputs(_scan_too_long), -200081),
-    "conversions too fast": (
-        _with_inputs(lambda ai: setattr(ai.timing, "ai_conv_rate", 1.5e6)),
-        -200077,
-    ),
-    "a start without channels": (_with_nothing(lambda made: made.start()), -200478),
-    "a clock while it runs": (_with_output(_timing_while_running), -200479),
-    "a buffer while it runs": (_with_inputs(_buffer_while_running), -200557),
-    "a start with nothing written": (_with_output(_empty_buffer), -200462),
-    "a buffer of one sample": (_with_output(_one_sample), -200609),
-    "more volts than it has": (_with_output(lambda ao: ao.write(10.5)), -200561),
-    "volts that are no number": (_with_output(lambda ao: ao.write(float("nan"))), -200561),
-    "a write without a start": (
-        _with_output(lambda ao: ao.write(1.0, auto_start=False)),
-        -200846,
-    ),
-    "a write beyond the end": (_with_output(_beyond_the_end), -201132),
-    "a write into a full buffer": (_with_output(_buffer_full), -200292),
-    "a second write where the first made the buffer": (
-        _with_output(_second_write_without_a_size),
-        -200547,
-    ),
-    "a read beyond the end": (_with_inputs(_read_too_much), -200278),
-    "a read of an output": (
-        _with_output(_read_output),
-        -200460,
-    ),
-    "a wait that is too short": (_with_inputs(_not_done), -200560),
-    "a property that it has not": (
-        lambda s: Device("Dev1", grpc_options=s).ai_bridge_rngs,
-        -200197,
-    ),
-    "a property that cannot be set": (
-        _with_inputs(lambda ai: setattr(ai.ai_channels[0], "ai_max", 1.0)),
-        -200197,
-    ),
-    "a channel that is not in the task": (
-        _with_inputs(lambda ai: ai.ai_channels["other"].ai_max),
-        -200461,
-    ),
-    "a watchdog that waits for ever and a day": (_watchdog(timeout=1e6), -200668),
-    "a name that is taken": (_twice_the_same_name, -200089),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("rule", list(RULES))
-def test_the_card_refuses(session, rule):
-    attempt, code = RULES[rule]
-    with pytest.raises(DaqError) as caught:
-        attempt(session)
-    assert caught.value.error_code == code, caught.value
-
-
-def test_after_a_refusal_nothing_is_reserved(card, session):
-    for attempt, _ in RULES.values():
-        with pytest.raises(DaqError):
-            attempt(session)
-    Device("Dev1", grpc_options=session).reset_device()
-    play_finite(session, lobes())
-
-
-def test_what_is_not_simulated_is_said_to_be_so(session):
-    with task(session) as made, pytest.raises(RpcError, match="not supported"):
-        made.ci_channels.add_ci_count_edges_chan("Dev1/ctr0")
-
-
-def test_a_task_that_another_client_has_cleared_is_refused(card, session):
-    made = nidaqmx.Task("shared", grpc_options=session)
-    card.device.clear(card.device.task("shared"))
-    for call in (made.start, made.close):
-        with pytest.raises(DaqError) as caught:
-            call()
-        assert caught.value.error_code == -200088
 
 
 def test_tasks_on_a_rate_that_only_the_clock_knows(session, output, inputs):

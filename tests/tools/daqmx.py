@@ -22,11 +22,14 @@ from nidaqmx.stream_readers import AnalogUnscaledReader
 from nidaqmx.stream_writers import AnalogSingleChannelWriter
 
 from dearig.config.rigfile import RigFile
+from dearig.drivers.gate import GatedWaveform
 from dearig.sim_backend.clock import Clock, ManualClock
 from dearig.sim_backend.daqmx.device import Device
 from dearig.sim_backend.daqmx.opening import open_device
 from dearig.sim_backend.daqmx.server import DaqmxServer
+from dearig.sim_backend.factory import open_simulated_rig
 from dearig.sim_backend.faults import FaultPlan
+from dearig.sim_backend.rig import SimulatedRig
 
 ENABLE = "port0/line0"
 SKEW, INTERVAL = 50e-6, 10e-6  # s, the rig file's defaults
@@ -199,6 +202,35 @@ def read(made: nidaqmx.Task, samples: int, timeout: float = 10.0) -> np.ndarray:
     counts = np.empty((len(made.channel_names), samples), dtype=np.int16)
     got = AnalogUnscaledReader(made.in_stream).read_int16(counts, samples, timeout)
     return counts.reshape(-1)[: counts.shape[0] * got].reshape(counts.shape[0], got)
+
+
+def the_rig(address: str = "sim", seed: int = 0) -> SimulatedRig:
+    """The same rig in this process, without a server."""
+    settings = RigFile()
+    return open_simulated_rig(address, settings, settings.as_film(), settings.as_load(), seed=seed)
+
+
+def volts(waveform: GatedWaveform) -> np.ndarray:
+    """V at the output that make ``waveform`` at the film, with a gain of 1000."""
+    return waveform.voltage / 1000.0
+
+
+def play_finite(
+    session: GrpcSessionOptions, waveform: GatedWaveform, kind: type = AnalogUnscaledReader
+) -> np.ndarray:
+    """Counts (inputs, samples) of one finite run as the rig file wires it."""
+    with task(session) as ao, task(session) as ai:
+        add_output(ao)
+        add_inputs(ai)
+        clock_output(ao, waveform.rate, waveform.voltage.size)
+        clock_inputs(ai, waveform.rate, waveform.voltage.size)
+        ao.write(volts(waveform))
+        ai.start()
+        ao.start()
+        counts = read(ai, waveform.voltage.size)
+        ao.wait_until_done(0.0)
+        ai.wait_until_done(0.0)
+    return counts
 
 
 def in_thread(call: Callable[[], object]) -> Callable[[], object]:
