@@ -222,6 +222,8 @@ def test_info_shows_them(folder):
 
 
 def test_notebooks_get_them_with_their_units(folder):
+    pytest.importorskip("xarray")
+    pytest.importorskip("pandas")
     recording = open_recording(folder / "run.h5")
     assert recording.to_xarray()["load_cell"].attrs == {"units": "N", "long_name": "Load cell"}
     assert recording.to_pandas().attrs["units"]["camera"] == "V"
