@@ -270,9 +270,15 @@ def _window() -> Iterator[Item]:
 
 def _left_out() -> dict[str, tuple[str, ...]]:
     """Return the sentences of each registry on the entries that it cannot use, by group."""
+    from dearig.acquisition.rigs import RIGS
     from dearig.config.segments import SEGMENT_KINDS
+    from dearig.drivers.instruments import INSTRUMENTS
 
-    return {"segments": SEGMENT_KINDS.left_out}
+    return {
+        "segments": SEGMENT_KINDS.left_out,
+        "rigs": RIGS.left_out,
+        "instruments": INSTRUMENTS.left_out,
+    }
 
 
 def _plugins() -> Iterator[Item]:
