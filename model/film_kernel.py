@@ -16,9 +16,9 @@ from dearig.model.coefficients import HELD, KIND, LIMIT, LOCKING, RATE, WIDTH
 from dearig.model.effects import assembly
 from dearig.model.jit import allocating, jit
 from dearig.model.kernel import BAD_INPUT, LOCKED, NOT_CONVERGED, OK
+from dearig.model.kernel.rodas_coefficients import ALPHA, GAMMA, A, C, D
 from dearig.model.kinematics import strain_and_pull
 from dearig.model.network import HEAD, branch_count, nominal_pull, nominal_pull_slope, true_pull
-from dearig.model.rodas import ALPHA, GAMMA, A, C, D
 
 __all__ = ["add_effects", "drive_by_stretch"]
 

@@ -1,0 +1,339 @@
+"""Carry the film along a record of voltages: interval by interval, each by the method it needs."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from dearig.model.coefficients import ELECTRIC, HELD, INERTIA, UNIFORM
+from dearig.model.jit import allocating, inlined, jit
+from dearig.model.kernel.effect_forces import active_effects, added_inertia, drag_at
+from dearig.model.kernel.exponential_rk import BRANCHES_MAX, exponential_steps, film_table, is_swift
+from dearig.model.kernel.motion import admissible, rates, reason_to_fail, spring_table
+from dearig.model.kernel.propagator import (
+    PROPAGATOR,
+    drag_class,
+    fill_propagator,
+    is_propagator_of,
+)
+from dearig.model.kernel.rk4 import rk4_steps
+from dearig.model.kernel.rodas import LONGEST, WORTH, cross_by_rodas
+from dearig.model.kernel.status import BAD_INPUT, CAREFUL, NOT_CONVERGED, OK
+from dearig.model.kernel.step_control import (
+    DRAG_SUBSTEPS_MAX,
+    EFFECT_SUBSTEPS_MAX,
+    RINGING,
+    STIFFNESS_NEAR,
+    Pace,
+    Policy,
+    Stiffness,
+    drag_between,
+    pace_of,
+    policy_of,
+    refinement,
+    stiffness_at,
+    stiffness_changed,
+    too_stiff,
+)
+from dearig.model.kinematics import electric
+
+__all__ = ["drive_by_voltage"]
+
+_LOOK_EVERY = 64  # samples: the film's stiffness follows the stretch slowly
+_EVEN = 1e-6  # of an interval: so near are intervals of one length
+_PROPAGATORS = 256  # that are kept
+_DRAG_MISSED = 1.5  # of the steps taken: so many may a drag ask for after the fact
+
+
+class Workspace(NamedTuple):
+    """The arrays of one simulation."""
+
+    springs: np.ndarray  # (WIDTH + 3, n + 1): spring_table
+    table: np.ndarray  # film_table, or (0,)
+    branches: np.ndarray  # (2, 3 or more): network_stiffness
+    propagators: np.ndarray  # (_PROPAGATORS, PROPAGATOR)
+    phi: np.ndarray  # (7, 3, 3)
+    work: np.ndarray  # (15, y.size)
+    before: np.ndarray  # (y.size,): the state at the last sample
+    trace: np.ndarray  # (5,): accelerations and speeds met, see rk4_steps and exponential_steps
+
+
+@inlined
+def _start_ringing(
+    c: np.ndarray, springs: np.ndarray, y: np.ndarray, v: float, dy: np.ndarray, trace: np.ndarray
+) -> None:
+    """Let ``trace`` begin at ``y``: an acceleration there may be the start of an oscillation."""
+    rates(int(c[HELD]), int(c[UNIFORM]), c, springs, y, v * v, dy)
+    trace[0] = trace[1] = dy[1]
+
+
+@inlined
+def _copy(source: np.ndarray, target: np.ndarray, count: int) -> None:
+    for j in range(count):
+        target[j] = source[j]
+
+
+@inlined
+def _steps_by_ringing(
+    policy: Policy,
+    film: Stiffness,
+    pace: Pace,
+    dt: float,
+    jump: float,
+    ringing: float,
+    hasty: bool,
+) -> int:
+    """Return how many exponential steps an interval takes, so that they resolve what must be."""
+    fine = pace.steps
+    if policy.fine_only:
+        fine = pace.calm_steps if hasty else pace.steps * refinement(pace, jump, ringing)
+    elif not policy.coarse and max(ringing * pace.fading, abs(jump)) > RINGING * film.springs:
+        finer = film.omega * dt / policy.phase_max
+        fine = max(fine, math.ceil(min(finer - 1e-6, EFFECT_SUBSTEPS_MAX)))
+    return fine
+
+
+@inlined
+def _propagator_for(
+    room: Workspace,
+    current: int,
+    stiffness: float,
+    grain: float,
+    drag: float,
+    h: float,
+    fine: int,
+) -> int:
+    """Return the row of ``room.propagators`` for a film so stiff, filled where it was not.
+
+    Stiffnesses are told apart by ``grain`` 1/s^2; the ``current`` row is kept where it is near
+    enough. A row is found again by a hash of what it was made of.
+    """
+    propagators = room.propagators
+    group = drag_class(drag)
+    row = current
+    if not is_propagator_of(propagators[row], stiffness, 0.5 * grain, group, h):
+        level = max(math.floor(stiffness / grain), 1.0)
+        middle = (level + 0.5) * grain
+        row = (int(level) + 37 * fine + 101 * group) % _PROPAGATORS
+        if not is_propagator_of(propagators[row], middle, 0.0, group, h):
+            fill_propagator(middle, drag, room.branches, h, room.phi, propagators[row])
+    return row
+
+
+@inlined
+def _cross_exponentially(
+    policy: Policy,
+    film: Stiffness,
+    pace: Pace,
+    c: np.ndarray,
+    room: Workspace,
+    current: int,
+    grain: float,
+    y: np.ndarray,
+    v0: float,
+    v1: float,
+    t: float,
+    warmth: float,
+    dt: float,
+    fine: int,
+    change: float,
+    hasty: bool,
+) -> tuple[int, int]:
+    """Cross one interval ``dt`` from ``room.before`` in ``fine`` steps, or more where a drag asks.
+
+    ``change`` is how much the rate of stretch may change meanwhile. Returns the steps taken, also
+    those in vain, and the row of ``room.propagators`` that was used.
+    """
+    before, trace = room.before, room.trace
+    taken, row, drag, asked = 0, current, 0.0, 0.0
+    seen, seen_before = trace[0], trace[1]
+    if policy.drags:
+        slow, fast = max(abs(before[1]) - change, 0.0), abs(before[1]) + change
+        drag, asked = drag_between(policy.acting, c, before, slow, fast, dt, hasty)
+    # a film that the field pulls on is softer by that
+    stiffness = film.springs - room.table[1] * 0.5 * (v0 * v0 + v1 * v1)
+    while True:
+        # a drag may change with the rate: then in finer steps
+        fine = max(fine, math.ceil(min(asked, DRAG_SUBSTEPS_MAX)))
+        h = dt / fine
+        row = _propagator_for(room, row, stiffness, grain, drag, h, fine)
+        exponential_steps(
+            policy.acting, c, room.table, room.branches, room.propagators[row], y, v0, v1, t,
+            warmth, h, fine, fine // pace.calm_steps if fine > pace.calm_steps else 1, trace,
+        )  # fmt: skip
+        taken += fine
+        if not policy.drags or fine >= DRAG_SUBSTEPS_MAX:
+            break
+        # the film may have been faster or slower on the way than was predicted
+        met, asked = drag_between(policy.acting, c, before, trace[3], trace[4], dt, hasty)
+        if asked <= _DRAG_MISSED * fine:
+            break
+        drag, fine = met, fine + 1
+        if not math.isfinite(asked):
+            drag, asked = drag_at(policy.acting, c, before, 0.0), 0.0
+            fine = DRAG_SUBSTEPS_MAX
+        trace[0], trace[1] = seen, seen_before
+        _copy(before, y, y.shape[0])
+    return taken, row
+
+
+@jit
+def _follow(
+    policy: Policy,
+    acting: int,
+    c: np.ndarray,
+    time: np.ndarray,
+    voltage: np.ndarray,
+    ends: np.ndarray,
+    warmth: np.ndarray,
+    y: np.ndarray,
+    stretch: np.ndarray,
+    rate: np.ndarray,
+    room: Workspace,
+) -> tuple[int, int, int]:
+    """Do what ``drive_by_voltage`` does: one compiled loop with its control."""
+    samples, held = time.shape[0], int(c[HELD])
+    springs, branches, trace = room.springs, room.branches, room.trace
+    before = room.before
+    carried = y.shape[0] if policy.acting else 1 + springs.shape[1]
+    warm = warmth.shape[0] == samples
+    film = stiffness_at(policy, acting, c, y, time[0], branches)
+    grain = STIFFNESS_NEAR * max(film.springs, 1.0)
+    field_gain = c[ELECTRIC] / c[INERTIA]
+    row = 0
+    pace, dt_paced, lam_seen = pace_of(policy, film, 1.0), 0.0, y[0]
+    ringing, jump, rate_before, dt_before = 0.0, 0.0, y[1], 1.0
+    last = last_begin = voltage[0]
+    status, reached, taken, h, fresh = OK, samples, 0, LONGEST, True
+    for k in range(samples):
+        stretch[k], rate[k] = y[0], y[1]
+        if k == samples - 1:
+            break
+        dt, v0, v1 = time[k + 1] - time[k], voltage[k], ends[k]
+        if not (dt > 0.0 and math.isfinite(v0) and math.isfinite(v1) and math.isfinite(dt)):
+            status, reached = BAD_INPUT, k + 1
+            break
+        if fresh:
+            _start_ringing(c, springs, y, v0, room.work[0], trace)
+            ringing, fresh = abs(trace[0]), False
+        if k and k % _LOOK_EVERY == 0:
+            film, lam_seen = stiffness_at(policy, acting, c, y, time[k], branches), y[0]
+            dt_paced = 0.0
+        if abs(dt - dt_paced) > _EVEN * dt:
+            pace, dt_paced = pace_of(policy, film, dt), dt
+        explicit = pace.explicit
+        if explicit:
+            # how the field jumps, and how its slope does
+            sloped = (last * last - last_begin * last_begin) * (dt / dt_before)
+            jump_before = jump
+            jump = v1 * v1 - last * last - sloped
+            jump *= field_gain * electric(held, y[0])
+            _copy(y, before, carried)
+            theta = warmth[k] if warm else 0.0
+            # a slow staircase rings within each of its long treads, but does not ring on
+            treads = v0 != last and pace.calm_steps > 1
+            if policy.exponential:
+                hasty = not policy.fine_only
+                if policy.watched and not film.steep:
+                    excited = max(ringing * pace.fading, abs(jump - jump_before))
+                    hasty = excited < policy.calm_below * film.springs
+                fine = _steps_by_ringing(
+                    policy, film, pace, dt, jump, ringing, hasty
+                )  # fmt: skip
+                treads = treads and policy.fine_only
+                change = 0.0
+                # a jump cannot carry the film on faster than springs let it oscillate
+                if policy.drags:
+                    change = abs(y[1] - rate_before) + abs(jump) * min(dt, 1.0 / film.omega)
+                rate_before = y[1]
+            else:
+                fine = pace.steps * refinement(pace, jump, ringing)
+            forced = 0.0
+            if treads:
+                trace[0] += jump
+                trace[1] += jump
+                forced = 3.0 * min(abs(jump), abs(jump_before))
+            if policy.exponential:
+                more, row = _cross_exponentially(
+                    policy, film, pace, c, room, row, grain, y,
+                    v0, v1, time[k], theta, dt, fine, change, hasty,
+                )  # fmt: skip
+                taken += more
+            else:
+                rk4_steps(
+                    policy.acting, c, springs, y, v0, v1, time[k], theta, dt / fine, fine,
+                    fine // pace.steps, room.work, trace,
+                )  # fmt: skip
+                taken += fine
+            ringing = max(ringing * pace.fading, trace[2] * pace.per_phase2 - forced)
+            explicit = admissible(springs, y)
+            if explicit and stiffness_changed(y[0], lam_seen):
+                softer = film
+                film, lam_seen = stiffness_at(policy, acting, c, y, time[k], branches), y[0]
+                dt_paced = 0.0
+                explicit = policy.acting != 0 or not too_stiff(film, softer)
+            if not explicit:
+                _copy(before, y, carried)
+        last, last_begin, dt_before = v1, v0, dt
+        if not explicit:
+            fresh = True
+            taken += WORTH
+            if policy.acting:
+                status = NOT_CONVERGED
+            else:
+                status, h = cross_by_rodas(c, springs, y, v0, v1, dt, h, room.work)
+        if status != OK:
+            status, reached = reason_to_fail(c, y, max(v0 * v0, v1 * v1)), k + 1
+            break
+    if status != OK:
+        for k in range(reached, samples):
+            stretch[k] = stretch[reached - 1]
+            rate[k] = 0.0
+    return status, reached, taken
+
+
+@allocating
+def drive_by_voltage(
+    c: np.ndarray,
+    time: np.ndarray,
+    voltage: np.ndarray,
+    ends: np.ndarray,
+    warmth: np.ndarray,
+    y: np.ndarray,
+    stretch: np.ndarray,
+    rate: np.ndarray,
+    fidelity: int = CAREFUL,
+) -> tuple[int, int, int]:
+    """Carry state ``y`` (2 + n + MEMORY,) along a record.
+
+    ``time`` s and ``voltage`` V are (N,), increasing and not necessarily even. From each sample to
+    the next the voltage goes linearly to that in ``ends`` (N,), from where it may jump: for a
+    converter's output, which stands until the next sample, that is ``voltage`` itself. ``warmth``
+    (N,) K is the temperature above that of the start, or (0,) where none was recorded.
+    ``fidelity`` is ``CAREFUL``, ``QUICK``, ``ROUGH`` or ``COARSE``. ``c`` must know the stretch at
+    rest (``dearig.model.actuator.at_rest``). ``stretch`` and ``rate`` (N,) are filled; element 0 is
+    the state as given, so that a record can be cut and continued.
+
+    Returns ``(status, reached, steps)``: on any status but ``OK`` the samples from ``reached`` on
+    are filled with the last stretch that was reached, never with NaN. ``steps`` were taken; a
+    sample by the stiff method counts for the explicit steps that take as long.
+    """
+    springs = spring_table(c)
+    c = c.copy()
+    acting = active_effects(c)
+    c[INERTIA] += added_inertia(acting, c, y)
+    policy = policy_of(acting, is_swift(c), fidelity)
+    # whoever makes arrays counts their owners, in every call: the loop must not
+    room = Workspace(
+        springs,
+        film_table(c, springs) if policy.exponential else np.zeros(0),
+        np.zeros((2, max(springs.shape[1] - 1, BRANCHES_MAX))),
+        np.zeros((_PROPAGATORS, PROPAGATOR)),
+        np.empty((7, 3, 3)),
+        np.zeros((15, y.shape[0])),
+        y.copy(),
+        np.zeros(5),
+    )
+    return _follow(policy, acting, c, time, voltage, ends, warmth, y, stretch, rate, room)
