@@ -1,8 +1,8 @@
 """Layout of the coefficient vector that every kernel reads.
 
-One row a parameter set, so that a population is a matrix: the numbers of the film and its load, the
-values of all effects (neutral unless a model says otherwise), then ``WIDTH`` numbers for each
-spring, the equilibrium spring first. ``dearig.model.network`` knows where the springs begin.
+A parameter set is one row, so that a population is a matrix. It holds the numbers of the film and
+its load, the values of all effects (neutral unless a model says otherwise), then ``WIDTH`` numbers
+for each spring, the equilibrium spring first. ``dearig.model.network.HEAD`` is where these begin.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""Current through the film, and the part of the voltage that it drops before it gets there.
+"""Leakage current through the film, and the voltage that it drops over a series resistance.
 
-Of the voltage V that is supplied, a film of conductivity g(E) gets v with v (1 + r g) = V: behind a
-resistance the current that the film takes lowers the field by which it conducts.
+Of a supplied voltage V, a film of conductivity g(E) behind a resistance gets v, with
+v (1 + r g) = V. The current that the film takes lowers the field, on which its conductivity
+depends.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from dearig.model.jit import jit
 
 __all__ = ["CROWDED", "HOPS", "REMEMBERED", "behind", "conductivity"]
 
-#: As the exponent of the field: charges hop, or crowd.
+#: Values of the exponent that name a law: hopping conduction, space-charge-limited current.
 HOPS, CROWDED = 0.0, -1.0
-#: Numbers that ``behind`` remembers.
+#: Numbers of internal state of ``behind``.
 REMEMBERED = 4
 
 _REFERENCE = 8e3  # V over the unstretched film
@@ -26,10 +27,10 @@ _ITERATIONS = 30
 
 @jit
 def conductivity(growth: float, exponent: float, field: float) -> tuple[float, float]:
-    """Over that at ``field`` 1; and how it grows, d(ln g)/d(ln E).
+    """Return the conductivity over that at ``field`` 1, and its slope d(ln g)/d(ln E).
 
-    Of traps which the field empties exp(b (E^n - 1)), of hops (``HOPS``) sinh(b E)/E over the same,
-    of charges that crowd (``CROWDED``) E^b.
+    Traps that the field empties give exp(b (E^n - 1)), with b the ``growth`` and n the
+    ``exponent``. Hopping (``HOPS``) gives sinh(b E)/(E sinh b), space charge (``CROWDED``) E^b.
     """
     if exponent == CROWDED:
         return field**growth, growth
@@ -46,9 +47,9 @@ def conductivity(growth: float, exponent: float, field: float) -> tuple[float, f
 def _reached(
     ratio: float, growth: float, exponent: float, supplied: float, lam: float, guess: float
 ) -> tuple[float, float]:
-    """Voltage at the film in V by Newton's steps from a ``guess``; the current is convex.
+    """Return the voltage at the film in V, and d(ln v)/d(ln V).
 
-    And how it follows what is supplied, d(ln v)/d(ln V).
+    Newton's method from a ``guess``; the current is convex, so that it converges.
     """
     if supplied <= 0.0:
         return 0.0, 1.0
@@ -78,13 +79,14 @@ def behind(
     lam: float,
     eased: float,
 ) -> tuple[float, float]:
-    """Voltage at the film before and after ``h`` s in which it goes from ``start`` to ``end`` V.
+    """Return the voltage at the film before and after ``h`` s.
 
-    ``loss`` is the part that is lost at 8 kV over the unstretched film; stretched by ``lam``, it
-    conducts ``eased`` times as well in the same field. ``REMEMBERED`` numbers are: the ratio r, and
-    of the step before the voltage that it ended at, that at the film then, and how the one follows
-    the other. A step begins where the one before has ended; from there the next voltage at the film
-    is foreseen so well that one of Newton's steps will do. With ``h`` = 0 none is made.
+    The supplied voltage goes from ``start`` to ``end`` V. ``loss`` is the part lost at 8 kV over
+    the unstretched film; stretched by ``lam``, the film conducts ``eased`` times as well in the
+    same field. The state ``m[j : j + REMEMBERED]`` holds the ratio r and, of the end of the step
+    before, the supplied voltage, the voltage at the film and d(ln v)/d(ln V). A step begins where
+    the one before has ended; the state predicts the next voltage so well that one Newton step is
+    enough. With ``h`` = 0 no step is made.
     """
     if m[j] == 0.0:
         left = 1.0 - loss

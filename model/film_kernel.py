@@ -1,9 +1,9 @@
-"""Integration of the branches of a film whose stretch is imposed, compiled.
+"""Integrate the branches of a film whose stretch is imposed, compiled.
 
-With the stretch given there is no equation of motion: each branch is one scalar equation on its
-own, dxi/dt = (1/T) P(lam(t)/xi) (eq. 40). It is solved from sample to sample, over a stretch that
-is linear in between, with the same L-stable RODAS method as the stiff actuator, step by error
-estimate: a relaxation of milliseconds within a sample of a second is then no difficulty.
+With the stretch given there is no equation of motion: each branch is one scalar equation,
+dxi/dt = (1/T) P(lam(t)/xi) (eq. 40). It is solved from sample to sample; the stretch is linear in
+between. The method is RODAS, as for the stiff actuator, with steps by its error estimate. It is
+L-stable: a relaxation of milliseconds within a sample of a second is no difficulty.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from dearig.model.network import HEAD, branch_count, nominal_pull, nominal_pull_
 __all__ = ["add_effects", "drive_by_stretch"]
 
 _TOLERANCE = 1e-7  # relative, in the inner stretch: 0.01 Pa on a modulus of 100 kPa
-_GENTLE = 0.1  # relaxation within one interval below which the branch is not stiff
+_NOT_STIFF = 0.1  # relaxation within one interval below which a branch is not stiff
 _SMALLEST_PART = 1e-9  # of a sample interval
 
 _soften, _stress = assembly.soften, assembly.stress
@@ -32,6 +32,7 @@ _commit, _felt, _acting = assembly.commit, assembly.measured_stress, assembly.ac
 
 @jit
 def _flow(held: int, kind: int, limit: float, rate: float, lam: float, xi: float) -> float:
+    """Flow of a branch d(xi)/dt in 1/s at stretch ``lam`` and inner stretch ``xi``."""
     s = (lam / xi) ** 2
     return rate * true_pull(held, kind, limit, s, 1.0 / s)
 
@@ -55,8 +56,8 @@ def _cross(
     Returns (status, xi, part of the next interval to try).
     """
     farthest, _ = strain_and_pull(held, (lam1 / xi) ** 2, (xi / lam1) ** 2)
-    gentle = rate * nominal_pull_slope(held, kind, limit, locking, lam0 / xi) * dt < _GENTLE
-    if gentle and farthest < 0.5 * locking:
+    slow = rate * nominal_pull_slope(held, kind, limit, locking, lam0 / xi) * dt < _NOT_STIFF
+    if slow and farthest < 0.5 * locking:
         # slow against the interval: one Runge-Kutta step is exact enough, and four times as quick
         middle = 0.5 * (lam0 + lam1)
         k1 = _flow(held, kind, limit, rate, lam0, xi)
@@ -118,12 +119,12 @@ def _cross(
 def drive_by_stretch(
     c: np.ndarray, time: np.ndarray, stretch: np.ndarray, xi: np.ndarray, parts: np.ndarray
 ) -> tuple[int, int]:
-    """Nominal stress of each spring per unit of its modulus under an imposed ``stretch`` (N,).
+    """Compute the nominal stress of each spring over its modulus under a ``stretch`` (N,).
 
     ``time`` (N,) s increases, not necessarily evenly. ``parts`` (1 + n, N) is filled: the nominal
-    stress is the moduli times it. ``xi`` (n,) are the inner stretches at the first sample and are
-    carried along in place. Returns ``(status, reached)``; from ``reached`` on the last column is
-    repeated, never NaN.
+    stress of the film is the moduli times it. ``xi`` (n,) are the inner stretches at the first
+    sample, carried along in place. Returns ``(status, reached)``; from ``reached`` on the last
+    column is repeated, never NaN.
     """
     held = int(c[HELD])
     samples = time.shape[0]
@@ -168,7 +169,7 @@ def drive_by_stretch(
 def add_effects(
     c: np.ndarray, time: np.ndarray, stretch: np.ndarray, memory: np.ndarray, stress: np.ndarray
 ) -> None:
-    """Make of the network's nominal ``stress`` (N,) Pa, in place, what a film with effects has.
+    """Turn the network's nominal ``stress`` (N,) Pa, in place, into that of a film with effects.
 
     ``memory`` (MEMORY,) is carried along; ``c`` must know the stretch at rest.
     """

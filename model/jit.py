@@ -1,9 +1,9 @@
-"""The one decorator that compiles the numerical kernels, with a disk cache that cannot go stale.
+"""Decorators that compile the numerical kernels, with a disk cache that cannot go stale.
 
-Numba checks only the file that holds a function, not the files that function calls, so a cached
-kernel would survive an edit of the spring it calls. The cache folder is therefore named after the
-text of every source file that kernels are made of: a changed file means a new folder and one
-compilation.
+Numba checks only the file that holds a function, not the files that this function calls: a cached
+kernel would survive an edit of the spring it calls. So the cache folder is named after a digest of
+every source file that kernels are made of, in all folders of ``dearig.model``. A changed file means
+a new folder and one compilation.
 """
 
 from __future__ import annotations
@@ -35,21 +35,21 @@ def _sources_digest() -> str:
 
 
 def cache_folder() -> Path:
-    """Folder of the compiled kernels of exactly these sources, or the one numba was told of."""
+    """Return the folder of the kernels compiled from these sources, or ``NUMBA_CACHE_DIR``."""
     if "NUMBA_CACHE_DIR" in os.environ:
         return Path(os.environ["NUMBA_CACHE_DIR"])
     return Path(platformdirs.user_cache_dir("dearig")) / f"kernels-{_sources_digest()}"
 
 
 def is_compiled() -> bool:
-    """True when a command will start at once, False when it must first compile the kernels."""
+    """Return True when kernels are on disk, False when a command must compile them first."""
     return any(Path(_settings["CACHE_DIR"]).rglob("*.nbi"))
 
 
 if "NUMBA_CACHE_DIR" not in os.environ:
     _settings["CACHE_DIR"] = str(cache_folder())
 
-# nogil: populations run on threads, which (unlike numba's own parallel layer) may be entered from
+# nogil: populations run on threads. Unlike numba's own parallel layer these may be entered from
 # several Python threads at once, as a window with a live overlay does.
 # error_model="numpy": a division by zero gives inf, which the status checks catch, no exception.
 # reassoc lets loops over branches use vector units; NaN and inf keep their meaning.
@@ -61,25 +61,25 @@ _compiled = partial(
     fastmath={"contract", "arcp", "nsz", "reassoc"},
 )
 
-# To the type checker a compiled function is the function it was compiled from: it is called with
-# the same arguments and returns the same values.
+# To the type checker a compiled function is the function that it was compiled from: it takes the
+# same arguments and returns the same values.
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
 
 def jit(function: _Function) -> _Function:
     """Compile ``function`` at its first call, and keep the machine code on disk.
 
-    It makes no arrays. Then who owns those that it is handed need not be counted, which at each
-    call of an effect would take longer than the effect.
+    The function must not make arrays. Then numba need not count references to those that it is
+    given; at each call of an effect the count would take longer than the effect.
     """
     return cast(_Function, _compiled(function, _nrt=False))
 
 
 def allocating(function: _Function) -> _Function:
-    """As ``jit``, of a function that makes arrays."""
+    """Compile as ``jit`` does a function that makes arrays."""
     return cast(_Function, _compiled(function))
 
 
 def inlined(function: _Function) -> _Function:
-    """As ``jit``, compiled into its caller, so that literal arguments become constants there."""
+    """Compile ``function`` into its caller, so that literal arguments become constants there."""
     return cast(_Function, _compiled(function, _nrt=False, inline="always"))

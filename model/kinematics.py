@@ -1,12 +1,12 @@
-"""How one stretch deforms the whole incompressible film, for the three ways a film is held.
+"""The kinematics of an incompressible film with one imposed stretch, for three ways to hold it.
 
     constrained-width   lam2 = 1            the thesis's actuator
     uniaxial            lam2 = lam^-1/2     a tensile test
     equibiaxial         lam2 = lam          a balloon or a frame pulled both ways
 
-All of them reduce to I1 - 3 as a function of the one stretch, to the share of dW/dlam that one
-direction carries, and to the electrical term: the film in a true field phi/z feels the nominal
-stress eps (phi/Z)^2 a(lam), with a = 1/2 d(lam1 lam2)^2/dlam times that share.
+Each gives I1 - 3 as a function of the stretch, the share of dW/dlam that one direction carries, and
+the electrical term: a true field phi/z causes the nominal stress eps (phi/Z)^2 a(lam), with
+a = 1/2 d(lam1 lam2)^2/dlam times that share.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ __all__ = [
 
 @jit
 def strain_and_pull(held: int, s: float, inverse: float) -> tuple[float, float]:
-    """``(I1 - 3, P)`` of a spring at squared stretch ``s`` = e^2, with ``inverse`` = 1/s.
+    """Return ``(I1 - 3, P)`` of a spring at squared stretch ``s`` = e^2, ``inverse`` = 1/s.
 
     P is the geometric part of its true stress, e g dI1/de / 2: a spring of slope dW/dI1 carries
     the true stress 2 (dW/dI1) P in each moving direction.
@@ -48,7 +48,7 @@ def strain_and_pull(held: int, s: float, inverse: float) -> tuple[float, float]:
 
 @jit
 def pull_slope(held: int, e: float) -> float:
-    """d(P/e)/de: how the geometric part of the nominal stress grows with stretch ``e``."""
+    """Return d(P/e)/de, the slope of the geometric part of the nominal stress at stretch ``e``."""
     u = 1.0 / e
     if held == 0:
         u2 = u * u
@@ -61,18 +61,18 @@ def pull_slope(held: int, e: float) -> float:
 
 @jit
 def directions(held: int) -> float:
-    """In how many directions ``lam`` is imposed: they share dW/dlam among them."""
+    """Return the number of directions in which ``lam`` is imposed: they share dW/dlam."""
     return 2.0 if held == 2 else 1.0
 
 
 def thinning(held: int, stretch: np.ndarray) -> np.ndarray:
-    """Z/z, the thickness before over the thickness after: true field = phi/Z times this."""
+    """Return Z/z, undeformed over deformed thickness: the true field is phi/Z times this."""
     return stretch ** (1.0, 0.5, 2.0)[held]
 
 
 @jit
 def thinning_squared(held: int, lam: float) -> float:
-    """(Z/z)^2: the true field squared over (phi/Z)^2, and the capacitance over that at rest."""
+    """Return (Z/z)^2: the true field squared over (phi/Z)^2, the capacitance over that at rest."""
     if held == 0:
         return lam * lam
     if held == 1:
@@ -82,7 +82,7 @@ def thinning_squared(held: int, lam: float) -> float:
 
 @jit
 def thinning_squared_slope(held: int, lam: float) -> float:
-    """d(thinning_squared)/dlam."""
+    """Return d(thinning_squared)/dlam."""
     if held == 0:
         return 2.0 * lam
     if held == 1:
@@ -92,7 +92,7 @@ def thinning_squared_slope(held: int, lam: float) -> float:
 
 @jit
 def electric(held: int, lam: float) -> float:
-    """Maxwell stress over eps (phi/Z)^2, nominal, in one direction."""
+    """Return the nominal Maxwell stress in one direction over eps (phi/Z)^2."""
     if held == 0:
         return lam
     if held == 1:
@@ -102,7 +102,7 @@ def electric(held: int, lam: float) -> float:
 
 @allocating
 def electric_along(held: int, stretch: np.ndarray) -> np.ndarray:
-    """``electric`` (N,) at each ``stretch`` (N,)."""
+    """Return ``electric`` (N,) at each ``stretch`` (N,)."""
     out = np.empty(stretch.size)
     for i in range(stretch.size):
         out[i] = electric(held, stretch[i])
@@ -111,7 +111,7 @@ def electric_along(held: int, stretch: np.ndarray) -> np.ndarray:
 
 @jit
 def electric_slope(held: int, lam: float) -> float:
-    """d(electric)/dlam."""
+    """Return d(electric)/dlam."""
     if held == 0:
         return 1.0
     if held == 1:

@@ -24,13 +24,13 @@ HEAD = EFFECTS_AT + PARAMETER_COUNT  #: where the springs begin in the coefficie
 
 @jit
 def branch_count(c: np.ndarray) -> int:
-    """Number of Maxwell branches in coefficient vector ``c``."""
-    return (c.shape[0] - HEAD) // WIDTH - 1
+    """Return the number of Maxwell branches in coefficient vector ``c``."""
+    return int((c.shape[0] - HEAD) // WIDTH - 1)
 
 
 @jit
 def true_pull(held: int, kind: int, limit: float, s: float, inverse: float) -> float:
-    """True stress over the modulus of one spring at squared stretch ``s``, with 1/s given.
+    """Return the true stress over the modulus of a spring at squared stretch ``s``, 1/s given.
 
     Beyond locking the value has no meaning: callers check the strain against the locking strain.
     """
@@ -40,7 +40,10 @@ def true_pull(held: int, kind: int, limit: float, s: float, inverse: float) -> f
 
 @jit
 def nominal_pull(held: int, kind: int, limit: float, locking: float, e: float) -> float:
-    """G W'(e)/mu of one spring at its own stretch ``e``; inf at and beyond locking."""
+    """Return the nominal stress over the modulus of a spring at its own stretch ``e``.
+
+    inf at and beyond locking.
+    """
     strain, pull = strain_and_pull(held, e * e, 1.0 / (e * e))
     if not strain < locking:
         return np.inf
@@ -49,7 +52,7 @@ def nominal_pull(held: int, kind: int, limit: float, locking: float, e: float) -
 
 @jit
 def nominal_pull_slope(held: int, kind: int, limit: float, locking: float, e: float) -> float:
-    """d(nominal_pull)/de; inf at and beyond locking."""
+    """Return d(nominal_pull)/de; inf at and beyond locking."""
     strain, pull = strain_and_pull(held, e * e, 1.0 / (e * e))
     if not strain < locking:
         return np.inf
@@ -62,7 +65,7 @@ def nominal_pull_slope(held: int, kind: int, limit: float, locking: float, e: fl
 
 @jit
 def network_stress(c: np.ndarray, lam: float, xi: np.ndarray) -> float:
-    """Nominal stress in Pa of all springs at stretch ``lam`` with inner stretches ``xi`` (n,)."""
+    """Return the nominal stress of all springs in Pa at ``lam`` and inner stretches ``xi`` (n,)."""
     held = int(c[HELD])
     total = c[HEAD + MODULUS] * nominal_pull(
         held, int(c[HEAD + KIND]), c[HEAD + LIMIT], c[HEAD + LOCKING], lam
@@ -71,4 +74,4 @@ def network_stress(c: np.ndarray, lam: float, xi: np.ndarray) -> float:
         k = HEAD + WIDTH * (i + 1)
         pull = nominal_pull(held, int(c[k + KIND]), c[k + LIMIT], c[k + LOCKING], lam / xi[i])
         total += c[k + MODULUS] * pull / xi[i]
-    return total
+    return float(total)

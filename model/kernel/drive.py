@@ -239,9 +239,7 @@ def _follow(
                 if policy.watched and not film.steep:
                     excited = max(ringing * pace.fading, abs(jump - jump_before))
                     hasty = excited < policy.calm_below * film.springs
-                fine = _steps_by_ringing(
-                    policy, film, pace, dt, jump, ringing, hasty
-                )  # fmt: skip
+                fine = _steps_by_ringing(policy, film, pace, dt, jump, ringing, hasty)
                 treads = treads and policy.fine_only
                 change = 0.0
                 # a jump cannot carry the film on faster than springs let it oscillate

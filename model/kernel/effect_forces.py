@@ -160,4 +160,4 @@ def softening_stiffness(acting: int, c: np.ndarray, y: np.ndarray, t: float) -> 
     here = _soften(acting, c, m, lam, 0.0, t, 0.0)
     up = abs(_soften(acting, c, m, lam + near, 0.0, t, 0.0) - here)
     down = abs(_soften(acting, c, m, lam - near, 0.0, t, 0.0) - here)
-    return max(up, down) / near * c[FORCE] / c[INERTIA]
+    return float(max(up, down) / near * c[FORCE] / c[INERTIA])

@@ -133,7 +133,7 @@ def reason_to_fail(c: np.ndarray, y: np.ndarray, field2: float) -> int:
 @jit
 def _locking_stretch(held: int, locking: float, sign: float) -> float:
     """Stretch above (``sign`` 1) or below (-1) 1 at which I1 - 3 reaches ``locking``."""
-    near, far = 1.0, STRETCH_MAX**sign
+    near, far = 1.0, float(STRETCH_MAX**sign)
     if strain_at(held, far) < locking:
         return far
     for _ in range(60):

@@ -97,7 +97,7 @@ def fill_propagator(
 @inlined
 def is_propagator_of(propagator: np.ndarray, k: float, near: float, drag: int, h: float) -> bool:
     """Whether ``propagator`` is of a stiffness so ``near`` to k, that class of drag, that step."""
-    return (
+    return bool(
         abs(k - propagator[STIFFNESS]) <= near
         and drag == propagator[DRAG_CLASS]
         and abs(h - propagator[STEP]) <= _STEP_NEAR * h

@@ -136,7 +136,7 @@ def rodas_step(
     error = max(abs(last[0]), abs(last[1]) / swing)
     for i in range(branches):
         error = max(error, 0.1 * abs(last[2 + i]))
-    return error / _TOLERANCE
+    return float(error / _TOLERANCE)
 
 
 @jit

@@ -18,7 +18,7 @@ SPRINGS: tuple[str, ...] = (neo_hookean.NAME, gent.NAME, arruda_boyce.NAME)
 
 @jit
 def energy(kind: int, strain: float, modulus: float, limit: float) -> float:
-    """Free energy density in J/m^3 of the spring with code ``kind``."""
+    """Return the free energy density in J/m^3 of the spring with code ``kind``."""
     if kind == 1:
         return gent.energy(strain, modulus, limit)
     if kind == 0:
@@ -28,7 +28,7 @@ def energy(kind: int, strain: float, modulus: float, limit: float) -> float:
 
 @jit
 def slope(kind: int, strain: float, modulus: float, limit: float) -> float:
-    """dW/dI1 in Pa of the spring with code ``kind``."""
+    """Return dW/dI1 in Pa of the spring with code ``kind``."""
     if kind == 1:
         return gent.slope(strain, modulus, limit)
     if kind == 0:
@@ -38,7 +38,7 @@ def slope(kind: int, strain: float, modulus: float, limit: float) -> float:
 
 @jit
 def curvature(kind: int, strain: float, modulus: float, limit: float) -> float:
-    """d2W/dI1^2 in Pa of the spring with code ``kind``."""
+    """Return d2W/dI1^2 in Pa of the spring with code ``kind``."""
     if kind == 1:
         return gent.curvature(strain, modulus, limit)
     if kind == 0:
@@ -48,7 +48,7 @@ def curvature(kind: int, strain: float, modulus: float, limit: float) -> float:
 
 @jit
 def locking_strain(kind: int, limit: float) -> float:
-    """I1 - 3 beyond which the spring has no energy: the locking stretch."""
+    """Return I1 - 3 at the locking stretch, beyond which the spring has no energy."""
     if kind == 1:
         return gent.locking_strain(limit)
     if kind == 0:

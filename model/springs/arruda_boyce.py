@@ -19,7 +19,10 @@ NAME = "arruda-boyce"
 
 @jit
 def langevin(beta: float) -> tuple[float, float]:
-    """Langevin function coth(beta) - 1/beta and its slope: series near 0, no overflow far out."""
+    """Return the Langevin function coth(beta) - 1/beta and its slope.
+
+    Below 0.05 by its series, beyond 20 by its asymptote, which cannot overflow.
+    """
     if beta < 0.05:
         b2 = beta * beta
         return (
@@ -34,11 +37,10 @@ def langevin(beta: float) -> tuple[float, float]:
 
 @jit
 def inverse_langevin(x: float) -> float:
-    """Beta with coth(beta) - 1/beta = x, for 0 <= x < 1, to rounding.
+    """Return beta with coth(beta) - 1/beta = x, for 0 <= x < 1, to rounding.
 
-    Starts from Kroeger's rational approximation (2015, error below 0.28 %); two Newton steps leave
-    nothing that double precision can show. They are taken in 1/beta, in which the Langevin function
-    of a stretched chain is a straight line.
+    Two Newton steps from Kroeger's rational approximation (2015, error below 0.28 %). They are
+    taken in 1/beta, in which the Langevin function of a stretched chain is a straight line.
     """
     if x < 1e-4:
         return 3.0 * x + 1.8 * x * x * x
@@ -52,7 +54,7 @@ def inverse_langevin(x: float) -> float:
 
 @jit
 def energy(strain: float, modulus: float, limit: float) -> float:
-    """Free energy density in J/m^3 at ``strain`` = I1 - 3, with ``limit`` = n, zero at rest."""
+    """Return the free energy density in J/m^3 at ``strain`` = I1 - 3, ``limit`` = n; 0 at rest."""
     root = math.sqrt(limit)
     total = 0.0
     for sign, invariant in ((1.0, strain + 3.0), (-1.0, 3.0)):
@@ -66,7 +68,7 @@ def energy(strain: float, modulus: float, limit: float) -> float:
 
 @jit
 def slope(strain: float, modulus: float, limit: float) -> float:
-    """dW/dI1 in Pa: mu sqrt(n) beta / (6 lambda_c)."""
+    """Return dW/dI1 in Pa: mu sqrt(n) beta / (6 lambda_c)."""
     chain = math.sqrt((strain + 3.0) / 3.0)
     root = math.sqrt(limit)
     return modulus * root * inverse_langevin(chain / root) / (6.0 * chain)
@@ -74,7 +76,7 @@ def slope(strain: float, modulus: float, limit: float) -> float:
 
 @jit
 def curvature(strain: float, modulus: float, limit: float) -> float:
-    """d2W/dI1^2 in Pa."""
+    """Return d2W/dI1^2 in Pa."""
     chain = math.sqrt((strain + 3.0) / 3.0)
     root = math.sqrt(limit)
     beta = inverse_langevin(chain / root)
@@ -85,5 +87,5 @@ def curvature(strain: float, modulus: float, limit: float) -> float:
 
 @jit
 def locking_strain(limit: float) -> float:
-    """I1 - 3 at which the chains are straight: 3 n - 3."""
+    """Return I1 - 3 at which the chains are straight: 3 n - 3."""
     return 3.0 * limit - 3.0

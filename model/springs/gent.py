@@ -11,24 +11,24 @@ NAME = "gent"
 
 @jit
 def energy(strain: float, modulus: float, limit: float) -> float:
-    """Free energy density in J/m^3 at ``strain`` = I1 - 3, with ``limit`` = J."""
+    """Return the free energy density in J/m^3 at ``strain`` = I1 - 3, with ``limit`` = J."""
     return -0.5 * modulus * limit * math.log1p(-strain / limit)
 
 
 @jit
 def slope(strain: float, modulus: float, limit: float) -> float:
-    """dW/dI1 in Pa."""
+    """Return dW/dI1 in Pa."""
     return 0.5 * modulus * limit / (limit - strain)
 
 
 @jit
 def curvature(strain: float, modulus: float, limit: float) -> float:
-    """d2W/dI1^2 in Pa."""
+    """Return d2W/dI1^2 in Pa."""
     room = limit - strain
     return 0.5 * modulus * limit / (room * room)
 
 
 @jit
 def locking_strain(limit: float) -> float:
-    """I1 - 3 at which the spring locks: J itself."""
+    """Return I1 - 3 at which the spring locks: J itself."""
     return limit

@@ -9,23 +9,23 @@ NAME = "neo-hookean"
 
 @jit
 def energy(strain: float, modulus: float, limit: float) -> float:
-    """Free energy density in J/m^3 at ``strain`` = I1 - 3; ``limit`` is not used."""
+    """Return the free energy density in J/m^3 at ``strain`` = I1 - 3; ``limit`` is not used."""
     return 0.5 * modulus * strain
 
 
 @jit
 def slope(strain: float, modulus: float, limit: float) -> float:
-    """dW/dI1 in Pa."""
+    """Return dW/dI1 in Pa."""
     return 0.5 * modulus
 
 
 @jit
 def curvature(strain: float, modulus: float, limit: float) -> float:
-    """d2W/dI1^2 in Pa."""
+    """Return d2W/dI1^2 in Pa."""
     return 0.0
 
 
 @jit
 def locking_strain(limit: float) -> float:
-    """I1 - 3 at which the spring locks: never."""
+    """Return I1 - 3 at which the spring locks: never."""
     return float("inf")
