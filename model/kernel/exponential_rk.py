@@ -70,7 +70,7 @@ def film_table(c: np.ndarray, springs: np.ndarray) -> np.ndarray:
     return table
 
 
-@inlined
+@jit
 def _pull(p: float, q: float, stiffening: float, modulus: float) -> float:
     """True stress over the modulus of a Gent spring, held in width, of squared stretch ``p/q``.
 
