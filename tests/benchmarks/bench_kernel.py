@@ -1,11 +1,11 @@
-"""How much faster the model's kernel follows the thesis's record than general-purpose solvers do.
+"""Time the compiled kernel on the thesis's record against general-purpose solvers.
 
-Run as ``python -m tests.benchmarks.bench_kernel``. One thesis record is two periods of eq. 49
-(22.8 s) with Table 3's film. The same right-hand side, compiled, goes to every solver; the general
-ones are set as loosely as their error against a 1e-10 reference stays below 0.1 um. SciPy has LSODA
-twice: stepped from Python (solve_ivp) and all in Fortran (odeint). A second table has what effects
-of ``dearig.model.effects`` cost, a third what the quick steps of a search save. Medians of repeats
-in one run: compare the ratios, the milliseconds belong to this machine and its load.
+Run as ``python -m tests.benchmarks.bench_kernel``. The record is two periods of eq. 49 (22.8 s)
+with Table 3's film. Every solver gets the same compiled right-hand side. The general ones get the
+loosest tolerance at which their error against a 1e-10 reference stays below 0.1 um. SciPy has LSODA
+twice: stepped from Python (solve_ivp) and all in Fortran (odeint). A second table has the cost of
+effects of ``dearig.model.effects``, a third what rough and coarse steps save. Medians over repeats
+in one run: compare the ratios, the milliseconds belong to this machine.
 """
 
 import math
@@ -75,7 +75,7 @@ def rates(t: float, y: np.ndarray, dy: np.ndarray) -> None:
 
 
 @numba.njit
-def returned(t: float, y: np.ndarray) -> np.ndarray:
+def rates_of(t: float, y: np.ndarray) -> np.ndarray:
     dy = np.empty(5)
     rates(t, y, dy)
     return dy
@@ -92,8 +92,8 @@ def timed(run: Callable[[], np.ndarray], repeats: int) -> tuple[float, np.ndarra
     return statistics.median(spent), result
 
 
-def followed(c: np.ndarray, drive: Drive, fidelity: int = kernel.CAREFUL) -> np.ndarray:
-    """Stretch (N,) from rest, as a fit would have it, or in ``fidelity`` as a search would."""
+def simulated(c: np.ndarray, drive: Drive, fidelity: int = kernel.CAREFUL) -> np.ndarray:
+    """Simulate the stretch (N,) from rest at a ``fidelity``."""
     y = initial_state(c, c[REST])
     stretch, rate = np.empty(drive.time.size), np.empty(drive.time.size)
     kernel.drive_by_voltage(
@@ -103,13 +103,13 @@ def followed(c: np.ndarray, drive: Drive, fidelity: int = kernel.CAREFUL) -> np.
 
 
 def at_neutral(name: str) -> EffectValues:
-    """The effect with its sizes neutral, and its shapes typical."""
+    """Return the effect with neutral amplitudes and typical shape parameters."""
     neutral = {p.name: p.neutral for p in EFFECTS[name].amplitudes}
     return ((name, tuple((n, neutral.get(n, value)) for n, value in typical(name)[1])),)
 
 
-def what_effects_cost(actuator: Actuator, drive: Drive) -> None:
-    """Print how long the kernel takes with effects, relative to itself without any."""
+def print_cost_of_effects(actuator: Actuator, drive: Drive) -> None:
+    """Print the times of the kernel with effects, relative to itself without any."""
     cases: list[tuple[str, EffectValues]] = [("no effect", ())]
     voltage_effects = [e.name for e in EFFECTS.values() if "voltage" in e.drives]
     neutral = tuple(values for n in voltage_effects for values in at_neutral(n))
@@ -121,12 +121,12 @@ def what_effects_cost(actuator: Actuator, drive: Drive) -> None:
         c = replace(actuator, effects=effects).coefficients()
         at_rest(c)
         rows.append(c)
-        followed(c, drive)
+        simulated(c, drive)
     spent: list[list[float]] = [[] for _ in rows]
     for _ in range(21):  # in turn, so that the machine's other work falls on all alike
         for c, times in zip(rows, spent, strict=True):
             before = time.perf_counter()
-            followed(c, drive)
+            simulated(c, drive)
             times.append(time.perf_counter() - before)
     base = statistics.median(spent[0])
     print(f"{'this kernel with':<44}{'ms':>10}{'ratio':>9}")
@@ -135,47 +135,47 @@ def what_effects_cost(actuator: Actuator, drive: Drive) -> None:
         print(f"{label:<44}{middle * 1e3:>10.3f}{middle / base:>8.2f}x")
 
 
-def what_quick_steps_save(actuator: Actuator, sequence: Sequence) -> None:
-    """Print careful against hasty steps on a converter's staircase, under which the film rings.
+def print_savings_of_rough_steps(actuator: Actuator, sequence: Sequence) -> None:
+    """Print careful against rough and coarse steps on a staircase, where the film rings.
 
-    Hasty are those of a search, and, of what follows the path, those of its first look. Sketched
-    are those by which a search is told what a number of the model does, with the reading at each
-    sample; what they get wrong is nearly the same of neighbours, and gone in their difference but
-    for the last column: the worst of any number, relative to what it does.
+    Rough steps are those of a search's first fits. A coarse drive gives derivatives with respect to
+    parameters, with the reading at each sample: its errors are nearly the same for neighbouring
+    parameters and cancel in the difference. The last column is the worst error of any derivative,
+    relative to that derivative.
     """
     t = np.arange(math.ceil(sequence.segments[0].duration * STAIRCASE)) / STAIRCASE
     drive = Drive(t, sequence.segments[0].voltage(t), hold=True)
     record = ActuatorRecord("staircase", drive, np.zeros(t.size), NOISE)
-    sketch = coarse_drive_of(record, actuator)
-    assert sketch is not None
+    coarse = coarse_drive_of(record, actuator)
+    assert coarse is not None
     print(
-        f"{'staircase of 200 Hz':<28}{'careful ms':>11}{'hasty ms':>10}{'ratio':>8}{'um':>8}"
-        f"{'sketch ms':>11}{'ratio':>8}{'um':>8}{'worst':>8}"
+        f"{'staircase of 200 Hz':<28}{'careful ms':>11}{'rough ms':>10}{'ratio':>8}{'um':>8}"
+        f"{'coarse ms':>11}{'ratio':>8}{'um':>8}{'worst':>8}"
     )
     for name in ("", "linear drag", "electrode resistance", "Mullins softening", "dry friction"):
         effects = (typical(name),) if name else ()
         model = replace(actuator, effects=effects)
         c = model.coefficients()
         at_rest(c)
-        careful, expected = timed(partial(followed, c, drive), 21)
-        quick, found = timed(partial(followed, c, drive, kernel.ROUGH), 21)
+        careful, expected = timed(partial(simulated, c, drive), 21)
+        quick, found = timed(partial(simulated, c, drive, kernel.ROUGH), 21)
         moved = (expected - expected[0]) * THESIS_FILM.length
-        drawn, shown = timed(partial(drawn_up, c, sketch, t), 21)
+        spent, shown = timed(partial(at_samples, c, coarse, t), 21)
         print(
             f"{name or 'no effect':<28}{careful * 1e3:>11.3f}{quick * 1e3:>10.3f}"
             f"{quick / careful:>7.2f}x{_rms_um((found - expected) * THESIS_FILM.length):>8.3f}"
-            f"{drawn * 1e3:>11.3f}{drawn / careful:>7.2f}x{_rms_um(shown - moved):>8.3f}"
-            f"{100.0 * missed_by(model, replace(record, coarse_drive=sketch)):>7.1f}%"
+            f"{spent * 1e3:>11.3f}{spent / careful:>7.2f}x{_rms_um(shown - moved):>8.3f}"
+            f"{100.0 * worst_derivative(model, replace(record, coarse_drive=coarse)):>7.1f}%"
         )
 
 
-def drawn_up(c: np.ndarray, sketch: Drive, times: np.ndarray) -> np.ndarray:
-    """Readings (N,) at ``times`` by a sketch."""
-    return reading_of(c, THESIS_FILM.length, sketch, 0.0, kernel.COARSE, times)[0]
+def at_samples(c: np.ndarray, coarse: Drive, times: np.ndarray) -> np.ndarray:
+    """Simulate readings (N,) at ``times`` with a coarse drive."""
+    return reading_of(c, THESIS_FILM.length, coarse, 0.0, kernel.COARSE, times)[0]
 
 
-def missed_by(model: Actuator, record: ActuatorRecord) -> float:
-    """How far the sketch of ``record`` is from telling what a number does, at worst, of 1."""
+def worst_derivative(model: Actuator, record: ActuatorRecord) -> float:
+    """Return the worst relative error of a derivative by the coarse drive of ``record``."""
     problem, x, free = posed(model, record, kernel.ROUGH)
     residuals = problem.residuals(x)
     whole = problem.jacobian(x, free, residuals)
@@ -200,17 +200,17 @@ def main() -> None:
     atol_weights = np.array([1.0, 100.0, 1.0, 1.0, 1.0])  # the rate may err more than the stretch
 
     def ours() -> np.ndarray:
-        return followed(c, drive)
+        return simulated(c, drive)
 
     def lsoda(tolerance: float) -> np.ndarray:
         return solve_ivp(
-            returned, (0.0, t[-1]), start, method="LSODA", t_eval=t, rtol=tolerance,
+            rates_of, (0.0, t[-1]), start, method="LSODA", t_eval=t, rtol=tolerance,
             atol=tolerance * atol_weights,
         ).y[0]  # fmt: skip
 
     def lsoda_in_fortran(tolerance: float) -> np.ndarray:
         return odeint(
-            returned, start, t, tfirst=True, rtol=tolerance, atol=tolerance * atol_weights,
+            rates_of, start, t, tfirst=True, rtol=tolerance, atol=tolerance * atol_weights,
             mxstep=100_000,
         )[:, 0]  # fmt: skip
 
@@ -222,7 +222,7 @@ def main() -> None:
         return solver.solve(t, start).y[:, 0]
 
     reference = solve_ivp(
-        returned, (0.0, t[-1]), start, method="DOP853", t_eval=t, rtol=1e-10,
+        rates_of, (0.0, t[-1]), start, method="DOP853", t_eval=t, rtol=1e-10,
         atol=1e-13 * atol_weights, max_step=2e-3,
     ).y[0]  # fmt: skip
 
@@ -237,7 +237,7 @@ def main() -> None:
     for name, run, target in (
         ("SciPy LSODA, solve_ivp", lsoda, "150x"),
         ("SciPy LSODA, odeint", lsoda_in_fortran, ""),
-        ("SUNDIALS CVODE Adams", cvode, "40x"),
+        ("SUNDIALS CVODE Adams", cvode, "60x"),
     ):
         tolerance = next((x for x in TOLERANCES if error(run(x)) <= ENOUGH), TOLERANCES[-1])
         spent, stretch = timed(partial(run, tolerance), 7)
@@ -247,9 +247,9 @@ def main() -> None:
             f"{spent / base:>8.0f}x{target:>9}"
         )
     print()
-    what_effects_cost(actuator, drive)
+    print_cost_of_effects(actuator, drive)
     print()
-    what_quick_steps_save(actuator, sequence)
+    print_savings_of_rough_steps(actuator, sequence)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """The film under voltage or stretch, written from thesis eq. 48 for SciPy: the tests' oracle.
 
 Nothing here comes from the kernels: the springs' derivatives, the three kinematics and the motion
-equation are written out once more, in the plainest form (compiled, because SciPy asks for them some
+equation are written out again in their plainest form (compiled, because SciPy calls them some
 hundred thousand times a test).
 """
 
@@ -16,7 +16,7 @@ from dearig.model.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY
 
 
 def langevin_inverse(x):
-    """By bisection: slow, and beyond doubt."""
+    """Inverse Langevin function by bisection: slow, but certain."""
     low, high = 0.0, 1e9
     for _ in range(200):
         middle = 0.5 * (low + high)
@@ -26,7 +26,7 @@ def langevin_inverse(x):
 
 
 def invariant(kinematics, e):
-    """I1 of one spring at stretch ``e``."""
+    """Return I1 of one spring at stretch ``e``."""
     return {
         "constrained-width": e**2 + 1.0 + e**-2,
         "uniaxial": e**2 + 2.0 / e,
@@ -43,12 +43,12 @@ def invariant_slope(kinematics, e):
 
 
 def share(kinematics):
-    """Of dW/dlam, carried by one direction."""
+    """Return the share of dW/dlam that one direction carries."""
     return 0.5 if kinematics == "equibiaxial" else 1.0
 
 
 def energy_slope(spring, i1):
-    """dW/dI1 of eqs. 24 to 26."""
+    """Return dW/dI1 of eqs. 24 to 26."""
     if spring.kind == "neo-hookean":
         return spring.modulus / 2.0
     if spring.kind == "gent":
@@ -59,18 +59,18 @@ def energy_slope(spring, i1):
 
 
 def spring_stress(spring, kinematics, e):
-    """Nominal stress of a spring at its own stretch ``e``."""
+    """Return the nominal stress of a spring at its own stretch ``e``."""
     slope = energy_slope(spring, invariant(kinematics, e))
     return slope * invariant_slope(kinematics, e) * share(kinematics)
 
 
 def maxwell_stress(kinematics, lam):
-    """Nominal, over eps (phi/Z)^2."""
+    """Return the nominal Maxwell stress over eps (phi/Z)^2."""
     return {"constrained-width": lam, "uniaxial": 0.5, "equibiaxial": lam**3}[kinematics]
 
 
 def balance(actuator, lam, voltage):
-    """Stress (Pa) left over at rest with relaxed branches: load + field - spring."""
+    """Return load + field - spring in Pa at rest with relaxed branches: 0 in equilibrium."""
     film, load = actuator.film, actuator.load
     permittivity = VACUUM_PERMITTIVITY * film.permittivity
     return (
@@ -132,9 +132,9 @@ def _rates(y, t, drive, head, springs):
 
 
 def solve(actuator, time, voltage, hold=False, tolerance=1e-11):
-    """Stretch (N,) at ``time`` under samples of ``voltage``, by LSODA from sample to sample.
+    """Solve for the stretch (N,) at ``time`` under ``voltage``, by LSODA from sample to sample.
 
-    Every sample is a corner of the drive, so the solver starts anew at each. Branches of relaxation
+    Every sample is a corner of the drive, so the solver restarts at each. Branches of relaxation
     time 0 carry nothing and are left out.
     """
     film = actuator.film
@@ -171,7 +171,7 @@ def solve(actuator, time, voltage, hold=False, tolerance=1e-11):
 
 
 def rest_bracket(actuator):
-    """A stretch at which the equilibrium spring pulls harder than the load, short of locking."""
+    """Return a stretch short of locking where the equilibrium spring pulls more than the load."""
     lam = 1.0
     while balance(actuator, lam, 0.0) >= 0.0:
         lam *= 1.002

@@ -49,8 +49,8 @@ def test_small_exponential_steps_are_those_of_classical_runge_kutta(effects):
 
 
 @pytest.mark.parametrize("drag", [0.0, 40.0, 2000.0])
-def test_the_exponential_method_is_of_order_four(drag):
-    effects = (("linear drag", (("drag", 2.0 * drag),)),) if drag else ()
+def test_the_method_is_of_order_four_where_the_drag_is_in_closed_form(drag):
+    effects = (("linear drag", (("drag", drag * THESIS_FILM.inertia),)),) if drag else ()
     c = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3, effects).coefficients()
     _, rest = at_rest(c)
     table, branches = film_table(c, spring_table(c)), np.zeros((2, 3))
@@ -69,7 +69,8 @@ def test_the_exponential_method_is_of_order_four(drag):
 
     errors = [abs(end(n) - end(1024)) for n in (8, 16, 32)]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert orders.min() > 3.5
+    # a strong drag comes to order 4 only in shorter steps
+    assert orders.min() > (3.4 if drag > 1e3 else 3.75)
 
 
 @pytest.mark.parametrize("drag", [1.0, 300.0, 3e4, 1e5])
