@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 
 import dearig
 
@@ -46,8 +47,11 @@ def isolated_spawn() -> Iterator[None]:
     """Within the body, a process that ``multiprocessing`` spawns gets ``child_environment``.
 
     ``multiprocessing`` has no parameters for these: it hands on ``sys.path`` and the environment
-    as they are when a process starts. Both are as before after the body.
+    as they are when a process starts. It also makes the child import the main module again, which
+    fails for a module of the working folder (``python -m``): the child gets an empty one. All are
+    as before after the body.
     """
+    main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
     path, names = sys.path.copy(), ("PYTHONPATH", "PYTHONSAFEPATH")
     before = {name: os.environ.get(name) for name in names}
     wanted = child_environment()
@@ -56,6 +60,7 @@ def isolated_spawn() -> Iterator[None]:
     try:
         yield
     finally:
+        sys.modules["__main__"] = main
         sys.path[:] = path
         for name, value in before.items():
             if value is None:

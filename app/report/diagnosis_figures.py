@@ -245,7 +245,8 @@ def bars_figure(
                 noise * shown.error_factor, color=base.MARK, linewidth=1.1,
                 linestyle=(0, (3, 2)), label="noise floor",
             )  # fmt: skip
-        names = [base.drawable(f"{a.name} ({a.role})", _NAME + 10) for _, a in pairs]
+        roles = {"train": "training", "validation": "validation"}
+        names = [base.drawable(f"{a.name} ({roles[a.role]})", _NAME + 10) for _, a in pairs]
         ax.set_yticks(rows, names)
         ax.set_ylim(len(pairs) - 0.4, -0.6)
         ax.set_xlim(0.0, 1.15 * max(float(before.max()), float(after.max())))

@@ -3,6 +3,7 @@
 import ast
 import multiprocessing
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -81,6 +82,24 @@ def test_spawned_worker_starts_beside_decoys(decoys, monkeypatch):
     process.join()
     assert process.exitcode == 7
     assert (sys.path, dict(os.environ)) == before
+
+
+def test_spawned_worker_starts_from_a_main_module_of_the_working_folder(tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "import multiprocessing, sys\n"
+        "from dearig.drivers.processes import isolated_spawn\n"
+        "if __name__ == '__main__':\n"
+        "    spawn = multiprocessing.get_context('spawn')\n"
+        "    process = spawn.Process(target=sys.exit, args=(7,))\n"
+        "    with isolated_spawn():\n"
+        "        process.start()\n"
+        "    process.join()\n"
+        "    sys.exit(process.exitcode)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "mine"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 7, done.stderr
 
 
 def test_guardian_that_cannot_import_says_why(tmp_path, monkeypatch):

@@ -106,7 +106,7 @@ def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
     order = [page.differences.horizontalHeaderItem(i).text() for i in (1, 2)]
     operators = rows(page.differences)["operator"]
     assert dict(zip(order, operators, strict=True)) == {"low": "Ada", "high": "Grace"}
-    assert page.sides.currentWidget() is page.differences
+    assert page.side_tabs.currentWidget() is page.differences
     assert len(page.plot.plots[1].listDataItems()) == 4
     assert all(words in page.plot.key.text() for words in (*order, "model\N{NO-BREAK SPACE}of"))
     click(qtbot, page.model_shown)
