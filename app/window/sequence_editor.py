@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -277,8 +278,10 @@ class SequenceEditor(QWidget):
     def _row_buttons(self) -> QHBoxLayout:
         row = QHBoxLayout()
         kinds = QMenu(self)
-        for kind in SEGMENT_KINDS:
+        kinds.setToolTipsVisible(True)
+        for kind, table in SEGMENT_KINDS.items():
             action = kinds.addAction(kind.replace("_", " "))
+            action.setToolTip((inspect.getdoc(table) or "").partition("\n")[0])
             action.triggered.connect(lambda _=False, kind=kind: self._add_from_menu(kind))
         self.add_button = menu_button("+ A&dd", "Add a segment after the chosen one", kinds)
         row.addWidget(self.add_button)

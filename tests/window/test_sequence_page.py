@@ -18,6 +18,7 @@ from dearig.config.presets import PRESETS
 from dearig.window.planner import Planner
 from dearig.window.sequence_page import SequencePage
 from dearig.window.session import Preview, Session
+from tests.tools.plugins import run_with_distribution
 
 WAIT = 60_000
 
@@ -131,6 +132,61 @@ def test_segments_are_added_moved_and_taken_back_by_keys(qtbot: QtBot, page: Seq
     settled(qtbot, page.session)
     assert page.session.preview is not None
     assert page.session.preview.playable
+
+
+SAWTOOTH = """
+from typing import Any, ClassVar, Literal
+from pydantic import Field
+from dearig.config.segments import Positive, SegmentTable, Voltage
+from dearig.model.excitation import Segment, Steps
+
+
+class Sawtooth(SegmentTable):
+    "A slow rise and a fast fall."
+
+    example: ClassVar[dict[str, Any]] = {"amplitude_kV": 3.0}
+    kind: Literal["sawtooth"]
+    amplitude_kV: Voltage = Field(description="top of the rise")
+    rise_s: Positive = Field(default=0.5, description="time of the rise")
+
+    def build(self, folder):
+        top = self.amplitude_kV * 1e3
+        return Steps((top, 0.0), self.rise_s, 0.5 * self.rise_s)
+"""
+
+
+def test_a_segment_kind_of_another_distribution_has_a_form(tmp_path: Path) -> None:
+    found = run_with_distribution(
+        tmp_path,
+        {"sawtooth.py": SAWTOOTH},
+        {"dearig.segments": {"sawtooth": "sawtooth:Sawtooth"}},
+        """
+        from pathlib import Path
+        from PySide6.QtWidgets import QApplication, QLabel
+        application = QApplication([])
+        from dearig.config.rigfile import RigFile
+        from dearig.window.planner import make_preview
+        from dearig.window.sequence_editor import SequenceEditor
+        editor = SequenceEditor('name = "new"\\n')
+        editor.fill(0)
+        (added,) = [a for a in editor.add_button.menu().actions() if a.text() == "sawtooth"]
+        print(added.toolTip())
+        added.trigger()
+        print(editor.table.item(0, 1).text(), "|", editor.table.item(0, 2).text())
+        print(editor.form.field("rise_s").placeholderText(), editor.form.field("rise_s").toolTip())
+        print(sorted(label.text() for label in editor.form.findChildren(QLabel) if label.text()))
+        editor.form.changed.emit("rise_s", 0.25)
+        print(make_preview(editor.draft.toml, Path(), RigFile()).playable)
+        """,
+    )
+    first, row, field, labels, playable = found.splitlines()
+    assert first == "A slow rise and a fast fall."
+    assert row == "sawtooth | amplitude 3 kV"
+    assert field.startswith("0.5 rise_s: time of the rise, in s")
+    assert all(
+        f"{text!r}" in labels for text in ("amplitude", "kV", "top of the rise", "rise", "s")
+    )
+    assert playable == "True"
 
 
 def test_a_file_is_saved_read_again_and_remembered(
