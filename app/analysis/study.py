@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -187,7 +188,7 @@ def _diagnosed(outcome: DiagnoseOutcome) -> tuple[Residual, ...]:
     return tuple(found)
 
 
-def _of(found: Sequence, record: str) -> list:
+def _of(found: Sequence[Any], record: str) -> list[Any]:
     return [item for item in found if item.record == record]
 
 

@@ -16,7 +16,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Annotated
+from typing import Annotated, TextIO
 
 import typer
 from typer.exceptions import TyperException
@@ -69,7 +69,7 @@ def _options(
     log.info("started: %s", shlex.join(["dearig", *sys.argv[1:]]))
 
 
-class _Terminal(logging.StreamHandler):
+class _Terminal(logging.StreamHandler[TextIO]):
     """Log messages on standard error: warnings, and more with ``--verbose``."""
 
     def __init__(self) -> None:

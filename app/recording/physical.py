@@ -110,7 +110,7 @@ def _backed(counts: h5py.Dataset) -> int:
     HDF5 goes on writing when a disk refuses a chunk, and a row may claim more than is there.
     """
     claimed = int(counts.shape[0])
-    claimed = min(claimed, counts.id.get_storage_size() // counts.dtype.itemsize)
+    claimed = min(claimed, int(counts.id.get_storage_size() // counts.dtype.itemsize))
     if counts.chunks is None or _closed(counts.parent):
         return claimed
     chunk = int(counts.chunks[0])

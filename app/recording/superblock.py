@@ -90,4 +90,4 @@ def lookup3(data: bytes, seed: int = 0) -> int:
         c = ((c ^ b) - _rotate(b, bits[0])) & MASK
         a = ((a ^ c) - _rotate(c, bits[1])) & MASK
         b = ((b ^ a) - _rotate(a, bits[2])) & MASK
-    return ((c ^ b) - _rotate(b, 24)) & MASK
+    return int(((c ^ b) - _rotate(b, 24)) & MASK)

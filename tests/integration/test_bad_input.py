@@ -114,7 +114,7 @@ SEQUENCES = {
     "brackets without end": ("x = " + "[" * 9000, ["nested too deeply"]),
     "a number without end": ("x = " + "9" * 5000, ["thousands of digits"]),
     "empty file": ("", ["s.toml: name is missing"]),
-    "no name": (segment(), ["name is missing", "what the recording will be called"]),
+    "no name": (segment(), ["name is missing", "title of the recording"]),
     "a number for a name": ("name = 3\n" + segment(), ["name = 3", "it takes a text"]),
     "no segment": (HEAD, ["there is no list of segments", "[[segment]]"]),
     "an empty list of segments": (f"{HEAD}segment = []\n", ["no list of segments"]),
@@ -314,7 +314,10 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
         "record {s}/lobe.toml --out {s}/lobe.toml --force",
         ["lobe.toml is the file that is read"],
     ),
-    "a table for a recording": ("record thesis --out o.csv", ["o.csv", "HDF5", "end in .h5"]),
+    "a table for a recording": (
+        "record thesis --out o.csv",
+        ["o.csv", "HDF5", "end its name in .h5"],
+    ),
     "json where the recording goes": (
         "record thesis --out o.h5 --json o.h5",
         ["o.h5 is named for two outputs"],
