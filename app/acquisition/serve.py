@@ -72,7 +72,7 @@ def serve(
     except ImportError as error:
         raise InstrumentFault(
             f"the simulated card is built on one version of nidaqmx, which is not installed "
-            f"({error}): pip install 'dearig[simulated-card]'"
+            f'({error}): pip install "dearig[simulated-card]"'
         ) from error
     try:
         plan = FaultPlan.parse(faults)

@@ -16,7 +16,7 @@ __all__ = ["require_qt", "require_screen", "run_window"]
 # a closed terminal or a stopped service must not leave a voltage on
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 _SIGNAL_INTERVAL = 200  # ms
-_INSTALL = "install it with: pip install 'dearig[gui]'"
+_INSTALL = 'install it with: pip install "dearig[gui]"'
 # Qt aborts when it cannot open a screen: another process tries first, without a core dump
 _TRY = (
     "import resource; resource.setrlimit(resource.RLIMIT_CORE, (0, 0)); "

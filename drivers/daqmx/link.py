@@ -30,7 +30,7 @@ class Link:
             import nidaqmx  # noqa: F401
         except ImportError as error:
             raise RigError(
-                f"the Python package nidaqmx is not installed ({error}): pip install 'dearig[rig]'"
+                f'the Python package nidaqmx is not installed ({error}): pip install "dearig[rig]"'
             ) from error
         if server is not None:
             self._channel = _channel_with_deadline(server, timeout)

@@ -105,7 +105,7 @@ def open_port(settings: LaserSettings) -> Port:
     except ModuleNotFoundError as error:
         raise LaserError(
             "pyserial, which speaks to serial ports, is not installed",
-            "pip install 'dearig[rig]'",
+            'pip install "dearig[rig]"',
         ) from error
     name = settings.port
     try:

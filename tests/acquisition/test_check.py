@@ -190,7 +190,7 @@ def test_without_nidaqmx_it_is_said_where_to_get_it(monkeypatch: pytest.MonkeyPa
     answer = dearig("check", "--rig", "daqmx:Dev1")
     assert answer.code == 4
     assert "nidaqmx is not installed" in answer.err
-    assert "pip install 'dearig[rig]'" in answer.err
+    assert 'pip install "dearig[rig]"' in answer.err
 
 
 @pytest.mark.parametrize("address", ["dev1", "sim:x", "daqmx:", "daqmx:Dev1@host", ""])

@@ -544,4 +544,4 @@ def test_without_pyserial_it_is_said_where_to_get_it(monkeypatch: pytest.MonkeyP
     (finding,) = inspect(SETTINGS).findings
     assert finding.verdict == "wrong"
     assert "pyserial" in finding.found
-    assert "pip install 'dearig[rig]'" in finding.advice
+    assert 'pip install "dearig[rig]"' in finding.advice
