@@ -273,9 +273,13 @@ def _left_out() -> dict[str, tuple[str, ...]]:
     from dearig.acquisition.rigs import RIGS
     from dearig.config.segments import SEGMENT_KINDS
     from dearig.drivers.instruments import INSTRUMENTS
+    from dearig.recording.exporters import EXPORTS
+    from dearig.recording.importers import IMPORTERS
 
     return {
         "segments": SEGMENT_KINDS.left_out,
+        "importers": IMPORTERS.left_out,
+        "exporters": EXPORTS.left_out,
         "rigs": RIGS.left_out,
         "instruments": INSTRUMENTS.left_out,
     }

@@ -155,8 +155,6 @@ _REWORDED = (
     (r"it must be greater than or equal to ", "it must be at least "),
     (r"it must be less than or equal to ", "it must be at most "),
     (r"Got unexpected extra argument\(?s?\)? \((.*)\)", r"too many arguments, from \1 on"),
-    (r"\. Choose from:\s*", "; choose from "),
-    (r",\s+", ", "),
 )
 
 
