@@ -1,10 +1,13 @@
 """The kernel's hooks, assembled from the functions of all effects and compiled once.
 
-Each hook is one place of the equations where effects take part. An effect at its neutral values is
-skipped, so one compiled kernel serves every combination; which are not neutral is looked up once a
-simulation, as bits of one number. Numba needs real functions with literal
-offsets, and a file to cache them by, so the text of the hooks is written beside the compiled
-kernels, in the folder that is named after the sources of this package.
+An effect at its neutral values is skipped, so one compiled kernel serves every combination. Which
+effects are active is determined once a simulation, as bits of one number. Numba needs real
+functions with literal offsets, and a file to cache them by. So the source of the hooks is written
+beside the compiled kernels, in the folder that is named after the sources of all effects.
+
+An assembled hook takes ``(on, c, m)`` and the arguments of ``HOOKS``; ``on`` is ``active(c)``, or
+``active_sensors(c)`` for ``sense``. ``m`` is the state of all effects of the motion, or of all
+effects of the sensor.
 """
 
 from __future__ import annotations
@@ -18,7 +21,8 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any
 
-from dearig.model.effects import EFFECTS, PLACES
+from dearig.model.effects.hooks import FASTEST, HOOKS
+from dearig.model.effects.registry import EFFECTS, PLACES
 from dearig.model.jit import cache_folder
 
 __all__ = [
@@ -39,44 +43,9 @@ __all__ = [
     "supply",
 ]
 
-#: Hooks: what an effect's function of that name takes besides ``(c, k, m, j)``, and what becomes
-#: of the answers. ``c`` are the coefficients and ``k`` where the effect's own begin; ``m`` is the
-#: memory of all effects of the motion, or of all of the sensor, and ``j`` where its own begins. A
-#: hook itself takes ``(on, c, m)`` and that, ``on`` being what ``active(c)`` says, or, for
-#: ``sense``, ``active_sensors(c)``.
-#:
-#: * ``inertia`` kg/m, added to the coefficient of lam'';
-#: * ``supply`` carries the voltage from ``start`` to ``end`` V over ``h`` s to the film, one effect
-#:   after another, each with its state in the memory; ``lam`` and ``rate`` are those amid that
-#:   time, and ``h`` = 0 asks for the voltage at the film now;
-#: * ``polarise`` gives what a slow dielectric adds to the voltage squared at start and end;
-#: * ``permittivity`` is a factor on the Maxwell stress, ``soften`` one on the network's stress;
-#: * ``stress`` Pa is added to the network's: at stretch ``lam`` and rate ``rate``, ``since`` s
-#:   after the step began at ``lam0``, the memory being that of the beginning; ``commit`` carries
-#:   the memory to the end of the step;
-#: * ``stiffness`` says what ``stress`` adds at a rate, (Pa, Pa s) at most: for the length of steps;
-#: * ``measured_stress`` is what a sample feels of the stress in it;
-#: * ``sense`` is what the sensor makes of displacement ``x`` m and velocity ``u`` m/s, ``dt`` s
-#:   after the reading before.
-#:
-#: ``t`` s is the time since the record began, ``warmth`` K the temperature above that of the start.
-HOOKS = MappingProxyType(
-    {
-        "inertia": ("", "sum"),
-        "supply": ("t, start, end, h, lam, rate", "start, end"),
-        "polarise": ("start, end, h", "sums"),
-        "permittivity": ("lam, field2", "product"),
-        "soften": ("lam, since, t, warmth", "product"),
-        "stress": ("lam, rate, lam0, since, t", "sum"),
-        "stiffness": ("lam, rate", "sums"),
-        "commit": ("lam, rate, lam0, h, t", ""),
-        "measured_stress": ("sigma", "sigma"),
-        "sense": ("t, dt, x, u", "x"),
-    }
-)
-# how the answers of several effects are put together: what to begin with, what to do with each (an
-# answer is {}), what to return; any other word is an argument that goes from one to the next
-_TOGETHER = MappingProxyType(
+# How the values of several effects combine: first line, line for each effect ({} is its value),
+# returned expression. Any other name is that of an argument that each effect hands to the next.
+_COMBINE = MappingProxyType(
     {
         "": ("", "{}", "0"),
         "sum": ("total = 0.0", "total += {}", "total"),
@@ -84,9 +53,8 @@ _TOGETHER = MappingProxyType(
         "product": ("total = 1.0", "total *= {}", "total"),
     }
 )
-# along the signal path, where the order matters: a sensor is slow before it is wrong
+# The order of effects is that of the signal path; a sensor's lag comes before its nonlinearity.
 _ORDER = ("amplifier", "electrode", "dielectric", "film stress", "inertia", "load", "environment")
-_EFFECTS_MAX = 62  # bits of a number that is not negative
 _SENSOR_ORDER = ("sensor_lag", "sensor_nonlinearity", "drift", "interference", "unknown")
 
 
@@ -100,16 +68,23 @@ def _rank(name: str) -> tuple[int, int, str]:
 def _bits() -> dict[str, int]:
     """One bit for each effect; those of the sensor are counted apart from those of the motion."""
     bits = {}
-    for sensed in (False, True):
-        names = [n for n in sorted(EFFECTS, key=_rank) if _has(n, "sense") == sensed]
-        if len(names) > _EFFECTS_MAX:
-            raise ImportError(f"{len(names)} effects: bits of one number tell {_EFFECTS_MAX} apart")
+    for of_sensor in (False, True):
+        names = [n for n in sorted(EFFECTS, key=_rank) if PLACES[n].is_sensor == of_sensor]
         bits.update({name: 1 << i for i, name in enumerate(names)})
     return bits
 
 
 def _has(name: str, hook: str) -> bool:
-    return hasattr(PLACES[name].module, hook)
+    """Whether an effect takes part in a hook; ``stiffness`` follows from ``stress``."""
+    if hook == "stiffness" and _is_numeric(name):
+        return True
+    return getattr(PLACES[name].module, hook, None) is not None
+
+
+def _is_numeric(name: str) -> bool:
+    """Whether the derivatives of an effect's stress are taken numerically."""
+    module = PLACES[name].module
+    return hasattr(module, "stress") and not hasattr(module, "stiffness")
 
 
 def _mask(names: Iterable[str]) -> int:
@@ -126,31 +101,64 @@ def _active(name: str) -> str:
     return " or ".join(tests)
 
 
+# Numeric derivatives of an effect's stress, where it gives none, at the beginning of a step at
+# ``lam``: the film comes from there at the rate. At an infinite rate the largest ones are wanted.
+_NUMERIC_STIFFNESS = """
+
+@jit
+def {effect}_stiffness(c, k, m, j, lam, rate):
+    slope, drag = 0.0, 0.0
+    speed, last = rate, rate
+    if rate > {fastest!r}:
+        speed, last = {fastest!r}, {slowest!r}
+    while True:
+        d, e = 1e-6 * lam, 1e-4 * max(speed, 1e-2)
+        since = d / max(speed, 1.0)
+        up = {effect}.stress(c, k, m, j, lam + d, speed, lam, since, 0.0)
+        down = {effect}.stress(c, k, m, j, lam - d, speed, lam, since, 0.0)
+        faster = {effect}.stress(c, k, m, j, lam, speed + e, lam, since, 0.0)
+        slower = {effect}.stress(c, k, m, j, lam, speed - e, lam, since, 0.0)
+        slope = max(slope, (up - down) / (2.0 * d))
+        drag = max(drag, (faster - slower) / (2.0 * e))
+        if speed <= last:
+            return slope, drag
+        speed *= 0.1
+"""
+
+
 def _text() -> str:
-    """Source of the hooks."""
+    """Return the source of the hooks."""
     names = sorted(EFFECTS, key=_rank)
     lines = ["from dearig.model.jit import jit"]
-    modules = {n: PLACES[n].module.__name__.rsplit(".", 1)[1] for n in names}
-    lines += [f"from dearig.model.effects import {m} as _{m}" for m in modules.values()]
+    modules = {name: f"_effect_{i}" for i, name in enumerate(names)}
+    lines += [f"import {PLACES[n].module.__name__} as {alias}" for n, alias in modules.items()]
+    lines += [
+        _NUMERIC_STIFFNESS.format(effect=modules[n], fastest=FASTEST, slowest=1e-3 * FASTEST)
+        for n in names
+        if _is_numeric(n)
+    ]
     for hook, (arguments, how) in HOOKS.items():
         taking = f", {arguments}" if arguments else ""
-        first, each, last = _TOGETHER.get(how, ("", f"{how} = {{}}", how))
+        first, each, last = _COMBINE.get(how, ("", f"{how} = {{}}", how))
         lines += ["", "", "@jit", f"def {hook}(on, c, m{taking}):", f"    {first}"]
         taken = [n for n in names if _has(n, hook)]
-        # by fours: one test spares four where nobody acts
+        # in groups of four: where none of a group is active, one test skips it
         for some in (taken[i : i + 4] for i in range(0, len(taken), 4)):
             lines.append(f"    if on & {_mask(some)}:")
             for name in some:
                 place = PLACES[name]
-                call = f"_{modules[name]}.{hook}(c, {place.at}, m, {place.memory}{taking})"
+                function = f"{modules[name]}.{hook}"
+                if hook == "stiffness" and _is_numeric(name):
+                    function = f"{modules[name]}_stiffness"
+                call = f"{function}(c, {place.at}, m, {place.memory}{taking})"
                 lines += [
                     f"        if on & {_OF_EFFECT[name]}:",
                     f"            {each.format(call)}",
                 ]
         lines.append(f"    return {last}")
-    for function, sensed in (("active", False), ("active_sensors", True)):
+    for function, of_sensor in (("active", False), ("active_sensors", True)):
         lines += ["", "", "@jit", f"def {function}(c):", "    found = 0"]
-        for name in (n for n in names if _has(n, "sense") == sensed):
+        for name in (n for n in names if PLACES[n].is_sensor == of_sensor):
             lines += [f"    if {_active(name)}:", f"        found |= {_OF_EFFECT[name]}"]
         lines.append("    return found")
     return "\n".join([*lines, ""])
@@ -161,13 +169,13 @@ def _load() -> ModuleType:
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "hooks.py"
     text = _text()
-    # written once and whole: its time of change is part of what the compiled kernels are known by
+    # Written once and atomically: numba compares its modification time with the compiled kernels'.
     if not path.exists() or path.read_text(encoding="utf-8") != text:
         handle, partial = tempfile.mkstemp(dir=folder, suffix=".py")
         with os.fdopen(handle, "w", encoding="utf-8") as file:
             file.write(text)
         Path(partial).replace(path)
-    spec = importlib.util.spec_from_file_location("dearig.model.effects.hooks", path)
+    spec = importlib.util.spec_from_file_location("dearig.model.effects.assembled", path)
     if spec is None or spec.loader is None:
         raise ImportError(f"{path} cannot be loaded")
     module = importlib.util.module_from_spec(spec)
@@ -177,10 +185,9 @@ def _load() -> ModuleType:
 
 
 _OF_EFFECT = _bits()
-#: What ``active(c)`` has in common with these says which hooks have anything to do; for ``sense``,
-#: what ``active_sensors(c)`` has.
+#: Bits of the effects that have each hook.
 HOOK_BITS = MappingProxyType({h: _mask(n for n in EFFECTS if _has(n, h)) for h in HOOKS})
-#: The same of the effects that depend on turning points.
+#: Bits of the hysteretic effects.
 HYSTERETIC = _mask(n for n, effect in EFFECTS.items() if effect.is_hysteretic)
 
 _hooks: Any = _load()

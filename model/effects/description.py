@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
-__all__ = ["ACTS_ON", "FAMILIES", "Effect", "EffectValues", "Parameter"]
+__all__ = ["ACTS_ON", "FAMILIES", "Effect", "EffectValues", "Parameter", "faults_of"]
 
 #: The places of the signal path where an effect can act.
 ACTS_ON = (
@@ -157,3 +158,65 @@ class Effect:
     def shape_parameters(self) -> tuple[Parameter, ...]:
         """The parameters that have no neutral value."""
         return tuple(p for p in self.parameters if p.neutral is None)
+
+
+_RELATIVE_TO = ("", "displacement", "voltage", "duration", "spectrum", "slope")
+_DRIVES = ("voltage", "stretch")
+
+
+def faults_of(effect: object) -> list[str]:
+    """Return what is wrong with the description of an effect, in sentences; none if all is well."""
+    if not isinstance(effect, Effect):
+        return ["it has no EFFECT of the class dearig.model.effects.Effect"]
+    return list(_faults(effect))
+
+
+def _faults(effect: Effect) -> Iterator[str]:
+    for value, known, what in (
+        (effect.family, FAMILIES, "family"),
+        (effect.acts_on, ACTS_ON, "acts_on"),
+    ):
+        if value not in known:
+            yield f"its {what} {value!r} is not one of {', '.join(known)}"
+    if not effect.name or not effect.summary:
+        yield "it needs a name and a summary"
+    if not effect.drives or not set(effect.drives) <= set(_DRIVES):
+        yield f"its drives {effect.drives} are not some of {', '.join(_DRIVES)}"
+    names = [p.name for p in effect.parameters]
+    if len(set(names)) < len(names):
+        yield f"two of its parameters have one name: {', '.join(names)}"
+    if not effect.amplitudes:
+        yield "it has no amplitude: a parameter with a neutral value"
+    if effect.parameters != effect.amplitudes + effect.shape_parameters:
+        yield "its amplitudes do not come before its shape parameters"
+    if effect.memory < 0:
+        yield f"its memory of {effect.memory} is negative"
+    for parameter in effect.parameters:
+        for fault in _parameter_faults(parameter):
+            yield f"its parameter {parameter.name!r} {fault}"
+
+
+def _parameter_faults(p: Parameter) -> Iterator[str]:
+    low, high = p.bounds
+    if not -math.inf < low < high < math.inf:
+        yield f"has bounds ({low}, {high}) that are not finite and increasing"
+        return
+    if not p.meaning:
+        yield "has no meaning"
+    if not 0.0 < p.typical <= high - low:
+        yield f"has a typical value {p.typical} that is not positive, or wider than its bounds"
+    if p.relative_to not in _RELATIVE_TO:
+        yield f"is relative to {p.relative_to!r}, which is not one of {', '.join(_RELATIVE_TO)}"
+    if p.logarithmic and low <= 0.0:
+        yield f"is logarithmic, but its lower bound {low} is not positive"
+    if p.neutral is None and not p.starts:
+        yield "is a shape parameter without starts"
+    is_fraction = p.relative_to in ("voltage", "displacement", "duration", "slope")
+    least, most = (0.0, 1.0) if is_fraction else p.bounds
+    if not all(least <= start <= most for start in p.starts):
+        yield f"has starts {p.starts} outside {least} to {most}"
+    if p.neutral is not None and not low <= p.neutral <= p.neutral + p.typical <= high:
+        yield f"has a neutral value {p.neutral}, or that and {p.typical} more, outside its bounds"
+    inner, outer = p.fit_bounds
+    if not low <= inner < outer <= high:
+        yield f"has fit_within ({inner}, {outer}) outside its bounds"

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dearig.model.coefficients import LENGTH, REST
 from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.hooks import FASTEST
 from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "stiffness", "stress"]
@@ -45,7 +46,6 @@ EFFECT = Effect(
 
 
 _DEPTH = 0.5e-3  # m, at which the stiffness is what it is called
-_FASTEST = 0.5  # 1/s, of a fast edge
 
 
 @jit
@@ -65,9 +65,8 @@ def stress(c, k, m, j, lam, rate, lam0, since, t):
 
 @jit
 def stiffness(c, k, m, j, lam, rate):
-    # from half the way on, so that the steps are short enough when it is met
-    held, slope = _held(c, k, lam - c[REST] - 0.5 * c[k + 1] / c[LENGTH])
-    if slope <= 0.0:
-        return 0.0, 0.0
+    # The slope counts from half of the way on, so that steps are short when the contact is met.
+    _, slope = _held(c, k, lam - c[REST] - 0.5 * c[k + 1] / c[LENGTH])
+    held, _ = _held(c, k, lam - c[REST] - c[k + 1] / c[LENGTH])
     fast = c[k + 3] * c[LENGTH]
-    return slope * (1.0 + fast * min(rate, _FASTEST)), held * fast
+    return slope * (1.0 + fast * min(rate, FASTEST)), held * fast

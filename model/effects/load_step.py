@@ -9,7 +9,7 @@ from dearig.model.effects.description import Effect, Parameter
 from dearig.model.filters import switched
 from dearig.model.jit import jit
 
-__all__ = ["EFFECT", "stress"]
+__all__ = ["EFFECT", "stiffness", "stress"]
 
 EFFECT = Effect(
     name="sudden change of force",
@@ -30,6 +30,8 @@ EFFECT = Effect(
     ),
     is_reproducible=False,
 )
+
+stiffness = None  # the stress depends on time alone
 
 
 @jit

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from dearig.model.effects.description import Effect, Parameter
+from dearig.model.effects.hooks import FASTEST
 from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "stiffness", "stress"]
@@ -26,13 +27,12 @@ EFFECT = Effect(
 
 _REFERENCE = 0.1  # 1/s
 _DRIVE = 3e3  # Pa: a Maxwell stress of 8 MV/m
-_FASTEST = 0.5  # 1/s: a fast edge
 
 
 @jit
 def greatest_rate(drag, exponent):
     """Rate in 1/s of a fast edge, or, if less, at which drag * rate**exponent holds the drive."""
-    return min(_FASTEST, (_DRIVE / max(drag, 1e-3)) ** (1.0 / exponent))
+    return min(FASTEST, (_DRIVE / max(drag, 1e-3)) ** (1.0 / exponent))
 
 
 @jit
@@ -43,7 +43,7 @@ def stress(c, k, m, j, lam, rate, lam0, since, t):
 @jit
 def stiffness(c, k, m, j, lam, rate):
     slope = c[k] * c[k + 1] / _REFERENCE
-    there = min(rate, _FASTEST) / _REFERENCE
+    there = min(rate, FASTEST) / _REFERENCE
     part = there ** (c[k + 1] - 1.0)
     if c[k] * part * there > _DRIVE:
         there = greatest_rate(c[k] / _REFERENCE ** c[k + 1], c[k + 1]) / _REFERENCE
