@@ -12,8 +12,8 @@ EFFECT = Effect(
     name="amplifier lag",
     family="amplifier",
     acts_on="amplifier",
-    summary="the film gets the voltage late, by a fixed time",
-    parameters=(Parameter("time_constant", "s", (0.0, 1.0), "of the amplifier", 5e-3, 0.0),),
+    summary="the voltage at the film lags the command by a fixed time",
+    parameters=(Parameter("time_constant", "s", (0.0, 1.0), "of the amplifier's lag", 5e-3, 0.0),),
     memory=1,
 )
 

@@ -13,14 +13,14 @@ EFFECT = Effect(
     name="amplifier limit",
     family="amplifier",
     acts_on="amplifier",
-    summary="the film sees less than was asked for beyond one voltage, and all of it below",
+    summary="above one voltage the film gets less than was commanded",
     parameters=(
-        Parameter("flattening", "", (0.0, 1.0), "part of the slope lost beyond the knee", 0.2, 0.0),
+        Parameter("flattening", "", (0.0, 1.0), "relative loss of slope beyond the knee", 0.2, 0.0),
         Parameter(
             "knee",
             "V",
             (1e3, 2e4),
-            "voltage beyond which it flattens",
+            "voltage at which the output begins to flatten",
             7e3,
             starts=(0.85, 0.7, 0.5),
             relative_to="voltage",

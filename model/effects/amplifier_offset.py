@@ -11,7 +11,7 @@ EFFECT = Effect(
     name="amplifier offset",
     family="amplifier",
     acts_on="amplifier",
-    summary="a force in proportion to the voltage itself, beside its square",
+    summary="a constant voltage is added: a force proportional to the voltage itself",
     parameters=(Parameter("offset", "V", (-2e3, 2e3), "of the output", 20.0, 0.0),),
 )
 

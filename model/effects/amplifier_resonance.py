@@ -16,9 +16,9 @@ EFFECT = Effect(
     name="amplifier resonance",
     family="amplifier",
     acts_on="amplifier",
-    summary="the film gets the voltage late and rounded, or with an overshoot",
+    summary="the voltage at the film lags and is rounded, or overshoots",
     parameters=(
-        Parameter("time_constant", "s", (0.0, 0.5), "one over the angular frequency", 5e-3, 0.0),
+        Parameter("time_constant", "s", (0.0, 0.5), "inverse angular frequency", 5e-3, 0.0),
         Parameter("damping", "", (0.05, 0.98), "ratio", 0.1, starts=(0.7,), logarithmic=True),
     ),
     memory=2,

@@ -15,14 +15,14 @@ EFFECT = Effect(
     name="amplifier saturation",
     family="amplifier",
     acts_on="amplifier",
-    summary="the film sees less than was asked for, the more the higher the voltage",
+    summary="the film gets less voltage than commanded, the more the higher the voltage",
     parameters=(
-        Parameter("loss", "", (0.0, 0.5), "part of the voltage that is lost at 8 kV", 0.02, 0.0),
+        Parameter("loss", "", (0.0, 0.5), "relative loss of voltage at 8 kV", 0.02, 0.0),
         Parameter(
             "exponent",
             "",
             (1.0, 12.0),
-            "by which the lost part grows with the voltage: how sharp the bend is",
+            "of the loss as a power of the voltage: sharpness of the bend",
             2.0,
             starts=(2.0, 5.0),
         ),

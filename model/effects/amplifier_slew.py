@@ -12,14 +12,14 @@ EFFECT = Effect(
     name="amplifier slew",
     family="amplifier",
     acts_on="amplifier",
-    summary="the film gets edges of the voltage late, and slow changes in time",
+    summary="fast edges of the voltage reach the film late, slow changes on time",
     parameters=(
         # shown by the steepest edges only: sought where it would touch so much of the time
         Parameter(
             "inverse_slew",
             "s/V",
             (0.0, 2e-3),
-            "one over the greatest slope",
+            "inverse of the largest slope",
             5e-5,
             0.0,
             starts=(

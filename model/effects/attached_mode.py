@@ -20,16 +20,21 @@ EFFECT = Effect(
     name="attached mode",
     family="unknown",
     acts_on="load",
-    summary="something rings on its own frequency after every edge",
+    summary="a second mass rings at its own frequency after every edge",
     parameters=(
         Parameter(
-            "stiffness", "Pa", (0.0, 1e6), "of what holds it, as stress per stretch", 5e3, 0.0
+            "stiffness",
+            "Pa",
+            (0.0, 1e6),
+            "of the spring that holds the mass, as stress per stretch",
+            5e3,
+            0.0,
         ),
         Parameter(
             "frequency",
             "Hz",
             (0.3, 40.0),
-            "of its own ringing",
+            "of the mass on its spring",
             5.0,
             starts=(4.0, 2.0, 8.0, 15.0),
             relative_to="spectrum",

@@ -18,7 +18,7 @@ EFFECT = Effect(
     name="broad creep",
     family="creep",
     acts_on="film stress",
-    summary="the film goes on creeping over decades of time after everything else has relaxed",
+    summary="the film keeps creeping over decades of time",
     parameters=(
         Parameter("modulus", "Pa", (0.0, 1e7), "of the first branch", 1e3, 0.0),
         Parameter(
@@ -31,7 +31,12 @@ EFFECT = Effect(
             logarithmic=True,
         ),
         Parameter(
-            "exponent", "", (-0.2, 0.9), "of the moduli's fall with time", 0.2, starts=(0.2,)
+            "exponent",
+            "",
+            (-0.2, 0.9),
+            "of the decrease of the moduli with time",
+            0.2,
+            starts=(0.2,),
         ),
     ),
     memory=6,

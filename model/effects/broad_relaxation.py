@@ -21,7 +21,7 @@ EFFECT = Effect(
     name="broad dielectric relaxation",
     family="dielectric_relaxation",
     acts_on="dielectric",
-    summary="a part of the force follows the voltage over decades of time, whatever the stretch",
+    summary="part of the force follows the voltage over decades of time, at any stretch",
     parameters=(
         Parameter(
             "strength", "", (-0.5, 2.0), "slow part of the permittivity over the fast", 0.01, 0.0
@@ -39,7 +39,7 @@ EFFECT = Effect(
             "alpha",
             "",
             (0.1, 0.8),
-            "of Cole and Cole: the larger, the broader is the spectrum",
+            "of Cole and Cole: the spectrum is broader for a larger one",
             0.1,
             starts=(0.4,),
         ),
@@ -47,7 +47,7 @@ EFFECT = Effect(
             "half_width",
             "",
             (1.0, 7.0),
-            "logarithm of the longest time over the relaxation time, where the spectrum ends",
+            "ln(longest time/relaxation time), where the spectrum ends",
             1.0,
             starts=(4.0,),
         ),

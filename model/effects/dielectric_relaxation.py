@@ -18,7 +18,7 @@ SETTLED = Parameter(
     "settled",
     "",
     (0.0, 1.0),
-    "1 where the film's data give the permittivity at rest, 0 where that of fast fields",
+    "1 if the film's permittivity is that at rest, 0 if that of fast fields",
     1.0,
     starts=(1.0,),
 )
@@ -27,7 +27,7 @@ EFFECT = Effect(
     name="dielectric relaxation",
     family="dielectric_relaxation",
     acts_on="dielectric",
-    summary="a part of the force follows the voltage with a delay of its own, whatever the stretch",
+    summary="part of the force follows the voltage with a delay, at any stretch",
     parameters=(
         Parameter(
             "strength", "", (-0.5, 2.0), "slow part of the permittivity over the fast", 0.01, 0.0

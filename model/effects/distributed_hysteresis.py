@@ -27,7 +27,7 @@ EFFECT = Effect(
     summary="hysteresis loops at any speed, narrow for small strokes and wide for large ones",
     parameters=(
         Parameter(
-            "stiffness", "Pa", (0.0, 1e6), "of all elements together before any slips", 3e3, 0.0
+            "stiffness", "Pa", (0.0, 1e6), "of all elements together before one slips", 3e3, 0.0
         ),
         Parameter(
             "reach",
@@ -42,7 +42,7 @@ EFFECT = Effect(
             "spread",
             "",
             (0.05, 4.0),
-            "of the elements: 0 if all slip at the reach, 1 if evenly up to it",
+            "of the thresholds: 0 all at the reach, 1 evenly up to it",
             0.1,
             starts=(1.0,),
         ),

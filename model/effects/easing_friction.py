@@ -24,19 +24,24 @@ _FRICTION, _PRESLIDING, _DAMPING = DRY.parameters
 EFFECT = replace(
     DRY,
     name="easing friction",
-    summary="a force against the motion that is greater when slow: the film sticks, and slips",
+    summary="friction that is larger at low speed: the film sticks and slips",
     parameters=(
         replace(_FRICTION, meaning="nominal stress while sliding fast"),
         replace(_PRESLIDING, starts=(1e-4, 5e-4)),
         _DAMPING,
         Parameter(
-            "excess", "", (0.0, 1.0), "part of it that is lost with speed", 0.1, starts=(0.15, 0.4)
+            "excess",
+            "",
+            (0.0, 1.0),
+            "friction at rest over that while sliding fast, less 1",
+            0.1,
+            starts=(0.15, 0.4),
         ),
         Parameter(
             "easing",
             "1/s",
             (2e-3, 0.3),
-            "rate of stretch at which most of that is lost",
+            "rate of stretch at which most of the excess is lost",
             1e-2,
             starts=(1e-2, 3e-2),
             logarithmic=True,

@@ -23,17 +23,22 @@ __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 EFFECT = replace(
     EASING,
     name="elastoplastic friction",
-    summary="a force against the motion, greater when slow, that a small swing does not overcome",
+    summary="friction that is larger at low speed and elastic for small swings",
     parameters=(
         *EASING.parameters,
         Parameter(
-            "elastic", "", (0.0, 0.9), "part of it up to which nothing slips", 0.1, starts=(0.6,)
+            "elastic",
+            "",
+            (0.0, 0.9),
+            "part of the deflection up to which nothing slips",
+            0.1,
+            starts=(0.6,),
         ),
         Parameter(
             "easing_exponent",
             "",
             (0.5, 3.0),
-            "of the rate: how suddenly it is lost",
+            "of the rate, by which the excess decreases",
             0.3,
             starts=(2.0,),
         ),

@@ -18,7 +18,7 @@ EFFECT = Effect(
     name="elastoplastic hysteresis",
     family="rate_independent_hysteresis",
     acts_on="film stress",
-    summary="loops that do not depend on the speed, opening over a part of the stroke",
+    summary="hysteresis loops at any speed that open over a part of the stroke",
     parameters=(
         Parameter(
             "yield_stress", "Pa", (0.0, 2e5), "stress far from the last reversal", 200.0, 0.0
@@ -33,13 +33,13 @@ EFFECT = Effect(
             logarithmic=True,
         ),
         Parameter(
-            "exponent", "", (0.7, 6.0), "the larger, the sharper it yields", 0.5, starts=(1.5,)
+            "exponent", "", (0.7, 6.0), "of the yield: larger is sharper", 0.5, starts=(1.5,)
         ),
         Parameter(
             "asymmetry",
             "",
             (0.5, 1.0),
-            "1/2 if unloading begins as stiff as what is fresh, 1 if twice as stiff",
+            "1/2 if unloading is as stiff as first loading, 1 if twice as stiff",
             0.1,
             starts=(0.8,),
         ),

@@ -19,9 +19,9 @@ EFFECT = Effect(
     name="electrode resistance",
     family="electrode_resistance",
     acts_on="electrode",
-    summary="the film charges through a resistance: a delay of the force that grows with stretch",
+    summary="the film charges through a resistance: the force is delayed, more when stretched",
     parameters=(
-        Parameter("resistance", "ohm", (0.0, 5e9), "between amplifier and film", 1e7, 0.0),
+        Parameter("resistance", "ohm", (0.0, 5e9), "between the amplifier and the film", 1e7, 0.0),
     ),
     memory=1,
 )

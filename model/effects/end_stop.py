@@ -19,9 +19,11 @@ EFFECT = Effect(
     name="stress beyond a displacement",
     family="unknown",
     acts_on="load",
-    summary="a stress that sets in at one displacement and grows from there, at any speed",
+    summary="a stress that sets in at one displacement and grows beyond it, at any speed",
     parameters=(
-        Parameter("stiffness", "Pa", (0.0, 5e7), "stress per stretch, 0.5 mm beyond", 2e4, 0.0),
+        Parameter(
+            "stiffness", "Pa", (0.0, 5e7), "stress per stretch, 0.5 mm beyond the onset", 2e4, 0.0
+        ),
         Parameter(
             "onset",
             "m",
@@ -36,7 +38,7 @@ EFFECT = Effect(
             "exponent",
             "",
             (1.0, 4.0),
-            "by which it grows with the depth",
+            "of the stress as a power of the depth",
             1.0,
             starts=(1.0, 1.5),
         ),

@@ -16,9 +16,16 @@ EFFECT = Effect(
     name="field-dependent permittivity",
     family="permittivity",
     acts_on="dielectric",
-    summary="the force of the field does not grow with its square",
+    summary="the force is not proportional to the square of the field",
     parameters=(
-        Parameter("field_coefficient", "", (-2.0, 0.5), "relative change at 8 MV/m", 0.03, 0.0),
+        Parameter(
+            "field_coefficient",
+            "",
+            (-2.0, 0.5),
+            "relative change of the permittivity at 8 MV/m",
+            0.03,
+            0.0,
+        ),
     ),
 )
 

@@ -15,14 +15,14 @@ EFFECT = Effect(
     name="sudden loss of field",
     family="unknown",
     acts_on="electrode",
-    summary="the voltage pulls less from one moment on",
+    summary="the force of the voltage drops at one moment and stays lower",
     parameters=(
-        Parameter("loss", "", (-0.5, 0.5), "part of the voltage that is lost", 5e-3, 0.0),
+        Parameter("loss", "", (-0.5, 0.5), "relative loss of voltage", 5e-3, 0.0),
         Parameter(
             "moment",
             "s",
             (0.0, 1e5),
-            "at which it comes",
+            "of the change",
             0.5,
             starts=(0.5,),
             relative_to="duration",

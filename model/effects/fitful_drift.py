@@ -1,14 +1,14 @@
-"""Drift of the sensor's zero that goes up and down again and again: of a longer record.
+"""Drift of the sensor's zero that goes up and down many times, in a longer record.
 
-As ``wandering_drift``, by a polynomial of the thirteenth degree: what wanders so fast that nine
-numbers follow it for half a minute asks for as many more as the record is longer. It plays nearly
-anything slow, and is sought only where nine have led and have left something.
+As ``wandering_drift``, with Chebyshev polynomials to the thirteenth degree. It imitates nearly
+anything slow: a diagnosis tries it only in place of a restless drift that leads and leaves more
+than noise.
 """
 
 from __future__ import annotations
 
 from dearig.model.effects.restless_drift import EFFECT as RESTLESS
-from dearig.model.effects.wandering_drift import finer, walked
+from dearig.model.effects.wandering_drift import drifted, finer
 from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
@@ -16,11 +16,11 @@ __all__ = ["EFFECT", "sense"]
 EFFECT = finer(
     RESTLESS,
     "fitful drift",
-    "the reading goes up and down again and again, whatever the film does",
-    {"decic": "nine", "undecic": "ten", "duodecic": "eleven", "tredecic": "twelve"},
+    "the reading drifts up and down many times, whatever the film does",
+    {"decic": "tenth", "undecic": "eleventh", "duodecic": "twelfth", "tredecic": "thirteenth"},
 )
 
 
 @jit
 def sense(c, k, m, j, t, dt, x, u):
-    return x + walked(c, k, 13, t)
+    return x + drifted(c, k, 13, t)

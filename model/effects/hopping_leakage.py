@@ -17,7 +17,7 @@ __all__ = ["EFFECT", "supply"]
 EFFECT = replace(
     BY_TRAPS,
     name="hopping leakage",
-    summary="the film takes a current at any voltage, and exponentially more at a high one",
+    summary="the film draws a current at any voltage, exponentially more at a high one",
     parameters=(BY_TRAPS.parameters[0], replace(BY_TRAPS.parameters[1], starts=(1.0, 4.0))),
 )
 

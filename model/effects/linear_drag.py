@@ -15,7 +15,7 @@ EFFECT = Effect(
     name="linear drag",
     family="drag",
     acts_on="load",
-    summary="a force against the motion, in proportion to its rate",
+    summary="a force against the motion, proportional to its rate",
     parameters=(
         Parameter("drag", "Pa s", (0.0, 1e5), "nominal stress per rate of stretch", 300.0, 0.0),
     ),

@@ -11,8 +11,8 @@ EFFECT = Effect(
     name="linear drift",
     family="drift",
     acts_on="sensor",
-    summary="the reading runs away with time, whatever the film does",
-    parameters=(Parameter("drift", "m/s", (-1e-4, 1e-4), "rate of the zero", 1e-7, 0.0),),
+    summary="the reading drifts at a constant rate, whatever the film does",
+    parameters=(Parameter("drift", "m/s", (-1e-4, 1e-4), "of the zero, per second", 1e-7, 0.0),),
 )
 
 

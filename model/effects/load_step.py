@@ -15,14 +15,14 @@ EFFECT = Effect(
     name="sudden change of force",
     family="unknown",
     acts_on="load",
-    summary="a stress that is there from one moment on",
+    summary="a force sets in at one moment and stays",
     parameters=(
-        Parameter("stress", "Pa", (-2e4, 2e4), "taken from the load", 30.0, 0.0),
+        Parameter("stress", "Pa", (-2e4, 2e4), "that supports the load", 30.0, 0.0),
         Parameter(
             "moment",
             "s",
             (0.0, 1e5),
-            "at which it comes",
+            "of the change",
             0.5,
             starts=(0.5,),
             relative_to="duration",

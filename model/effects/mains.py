@@ -13,7 +13,7 @@ EFFECT = Effect(
     name="mains interference",
     family="interference",
     acts_on="sensor",
-    summary="a line at the mains frequency in the spectrum of the reading, whatever the film does",
+    summary="a line at the mains frequency in the spectrum of the reading",
     parameters=(
         Parameter("cosine", "m", (-1e-3, 1e-3), "of the fundamental", 2e-6, 0.0),
         Parameter("sine", "m", (-1e-3, 1e-3), "of the fundamental", 2e-6, 0.0),

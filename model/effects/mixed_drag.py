@@ -19,7 +19,7 @@ __all__ = ["EFFECT", "stiffness", "stress"]
 EFFECT = replace(
     LINEAR,
     name="mixed drag",
-    summary="a force against the motion that grows with its rate, and with the square of that",
+    summary="a force against the motion that grows with its rate and with the square of the rate",
     parameters=(
         *LINEAR.parameters,
         Parameter("quadratic", "Pa s^2", (0.0, 1e6), "nominal stress per rate squared", 5e3, 0.0),

@@ -19,7 +19,7 @@ EFFECT = Effect(
     name="power-law creep",
     family="creep",
     acts_on="film stress",
-    summary="the film creeps in equal steps in equal ratios of time",
+    summary="the film creeps by a power of time: alike in every decade",
     parameters=(
         Parameter(
             "modulus", "Pa", (0.0, 1e7), "relaxation modulus of the power law at 1 s", 3e3, 0.0

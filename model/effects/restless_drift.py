@@ -1,13 +1,14 @@
-"""Drift of the sensor's zero that wanders up and down in a record: air that moves about a mount.
+"""Drift of the sensor's zero that goes up and down within a record: moving air at a mount.
 
-As ``wandering_drift``, by a polynomial of the ninth degree, which follows two turns there and back
-in half a minute. So many numbers play much that is slow: they are sought only where fewer have led.
+As ``wandering_drift``, with Chebyshev polynomials to the ninth degree, enough for two swings in
+half a minute. So many amplitudes imitate much that is slow: a diagnosis tries this one only in
+place of a wandering drift that leads and leaves more than noise.
 """
 
 from __future__ import annotations
 
 from dearig.model.effects.wandering_drift import EFFECT as WANDERING
-from dearig.model.effects.wandering_drift import finer, walked
+from dearig.model.effects.wandering_drift import drifted, finer
 from dearig.model.jit import jit
 
 __all__ = ["EFFECT", "sense"]
@@ -15,11 +16,11 @@ __all__ = ["EFFECT", "sense"]
 EFFECT = finer(
     WANDERING,
     "restless drift",
-    "the reading wanders up and down within the record, whatever the film does",
-    {"sextic": "five", "septic": "six", "octic": "seven", "nonic": "eight"},
+    "the reading drifts up and down several times, whatever the film does",
+    {"sextic": "sixth", "septic": "seventh", "octic": "eighth", "nonic": "ninth"},
 )
 
 
 @jit
 def sense(c, k, m, j, t, dt, x, u):
-    return x + walked(c, k, 9, t)
+    return x + drifted(c, k, 9, t)

@@ -17,9 +17,16 @@ EFFECT = Effect(
     name="self-heating",
     family="thermal",
     acts_on="environment",
-    summary="the stiffness follows the square of the voltage, seconds and minutes late",
+    summary="the stiffness follows the square of the voltage, with a delay of seconds or minutes",
     parameters=(
-        Parameter("stiffening", "", (-0.5, 0.5), "relative change under 5 kV, later", 3e-3, 0.0),
+        Parameter(
+            "stiffening",
+            "",
+            (-0.5, 0.5),
+            "relative change of stress under constant 5 kV, final",
+            3e-3,
+            0.0,
+        ),
         Parameter(
             "time_constant",
             "s",

@@ -16,10 +16,24 @@ EFFECT = Effect(
     name="self-heating in stages",
     family="thermal",
     acts_on="environment",
-    summary="the stiffness follows the square of the voltage, first in seconds, then in minutes",
+    summary="the stiffness follows the square of the voltage, in seconds and then in minutes",
     parameters=(
-        Parameter("stiffening", "", (-0.5, 0.5), "relative change under 5 kV, first", 3e-3, 0.0),
-        Parameter("later", "", (-0.5, 0.5), "relative change under 5 kV, later", 3e-3, 0.0),
+        Parameter(
+            "stiffening",
+            "",
+            (-0.5, 0.5),
+            "relative change of stress under constant 5 kV, first",
+            3e-3,
+            0.0,
+        ),
+        Parameter(
+            "later",
+            "",
+            (-0.5, 0.5),
+            "relative change of stress under constant 5 kV, final",
+            3e-3,
+            0.0,
+        ),
         Parameter(
             "time_constant", "s", (1.0, 3e2), "of the first", 8.0, starts=(8.0,), logarithmic=True
         ),

@@ -24,8 +24,8 @@ EFFECT = Effect(
     name="sensor averaging",
     family="sensor_lag",
     acts_on="sensor",
-    summary="the reading is the mean over the time just gone: late, and rounded at corners",
-    parameters=(Parameter("window", "s", (0.0, 2.0), "over which the sensor averages", 1e-2, 0.0),),
+    summary="the reading is a mean over a time window: late, and rounded at corners",
+    parameters=(Parameter("window", "s", (0.0, 2.0), "of the mean", 1e-2, 0.0),),
     # position, rate, integral and time at the reading before, and what was shown; then integrals
     # and positions at the ends of the parts
     memory=5 + 2 * _KEPT,

@@ -14,7 +14,7 @@ EFFECT = Effect(
     name="sensor bend",
     family="sensor_nonlinearity",
     acts_on="sensor",
-    summary="the reading is a bent function of the position, most at the far end",
+    summary="the reading is a cubic function of the position, most wrong at the far end",
     parameters=(Parameter("cubic", "1/m^2", (-2e5, 2e5), "of the reading", 3e3, 0.0),),
 )
 

@@ -16,12 +16,12 @@ EFFECT = Effect(
     acts_on="sensor",
     summary="the reading flattens beyond one displacement, at any speed",
     parameters=(
-        Parameter("flattening", "", (0.0, 1.0), "part of the slope lost beyond the knee", 0.1, 0.0),
+        Parameter("flattening", "", (0.0, 1.0), "relative loss of slope beyond the knee", 0.1, 0.0),
         Parameter(
             "knee",
             "m",
             (1e-5, 2e-2),
-            "displacement beyond which it flattens",
+            "displacement at which the reading begins to flatten",
             1e-3,
             starts=(0.5, 0.3, 0.7, 0.85),
             relative_to="displacement",

@@ -14,7 +14,7 @@ EFFECT = Effect(
     name="sensor curvature",
     family="sensor_nonlinearity",
     acts_on="sensor",
-    summary="the reading is a bent function of the position, the same at any speed",
+    summary="the reading is a quadratic function of the position, at any speed",
     parameters=(Parameter("quadratic", "1/m", (-300.0, 300.0), "of the reading", 5.0, 0.0),),
 )
 

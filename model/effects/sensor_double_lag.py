@@ -16,7 +16,7 @@ EFFECT = Effect(
     name="sensor double lag",
     family="sensor_lag",
     acts_on="sensor",
-    summary="the reading is late by a fixed time, and rounded, as behind two filters",
+    summary="the reading lags by a fixed time and is rounded, as behind two filters",
     parameters=(Parameter("time_constant", "s", (0.0, 0.5), "of each low-pass", 5e-3, 0.0),),
     memory=4,
 )

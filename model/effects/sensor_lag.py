@@ -15,7 +15,7 @@ EFFECT = Effect(
     name="sensor lag",
     family="sensor_lag",
     acts_on="sensor",
-    summary="the reading is late by a fixed time, on the way up and on the way down",
+    summary="the reading lags by a fixed time, loading and unloading alike",
     parameters=(Parameter("time_constant", "s", (0.0, 1.0), "of the low-pass", 5e-3, 0.0),),
     memory=3,
 )

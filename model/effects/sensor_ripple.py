@@ -16,7 +16,7 @@ EFFECT = Effect(
     name="sensor ripple",
     family="sensor_nonlinearity",
     acts_on="sensor",
-    summary="the reading is off by the same again every so many micrometres of travel",
+    summary="the reading has an error that is periodic along the travel",
     parameters=(
         Parameter("sine", "m", (-5e-4, 5e-4), "of the error", 5e-6, 0.0),
         Parameter("cosine", "m", (-5e-4, 5e-4), "of the error", 5e-6, 0.0),

@@ -22,7 +22,7 @@ EFFECT = Effect(
             "moment",
             "s",
             (0.0, 1e5),
-            "at which it comes",
+            "of the change",
             0.5,
             starts=(0.5,),
             relative_to="duration",

@@ -16,9 +16,9 @@ EFFECT = Effect(
     name="settling drift",
     family="drift",
     acts_on="sensor",
-    summary="the reading moves to another zero as time passes, whatever the film does",
+    summary="the reading drifts to another zero and settles, whatever the film does",
     parameters=(
-        Parameter("drift", "m", (-5e-3, 5e-3), "of the zero in the end", 3e-6, 0.0),
+        Parameter("drift", "m", (-5e-3, 5e-3), "of the zero, final", 3e-6, 0.0),
         Parameter(
             "time_constant",
             "s",

@@ -28,10 +28,17 @@ _HALVINGS = 50  # of the interval in which a root lies: to the last digit
 EFFECT = replace(
     LUMPED,
     name="sheet electrode",
-    summary="the film charges through the sheet of its electrode, far from the contact later",
+    summary="the electrode charges as a sheet: late where it is far from the contact",
     parameters=(
         replace(LUMPED.parameters[0], meaning="of contact and sheet, end to end"),
-        Parameter("contact", "", (0.02, 0.95), "its part at the contact", 0.1, starts=(0.2,)),
+        Parameter(
+            "contact",
+            "",
+            (0.02, 0.95),
+            "fraction of the resistance at the contact",
+            0.1,
+            starts=(0.2,),
+        ),
     ),
     memory=2 * _MODES,
 )

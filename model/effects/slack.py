@@ -16,9 +16,16 @@ EFFECT = Effect(
     name="slack",
     family="slack",
     acts_on="film stress",
-    summary="the strip buckles where the springs would push: no stress on the way back",
+    summary="the strip buckles in place of pushing: no stress on the way back",
     parameters=(
-        Parameter("looseness", "", (0.0, 1.0), "part of a push that is not felt", 0.5, 0.0),
+        Parameter(
+            "looseness",
+            "",
+            (0.0, 1.0),
+            "fraction of a compressive stress that is not measured",
+            0.5,
+            0.0,
+        ),
     ),
     drives=("stretch",),
 )

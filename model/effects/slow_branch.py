@@ -12,7 +12,7 @@ EFFECT = Effect(
     name="slow branch",
     family="creep",
     acts_on="film stress",
-    summary="the film goes on creeping after everything else has relaxed",
+    summary="the film keeps creeping with one more relaxation time",
     parameters=(
         Parameter("modulus", "Pa", (0.0, 1e7), "of the branch", 2e3, 0.0),
         Parameter(

@@ -15,14 +15,14 @@ EFFECT = Effect(
     name="slowing drift",
     family="drift",
     acts_on="sensor",
-    summary="the reading runs away with time, ever slower, whatever the film does",
+    summary="the reading drifts, ever more slowly, whatever the film does",
     parameters=(
         Parameter("drift", "m", (-5e-3, 5e-3), "of the zero within 30 s", 3e-6, 0.0),
         Parameter(
             "onset",
             "s",
             (0.1, 100.0),
-            "time after which it slows down",
+            "time after which the drift slows down",
             2.0,
             starts=(2.0,),
             logarithmic=True,

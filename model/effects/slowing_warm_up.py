@@ -21,15 +21,15 @@ _STIFFENING, _TIME_CONSTANT = WARM_UP.parameters
 EFFECT = replace(
     WARM_UP,
     name="slowing warm-up",
-    summary="the stiffness goes on changing, by a power of time, whatever the film does",
+    summary="the stiffness changes by a power of time, whatever the film does",
     parameters=(
         _STIFFENING,
-        replace(_TIME_CONSTANT, meaning="from which on it slows down", starts=(5.0, 20.0)),
+        replace(_TIME_CONSTANT, meaning="after which the change slows down", starts=(5.0, 20.0)),
         Parameter(
             "power",
             "",
             (0.1, 5.0),
-            "of what is still to come",
+            "of time in the remaining change",
             0.5,
             starts=(1.0,),
             logarithmic=True,

@@ -21,12 +21,12 @@ _LOSS, _GROWTH, _ = BY_TRAPS.parameters
 EFFECT = replace(
     BY_TRAPS,
     name="space-charge leakage",
-    summary="the film takes a current that goes with a power of the voltage",
+    summary="the film draws a current that grows with a power of the voltage",
     parameters=(
         _LOSS,
         replace(
             _GROWTH,
-            meaning="power of the field by which the conductivity grows: 1 without traps",
+            meaning="power of the field in the conductivity: 1 without traps",
             typical=1.0,
             starts=(1.0, 3.0),
         ),

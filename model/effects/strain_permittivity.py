@@ -15,7 +15,7 @@ EFFECT = Effect(
     name="strain-dependent permittivity",
     family="permittivity",
     acts_on="dielectric",
-    summary="the force of the field changes with the stretch",
+    summary="the force of the field changes in proportion to the stretch",
     parameters=(
         Parameter("strain_coefficient", "", (-10.0, 10.0), "relative change per stretch", 0.5, 0.0),
     ),

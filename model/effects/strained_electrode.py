@@ -20,10 +20,12 @@ EFFECT = Effect(
     name="strained electrode",
     family="electrode_resistance",
     acts_on="electrode",
-    summary="the film charges through a resistance that changes as the electrode is stretched",
+    summary="the film charges through a resistance that changes with the stretch",
     parameters=(
-        Parameter("resistance", "ohm", (0.0, 5e9), "between amplifier and film", 1e7, 0.0),
-        Parameter("gauge", "", (-60.0, 60.0), "by which stretch changes it", 5.0, starts=(10.0,)),
+        Parameter("resistance", "ohm", (0.0, 5e9), "between the amplifier and the film", 1e7, 0.0),
+        Parameter(
+            "gauge", "", (-60.0, 60.0), "factor of the resistance with stretch", 5.0, starts=(10.0,)
+        ),
     ),
     memory=1,
 )

@@ -15,7 +15,7 @@ EFFECT = Effect(
     name="temperature",
     family="thermal",
     acts_on="environment",
-    summary="the stiffness follows the thermometer",
+    summary="the stiffness follows the recorded temperature",
     parameters=(
         Parameter(
             "stiffening", "1/K", (-0.2, 0.2), "relative change of stress per kelvin", 1e-3, 0.0

@@ -16,9 +16,9 @@ EFFECT = Effect(
     name="warm-up",
     family="thermal",
     acts_on="environment",
-    summary="the stiffness goes to another value as time passes, whatever the film does",
+    summary="the stiffness settles at another value with time, whatever the film does",
     parameters=(
-        Parameter("stiffening", "", (-0.5, 0.5), "relative change of stress in the end", 1e-3, 0.0),
+        Parameter("stiffening", "", (-0.5, 0.5), "final relative change of stress", 1e-3, 0.0),
         Parameter(
             "time_constant",
             "s",

@@ -1,9 +1,11 @@
 """The contract of effects: every effect passes it, and each kind of mistake is told."""
 
 import re
+from pathlib import Path
 
 import pytest
 
+from dearig.model import effects
 from dearig.model.effects import EFFECTS
 from dearig.model.effects.contract import check_effect
 from dearig.model.errors import ModelError
@@ -136,7 +138,7 @@ EXPECTED = {
     "stress with a state of its own": r"its hook stress changes the state",
     "not nothing when neutral": r"m of it are left near its neutral values",
     "infinite at a bound": r"its hook soften returns \[inf\] at size = 1e\+06",
-    "state that is not handed on": r"its stress jumps by .* what commit hands on",
+    "state that is not handed on": r"its stress jumps between steps .* what commit hands on",
     "supply that moves on": r"its hook supply changes the state where h is 0",
     "hysteresis that is not declared": r"without is_hysteretic, quick steps change",
     "another drift": r"its drift_basis differs from what sense adds",
@@ -161,6 +163,13 @@ def test_an_effect_that_nobody_knows():
         check_effect("magic")
 
 
+def worked_example():
+    """The effect that the README walks through."""
+    text = (Path(effects.__path__[0]) / "README.md").read_text(encoding="utf-8")
+    (source,) = re.findall(r"```python\n(\"\"\".*?)```", text, flags=re.DOTALL)
+    return source
+
+
 @pytest.fixture(scope="module")
 def told(tmp_path_factory):
     """What the contract says of every made effect."""
@@ -170,6 +179,7 @@ def told(tmp_path_factory):
         settings = {"acts_on": "load", "low": 0.0, "typical": 50.0, "memory": 0, "basis": None}
         head = HEAD.format(name=name, **settings | SETTINGS.get(name, {}))
         modules[f"made_effect_{i}"] = head + body
+    modules["fading_drag"] = worked_example()
     add_distribution(folder, "made-effects", modules)
     lines = run_with(folder, PROGRAM, compiled=True).splitlines()
     return dict(line.split(": ", 1) for line in lines)
@@ -180,3 +190,8 @@ def told(tmp_path_factory):
 def test_the_contract_tells_a_wrong_effect(name, told):
     assert re.search(EXPECTED[name], told[name]), told[name]
     assert bool(told[name]) == bool(EXPECTED[name])
+
+
+@pytest.mark.slow
+def test_the_worked_example_of_the_readme_keeps_the_contract(told):
+    assert told["fading drag"] == ""
