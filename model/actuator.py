@@ -39,7 +39,7 @@ __all__ = [
 STATUS_WORDS = MappingProxyType(
     {
         kernel.OK: "ok",
-        kernel.PULL_IN: "pull-in: the field outgrew the film's stiffness and the stretch ran away",
+        kernel.PULL_IN: "pull-in: the field exceeded the film's stiffness and the stretch ran away",
         kernel.LOCKED: "a spring was stretched to its locking limit",
         kernel.NOT_CONVERGED: "the integration step had to become too small",
         kernel.NO_REST: "no rest state: the springs cannot carry the load",
@@ -88,7 +88,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Response:
-    """What the film did: arrays (N,) on the drive's time, and how the computation ended.
+    """Motion of the film: arrays (N,) on the drive's time, and the status of the computation.
 
     ``stretch`` lam, ``rate`` dlam/dt in 1/s, ``displacement`` in m what the sensor reads, which is
     (lam - lam_rest) L1 unless an effect acts on it, ``field`` the true field phi/z in V/m.
@@ -112,7 +112,7 @@ class Response:
 
     @property
     def in_words(self) -> str:
-        """The status in words, with the time at which it came."""
+        """The status in words, with the time at which it occurred."""
         words = STATUS_WORDS[self.status]
         if self.ok:
             return words
@@ -245,14 +245,14 @@ def _modulus_at_rest(c: np.ndarray, stretch: float) -> float:
 
 
 def at_rest(c: np.ndarray) -> tuple[int, float]:
-    """``(status, stretch)`` under the load at 0 V; the coefficients ``c`` get to know it."""
+    """Return ``(status, stretch)`` under the load at 0 V; enter it in the coefficients ``c``."""
     status, rest = kernel.rest_stretch(c, 0.0)
     c[at.REST] = rest
     return status, rest
 
 
 def initial_state(c: np.ndarray, rest: float) -> np.ndarray:
-    """Kernel state at rest: branches relaxed, xi_i = lam_rest (eq. 48), nothing to remember."""
+    """Kernel state at rest: branches relaxed, xi_i = lam_rest (eq. 48), state of the effects 0."""
     branches = (c.size - HEAD) // at.WIDTH - 1
     y = np.zeros(2 + branches + MEMORY)
     y[: 2 + branches] = rest

@@ -35,9 +35,9 @@ def relaxed(
 ) -> float:
     """Stress in Pa of ``count`` branches, ``since`` s after the step began at ``lam0``.
 
-    The first is of ``modulus`` Pa and relaxes in ``time`` s; from one to the next these go by the
-    factors ``fall`` and ``ratio``. Their q stand in the memory ``m`` from ``j`` on, and are carried
-    there with ``commits``.
+    The first has the modulus ``modulus`` Pa and the relaxation time ``time`` s; from one to the next
+    these change by the factors ``fall`` and ``ratio``. Their internal strains q are in the state
+    ``m`` from ``j`` on; ``commits`` carries them to the end.
     """
     e0, e = math.log(lam0 / c[REST]), math.log(lam / c[REST])
     time *= 0.5 * (lam0 + lam) / c[REST]
@@ -49,4 +49,5 @@ def relaxed(
             m[j + i] = q
         modulus *= fall
         time *= ratio
-    return total * c[REST] / lam
+    stress: float = total * c[REST] / lam
+    return stress

@@ -1,9 +1,9 @@
-"""A voltage that was read back carries its reading's noise, and a model would ring with that.
+"""Remove the noise of a voltage that was read back, and keep its edges.
 
 The film under its load rings at some 70 Hz with hardly any damping, so a few volts of noise on the
-drive become a micrometre of displacement that nothing measured. The smoothest course that the
-readings allow is taken instead (Lepski's rule): at each sample a parabola over the widest window
-about it that the readings follow within their noise.
+drive become a micrometre of simulated displacement. The smoothest voltage that agrees with the
+readings is used instead (Lepski's rule): at each sample a parabola over the widest window around it
+that the readings follow within their noise.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from scipy.signal import savgol_filter
 __all__ = ["quieted", "reading_noise"]
 
 _WINDOWS = (81, 41, 21, 11, 7)  # samples
-_AGREES = 1.25  # local RMS of what is smoothed away, over the noise
+_AGREES = 1.25  # local RMS of the removed part, over the noise
 _QUIET_MIN = 20  # samples
 
 
 def reading_noise(voltage: np.ndarray) -> float:
-    """Noise in V of readings (N,) that begin at rest; 0 where they begin without any.
+    """Return the noise in V of readings (N,) that begin at rest; 0 where they begin without any.
 
-    Read from the start up to where the voltage leaves it for good.
+    It is read from the start to the last sample before the voltage leaves its initial value.
     """
     start = voltage[:_QUIET_MIN]
     if start.size < _QUIET_MIN:
@@ -36,7 +36,7 @@ def reading_noise(voltage: np.ndarray) -> float:
 
 
 def quieted(voltage: np.ndarray, noise: float) -> np.ndarray:
-    """``voltage`` (N,) V with readings' ``noise`` V taken off it, edges kept as they are."""
+    """Return ``voltage`` (N,) V without the ``noise`` V of its readings; edges are kept."""
     out = voltage.copy()
     open_ = np.ones(voltage.size, dtype=bool)
     for window in _WINDOWS:

@@ -325,7 +325,7 @@ def _taper(t: np.ndarray, duration: float, taper: float) -> np.ndarray:
     if taper == 0.0:
         return np.ones_like(t)
     nearest = np.clip(np.minimum(t, duration - t) / taper, 0.0, 1.0)
-    return 0.5 - 0.5 * np.cos(np.pi * nearest)
+    return np.asarray(0.5 - 0.5 * np.cos(np.pi * nearest))
 
 
 class _AboutOffset:
@@ -380,7 +380,7 @@ class Chirp(_AboutOffset):
         else:
             cycles = self.low * self.length / ratio * np.expm1(ratio * t / self.length)
         swing = np.sin(2.0 * np.pi * cycles) * _taper(t, self.length, self.taper)
-        return self.start + self.amplitude * swing
+        return np.asarray(self.start + self.amplitude * swing)
 
 
 @dataclass(frozen=True)
@@ -423,7 +423,7 @@ class Multisine(_AboutOffset):
         grid = np.linspace(0.0, self.length, min(max(points, 64), 200_000))
         crest = float(np.max(np.abs(self._sum(grid) * _taper(grid, self.length, self.taper))))
         shape = self._sum(t) * _taper(t, self.length, self.taper) / crest
-        return self.start + self.amplitude * np.clip(shape, -1.0, 1.0)
+        return np.asarray(self.start + self.amplitude * np.clip(shape, -1.0, 1.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -464,7 +464,7 @@ class Sampled(_Fixed):
         return float(self.voltages[-1])
 
     def voltage(self, t: np.ndarray) -> np.ndarray:
-        return np.interp(t, self.times, self.voltages)
+        return np.asarray(np.interp(t, self.times, self.voltages))
 
 
 @dataclass(frozen=True)

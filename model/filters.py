@@ -184,7 +184,8 @@ def bent(z: float, travel: float, reach: float, elastic: float) -> float:
 
 @jit
 def _winds(b: float, exponent: float, asymmetry: float) -> float:
-    return 1.0 - abs(b) ** exponent * (1.0 - asymmetry + math.copysign(asymmetry, b))
+    bent: float = abs(b) ** exponent
+    return 1.0 - bent * (1.0 - asymmetry + math.copysign(asymmetry, b))
 
 
 @jit

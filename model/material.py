@@ -1,4 +1,4 @@
-"""What a film is made of and how it hangs: immutable values, in SI units."""
+"""Film, load and spring network: immutable values in SI units."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class Network:
             c[k + at.LIMIT] = spring.limit
             c[k + at.LOCKING] = locking_strain(kind, spring.limit)
             if i:
-                # a branch that relaxes within a nanosecond carries nothing; 1/0 would be no number
+                # a branch that relaxes within a nanosecond carries no stress; 1/0 is avoided
                 c[k + at.RATE] = 1.0 / max(self.times[i - 1], 1e-9)
         return c
 

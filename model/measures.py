@@ -1,4 +1,4 @@
-"""How far a model is from a measurement: the thesis's measures as printed, and sound ones."""
+"""Errors of a model against a measurement: as the thesis prints them, and normalised."""
 
 from __future__ import annotations
 

@@ -149,7 +149,7 @@ def _pulling_alike(drive: Drive, edges: np.ndarray) -> np.ndarray:
     found = wanted.copy()
     for _ in range(_MATCHING):
         found = np.maximum(found + wanted - _mean_square(sign * np.sqrt(found)), 0.0)
-    return sign * np.sqrt(found)
+    return np.asarray(sign * np.sqrt(found))
 
 
 def _mean_square(voltage: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ def at_sensor(
 ) -> None:
     """``value`` (N,) and its ``rate`` at the times ``at`` (M,), which increase: cubic Hermite.
 
-    Into ``shown`` and ``shown_rate`` (M,). A sensor that is late shows what was a little earlier.
+    Into ``shown`` and ``shown_rate`` (M,). A sensor with a lag reads an earlier position.
     """
     last = time.shape[0] - 1
     j = 0

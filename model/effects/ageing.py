@@ -1,6 +1,7 @@
-"""Softening by use: the network loses stiffness with the path that the film has gone.
+"""Softening by use: the network loses stiffness with the travel of the film.
 
-The stress is multiplied by 1 - a (1 - exp(-p/p_0)), p the stretch gone up and down since the start.
+The stress is multiplied by 1 - a (1 - exp(-p/p_0)), p the travel in stretch, up and down, since the
+start.
 """
 
 from __future__ import annotations

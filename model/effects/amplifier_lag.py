@@ -1,4 +1,4 @@
-"""Lag of the amplifier, first order: dV/dt = (V_asked - V)/tau."""
+"""Lag of the amplifier, first order: dV/dt = (V_command - V)/tau."""
 
 from __future__ import annotations
 

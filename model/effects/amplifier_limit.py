@@ -1,4 +1,4 @@
-"""A limit of the amplifier with a knee: beyond it the output has 1 - s of its slope."""
+"""Limit of the amplifier with a knee, beyond which the slope is 1 - s of that below."""
 
 from __future__ import annotations
 

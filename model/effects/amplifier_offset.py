@@ -1,4 +1,4 @@
-"""Offset of the amplifier: the film gets V + V_0, and pulls by 2 V V_0 more."""
+"""Offset of the amplifier: the film gets V + V_0, so V^2 grows by 2 V V_0 + V_0^2."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Lag of the amplifier, second order: a control loop with a frequency and a damping of its own.
+"""Lag of the amplifier, second order: a control loop with its own frequency and damping.
 
-V'' = (V_asked - V)/tau^2 - 2 z V'/tau, with tau = 1/(2 pi f): late as a first-order lag is, and
-overshooting where the damping ratio z is below 0.7.
+V'' = (V_command - V)/tau^2 - 2 z V'/tau, with tau = 1/(2 pi f): it lags as a
+first-order lag does, and overshoots where the damping ratio z is below 0.7.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""Saturation of the amplifier: the output bends towards a limit V_s, as sharply as it likes.
+"""Saturation of the amplifier: the output approaches a limit V_s.
 
-V/(1 + (|V|/V_s)^n)^(1/n) (Rapp's model of an amplifier), V_s = 8 kV/(n s)^(1/n). At a small loss s
-it is short of s V (|V|/8 kV)^n, as behind a film that leaks: no record tells the two apart.
+V/(1 + (|V|/V_s)^n)^(1/n) (Rapp's model of an amplifier), V_s = 8 kV/(n s)^(1/n). For a
+small loss s the output is s V (|V|/8 kV)^n too low, as behind a film that leaks: no record
+distinguishes the two.
 """
 
 from __future__ import annotations

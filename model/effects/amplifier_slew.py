@@ -1,4 +1,4 @@
-"""Slew limit of the amplifier: the output changes no faster than so many volts a second."""
+"""Slew limit of the amplifier: the slope of the output has a largest value."""
 
 from __future__ import annotations
 

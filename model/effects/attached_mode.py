@@ -1,8 +1,7 @@
-"""Something weakly damped that hangs on the film: a frame that rings, a load that swings.
+"""A weakly damped mass on a spring at the edge of the film: a ringing frame, a swinging load.
 
-A mass hangs on the film's edge by a spring: its own position w, counted as strain, obeys
-w'' = -2 z om w' - om^2 (w - e) with e = lam - lam_rest, and the spring pulls the film back by the
-stress s (e - w). No family of its own.
+The position w of the mass, as a strain, obeys w'' = -2 z om w' - om^2 (w - e), e = lam - lam_rest;
+the spring adds the stress s (e - w). It belongs to no named family.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Creep spread over many times: a broad spectrum of branches slower than the film's own.
+"""Creep with a broad spectrum of relaxation times, slower than the film's own branches.
 
-Six branches as of ``slow_branch``, two a decade from T on, with moduli that fall as a power of
-time. For the power 0 the film creeps with the logarithm of time.
+Six branches as in ``slow_branch``, two per decade from T on, with moduli that decrease as a power
+of time. With the power 0 the film creeps with the logarithm of time.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Slow polarisation spread over many times, as most polymers have it: a broad Debye spectrum.
+"""Slow polarisation with a broad spectrum of relaxation times, as in most polymers.
 
 Cole and Cole's (J. Chem. Phys. 9, 341 (1941)): the strength is spread over y = ln(T_i/T) as
-1/(cosh((1 - alpha) y) - cos(pi alpha)). No spectrum goes on for ever: the decades where it ends
-are most of what differs between a broad one and a narrow one on short ramps. Seven Debye terms as
-of ``dielectric_relaxation`` stand for it, at even steps of y from -w to w.
+1/(cosh((1 - alpha) y) - cos(pi alpha)). The spectrum ends at
+-w and w: on short ramps these ends are most of the difference between a broad and a narrow one.
+Seven Debye terms as in ``dielectric_relaxation``, evenly spaced in y, represent it.
 """
 
 from __future__ import annotations

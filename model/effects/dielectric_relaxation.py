@@ -1,8 +1,8 @@
 """Slow polarisation: a part of the permittivity follows the field with a delay (Debye).
 
 With the slow polarisation in proportion to u, u' = (V - u)/tau, the stress D E is
-eps V (V + d u)/(1 + g d): the film pulls a little harder after the voltage has stood for a while.
-With g = 1 eps is the permittivity at rest, with g = 0 that of fast fields: data sheets differ.
+eps V (V + d u)/(1 + g d): the force grows a little while the voltage is constant. With
+g = 1 eps is the permittivity at rest, with g = 0 that of fast fields: data sheets give either.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Rate-independent hysteresis as a distribution of yielding elements (Prandtl and Ishlinskii).
 
-Equal elements in parallel, each a spring that slips when it is strained beyond its own threshold.
-The share of them that slips below the threshold s is (s/r)^(1/p) up to the reach r, a power law as
-in Segalman (J. Appl. Mech. 72, 2005). With the spread p = 1 thresholds lie evenly, and small loops
-are parabolic, as Rayleigh found for iron; near 0 all slip at once; a large p rounds the loop from
-its very beginning. Twenty-four elements follow the loop of infinitely many within 1e-3 of what all
-of them can bear.
+Equal elements in parallel, each a spring that slips beyond its own threshold of strain. The part of
+them that slips below the threshold s is (s/r)^(1/p) up to the reach r, a power law as
+in Segalman (J. Appl. Mech. 72, 2005). With the spread p = 1 the thresholds are evenly spaced and
+small loops are parabolic (Rayleigh); near 0 all slip at once; a large p rounds the loop from its
+beginning. Twenty-four elements follow the loop of infinitely many within 1e-3 of the largest
+stress.
 """
 
 from __future__ import annotations

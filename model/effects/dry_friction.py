@@ -1,13 +1,12 @@
-"""Dry friction of a guide, with the little travel that it takes to build up (pre-sliding).
+"""Dry friction of a guide, with the travel over which it builds up (pre-sliding).
 
 Dahl's model (1968): the stress approaches F against the motion, dz/dlam = 1 - z/p sign(lam'), so
 that for motion one way z goes to +-p exponentially over the stretch p, and the stress is F z/p.
 The exact solution is used from one turning point to the next, so z is rate-independent at any step.
 
-What bends also resists its bending (Canudas de Wit and others, IEEE Trans. Autom. Control 40, 1995,
-the bristles' own damping): the stress runs ahead of F z/p by the time tau, F/p (z + tau z'). A film
-that sticks would otherwise ring on its guide for long, which none does; one that slides is not
-damped by it.
+The bristles are damped (Canudas de Wit and others, IEEE Trans. Autom. Control 40, 1995): the stress
+leads F z/p by the time tau, F/p (z + tau z'). Without it a film that sticks would ring on its guide
+for long; a film that slides is not damped by it.
 """
 
 from __future__ import annotations

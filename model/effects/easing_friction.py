@@ -1,9 +1,9 @@
-"""Dry friction that eases with speed: a film at rest holds on more firmly than one that slides.
+"""Dry friction that decreases with speed (Stribeck): it is larger at rest than while sliding.
 
 The law of Canudas de Wit, Olsson, Astrom and Lischinsky (IEEE Trans. Autom. Control 40, 1995):
 ``dry friction``, whose stress while sliding is F (1 + e exp(-(lam'/v)^2)) after Stribeck, as is the
-travel over which it builds up. What eases with speed drives a film that slides slowly: it squeals
-at its own frequency, and sticks and slips.
+travel over which it builds up. Friction that decreases with speed feeds energy into a film that
+slides slowly: it squeals at its own frequency, and sticks and slips.
 """
 
 from __future__ import annotations

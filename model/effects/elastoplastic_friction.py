@@ -1,10 +1,10 @@
-"""Dry friction of bristles that only bend at first, and slip later: what swings a little stays.
+"""Dry friction of bristles that bend elastically at first and slip later: small swings are elastic.
 
 The law of Dupont, Hayward, Armstrong and Altpeter (IEEE Trans. Autom. Control 47, 2002): as
-``easing friction``, but where bristles are bent by less than a part of the deflection at which they
-slip, or back, they follow the film; from there to that deflection they slip the more. And what is
-lost with speed goes as exp(-|lam'/v|^d), of which Stribeck's d = 2 and Tustin's d = 1 are two (Bo
-and Pavelescu, Wear 82, 1982).
+``easing friction``, but bristles follow the film while they are bent by less than a fraction of the
+deflection at which they slip, or bend back; beyond, they slip more and more. The excess decreases
+as exp(-|lam'/v|^d), with Stribeck's d = 2 and Tustin's d = 1 as cases (Bo and Pavelescu, Wear 82,
+1982).
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Rate-independent hysteresis of the film itself: one yielding element in parallel to its springs.
 
 Bouc and Wen's model (J. Eng. Mech. Div. ASCE 102, 1976): the stress is Y b, and over the stretch r
-db/d(lam/r) = 1 - |b|^n (1 - s + s sign(b lam')). With n = s = 1 it is Dahl's; a large n yields at
-once; with s = 1/2 what is unloaded is as stiff as what is fresh. The film's own loops open over a
-good part of the stroke, where those of dry friction open within a few micrometres.
+db/d(lam/r) = 1 - |b|^n (1 - s + s sign(b lam')). With n = s = 1 it is Dahl's model; a large n
+yields abruptly; with s = 1/2 unloading is as stiff as first loading. The film's loops open over a
+good part of the stroke, those of dry friction within a few micrometres.
 """
 
 from __future__ import annotations

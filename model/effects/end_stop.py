@@ -1,9 +1,8 @@
-"""Something that the film meets beyond some travel: an elastic stop, a cable that gets taut.
+"""A contact beyond some travel: an elastic stop, a cable that becomes taut.
 
 The stress k d (d/d_0)^(n - 1) (1 + c x'), d = (x - x_s)/L1 beyond the displacement x_s and d_0 half
-a millimetre: n = 1 is a spring, 1.5 a ball on a flat (Hertz), more a cushion; c is what the contact
-loses (Hunt and Crossley, J. Appl. Mech. 42, 440 (1975)). No family of its own: it is what an
-unnamed stress that sets in at one displacement looks like.
+a millimetre: n = 1 is a spring, 1.5 a ball on a flat (Hertz), more a cushion; c is the loss in
+the contact (Hunt and Crossley, J. Appl. Mech. 42, 440 (1975)). It belongs to no named family.
 """
 
 from __future__ import annotations
@@ -47,7 +46,7 @@ EFFECT = Effect(
 )
 
 
-_DEPTH = 0.5e-3  # m, at which the stiffness is what it is called
+_DEPTH = 0.5e-3  # m: the depth at which the stiffness is defined
 
 
 @jit

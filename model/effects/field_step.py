@@ -1,6 +1,6 @@
-"""A part of the film that the field no longer reaches from one moment on: an electrode that cracks.
+"""A sudden loss of field: an electrode that cracks, so that part of the film is not charged.
 
-From the time t_0 on the voltage counts 1 - s of what it did, over 20 ms so that a fit can find it.
+From the time t_0 on the voltage is multiplied by 1 - s, over 20 ms so that a fit can find it.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Damage by the largest stretch so far, which stays (discontinuous damage, after Miehe 1995).
 
 The network carries 1 - s (1 - q) of its stress, q = (1 + b x)^(-1/b) with x = (d/r)^n and d the
-largest change of stretch since rest: once a film has been stretched, it is softer at every stretch,
-and goes on to be. What can still be lost goes with exp(-x) for b = 0 (Miehe), with 1/(1 + x) for
-b = 1: a broader spread of what the parts of the network bear.
+largest change of stretch since rest: once a film has been stretched, it stays softer
+at every stretch. The remaining loss decreases as exp(-x) for b = 0 (Miehe) and as 1/(1 + x) for
+b = 1: a broader distribution of the strengths of the network.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Leakage by charges that hop over equal barriers, with the field and, less often, against it.
+"""Leakage by charges that hop over equal barriers, with the field and against it.
 
-The current goes with sinh(b E) (Mott and Gurney 1940; Eyring): at small fields the film is a plain
-resistor, which leakage by traps is not, and at large ones the current grows exponentially.
+The current goes with sinh(b E) (Mott and Gurney 1940; Eyring): at small fields the film is a
+plain resistor, unlike leakage by traps; at large ones the current grows exponentially.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Leakage through the film, whose current drops a part of the voltage in the electrodes.
+"""Leakage through the film: its current drops part of the voltage in the electrodes.
 
-The film conducts better in a strong field, which helps its charges out of their traps (n = 1/2;
-Frenkel, Phys. Rev. 54, 647 (1938); n = 1 where it lowers barriers in proportion, Poole). The
-conductivity goes with exp(b E^n): nothing is lost at small voltages, most at the peak.
+The conductivity grows as exp(b E^n): the field frees charges from traps (n = 1/2; Frenkel, Phys.
+Rev. 54, 647 (1938)) or lowers barriers in proportion (n = 1; Poole). So nothing is lost at small
+voltages, and most at the peak.
 """
 
 from __future__ import annotations

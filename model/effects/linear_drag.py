@@ -1,7 +1,7 @@
 """Drag in proportion to the rate: air around the load, a viscous guide, losses in the frame.
 
-The nominal stress d lam' acts against the motion. A Maxwell branch that relaxes much faster than
-anything the record shows does the same, so the two are one and the same to slow data.
+The nominal stress d lam' acts against the motion. A Maxwell branch that relaxes much faster
+than the record shows has the same effect: slow data do not distinguish the two.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A force that changes at one moment: a load that slips, a hook that settles.
 
-The stress p is taken from the load from the time t_0 on, over 20 ms so that a fit can find it.
+From the time t_0 on the stress p supports the load, over 20 ms so that a fit can find it.
 """
 
 from __future__ import annotations

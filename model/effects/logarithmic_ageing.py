@@ -1,8 +1,8 @@
-"""Softening by use that never ends: stiffness lost with the logarithm of the path gone.
+"""Softening by use without an end: stiffness lost with the logarithm of the travel.
 
-The stress is multiplied by 1 - a ln(1 + p/p_0), p the stretch gone up and down since the start:
-each tenfold of the cycles costs the same, which is how filled and unfilled rubbers relax under
-cyclic load (Derham and Thomas, Rubber Chem. Technol. 50, 1977).
+The stress is multiplied by 1 - a ln(1 + p/p_0), p the travel in stretch since the start: each
+tenfold number of cycles costs the same, as filled and unfilled rubbers relax under cyclic load
+ (Derham and Thomas, Rubber Chem. Technol. 50, 1977).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Drag in proportion to the rate and to its square: a viscous guide, and the wake of what moves.
 
 The nominal stress (d + q |lam'|) lam' acts against the motion. Below the rate d/q the fluid's
-viscosity rules, above it the fluid's inertia (Forchheimer 1901, of flow through a bed): a power of
-the rate may do as well as this in slow lobes, and then not on an edge.
+viscosity dominates, above it the fluid's inertia (Forchheimer 1901, of flow through a bed). In slow
+lobes a power of the rate explains as much; on a fast edge it does not.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Softening by the largest stretch so far (Mullins; after Ogden and Roxburgh).
 
-Below the largest strain I_max - I_rest that the film has seen, its network carries only
+Below the largest strain I_max - I_rest so far, the network carries only
 1 - s tanh((I_max - I)/(w (I_max - I_rest + I_0))) of its stress; on the first loading, all of it.
-I_0 = 0.001 keeps a film that was never stretched from softening by a tremor: without it, rest would
-be unstable.
+I_0 = 0.001 keeps a film that was never stretched from softening by small vibrations: without it the
+rest state would be unstable.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Drag that grows with a power of the rate: a plate moving through air or oil.
 
-The nominal stress d |lam'/r|^n sign(lam'), r = 0.1/s, acts against the motion: n is 2 where inertia
-of the fluid rules, as rho C_d A (L1 lam')^2/2, 1 where its viscosity does, and between in between.
+The nominal stress d |lam'/r|^n sign(lam'), r = 0.1/s, acts against the motion: n is 2 where the
+fluid's inertia dominates, as rho C_d A (L1 lam')^2/2, and 1 where its viscosity does.
 """
 
 from __future__ import annotations

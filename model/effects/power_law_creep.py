@@ -2,7 +2,7 @@
 
 The relaxation modulus k (t/1 s)^-a is a sum of six branches, one a decade from 0.03 s to 3000 s,
 with moduli that fall as T^-a. For a = 0.2 the sum follows the power within 1.5 % from 0.05 s to
-100 s, less a constant that slower branches would carry: to a record of minutes that is elasticity.
+100 s, less a constant of slower branches, which a record of minutes shows as elasticity.
 """
 
 from __future__ import annotations

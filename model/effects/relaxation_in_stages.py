@@ -1,6 +1,6 @@
 """Slow polarisation in three stages (side groups, chains, charges): a Prony series.
 
-Three Debye terms as of ``dielectric_relaxation``, each of its own strength, at T/s, T and r T.
+Three Debye terms as of ``dielectric_relaxation``, each with its own strength, at T/s, T and r T.
 """
 
 from __future__ import annotations

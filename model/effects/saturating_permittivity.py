@@ -1,7 +1,7 @@
-"""Permittivity that changes with the stretch up to a limit: chains align until they are aligned.
+"""Permittivity that changes with the stretch up to a limit: chains align, up to full alignment.
 
-The Maxwell stress is multiplied by 1 + a d/(1 + |d/r|^n)^(1/n), d = lam - lam_rest: of slope a at
-first, levelling off at a change of a r after the stretch r, as sharply as n says.
+The Maxwell stress is multiplied by 1 + a d/(1 + |d/r|^n)^(1/n), d = lam - lam_rest: the slope
+is a at first and levels off at a change of a r, over the stretch r, with the sharpness n.
 """
 
 from __future__ import annotations

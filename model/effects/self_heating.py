@@ -1,8 +1,8 @@
 """Warming by the film's own losses, where no thermometer was recorded.
 
-Losses go with the square of the voltage, and the heat leaves with one time constant:
-T' = ((V/5 kV)^2 - T)/tau, T in units of what a standing 5 kV would come to. The network's stress is
-multiplied by 1 + a T.
+Losses are proportional to the square of the voltage, and the heat leaves with one time constant:
+T' = ((V/5 kV)^2 - T)/tau, T in units of the temperature under constant 5 kV. The network's
+stress is multiplied by 1 + a T.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Warming by the film's own losses, and of what is around it, where no thermometer was recorded.
+"""Warming by the film's own losses, first of the film and later of its surroundings.
 
-Two bodies as of ``self_heating``: the film, and frame and air, which come to their warmth later.
+Where no thermometer was recorded: two bodies as in ``self_heating``, the film, and frame and air.
 The network's stress is multiplied by 1 + a T + b T_2.
 """
 

@@ -1,8 +1,8 @@
-"""Moving average of the sensor over a window that nobody declared.
+"""Undeclared moving average of the sensor over a time window.
 
-The mean over the last w s is a difference of two values of the reading's integral. The integral and
-the position are remembered at 24 moments of the window, and the integral between these is the cubic
-that agrees with both; from reading to reading it is exact for the cubic through positions and
+The mean over the last w s is a difference of two values of the reading's integral. The memory
+holds the integral and the position at 24 times of the window; between these the integral is the
+cubic that agrees with both. From reading to reading it is exact for the cubic through positions and
 rates.
 """
 

@@ -1,7 +1,4 @@
-"""A sensor that gives less and less beyond some displacement, down to nothing: clipping.
-
-Beyond the knee the reading has 1 - s of its slope.
-"""
+"""Clipping of the sensor: beyond a knee the reading has 1 - s of its slope."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Sensor nonlinearity, quadratic: a tilted or badly linearised laser.
 
-The reading is x + q x^2; the linear term is the sensor's gain, which only a gauge can tell.
+The reading is x + q x^2; the linear term is the sensor's gain, which only a calibration gives.
 """
 
 from __future__ import annotations

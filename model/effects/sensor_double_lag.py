@@ -1,7 +1,7 @@
-"""Lag of the sensor, second order: two low-passes in a row, as of a filter of two stages.
+"""Lag of the sensor, second order: two low-passes in series.
 
 r' = (q - r)/tau behind q' = (x - q)/tau, each solved exactly for the cubic through positions and
-rates. As late as a first-order lag of 2 tau, and rounder.
+rates. The delay is that of a first-order lag of 2 tau; corners are rounder.
 """
 
 from __future__ import annotations

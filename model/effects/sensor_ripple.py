@@ -1,4 +1,4 @@
-"""Sensor nonlinearity that comes again along the travel, as of a grating, fringes or pixels.
+"""Sensor nonlinearity that is periodic along the travel, as of a grating, fringes or pixels.
 
 The reading is x + a sin(2 pi x/p) + b (1 - cos(2 pi x/p)).
 """

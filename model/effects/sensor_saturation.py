@@ -1,6 +1,6 @@
-"""A sensor whose spot leaves the detector bit by bit: what is beyond the knee counts less and less.
+"""Saturation of the sensor: beyond a knee the gain decreases, as a spot leaves the detector.
 
-A travel y beyond the knee reads y/(1 + y/s); at s the half of it.
+A travel y beyond the knee reads y/(1 + y/s), half of it at y = s.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A reading that jumps at one moment: a mount that slips, a target that is knocked.
+"""A reading that jumps at one moment: a mount slips, or something hits the target.
 
 The reading is moved by d from the time t_0 on, over 20 ms so that a fit can find it.
 """

@@ -2,9 +2,9 @@
 
 Along the sheet the voltage obeys a diffusion equation, C R_s dV/dt = V'' on a length of one, with
 the contact's resistance R_c at the edge: beta = R_s/R_c. It is solved by modes, mu tan(mu) = beta,
-each a lag of R_s C/mu^2 whose share 2 beta^2/(mu^2 (mu^2 + beta^2 + beta)) of the mean square of
-the voltage, which pulls, is that of the mean temperature of a plate in heat conduction (Carslaw and
-Jaeger, section 3.11). Three modes stand for all: the third has what the others leave, a tenth. As
+each a lag of R_s C/mu^2. Its share 2 beta^2/(mu^2 (mu^2 + beta^2 + beta)) of the mean square of
+the voltage is that of the mean temperature of a plate in heat conduction (Carslaw and
+Jaeger, section 3.11). Three modes represent all: the third has the rest, a tenth. As
 in ``electrode resistance`` the capacitance C = C_0 (Z/z)^2 grows with stretch.
 """
 

@@ -1,8 +1,8 @@
-"""A strip that hangs slack: it cannot push.
+"""A slack strip buckles: it carries no compressive stress.
 
-Where the network would push (a film unloaded faster than it recovers), a strip buckles and what is
-measured is nothing: the stress felt is (1 - s) of it, and s = 1 is a strip without any stiffness in
-bending. Only a film pulled by its ends can do this.
+This happens where a film is unloaded faster than it recovers. The measured stress is 1 - s of a
+compressive one; s = 1 is a strip without bending stiffness. Only a film pulled by its ends can do
+this.
 """
 
 from __future__ import annotations

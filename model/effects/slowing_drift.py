@@ -1,7 +1,7 @@
-"""Drift of the sensor's zero that slows down but does not settle: heat that spreads into a mount.
+"""Drift of the sensor's zero that slows down but does not settle: heat that diffuses into a mount.
 
-The reading is moved by d ((1 + t/T)^n - 1)/((1 + 30 s/T)^n - 1), t since the record began: with
-n = 1 at one rate, with 1/2 as by diffusion, near 0 with the logarithm of time.
+The reading is moved by d ((1 + t/T)^n - 1)/((1 + 30 s/T)^n - 1), t since the record began: n = 1
+is a constant rate, n = 1/2 diffusion, n near 0 the logarithm of time.
 """
 
 from __future__ import annotations

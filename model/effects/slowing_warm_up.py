@@ -1,8 +1,8 @@
-"""Warming up ever more slowly, where no thermometer was recorded: through a thick wall, or a room.
+"""Warming with a broad spectrum of rates, where no thermometer was recorded: a thick wall, a room.
 
 The network's stress is multiplied by 1 + a (1 - (1 + t/tau)^-p), t since the record began: bodies
-that warm at rates spread about p/tau (as gamma distributed), of which the slow ones go on for long.
-``warm_up`` is what they come to if all warm alike, with p without end.
+warm at rates that are gamma distributed about p/tau. ``warm_up`` is the limit of large p, where all
+warm alike.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Leakage limited by the charges that are in the film already: a power of the voltage.
+"""Leakage limited by space charge: a power of the voltage.
 
-What is injected repels what would follow: without traps the current goes with the square of the
-voltage (Mott and Gurney 1940), and with traps of all depths with V^(l+1)/d^(2l+1) of a thickness d
+Injected charges repel the following ones: without traps the current is proportional to the square
+of the voltage (Mott and Gurney 1940), with traps of all depths to V^(l+1)/d^(2l+1) of a thickness d
 (Mark and Helfrich, J. Appl. Phys. 33, 205 (1962)). A film stretched by lam is that much thinner and
 wider.
 """

@@ -1,6 +1,6 @@
 """Stiffness that follows the recorded temperature.
 
-Rubber elasticity grows with absolute temperature, 1/300 a kelvin; viscous losses make it fall. The
+Rubber elasticity grows with absolute temperature, 1/300 a kelvin; viscous losses decrease it. The
 network's stress is multiplied by 1 + a (theta - theta_0), with the thermometer's theta.
 """
 

@@ -1,4 +1,4 @@
-"""Warming up in two stages, where no thermometer was recorded: the device, then what is around it.
+"""Warming up in two stages, where no thermometer was recorded: the device, then its surroundings.
 
 The network's stress is multiplied by 1 + a (1 - exp(-t/tau)) + b (1 - exp(-t/(10 tau))), t since
 the record began.
