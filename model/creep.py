@@ -1,8 +1,8 @@
-"""Maxwell branches beside the network's own: what creeps.
+"""Maxwell branches beside the network's own, for effects that creep.
 
-As the network's do at small elastic strains (to second order, held at the sides as the film is),
-each answers to the logarithmic strain e = ln(lam/lam_rest), with the stress mu (e - q) lam_rest/lam
-and q' = (e - q) lam_rest/(lam T).
+As the network's branches do at small elastic strains (to second order, held at the sides as the
+film is), each follows the logarithmic strain e = ln(lam/lam_rest), with the stress
+mu (e - q) lam_rest/lam and q' = (e - q) lam_rest/(lam T).
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ def relaxed(
 ) -> float:
     """Stress in Pa of ``count`` branches, ``since`` s after the step began at ``lam0``.
 
-    The first has the modulus ``modulus`` Pa and the relaxation time ``time`` s; from one to the next
-    these change by the factors ``fall`` and ``ratio``. Their internal strains q are in the state
-    ``m`` from ``j`` on; ``commits`` carries them to the end.
+    The first has the modulus ``modulus`` Pa and the relaxation time ``time`` s. These change by the
+    factors ``fall`` and ``ratio`` from one branch to the next. The internal strains q are in the
+    state ``m`` from ``j`` on; ``commits`` carries them to the end.
     """
     e0, e = math.log(lam0 / c[REST]), math.log(lam / c[REST])
     time *= 0.5 * (lam0 + lam) / c[REST]
