@@ -1,6 +1,6 @@
-"""Responses over a step of any length: no stiffness, no limit to the step.
+"""Responses of lags, limits and yielding elements over a step of any length, without stiffness.
 
-All but Bouc and Wen's loop, which has no closed form for any power, are exact.
+All are exact except the loop of Bouc and Wen, which has no closed form for a general power.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ __all__ = [
 _SMALL = 0.1
 _SWITCHING = 0.02  # s: long enough for a fit to find the moment
 _WINDING = 0.25  # reaches over the power, a step: within 3e-5 of the yield stress
-_SHORT = 0.05  # of the place, a travel times the power: the series is within 3e-5 of it
-_NEARLY_ALL = 10.0  # cotangent: from there its law is exact enough for any way
-_NEAR_ALL = 0.02  # of the same angle: there all slip but 4e-4
-_LITTLE = 0.1  # of that angle, a travel: the series is within 1e-5 of it
-_ALL_SLIP = 1e6  # cotangent: bristles bend no more
-_ENOUGH = 30.0  # reaches, by which it is far beyond that
-_YIELDED = 1.0 - 1e-6  # of the yield stress: the loop has come to its end
+_SHORT = 0.05  # of the value, travel times power: the series is within 3e-5
+_NEARLY_ALL = 10.0  # cotangent: beyond it the approximation holds for any travel
+_NEAR_ALL = 0.02  # of the same angle: all but 4e-4 slip
+_LITTLE = 0.1  # of that angle, a travel: the series is within 1e-5
+_ALL_SLIP = 1e6  # cotangent: bristles do not bend further
+_ENOUGH = 30.0  # reaches, after which it is far beyond that
+_YIELDED = 1.0 - 1e-6  # of the yield stress: the loop has saturated
 
 
 @jit
@@ -40,7 +40,7 @@ def lagged(before: float, start: float, end: float, h: float, tau: float) -> flo
     """Output after ``h`` s of q' = (x - q)/tau, q(0) = ``before``, x from ``start`` to ``end``."""
     s = h / tau
     if s < _SMALL:
-        # Pade's approximation, here within 1.3e-7 of the change of x, at a tenth of an exponential
+        # Pade's approximation: within 1.3e-7 of the change of x, a tenth of an exponential's time
         even, odd = 1.0 + s * s / 12.0, 0.5 * s
         left = (even - odd) / (even + odd)
         mean = 1.0 / (even + odd)
@@ -115,7 +115,7 @@ def slewed(before: float, start: float, end: float, h: float, most: float) -> fl
 
 @jit
 def slid(z: float, travel: float, reach: float) -> float:
-    """Strain of a yielding element after ``travel`` one way: it goes to +-``reach``, from ``z``."""
+    """Return the strain of a yielding element after ``travel``: from ``z`` towards +-``reach``."""
     end = math.copysign(reach, travel)
     return end + (z - end) * math.exp(-abs(travel) / reach)
 
@@ -124,7 +124,7 @@ def slid(z: float, travel: float, reach: float) -> float:
 def bristles_slip(z: float, elastic: float) -> float:
     """Part of the travel by which bristles bent to ``z`` along it slip, after Dupont and others.
 
-    Both ``z`` and the ``elastic`` part, up to which nothing slips, are in parts of where all does.
+    ``z`` and ``elastic``, up to which nothing slips, are fractions of the deflection of full slip.
     """
     if z <= elastic:
         return 0.0
@@ -160,7 +160,7 @@ def bent(z: float, travel: float, reach: float, elastic: float) -> float:
         z = elastic
         left -= free
     a = 2.0 / math.pi * (1.0 - elastic)
-    # who slides is there mostly
+    # the common case while sliding
     if z > 1.0 - _NEAR_ALL * a:
         return way * reach * (1.0 + (z - 1.0) * math.exp(-left))
     if left < _LITTLE * a:
@@ -199,12 +199,12 @@ def wound(b: float, travel: float, exponent: float, asymmetry: float) -> float:
     b *= way
     left = abs(travel)
     longest = _WINDING / max(exponent, 1.0)
-    # who has yielded stays there
+    # a loop that has saturated stays so
     while left > 0.0 and b < _YIELDED:
         h = min(left, longest)
         k1 = _winds(b, exponent, asymmetry)
         if b < 0.0 <= b + h * k1:
-            # Simpson's rule for the way to 0
+            # Simpson's rule for the travel to 0
             middle = _winds(0.5 * b, exponent, asymmetry)
             h = -b / 6.0 * (1.0 / k1 + 4.0 / middle + 1.0)
             if h <= left:
@@ -237,5 +237,5 @@ def wound_on(b: float, power: float, travel: float, exponent: float, asymmetry: 
 
 @jit
 def switched(since: float) -> float:
-    """0 before and 1 after the moment from which ``since`` s counts, straight in between."""
+    """Return 0 before and 1 after the moment ``since`` s ago, linear in between."""
     return min(max(since / _SWITCHING + 0.5, 0.0), 1.0)

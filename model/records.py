@@ -1,4 +1,4 @@
-"""Measured records, as a fit sees them: arrays and what is known about their noise."""
+"""Measured records for fits: arrays, and their noise."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dearig.model.errors import ModelError
 
 __all__ = ["ActuatorRecord", "FilmRecord", "Record", "counted"]
 
-_MATCHING = 10  # rounds; each leaves a third of what the one before did
+_MATCHING = 10  # iterations; each leaves a third of the error of the one before
 
 
 def counted(displacement: np.ndarray, lead_in: int) -> np.ndarray:
@@ -64,17 +64,17 @@ class ActuatorRecord:
         return self.displacement
 
     def seen(self, displacement: np.ndarray) -> np.ndarray:
-        """What these readings are of a ``displacement`` (..., N) at their times: means, counted."""
+        """Return a ``displacement`` (..., N) as it is read: averaged, from the lead-in's mean."""
         return counted(_mean_about(displacement, self.means_of), self.lead_in)
 
     def coarse(self, rate: float) -> ActuatorRecord:
-        """The record at no more than about ``rate`` Hz, in means of neighbours."""
+        """Return the record at about ``rate`` Hz or less, in means of neighbours."""
         step = float(np.median(np.diff(self.time)))
-        # the steps of a clock are even to rounding only: 4.9999999 samples are 5
+        # steps of a clock are equal only within rounding: 4.9999999 samples are 5
         return self.in_means(int(1.0 / (rate * step) + 1e-6))
 
     def in_means(self, every: int) -> ActuatorRecord:
-        """The record in means of ``every`` readings, the noise of which averages down.
+        """Return the record in means of ``every`` readings, with less noise.
 
         The voltage between two means is linear, and pulls as much over the time of each as the
         voltage that was applied: the mean of its square is the same.
@@ -105,14 +105,14 @@ class ActuatorRecord:
 
 
 def _mean_about(values: np.ndarray, many: int) -> np.ndarray:
-    """Means over each of the intervals amid which ``values`` (..., N) are, of ``many``.
+    """Return means over intervals of ``many`` readings, centred on ``values`` (..., N).
 
     Of as many samples of each interval, evenly spaced. From neighbours, to the fourth order in the
     interval's length; the ends are copied.
     """
     if many == 1:
         return values
-    # the mean of a wave that turns by an angle from one interval to the next, as a series in it
+    # the mean of a sine, as a series in its phase per interval
     bend = (1.0 - many**-2.0) / 24.0
     curl = 1.0 / 1920.0 - many**-2.0 / 576.0 + 7.0 * many**-4.0 / 5760.0 - bend / 12.0
     means = values.copy()
@@ -123,7 +123,7 @@ def _mean_about(values: np.ndarray, many: int) -> np.ndarray:
 
 
 def _pulling_alike(drive: Drive, edges: np.ndarray) -> np.ndarray:
-    """Voltages (N,) amid ``edges`` (N + 1,), linear between, that pull as ``drive`` does.
+    """Return voltages (N,) between ``edges`` (N + 1,), linear, with the mean square of ``drive``.
 
     Between each two of the edges the mean of the square is that of the drive, as far as a square
     can be made so.
@@ -153,7 +153,7 @@ def _pulling_alike(drive: Drive, edges: np.ndarray) -> np.ndarray:
 
 
 def _mean_square(voltage: np.ndarray) -> np.ndarray:
-    """Means (N,) of the square of what is linear between ``voltage`` (N,), half-way each way."""
+    """Return means (N,) of the square of linear ``voltage`` (N,), half-way to each neighbour."""
     to_next = np.diff(voltage, append=voltage[-1])
     to_last = np.diff(voltage[::-1], append=voltage[0])[::-1]
     halves = [voltage**2 + 0.5 * voltage * to + to**2 / 12.0 for to in (to_next, to_last)]
@@ -164,7 +164,7 @@ def _mean_square(voltage: np.ndarray) -> np.ndarray:
 class FilmRecord:
     """Nominal stress (N,) in Pa under an imposed ``stretch`` (N,) at ``time`` (N,) s.
 
-    ``valid`` as of an ``ActuatorRecord``.
+    ``valid`` as in an ``ActuatorRecord``.
     """
 
     name: str
@@ -188,7 +188,7 @@ class FilmRecord:
         return self.stress
 
     def coarse(self, samples: int) -> FilmRecord:
-        """The record in no more than about ``samples`` means of neighbours; the ends are kept."""
+        """Return the record in at most about ``samples`` means of neighbours; the ends are kept."""
         every = self.time.size // samples
         if every < 2:
             return self

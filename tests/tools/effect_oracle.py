@@ -1,8 +1,7 @@
-"""The effects of ``dearig.model.effects`` written once more, for SciPy: what their tests compare
-with.
+"""The effects of ``dearig.model.effects`` as plain differential equations, solved by SciPy.
 
-The thesis's film (width held, Gent springs) with one effect in it, in the plainest differential
-form, with no step splitting and no closed forms. Nothing here comes from kernels or effects.
+The thesis's film (width held, Gent springs) with one effect, without step splitting or closed
+forms. Nothing here comes from kernels or effects; the tests of effects compare with it.
 """
 # ruff: noqa: ARG005 (the parts of an effect have one signature, as its hooks do)
 
