@@ -273,6 +273,7 @@ def _left_out() -> dict[str, tuple[str, ...]]:
     from dearig.acquisition.rigs import RIGS
     from dearig.config.segments import SEGMENT_KINDS
     from dearig.drivers.instruments import INSTRUMENTS
+    from dearig.model.effects import PROBLEMS
     from dearig.recording.exporters import EXPORTS
     from dearig.recording.importers import IMPORTERS
 
@@ -282,6 +283,7 @@ def _left_out() -> dict[str, tuple[str, ...]]:
         "exporters": EXPORTS.left_out,
         "rigs": RIGS.left_out,
         "instruments": INSTRUMENTS.left_out,
+        "effects": PROBLEMS,
     }
 
 

@@ -34,6 +34,12 @@ print(assembly.stress(on, c, m, 1.1, 0.5, 1.1, 0.0, 0.0))
 print(assembly.stiffness(on, c, m, 1.1, 0.5)[1])
 print(cache_folder().name)
 """
+EXAMINED = """
+from dearig.cli.doctor import examine
+for item in examine():
+    if item.section == "plug-ins":
+        print(item.name, item.verdict, item.found, sep=" | ")
+"""
 SOFTENED = """
 
 @jit
@@ -132,3 +138,11 @@ def test_an_effect_that_is_left_out_for_now_has_kernels_of_its_own(tmp_path):
     there = run_with(tmp_path, HOOK, compiled=True).splitlines()
     assert without[0] == there[0] == "125.0"
     assert without[2] != there[2]
+
+
+def test_the_doctor_tells_which_effects_are_left_out(tmp_path):
+    modules = {"lab_drag": made_effect("lab drag"), "lab_twice": made_effect("linear drag")}
+    add_distribution(tmp_path, "lab-effects", modules)
+    good, bad = run_with(tmp_path, EXAMINED).splitlines()
+    assert good == "effects: lab_drag | ok | lab_drag of lab-effects 1.0"
+    assert bad.startswith("effects: lab_twice | wrong | The effect 'lab_twice' of lab-effects 1.0")

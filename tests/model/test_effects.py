@@ -658,13 +658,13 @@ def refitted(truth, start):
     held[layout.column("J")] = True
     start = layout.coordinates(layout.initial())
     fit = descend(problem, start, held, iterations=60)
-    walking = problem.walking(fit.x)
-    if walking is not None:
+    drift = problem.fit_drift(fit.x)
+    if drift is not None:
         # each record has a walk of its own; here they are alike, and told by both together
         x = fit.x.copy()
-        x[problem.own] = walking.in_common
+        x[problem.own] = drift.in_common
         fit = replace(fit, x=x)
-    jac = problem.without_walks().jacobian(fit.x, ~held)
+    jac = problem.without_drift().jacobian(fit.x, ~held)
     inflation = max(1.0, fit.cost) * max(1.0, correlation_time(fit.residuals))
     sigma = np.zeros(layout.size)
     sigma[~held] = np.sqrt(np.diag(covariance(jac.T @ jac, inflation)))
@@ -672,7 +672,7 @@ def refitted(truth, start):
     misfit = (problem.residuals(fit.x) * problem.sigma + problem.measured - clean[0]) / NOISE
     if isinstance(truth, Strip):
         misfit *= NOISE / 20.0
-    assert walking is None or np.mean(walking.residuals_in_common**2) < 1.05
+    assert drift is None or np.mean(drift.residuals_in_common**2) < 1.05
     return layout, fit, sigma, float(np.sqrt(np.mean(misfit**2)))
 
 
