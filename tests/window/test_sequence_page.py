@@ -164,8 +164,7 @@ def test_a_segment_kind_of_another_distribution_has_a_form(tmp_path: Path) -> No
         from pathlib import Path
         from PySide6.QtWidgets import QApplication, QLabel
         application = QApplication([])
-        from dearig.config.rigfile import RigFile
-        from dearig.window.planner import make_preview
+        from dearig.config.sequencefile import parse_sequence
         from dearig.window.sequence_editor import SequenceEditor
         editor = SequenceEditor('name = "new"\\n')
         editor.fill(0)
@@ -176,17 +175,18 @@ def test_a_segment_kind_of_another_distribution_has_a_form(tmp_path: Path) -> No
         print(editor.form.field("rise_s").placeholderText(), editor.form.field("rise_s").toolTip())
         print(sorted(label.text() for label in editor.form.findChildren(QLabel) if label.text()))
         editor.form.changed.emit("rise_s", 0.25)
-        print(make_preview(editor.draft.toml, Path(), RigFile()).playable)
+        (made,) = parse_sequence(editor.draft.toml, "new", Path()).sequence.segments
+        print(made.duration)
         """,
     )
-    first, row, field, labels, playable = found.splitlines()
+    first, row, field, labels, duration = found.splitlines()
     assert first == "A slow rise and a fast fall."
     assert row == "sawtooth | amplitude 3 kV"
     assert field.startswith("0.5 rise_s: time of the rise, in s")
     assert all(
         f"{text!r}" in labels for text in ("amplitude", "kV", "top of the rise", "rise", "s")
     )
-    assert playable == "True"
+    assert float(duration) == 0.5  # two steps of the rise that was typed
 
 
 def test_a_file_is_saved_read_again_and_remembered(
