@@ -211,7 +211,9 @@ class RunPage(QWidget):
                     f"{name}: {seconds:.1f} s at {rate:g} Hz on {session.address}", ""
                 )
             else:
-                self.plan.show_text(f"{name} is refused: {'; '.join(preview.plan.reasons)}", "bad")
+                self.plan.show_text(
+                    f"{name!r} is refused: {'; '.join(preview.plan.reasons)}", "bad"
+                )
 
     @Slot()
     def _draw(self) -> None:

@@ -102,7 +102,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
             legend.setParentItem(plot.getViewBox())
             self._legends.append(legend)
             if name in self._predicted:
-                legend.addItem(self._planned[name], "predicted")
+                legend.addItem(self._planned[name], "planned" if name == "voltage" else "predicted")
             for signal in _PLOTS[name][1]:
                 if words := self._words(signal):
                     legend.addItem(self._curves[signal], words)

@@ -89,7 +89,7 @@ class StudyPage(QWidget):
     def _make_inputs(self) -> QWidget:
         self.recordings = TrainingTable(self._library)
         self.recordings.changed.connect(self._enable)
-        hint = label("Check the recordings for training, and others for validation.", "muted")
+        hint = label("Select recordings for training, and others for validation.", "muted")
         hint.setWordWrap(True)
 
         self.diagnose = QRadioButton("&Diagnose: find missing effects")
@@ -411,7 +411,7 @@ class StudyPage(QWidget):
 
 #: Text of the page before the first result.
 _INTRODUCTION = (
-    "Check the recordings for training at the left. Validation recordings show at the end how well "
+    "Select recordings for training at the left. Validation recordings show at the end how well "
     "the model predicts data that it was not fitted to.",
     "A diagnosis fits the thesis model, analyses the residual, and tries every known effect. It "
     "names the effects that the data support, and the explanations that the data cannot separate. "
