@@ -37,7 +37,8 @@ def card(title: str, *parts: str, sentences: Iterable[str] = ()) -> str:
         for sentence in list(sentences)[:_SENTENCES_MAX]
     )
     return (
-        '<div style="border-left:3px solid #0072B2;padding:.1em 0 .1em 1em;max-width:48em">'
+        '<div style="border-left:3px solid #0072B2;padding:.1em 0 .1em 1em;margin:0 0 1em;'
+        'max-width:48em">'
         f'<p style="margin:.2em 0 .5em;font-weight:600;font-size:1.1em">{escape(title)}</p>'
         f"{said}{''.join(parts)}</div>"
     )

@@ -110,6 +110,7 @@ class Rows(Sequence[T], Generic[T]):
         if not self._rows:
             return "<p>no rows</p>"
         names = [field.name for field in fields(self._rows[0])]  # type: ignore[arg-type]
+        names = [n for n in names if any(getattr(row, n) not in ("", None) for row in self._rows)]
         head = tuple((name.replace("_", " "), "") for name in names)
         lines = tuple(
             Row(tuple(_shown(getattr(row, name)) for name in names)) for row in self._rows

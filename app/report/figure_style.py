@@ -107,9 +107,9 @@ def style() -> Iterator[None]:
 
 def blank(width: float, height: float) -> Figure:
     """Make an empty figure of ``width`` and ``height`` in inches."""
-    from matplotlib.figure import Figure
+    from dearig.report.notebook_figure import NotebookFigure
 
-    return Figure(figsize=(width, height), layout="constrained")
+    return NotebookFigure(figsize=(width, height), layout="constrained")
 
 
 def legend(ax: Axes, columns: int = 2) -> None:
