@@ -1,1 +1,1 @@
-"""One run: planned, checked, played, watched and recorded."""
+"""A run: its plan, the check of the rig, the recording, and an overlay model in step with it."""

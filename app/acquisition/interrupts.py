@@ -1,4 +1,4 @@
-"""Ctrl-C during a run: looked at between two blocks, so that no block is torn."""
+"""Ctrl-C during a run: handled between two blocks, so that no block is lost."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from types import FrameType, TracebackType
 
 __all__ = ["Interrupts"]
 
-# a closed terminal or a stopped service must not leave a voltage up either
+# a closed terminal or a stopped service must not leave the voltage on either
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 _Handler = Callable[[int, FrameType | None], object] | int | None
 
 
 class Interrupts:
-    """While it is entered, the first ctrl-C is ``asked`` for and the second raises.
+    """A context in which the first ctrl-C sets ``asked`` and the second raises.
 
-    Raised at once, it could strike between a block's being read and its being written, and the
-    samples around the ramp to 0 V would be lost; a rig that hangs answers to the second. Whatever
-    handlers a host program has set stay, and so does a signal that is ignored; outside the main
-    thread nothing is installed, because signals do not go there.
+    An exception at the first could come after a block is read and before it is written, and the
+    samples around the ramp to 0 V would be lost; the second ends a run on a rig that hangs.
+    Handlers that a host program has set stay, and so does a signal that is ignored. Outside the
+    main thread nothing is installed, because signals are not delivered there.
     """
 
     def __init__(self) -> None:
@@ -30,27 +30,27 @@ class Interrupts:
         self._before: dict[int, _Handler] = {}
 
     def asked(self) -> bool:
-        """True once the run is to end."""
+        """Return whether the run is to end."""
         return self._asked
 
     def ask(self) -> None:
-        """End the run, as the first ctrl-C does; may be called from any thread."""
+        """Ask for the end of the run, as the first ctrl-C does; may be called from any thread."""
         self._asked = True
 
     def ask_at_once(self) -> None:
-        """End the run at 0 V at once, without a ramp; may be called from any thread."""
+        """Ask for 0 V at once, without a ramp; may be called from any thread."""
         self._asked = self._at_once = True
 
     def at_once(self) -> bool:
-        """True once the run is to end without a ramp."""
+        """Return whether the run is to end without a ramp."""
         return self._at_once
 
     def close(self) -> None:
-        """Raise no more: the rig is being made safe, and nothing is quicker than that."""
+        """Stop raising: the rig is being made safe, and an exception would delay that."""
         self._raises = False
 
     def __enter__(self) -> Interrupts:
-        """Itself."""
+        """Install the handlers."""
         if threading.current_thread() is threading.main_thread():
             for name in _NAMES:
                 number = getattr(signal, name, None)
@@ -68,7 +68,7 @@ class Interrupts:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Put back what was there."""
+        """Restore the handlers that were there before."""
         for number, before in self._before.items():
             signal.signal(number, before)
 

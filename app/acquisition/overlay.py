@@ -1,4 +1,4 @@
-"""A model stepped in time with a run: each block of samples in, its displacement out."""
+"""An overlay model, stepped with a run: block of samples in, displacement out."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dearig.model.sensor import at_sensor
 
 __all__ = ["Overlay", "OverlayModel"]
 
-_WARM = 1.0  # s over which a temperature is the mean, as a fit takes it
+_TEMPERATURE_MEAN = 1.0  # s over which a temperature is averaged, as in a fit
 
 
 @dataclass(frozen=True)
@@ -79,13 +79,13 @@ class Overlay:
         self._past = np.zeros((3, 0))
         self._keep = max(2, math.ceil(max(self._lag, 0.0) * rate) + 2)
         self._read = (0.0, 0.0)  # displacement and velocity before the sensor's effects
-        self._warmth = _Warmth(rate)
-        self._words = ""
+        self._temperature_rise = _TemperatureRise(rate)
+        self._failure = ""
 
     @property
-    def words(self) -> str:
-        """Why the model could follow no further; empty while it can."""
-        return self._words
+    def failure(self) -> str:
+        """The reason why the model failed; empty while it follows."""
+        return self._failure
 
     def advance(self, block: Block) -> np.ndarray:
         """Displacement (n,) m that the sensor would read at the samples of ``block``.
@@ -97,7 +97,7 @@ class Overlay:
         if block.start != self._next:
             raise ValueError(f"a block starts at sample {block.start}, not at {self._next}")
         self._next += samples
-        if self._words or samples == 0:
+        if self._failure or samples == 0:
             return np.full(samples, np.nan)
         first = 0 if block.start == 0 else 1  # the sample before, from which the state goes on
         time = (block.start - first + np.arange(first + samples)) / self._rate
@@ -105,19 +105,19 @@ class Overlay:
         voltage[:first] = self._voltage
         voltage[first:] = self._scaling.physical(block.counts[self._row])
         self._voltage = float(voltage[-1])
-        warmth = np.zeros(0)
+        rise = np.zeros(0)
         if self._thermometer is not None:
             scaling = self._channels[self._thermometer].scaling
-            now = self._warmth.after(scaling.physical(block.counts[self._thermometer]))
-            warmth = np.full(time.size, now)
+            now = self._temperature_rise.after(scaling.physical(block.counts[self._thermometer]))
+            rise = np.full(time.size, now)
         stretch, speed = np.empty(time.size), np.empty(time.size)
         status, reached, _ = kernel.drive_by_voltage(
-            self._coefficients, time, voltage, voltage, warmth, self._state, stretch, speed
+            self._coefficients, time, voltage, voltage, rise, self._state, stretch, speed
         )
         moved = (stretch - self._rest) * self._length
         out = self._sensed(time[first:], moved[first:], speed[first:] * self._length)
         if status != kernel.OK:
-            self._words = f"{STATUS_WORDS[status]} (at {time[min(reached, time.size - 1)]:.4g} s)"
+            self._failure = f"{STATUS_WORDS[status]} (at {time[min(reached, time.size - 1)]:.4g} s)"
             out[max(reached - first, 0) :] = np.nan
         return out
 
@@ -137,11 +137,11 @@ class Overlay:
         return reading[before:]
 
 
-class _Warmth:
+class _TemperatureRise:
     """Temperature above that of the first second, as the mean of the last second."""
 
     def __init__(self, rate: float) -> None:
-        self._count = max(1, round(_WARM * rate))
+        self._count = max(1, round(_TEMPERATURE_MEAN * rate))
         self._blocks: list[np.ndarray] = []
         self._first: list[np.ndarray] = []
         self._start = 0.0

@@ -1,4 +1,4 @@
-"""A sequence before it is played: its voltage, what the model foresees, and what the gate says."""
+"""Plan of a run: the voltage, the predicted response, and what the gate says."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from dearig.model.material import TABLE_3
 
 __all__ = ["Plan", "plan"]
 
-# Hz: a film with milliseconds of ringing is foreseen well enough at this rate, however fast the
-# clock; what the field is judged by is every sample of the voltage all the same
-_FORESEEN_AT = 5000.0
+# Hz: this rate is enough to predict a film that rings for milliseconds, however fast the clock;
+# the field is still checked with every sample of the voltage
+_PREDICTION_RATE = 5000.0
 
 
 @dataclass(frozen=True)
 class Plan:
     """A sequence on the rig's clock of ``rate`` Hz, N samples.
 
-    ``voltage`` (N,) V. What the model foresees is one number for each ``stride`` samples, M in all:
+    ``voltage`` (N,) V. The prediction has one value for each ``stride`` samples, M in all:
     ``displacement`` (M,) m, the true ``field`` (M,) V/m at the highest voltage among them, both NaN
-    from where it cannot. ``waveform`` is what passed the gate, or None with the ``reasons``, one
-    sentence each.
+    from where the model fails. ``waveform`` has passed the gate, or is None with the ``reasons``,
+    one sentence each.
     """
 
     name: str
@@ -45,17 +45,20 @@ class Plan:
 
     @property
     def time(self) -> np.ndarray:
-        """Time (M,) s of what is foreseen."""
+        """Time (M,) s of the prediction."""
         return np.arange(self.displacement.size) * (self.stride / self.rate)
 
     @property
     def displacement_of_samples(self) -> np.ndarray:
         """Displacement (N,) m of every sample, in single precision: a run may have many."""
-        foreseen = self.displacement.astype(np.float32)
-        return np.repeat(foreseen, self.stride)[: self.voltage.size]
+        predicted = self.displacement.astype(np.float32)
+        return np.repeat(predicted, self.stride)[: self.voltage.size]
 
     def admitted(self) -> GatedWaveform:
-        """What may be played. Raises ``InputError`` with a sentence for every limit it breaks."""
+        """Return the waveform that may be played.
+
+        Raises ``InputError`` with a sentence for every limit that the sequence breaks.
+        """
         if self.waveform is None:
             raise InputError(
                 f"sequence {self.name!r} is refused: {'; '.join(self.reasons)} "
@@ -67,26 +70,26 @@ class Plan:
 def plan(
     loaded: LoadedSequence, rig_file: RigFile, model: Actuator | None = None, film: str = ""
 ) -> Plan:
-    """``loaded`` as the rig would play it, and whether it may.
+    """Plan ``loaded`` as the rig would play it, and check it with the gate.
 
-    The film is foreseen with ``model``, by default that of the rig file's film with Table 3's
-    network: a stretched film is thinner, and feels a higher field. ``film`` names the film that
-    hangs there; the rig file's own, unless another is named. Raises ``InputError`` where the model
-    cannot be asked at all (a film without a rest state).
+    The response is predicted with ``model``, by default that of the rig file's film with Table 3's
+    network: a stretched film is thinner, so its field is higher. ``film`` names the film on the
+    rig, by default the rig file's. Raises ``InputError`` where the model cannot be simulated at all
+    (a film without a rest state).
     """
     rate, limits = float(rig_file.card.sample_rate_Hz), rig_file.gate_limits()
     film = film or rig_file.film.name
     name = loaded.sequence.name
     voltage = loaded.sample(rate)[1]
-    stride = max(1, math.floor(rate / _FORESEEN_AT))
+    stride = max(1, math.floor(rate / _PREDICTION_RATE))
     peaks = _peaks(voltage, stride)
     unknown = np.full(peaks.size, np.nan)
     try:
         actuator = model or Actuator(rig_file.as_film(), rig_file.as_load(), TABLE_3)
         actuator.rest()
         volume = actuator.film.electric_volume
-        # the film at its thickest: what is refused here needs no prediction, and what a voltage far
-        # beyond every limit would do to the model is not the operator's question
+        # the film at its thickest: a sequence that is refused here needs no prediction, and a
+        # voltage far beyond every limit would only make the model fail
         thick = np.full(peaks.size, 1.0 / actuator.film.thickness)
         admit(voltage, rate, limits, Prediction(thick, volume, film=film, stride=stride))
         time = np.arange(peaks.size) * (stride / rate)
@@ -110,7 +113,7 @@ def plan(
 
 
 def _peaks(voltage: np.ndarray, stride: int) -> np.ndarray:
-    """Of each ``stride`` samples of ``voltage`` (N,), the one farthest from 0 V."""
+    """Return the sample farthest from 0 V of each ``stride`` samples of ``voltage`` (N,)."""
     if stride == 1:
         return voltage
     whole = voltage.size // stride * stride

@@ -1,4 +1,4 @@
-"""A run repeated from its recording alone: sequence, rig file, rig and seed as they stand there."""
+"""Repetition of a run from its recording: sequence, rig file, rig and seed."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ __all__ = ["Original", "original_of"]
 
 @dataclass(frozen=True)
 class Original:
-    """What ``dearig.acquisition.run.record`` needs to make the run of ``path`` again.
+    """What ``dearig.acquisition.run.record`` needs to repeat the run of the recording ``path``.
 
-    ``configuration`` is the text of the rig file. ``rig`` is the address that it was made on, ""
-    for data that no run made here; ``seed`` that of its simulated noise.
+    ``configuration`` is the text of the rig file. ``rig`` is the address of the run, "" for data
+    from elsewhere; ``seed`` is that of its simulated noise.
     """
 
     path: Path
@@ -36,13 +36,13 @@ class Original:
     load: Load | None
 
     def on(self, rig: str) -> str:
-        """The address for ``rig``: ``sim`` is the simulated rig of the original, if it had one."""
+        """Return the address for ``rig``; ``sim`` is the original's simulated rig, if any."""
         return self.rig if rig == "sim" and is_simulated(self.rig) else rig
 
     def check_film(self, rig_file: RigFile) -> None:
         """Raise ``InputError`` unless film and load of ``rig_file`` are those of the original.
 
-        They are not where the simulated rig was made of a model file.
+        They differ where the simulated rig was made from a model file.
         """
         if (self.film, self.load) != (rig_file.as_film(), rig_file.as_load()):
             raise InputError(
@@ -52,10 +52,10 @@ class Original:
 
 
 def original_of(path: str | Path) -> Original:
-    """What the recording at ``path`` says of its run.
+    """Return what the recording at ``path`` says of its run.
 
-    A waveform in a CSV file is looked for beside the recording. Raises ``InputError`` for what is
-    no recording of a run, or is of a sequence or rig file that this version does not take.
+    The CSV file of a waveform is read from the recording's folder. Raises ``InputError`` for a file
+    that is no recording of a run, or whose sequence or rig file this version does not accept.
     """
     path = Path(path)
     recording = open_recording(path)

@@ -1,4 +1,4 @@
-"""One run: sequence -> gate -> rig -> recording, watched all the way, and 0 V at its end."""
+"""A run: sequence -> gate -> rig -> recording, with interlocks on every sample, 0 V at its end."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ __all__ = ["RunObserver", "RunOptions", "RunResult", "open_rig", "record"]
 
 log = logging.getLogger(__name__)
 
-_DISK_INTERVAL = 1.0  # s between two looks at the room on the disk
+_DISK_INTERVAL = 1.0  # s between two checks of the free space on the disk
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,9 @@ _DEFAULT = RunOptions()
 
 @dataclass(frozen=True)
 class RunResult:
-    """A run that was recorded: where, how much, how it ended, and what happened on the way.
+    """A recorded run: its file, size, outcome and events.
 
-    ``margins`` say how near it was planned to come to each limit of the gate.
+    ``margins`` say how near the plan came to each limit of the gate.
     """
 
     path: Path
@@ -97,13 +97,13 @@ class RunObserver:
     """
 
     def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:
-        """The sample clock of ``rate`` Hz is about to start."""
+        """Receive the plan before the sample clock of ``rate`` Hz starts."""
 
     def block(self, block: Block) -> None:
-        """The next samples, as they were recorded."""
+        """Receive the next samples, as they were recorded."""
 
     def event(self, event: Event) -> None:
-        """Something happened; it is in the recording."""
+        """Receive an event that is in the recording."""
 
 
 def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) -> Rig:
@@ -219,7 +219,7 @@ def record(
 
 
 class _Run:
-    """A loaded rig being played, watched and recorded."""
+    """One run of a loaded rig: playing, checking and recording."""
 
     def __init__(
         self,
@@ -238,15 +238,15 @@ class _Run:
         self._interrupts = interrupts
         self._observer = observer
         self._clock = clock
-        self._looked = clock()  # at the disk
+        self._disk_checked = clock()
         self._events: list[str] = []
         self._overlay = overlay
         self._model_toml = model_toml
         self._modelled: list[np.ndarray] = []  # m, of the overlay, in single precision
-        self._trip: Trip | None = None  # the first one: what came after it follows from it
+        self._trip: Trip | None = None  # the first one; later ones follow from it
 
     def follow(self, samples: int, progress: Progress) -> tuple[str, ...]:
-        """Play and record; whatever happens, 0 V comes first, then the file's end."""
+        """Play and record; on every exit 0 V comes first, then the file is closed."""
         writer = self._writer
         try:
             try:
@@ -280,7 +280,7 @@ class _Run:
             safe = "" if isinstance(error, NotSafe) else "the rig was made safe, and "
             raise type(error)(f"{error}; {safe}{kept}") from error
         finally:
-            # only what nobody foresaw comes here with an open file
+            # only an unexpected exception reaches this with an open file
             self._end("ended early by a fault of the program")
         return tuple(self._events)
 
@@ -316,7 +316,7 @@ class _Run:
         except (RigError, KeyboardInterrupt):
             raise
         except BaseException:
-            # the instruments are well: a disk or a fault of ours is no reason for a jolt
+            # the instruments work: a disk fault or a program error is no reason for a step to 0 V
             _ramp_down(rig)
             raise
 
@@ -329,7 +329,7 @@ class _Run:
             self._tell(event)
 
     def _watch(self, block: Block) -> Trip | None:
-        """What trips an interlock now; noted, each one."""
+        """Return the interlock that trips now, if any; every one is recorded as an event."""
         trips = self._interlocks.watch(block)
         trips += [trip for trip in (self._interlocks.late(self._rig.waiting), self._disk()) if trip]
         for trip in trips:
@@ -337,14 +337,14 @@ class _Run:
             self._trip = self._trip or trip
         if not trips:
             return None
-        # the stronger action counts
+        # the stronger action is taken
         return next((trip for trip in trips if trip.action == "at once"), trips[0])
 
     def _disk(self) -> Trip | None:
         now = self._clock()
-        if now - self._looked < _DISK_INTERVAL:
+        if now - self._disk_checked < _DISK_INTERVAL:
             return None
-        self._looked = now
+        self._disk_checked = now
         folder = self._writer.path.parent
         try:
             free = shutil.disk_usage(folder).free
@@ -360,9 +360,9 @@ class _Run:
         self._tell(event)
 
     def _end(self, outcome: str, event: str = "", level: str = "warning") -> str:
-        """Close the recording of a run that ended early; where it is, in words.
+        """Close the recording of a run that ended early, and return a clause that names its file.
 
-        A disk that fails here too is one more thing to say, and must not hide what ended the run.
+        A disk that fails here too is reported with it, and must not hide what ended the run.
         """
         writer = self._writer
         if writer.closed:
@@ -400,7 +400,7 @@ class _Run:
 
 
 def _ramp_down(rig: Rig) -> None:
-    """Down to 0 V in the set time; what is read meanwhile has nowhere to go."""
+    """Ramp down to 0 V in the set time; the samples read meanwhile are discarded."""
     try:
         rig.stop()
         while rig.read() is not None:

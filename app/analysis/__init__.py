@@ -1,1 +1,1 @@
-"""From recordings to models and verdicts."""
+"""Analysis of recordings: quality, fits, validation, prediction and diagnosis."""

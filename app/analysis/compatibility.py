@@ -1,4 +1,4 @@
-"""Whether recordings go together, and the model that is to be fitted to them."""
+"""Compatibility of recordings, and the model to fit to them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def base_model(
     rest_length_mm: float | None,
     rig_file: RigFile | None,
 ) -> Actuator | Strip:
-    """What to fit: its structure matters, its numbers do not."""
+    """Return the model to fit; its structure matters, its parameter values do not."""
     limit = {"neo-hookean": math.inf, "gent": 1e4, "arruda-boyce": 1e4}.get(spring)
     if limit is None:
         raise InputError(f"spring {spring!r} is not one of neo-hookean, gent, arruda-boyce")
@@ -80,7 +80,7 @@ def base_model(
 
 
 def check_apart(train: Sequence[Recording], validation: Sequence[Recording]) -> None:
-    """Refuse data that would be both fitted and validated, and kinds that do not go together."""
+    """Refuse data that would be both fitted and validated, and recordings of different kinds."""
     fitted = {r.sha256: r.path for r in train}
     for recording in validation:
         if recording.sha256 in fitted:
@@ -104,7 +104,7 @@ def check_apart(train: Sequence[Recording], validation: Sequence[Recording]) -> 
 
 
 def _differing(recordings: Sequence[Recording]) -> str:
-    """Which two recordings are not of one film and load."""
+    """Return a sentence on two recordings that are not of one film and load."""
     first = next(r for r in recordings if r.film is not None or r.load is not None)
     for other in recordings:
         for what, one, two in (
@@ -121,13 +121,13 @@ def _differing(recordings: Sequence[Recording]) -> str:
 
 
 def _apart(one: Film | Load, two: Film | Load) -> str:
-    """The numbers in which two films or two loads differ."""
+    """Return the properties in which two films or two loads differ."""
     pairs = ((f.name, getattr(one, f.name), getattr(two, f.name)) for f in fields(one))
     return ", ".join(f"{name.replace('_', ' ')} {a} and {b}" for name, a, b in pairs if a != b)
 
 
 def of_rig(rig_file: RigFile, film: Film, load: Load) -> RigFile:
-    """``rig_file`` with ``film`` under ``load`` in it: its limits hold for what was measured."""
+    """Return ``rig_file`` with ``film`` and ``load`` in it, so that its limits hold for them."""
     film_section = FilmSection(
         length_mm=film.length * 1e3,
         width_mm=film.width * 1e3,

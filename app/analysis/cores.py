@@ -1,4 +1,4 @@
-"""Who gets the processor's cores while models are fitted."""
+"""Limit of linear algebra to one thread while models are fitted."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ __all__ = ["for_simulations"]
 
 @contextmanager
 def for_simulations() -> Iterator[None]:
-    """A context or a decorator: linear algebra keeps to one thread, the cores go to simulations.
+    """Context or decorator in which linear algebra uses one thread, and simulations the others.
 
-    BLAS's threads wait by spinning, which takes a core from those that simulate.
+    BLAS's threads wait by spinning, which takes cores from the simulations.
     """
     with threadpool_limits(limits=1, user_api="blas"):
         yield

@@ -1,4 +1,4 @@
-"""Long curves made short without losing a peak."""
+"""Decimation of long curves that keeps their peaks."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ __all__ = ["decimate", "decimate_path"]
 
 
 def decimate(x: np.ndarray, y: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
-    """What a drawing of ``y`` (N,) against increasing ``x`` (N,) shows in ``columns`` pixels.
+    """Return the points of ``y`` (N,) over increasing ``x`` (N,) that ``columns`` pixels can show.
 
-    Of every column the lowest and the highest sample are kept, where they are, and of all the first
-    and the last: at most 2 columns + 2 points. Where a column has no finite sample, one NaN is
-    kept, so that the line breaks there. Curves that are short enough come back as they are.
+    Of every column the lowest and the highest sample are kept at their places, and of the curve the
+    first and the last: at most 2 columns + 2 points. Where a column has no finite sample, one NaN
+    is kept, so that the line breaks there. A curve that is short enough is returned unchanged.
     """
     x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     if x.shape != y.shape or x.ndim != 1:
@@ -31,10 +31,10 @@ def decimate(x: np.ndarray, y: np.ndarray, columns: int) -> tuple[np.ndarray, np
 
 
 def decimate_path(x: np.ndarray, y: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
-    """A curve (``x``, ``y``) (N,) that turns back, such as a loop, in at most 4 parts + 2 points.
+    """Return at most 4 parts + 2 points of a curve (``x``, ``y``) (N,) that may turn back.
 
-    It is cut into ``parts`` of as many samples each, and of every part the extremes of both are
-    kept.
+    The curve is cut into ``parts`` of equal length, and of each the extremes of both coordinates
+    are kept. Use it for loops.
     """
     x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     if x.shape != y.shape or x.ndim != 1:
@@ -51,7 +51,7 @@ def _pick(x: np.ndarray, y: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _extremes(y: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """Rows of the lowest and highest of ``y`` (N,) in each run that begins at ``starts`` (K,)."""
+    """Return rows of the lowest and highest ``y`` in each run that begins at ``starts`` (K,)."""
     lengths = np.diff(starts, append=y.size)
     rows = [starts[np.isnan(np.fmin.reduceat(y, starts))]]
     for ends in (np.fmin.reduceat(y, starts), np.fmax.reduceat(y, starts)):

@@ -1,4 +1,4 @@
-"""Diagnosis: from recordings to the effect that the model lacks, and the error before and after."""
+"""Diagnosis: the effects that the model lacks, and the errors before and after."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from dearig.analysis.outcomes import (
     Stand,
     pooled_rms,
 )
-from dearig.analysis.quality import beyond, check_enough, inspect
+from dearig.analysis.quality import check_enough, extrapolated, inspect
 from dearig.analysis.records import Source, as_record, check_named_once, compare, open_all
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
@@ -51,10 +51,10 @@ from dearig.units import SHOWN
 
 __all__ = ["VALIDATION", "diagnose_recordings", "diagnose_rig"]
 
-#: What a rig is asked for at the end, to validate on: one run of each of the thesis's tables.
+#: Validation runs that are recorded on a rig: one of each of the thesis's tables.
 VALIDATION = ("validation-a-0.6", "validation-b-7.0")
 
-_ENDS = (Interrupted, SafetyStop, InstrumentFault, DiskFault)  # of a run, the rig safe
+_EARLY_ENDS = (Interrupted, SafetyStop, InstrumentFault, DiskFault)  # the rig is safe
 
 
 def diagnose_recordings(
@@ -120,7 +120,9 @@ def diagnose_rig(
     for name in planned:
         check_output(out / f"{name}.h5", overwrite)
     runs = len(planned)
-    parts = 2.0 * (1 + experiments) + 1.0  # a diagnosis counts two, all recordings together one
+    parts = (
+        2.0 * (1 + experiments) + 1.0
+    )  # of the progress: a diagnosis counts two, all recordings together one
     done = 0.0
 
     def part(size: float) -> Progress:
@@ -150,8 +152,8 @@ def diagnose_rig(
                 run(sequence, name)
         except NotSafe:
             raise
-        except _ENDS as error:
-            return error  # the rig is safe, and what was found before still holds
+        except _EARLY_ENDS as error:
+            return error  # the rig is safe, and the results until here hold
         return None
 
     if not files:
@@ -203,7 +205,7 @@ def _prepared(
     drive: str,
     rig_file: RigFile | None,
 ) -> tuple[Any, tuple[str, ...]]:
-    """The baseline to fit, and what is to be said of the recordings. Raises ``InputError``."""
+    """Return the baseline to fit, and sentences on the recordings. Raises ``InputError``."""
     check_branches(branches)
     check_apart(recordings, others)
     base = base_model(recordings, branches, "gent", None, rig_file)
@@ -212,7 +214,7 @@ def _prepared(
         for r in (*recordings, *others)
         for sentence in inspect(r, drive, to_fit=r in recordings).findings
     ]
-    said += beyond(recordings, others, drive)
+    said += extrapolated(recordings, others, drive)
     films = sorted({r.film_id for r in (*recordings, *others) if r.film_id})
     if len(films) > 1:
         said.append(f"the recordings name different films: {', '.join(films)}")
@@ -307,13 +309,13 @@ def _compared(
         try:
             found.append(compare(recording, model, role, drive))
         except InputError as error:
-            # an hour's search is not lost for one drive that a model cannot follow
+            # a long search must not be lost because a model cannot follow one drive
             failed.append(f"{recording.name} is left out of the {role} errors: {error}")
     return tuple(found)
 
 
 def _noise(recordings: Sequence[Recording], drive: str) -> float:
-    """The pooled floor of the training recordings, m or Pa."""
+    """Return the pooled noise floor of the training recordings, m or Pa."""
     floors = [as_record(r, drive).noise for r in recordings]
     return math.sqrt(sum(n * n for n in floors) / len(floors))
 
@@ -321,7 +323,7 @@ def _noise(recordings: Sequence[Recording], drive: str) -> float:
 def _experiment(
     finding: Diagnosis, noise: float, rig_file: RigFile
 ) -> tuple[SeparatingExperiment | None, str]:
-    """What separates the final model from its rivals; a sentence, also where there is nothing."""
+    """Return the experiment that separates the final model from its rivals, and a sentence."""
     final = finding.final.model
     if not isinstance(final, Actuator) or not finding.rivals:
         return None, "No other family explains these data as well: there is nothing to separate"
@@ -345,7 +347,7 @@ def _history(
     quality: Sequence[str],
     seconds: float,
 ) -> dict[str, Any]:
-    """Where the model comes from, for its file."""
+    """Return the origin of the model, for its file."""
     shown = SHOWN[recordings[0].kind]
 
     def rms(comparisons: Sequence[Comparison]) -> float | None:

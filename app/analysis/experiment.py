@@ -1,4 +1,4 @@
-"""The excitation that tells rival models apart best, within what a rig allows."""
+"""The excitation that separates rival models best within the limits of a rig."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from dearig.model.kernel import OK
 
 __all__ = ["SEPARATES", "candidates", "separating_experiment"]
 
-#: RMS difference of two predictions, in noise floors, from which on an experiment tells them apart.
+#: RMS difference of two predictions, in noise floors, from which an experiment separates them.
 SEPARATES = 0.5
 
-# amplitudes are lowered in these steps until a sequence can be played, and read
+# amplitudes are lowered in these steps until a sequence can be played and read
 _SCALES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
-_CALM = 0.7  # of what trips an interlock: a film does not do quite what any of the rivals foresees
-_BLURRED = 1.0  # of the noise: what the film may move while it is not known when the laser looks
-_NEARLY = 0.9  # of the best separation: among such, the one that separates most a second
+_INTERLOCK_MARGIN = 0.7  # of what trips an interlock: no rival predicts the film exactly
+_DELAY_BLUR = 1.0  # of the noise: displacement within the unknown part of the laser's delay
+_NEAR_BEST = 0.9  # of the best separation: of these the one with the most per second is taken
 
 
 def candidates(top_kV: float) -> Mapping[str, str]:
-    """TOML of sequences that ask different questions, up to ``top_kV``, by name."""
+    """Return sequences of different kinds up to ``top_kV``, as TOML by name."""
     half = round(0.45 * top_kV, 3)
     low, middle = round(0.4 * top_kV, 3), round(0.7 * top_kV, 3)
     found: dict[str, list[dict[str, Any]]] = {
@@ -96,18 +96,17 @@ def _steps(top_kV: float, dwell_s: float, repeats: int) -> dict[str, Any]:
 def separating_experiment(
     rivals: Sequence[tuple[str, str, Actuator]], rig_file: RigFile, noise: float
 ) -> tuple[SeparatingExperiment | None, str]:
-    """The sequence under which the least separated two of ``rivals`` lie farthest apart.
+    """Return the sequence that separates the two closest of ``rivals`` best, and a sentence on it.
 
-    Two that no sequence at all would separate do not count: others may be told from both.
+    Two rivals that no sequence separates do not count: others may be separated from both.
 
     ``rivals`` are (label, family, fitted model), the final model among them; ``noise`` is the floor
-    of one reading in m. Every sequence has passed the gate of ``rig_file``, and trips no interlock
-    where the film does what any of the rivals foresees. Also returned is a sentence, which says why
-    where there is no such sequence.
+    of one reading in m. Every sequence passes the gate of ``rig_file`` and trips no interlock if
+    the film does what any rival predicts. Where there is no such sequence, the sentence says why.
     """
     labels = tuple(label for label, _, _ in rivals)
     families = tuple(dict.fromkeys(family for _, family, _ in rivals))
-    # as much as the rig may give, and no more than the thesis's experiments
+    # the rig's limit, and at most the voltage of the thesis's experiments
     top = math.floor(min(rig_file.gate_limits().voltage_max / 1e3, 8.0) * 1e3) / 1e3
     made: list[tuple[str, dict[tuple[str, str], float], float, str]] = []
     for name, text in candidates(top).items():
@@ -138,7 +137,7 @@ def separating_experiment(
             f"None of {len(tried)} excitations within the rig's limits would separate "
             f"{_and(labels)}: at best their predictions differ by {best:.2g} times the noise"
         )
-    good = [t for t in tried if t[1] >= _NEARLY * best]
+    good = [t for t in tried if t[1] >= _NEAR_BEST * best]
     name, separation, seconds, closest, toml = max(good, key=lambda t: t[1] / t[2])
     alike = [_and(p) for p in pairs if p not in separable]
     but = f", but for {'; '.join(alike)}, which none would separate" if alike else ""
@@ -166,9 +165,9 @@ def _playable(
     rig_file: RigFile,
     noise: float,
 ) -> tuple[LoadedSequence, GatedWaveform, list[np.ndarray]] | None:
-    """The sequence as high as it can be played and read, and what the ``rivals`` foresee (m).
+    """Return the sequence at the largest playable amplitude, and the predictions (m) of ``rivals``.
 
-    None where that is at no height.
+    None where it can be played at no amplitude.
     """
     for scale in _SCALES:
         try:
@@ -188,23 +187,23 @@ def _playable(
 def _would_end(
     planned: Plan, waveform: GatedWaveform, moved: np.ndarray, rig_file: RigFile, noise: float
 ) -> bool:
-    """Whether a film that is ``moved`` (N,) m would trip an interlock, or outrun the laser.
+    """Return whether a film at ``moved`` (N,) m would trip an interlock, or be too fast to measure.
 
-    The laser has a clock of its own: how old a reading is, is not known to less than its period.
+    The laser has its own clock, so the age of a reading is uncertain by its period.
     """
     speed = float(np.max(np.abs(np.diff(moved)))) * waveform.rate
-    if speed * rig_file.laser.delay_error > _BLURRED * noise:
+    if speed * rig_file.laser.delay_error > _DELAY_BLUR * noise:
         return True
-    foreseen = planned.displacement_of_samples
-    # further than the film is foreseen to go, and not as far
+    predicted = planned.displacement_of_samples
+    # more than predicted, and less
     return any(
-        would_trip(rig_file, waveform.rate, waveform.voltage, part * moved, foreseen)
-        for part in (1.0 / _CALM, _CALM)
+        would_trip(rig_file, waveform.rate, waveform.voltage, part * moved, predicted)
+        for part in (1.0 / _INTERLOCK_MARGIN, _INTERLOCK_MARGIN)
     )
 
 
 def _scaled(text: str, scale: float) -> str:
-    """The sequence with all its voltages times ``scale``."""
+    """Return the sequence with all its voltages times ``scale``."""
     if scale == 1.0:
         return text
 
@@ -225,7 +224,7 @@ def _scaled(text: str, scale: float) -> str:
 def _predictions(
     rivals: Sequence[tuple[str, str, Actuator]], waveform: GatedWaveform
 ) -> list[np.ndarray] | None:
-    """Displacements of all rivals in m; None where one fails or sees more field than allowed."""
+    """Return displacements of all rivals in m; None where one fails or exceeds the field limit."""
     time = np.arange(waveform.voltage.size) / waveform.rate
     drive = Drive(time, waveform.voltage, hold=True)
     found = []

@@ -88,7 +88,7 @@ def identify_recordings(
             raise InputError(f"these recordings cannot be fitted: {error}") from error
         smaller = fit.model.network
         fits.append(fit)
-    # one count of independent samples for all, from the fit that left the least structure behind
+    # one number of independent samples for all, from the fit with the least structured residual
     correlation = max(1.0, min(fit.correlation for fit in fits))
     scores = [_bic(fit, records, correlation) for fit in fits]
     best = int(np.argmin(scores))
@@ -123,7 +123,7 @@ def identify_recordings(
 
 
 def _bic(fit: Identification, records: Sequence[Record], correlation: float) -> float:
-    """Bayesian information criterion that counts correlated residuals as what they are worth."""
+    """Return the Bayesian information criterion, for the number of independent residuals."""
     samples = sum(r.measured.size for r in records) / correlation
     free = sum(e.free for e in fit.estimates)
     return float(samples * math.log(fit.cost) + free * math.log(max(samples, 2.0)))
@@ -152,7 +152,7 @@ def _trial(
 
 
 def _pooled(comparisons: Sequence[Comparison]) -> float:
-    """RMS over all files, each file counting the same."""
+    """Return the RMS over all files, with equal weights."""
     return math.sqrt(float(np.mean([c.errors.rms**2 for c in comparisons])))
 
 
@@ -169,7 +169,7 @@ def _history(
     drive: str,
     seconds: float,
 ) -> dict[str, Any]:
-    """Where the model comes from, for its file."""
+    """Return the origin of the model, for its file."""
     unit, scale = ("um", 1e6) if train[0].kind == "actuator" else ("kPa", 1e-3)
 
     def figures(comparison: Comparison) -> dict[str, Any]:

@@ -1,7 +1,7 @@
-"""A look at recordings before they are used: what is masked, what is refused, and why.
+"""Quality checks of recordings before they are used.
 
-A mask takes out the samples that say nothing about the film, with a small margin, and leaves the
-rest as it is. What cannot be used at all is refused with a sentence that says what and where.
+Faulty samples are masked with a small margin; the rest stays as it is. A recording that cannot be
+used at all is refused with a sentence that says what is wrong and where.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from dearig.errors import InputError
 from dearig.model.material import THESIS_FILM, VACUUM_PERMITTIVITY, Film
 from dearig.recording.recording import Recording
 
-__all__ = ["Quality", "beyond", "check_enough", "driven_by", "inspect", "overlap"]
+__all__ = ["Quality", "check_enough", "driven_by", "extrapolated", "inspect", "overlap"]
 
-#: Fewer samples than this tell nothing about what is usual in a recording.
+#: With fewer samples there are no statistics of a recording to compare a sample with.
 _SAMPLES_MIN = 20
-#: A modulus in Pa in the middle of what elastomers have, of 1e4 to 1e7.
+#: Pa; a modulus in the middle of the range of elastomers, 1e4 to 1e7 Pa.
 _MODULUS = 1e5
-_FURTHER = 1.05  # times what was trained on: errors from there on are of an extrapolation
-_LONGER = 3.0  # the same of how long a recording is
-_MARGIN = 2  # samples beside a faulty one that are taken out with it
+_DRIVE_RATIO = 1.05  # of the largest drive to that of the training data: extrapolation from here
+_DURATION_RATIO = 3.0  # the same for the duration
+_MARGIN = 2  # samples on either side of a faulty one that are masked with it
 
 
 @dataclass(frozen=True)
@@ -38,15 +38,15 @@ class Quality:
 
 
 def inspect(recording: Recording, drive: str = "command", *, to_fit: bool = True) -> Quality:
-    """Look at ``recording``, as ``drive`` (command or monitor) moved its film.
+    """Check ``recording``, whose film ``drive`` (command or monitor) moved.
 
-    Raises ``InputError`` for what no mask can mend: a unit that is wrong by a thousand, a gap in
-    which the film was driven, nothing left; and with ``to_fit`` a drive that never changes.
+    Raises ``InputError`` for faults that no mask removes: a unit that is wrong by a thousand, a gap
+    in which the film was driven, too few samples left; with ``to_fit`` also a constant drive.
     """
     signal = recording.signal
     moved = driven_by(recording, drive)
     if moved is None or signal.size < _SAMPLES_MIN:
-        return Quality(None, ())  # there are better words for these, where they are used
+        return Quality(None, ())  # the fit refuses these with a better sentence
     if to_fit:
         _check_driven(recording, moved)
     _check_units(recording, moved)
@@ -57,7 +57,7 @@ def inspect(recording: Recording, drive: str = "command", *, to_fit: bool = True
     for what, runs in (
         ("the sensor is clipped", _clipped(signal, pull)),
         ("the sensor is stuck", _stuck(recording.time, signal, pull)),
-        ("the reading drops out", _wild(signal, moved)),
+        ("the reading drops out", _outliers(signal, moved)),
     ):
         fresh = [(a, b) for a, b in runs if not bad[a:b].all()]
         if fresh:
@@ -77,10 +77,10 @@ def inspect(recording: Recording, drive: str = "command", *, to_fit: bool = True
 
 
 def check_enough(recordings: Sequence[Recording], drive: str = "command") -> None:
-    """Refuse recordings that together are too short to tell one effect from another.
+    """Refuse recordings that together are too short to distinguish effects.
 
-    Less than 3 s and 200 samples under voltage, or 100 samples of film data, hold less than a few
-    lobes and relaxation times.
+    3 s and 200 samples under voltage, or 100 samples of film data, are the least that can hold a
+    few lobes and relaxation times.
     """
     if recordings[0].kind == "film":
         samples = sum(r.samples for r in recordings)
@@ -108,10 +108,10 @@ def check_enough(recordings: Sequence[Recording], drive: str = "command") -> Non
 
 
 def overlap(one: Recording, two: Recording) -> tuple[float, float] | None:
-    """Times in s, in ``one`` and in ``two``, at which the same measured values begin, or None.
+    """Return the times in s, in ``one`` and ``two``, where equal measured values begin, or None.
 
-    Two runs never have the same noise, so a row of equal values is an excerpt of the other. What
-    this program recorded at two times is two runs: a simulated rig may repeat its noise.
+    Two runs never have the same noise, so a row of equal values is an excerpt of the other. Runs
+    that this program recorded at two times are two runs: a simulated rig may repeat its noise.
     """
     if _is_run(one) and _is_run(two) and _began(one) != _began(two):
         return None
@@ -124,7 +124,7 @@ def overlap(one: Recording, two: Recording) -> tuple[float, float] | None:
     for start in windows:
         row = b[start : start + _RUN]
         if np.ptp(row) < 1e-3 * span or np.unique(row).size < _RUN // 4:
-            continue  # rest, or a noiseless hold, says nothing
+            continue  # rest, or a hold without noise, is alike in every recording
         at = np.flatnonzero(np.abs(a[: a.size - _RUN + 1] - row[0]) <= close)
         for k in range(1, _RUN):
             at = at[np.abs(a[at + k] - row[k]) <= close]
@@ -139,33 +139,33 @@ _RUN = 40  # samples that have to agree
 _PROBES = 60
 
 
-def beyond(
+def extrapolated(
     train: Sequence[Recording], others: Sequence[Recording], drive: str = "command"
 ) -> tuple[str, ...]:
-    """Sentences on ``others`` that go further than any of ``train``, or last much longer.
+    """Return sentences on ``others`` with a larger drive or a much longer duration than ``train``.
 
-    What a model foresees there was not learnt from any data: the error is one of an extrapolation.
+    The model was not fitted there, so its error is that of an extrapolation.
     """
-    farthest = max(_farthest(r, drive) for r in train)
+    largest = max(_largest_drive(r, drive) for r in train)
     longest = max(float(np.ptp(r.time)) for r in train)
     found = []
     for recording in others:
         said = []
-        far, long = _farthest(recording, drive), float(np.ptp(recording.time))
-        if recording.kind == "film" and far - 1.0 > _FURTHER * (farthest - 1.0):
-            said.append(f"goes to a stretch of {far:.3g}, those that were fitted to {farthest:.3g}")
-        elif recording.kind != "film" and far > _FURTHER * farthest:
+        far, long = _largest_drive(recording, drive), float(np.ptp(recording.time))
+        if recording.kind == "film" and far - 1.0 > _DRIVE_RATIO * (largest - 1.0):
+            said.append(f"goes to a stretch of {far:.3g}, those that were fitted to {largest:.3g}")
+        elif recording.kind != "film" and far > _DRIVE_RATIO * largest:
             said.append(
-                f"goes to {far / 1e3:.3g} kV, those that were fitted to {farthest / 1e3:.3g} kV"
+                f"goes to {far / 1e3:.3g} kV, those that were fitted to {largest / 1e3:.3g} kV"
             )
-        if long > _LONGER * longest:
+        if long > _DURATION_RATIO * longest:
             said.append(f"lasts {long:.0f} s, those that were fitted {longest:.0f} s at most")
         if said:
             found.append(f"{recording.name} {'; and '.join(said)}: its error is extrapolated")
     return tuple(found)
 
 
-def _farthest(recording: Recording, drive: str) -> float:
+def _largest_drive(recording: Recording, drive: str) -> float:
     """The largest stretch, or the highest voltage in V."""
     moved = driven_by(recording, drive)
     return 0.0 if moved is None else float(np.nanmax(np.abs(moved)))
@@ -180,7 +180,7 @@ def _began(recording: Recording) -> object:
 
 
 def driven_by(recording: Recording, drive: str) -> np.ndarray | None:
-    """What moved the film: the stretch, or the voltage, commanded or as the monitor read it."""
+    """Return the drive of the film: the stretch, or the commanded or monitored voltage."""
     if recording.kind == "film":
         return recording.stretch
     if drive != "monitor":
@@ -192,7 +192,7 @@ def driven_by(recording: Recording, drive: str) -> np.ndarray | None:
     return recording.voltage_monitor
 
 
-# ---------------------------------------------------------------- what is refused
+# ---------------------------------------------------------------- refused
 
 
 def _check_driven(recording: Recording, moved: np.ndarray) -> None:
@@ -236,7 +236,7 @@ def _check_units(recording: Recording, moved: np.ndarray) -> None:
             f"is it in kV, and was it imported as V?"
         )
     film = recording.film or THESIS_FILM
-    # the 99.9 % range, so that a single wild reading is no wrong unit
+    # the 99.9 % range: a single outlier is not taken for a wrong unit
     travel = float(np.subtract(*np.percentile(recording.signal, (99.95, 0.05))))
     expected = _expected_travel(film, peak)
     if travel > 100.0 * expected and travel > 1e-3 * film.length:
@@ -254,7 +254,7 @@ def _check_units(recording: Recording, moved: np.ndarray) -> None:
 
 
 def _expected_travel(film: Film, voltage: float) -> float:
-    """m, by the Maxwell stress over a modulus in the middle of the usual ones."""
+    """Return the displacement in m: the Maxwell stress over a modulus in the usual range."""
     stress = VACUUM_PERMITTIVITY * film.permittivity * (voltage / film.thickness) ** 2
     return min(stress / _MODULUS, 3.0) * film.length
 
@@ -273,7 +273,7 @@ def _check_film_units(recording: Recording, stretch: np.ndarray) -> None:
             f"at {_place(recording, int(np.argmin(stretch)))}; it is length over length at rest, "
             f"1 at the start: is it a strain?"
         )
-    # by the stiffest and softest that films are made of, with a factor to spare
+    # compared with the stiffest and softest films, and a factor of safety
     pull = np.abs(stretch - stretch**-2.0)
     wide = pull > 0.5 * float(pull.max())
     if not (wide.any() and float(pull.max()) > 0.02):
@@ -290,13 +290,13 @@ def _check_film_units(recording: Recording, stretch: np.ndarray) -> None:
 
 
 def _gaps(recording: Recording, moved: np.ndarray) -> Iterator[str]:
-    """A sentence for each harmless jump of time; refused where the film may have been driven."""
+    """Yield a sentence for each harmless jump of time; refuse one where the film may have moved."""
     steps = np.diff(recording.time)
     typical = float(np.median(steps))
     span = float(np.ptp(moved)) or 1.0
     for i in map(int, np.flatnonzero(steps > 5.0 * typical)):
         before, after = steps[max(i - 10, 0) : i], steps[i + 1 : i + 11]
-        # a logger that changes its rate has small steps on one side only
+        # a logger that changes its rate has short steps on one side only
         around = [float(np.median(s)) for s in (before, after) if s.size]
         if len(around) < 2 or steps[i] < 5.0 * max(around):
             continue
@@ -310,11 +310,11 @@ def _gaps(recording: Recording, moved: np.ndarray) -> Iterator[str]:
         yield f"{jump}; the drive is taken to have stood meanwhile"
 
 
-# ---------------------------------------------------------------- what is masked
+# ---------------------------------------------------------------- masked
 
 
 def _runs(values: np.ndarray, shortest: int) -> list[tuple[int, int]]:
-    """``(start, end)`` of runs of equal neighbours of at least ``shortest`` samples."""
+    """Return ``(start, end)`` of runs of at least ``shortest`` equal samples."""
     edges = np.flatnonzero(np.diff(values) != 0.0) + 1
     starts = np.concatenate(([0], edges))
     ends = np.concatenate((edges, [values.size]))
@@ -323,9 +323,9 @@ def _runs(values: np.ndarray, shortest: int) -> list[tuple[int, int]]:
 
 
 def _clipped(signal: np.ndarray, moved: np.ndarray) -> list[tuple[int, int]]:
-    """Runs at the very largest or smallest value, longer than noise or a smooth hill has them.
+    """Return runs at the largest or smallest value that are longer than noise or a peak explains.
 
-    The top of a hill in coarse steps is flat as well, but hides no more than a step.
+    The top of a peak in coarse steps is flat too, but hides no more than one step.
     """
     steps = np.abs(np.diff(signal))
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
@@ -353,7 +353,7 @@ def _clipped(signal: np.ndarray, moved: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _stuck(time: np.ndarray, signal: np.ndarray, moved: np.ndarray) -> list[tuple[int, int]]:
-    """Runs of one value for at least 0.1 s and 15 samples, though the drive moves much."""
+    """Return runs of one value for at least 0.1 s and 15 samples while the drive changes."""
     span = float(np.ptp(moved)) or 1.0
     return [
         (a, b)
@@ -362,8 +362,8 @@ def _stuck(time: np.ndarray, signal: np.ndarray, moved: np.ndarray) -> list[tupl
     ]
 
 
-def _wild(signal: np.ndarray, moved: np.ndarray) -> list[tuple[int, int]]:
-    """Up to 5 readings far from their neighbours, which agree, while the drive is calm."""
+def _outliers(signal: np.ndarray, moved: np.ndarray) -> list[tuple[int, int]]:
+    """Return runs of up to 5 outliers between neighbours that agree, while the drive is steady."""
     steps = np.diff(signal)
     noise = 1.4826 * float(np.median(np.abs(np.diff(signal, 2)))) / 6.0**0.5
     span = float(np.subtract(*np.percentile(signal, (99.0, 1.0))))

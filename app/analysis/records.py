@@ -1,4 +1,4 @@
-"""From recordings to the records that a fit takes, and back to comparisons with a model."""
+"""Records that a fit takes, made from recordings, and comparisons of recordings with a model."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ __all__ = [
 #: A recording that was opened, or the path of one.
 Source = str | Path | Recording
 
-#: What the thesis prints for its identification run.
+#: The thesis's printed errors of its identification run.
 PUBLISHED_FIT = Published(2.13, 4.07)
 
 # Tables 4 and 5 of the thesis, by preset: e_rms and e_m in per cent, as printed
@@ -104,13 +104,13 @@ def _path(source: Source) -> Path:
     return source.path if isinstance(source, Recording) else Path(source)
 
 
-_THERMOMETER = 1.0  # s, over which a temperature is the mean: films do not warm faster
+_THERMOMETER = 1.0  # s over which a temperature is averaged: films do not warm faster
 
 _KIND_WORDS = {"actuator": "an actuator (voltage)", "film": "a film (stretch)"}
 
 
 def as_record(recording: Recording, drive: str = "command") -> Record:
-    """What a fit sees of a recording; ``drive`` is command or monitor, for actuators.
+    """Return the record that a fit takes; ``drive`` is command or monitor, for actuators.
 
     The noise comes from the quiet lead-in, or from second differences where there is none. Readings
     that must not be used (see ``dearig.analysis.quality``) are masked, and replaced by a line
@@ -119,7 +119,7 @@ def as_record(recording: Recording, drive: str = "command") -> Record:
     try:
         if recording.kind == "film":
             stretch, stress = _present(recording.stretch), _present(recording.nominal_stress)
-            _noise(stress)  # one that never changes has its own words
+            _noise(stress)  # refuses one that never changes
             valid = inspect(recording, drive).valid
             stress = _bridged(recording.time, stress, valid)
             return FilmRecord(
@@ -148,7 +148,7 @@ def as_record(recording: Recording, drive: str = "command") -> Record:
 
 
 def _lead_in(recording: Recording) -> int:
-    """Samples from whose mean displacement is counted; 0 where that is within the noise."""
+    """Return the samples whose mean is the zero of displacement; 0 if they are too few for it."""
     return recording.quiet_samples if recording.quiet_samples >= MIN_QUIET else 0
 
 
@@ -160,10 +160,10 @@ def _bridged(time: np.ndarray, values: np.ndarray, valid: np.ndarray | None) -> 
 
 
 def recording_drive(recording: Recording, drive: str) -> Drive:
-    """The voltage of a recording: what was commanded, or what the monitor read.
+    """Return the voltage of a recording: the command, or the monitor's reading.
 
-    A voltage that was read, not commanded, is freed of the reading's noise. With a thermometer, the
-    temperature above that of the first second comes along, as a mean over a second.
+    A voltage that was read is smoothed to remove the reading's noise. With a thermometer, the
+    temperature above that of the first second is included, as a mean over a second.
     """
     voltage = driven_by(recording, drive)
     warmth = None
@@ -204,9 +204,9 @@ def compare(
     role: str,
     drive: str = "command",
 ) -> Comparison:
-    """The recording beside what ``model`` says, with its errors.
+    """Compare the recording with the prediction of ``model``.
 
-    Readings that must not be used are NaN in it, and no part of its errors. Raises ``InputError``
+    Readings that must not be used are NaN and do not count in the errors. Raises ``InputError``
     where model and recording are not of one kind, or where the model cannot follow the drive.
     """
     look = inspect(recording, drive, to_fit=False)
@@ -270,7 +270,7 @@ def compare(
 
 
 def _other_rig(recording: Recording, model: Actuator) -> list[str]:
-    """Sentences about a film or load in the recording that is not the model's."""
+    """Return sentences on a film or load of the recording that differs from the model's."""
     sentences = []
     if recording.film is not None and recording.film != model.film:
         sentences.append("the recording was made with another film than the model's")
@@ -283,20 +283,20 @@ def _other_rig(recording: Recording, model: Actuator) -> list[str]:
 
 
 def _place(recording: Recording) -> tuple[str, str, Published | None]:
-    """Table, row and printed figures of a run that the thesis made too."""
+    """Return table, row and printed errors of a run that the thesis made too."""
     elsewhere = ("", recording.name, None)
     if not recording.sequence_toml:
         return elsewhere
     try:
         played = _lobes(recording.sequence_toml, recording.name)
     except InputError:
-        return elsewhere  # a sequence with a CSV that is not here: not one of the thesis's
+        return elsewhere  # a sequence with a CSV file that is missing: not one of the thesis's
     return elsewhere if played is None else _thesis_runs().get(played, elsewhere)
 
 
 @cache
 def _thesis_runs() -> Mapping[Lobes, tuple[str, str, Published | None]]:
-    """Table, row and printed figures of the thesis's runs, by one period of their lobes."""
+    """Return table, row and printed errors of the thesis's runs, by one period of their lobes."""
     places: dict[str, tuple[str, str, Published | None]] = {
         "thesis": ("", "identification", PUBLISHED_FIT)
     }
@@ -309,7 +309,7 @@ def _thesis_runs() -> Mapping[Lobes, tuple[str, str, Published | None]]:
 
 
 def _lobes(toml: str, name: str) -> Lobes | None:
-    """One period of a sequence that is nothing but the thesis's lobes; None for any other."""
+    """Return one period of a sequence of the thesis's lobes alone; None for any other."""
     segments = parse_sequence(toml, name, Path()).sequence.segments
     if len(segments) == 1 and isinstance(segments[0], Lobes):
         # one period, so that runs of any length compare equal

@@ -1,4 +1,4 @@
-"""What a model leaves unexplained, as the curves by which one tells it from noise."""
+"""Autocorrelation and spectrum of a residual, which distinguish it from noise."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 
 __all__ = ["autocorrelation", "even", "spectrum"]
 
-_SAMPLES_MAX = 2**20  # beyond this a transform only gets slow
+_SAMPLES_MAX = 2**20  # a longer transform is slower and shows nothing more
 
 
 def even(time: np.ndarray, residual: np.ndarray) -> tuple[float, np.ndarray]:
-    """``(step, residual)`` on an even grid: as it is, or interpolated where sampling is uneven."""
+    """Return ``(step, residual)`` on an even grid, interpolated where the sampling is uneven."""
     span = float(time[-1] - time[0])
     step = span / (time.size - 1)
     if time.size <= _SAMPLES_MAX and np.allclose(np.diff(time), step, rtol=1e-2, atol=0.0):
@@ -21,9 +21,9 @@ def even(time: np.ndarray, residual: np.ndarray) -> tuple[float, np.ndarray]:
 
 
 def autocorrelation(step: float, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """``(lag, correlation)`` (K,) for lags of one sample to a quarter of the record, in s.
+    """Return ``(lag, correlation)`` (K,) for lags in s from one sample to a quarter of the record.
 
-    The mean is kept: a residual that sits beside zero is correlated with itself.
+    The mean is not removed: a residual with an offset is correlated with itself.
     """
     n = residual.size
     transform = np.fft.rfft(residual, 2 * n)
@@ -33,9 +33,9 @@ def autocorrelation(step: float, residual: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def spectrum(step: float, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """``(frequency, density)`` (K,): one-sided amplitude density per root Hz, by Welch's method.
+    """Return ``(frequency, density)`` (K,): one-sided amplitude density per root Hz (Welch).
 
-    White noise of standard deviation s shows as s sqrt(2 step) at every frequency.
+    White noise of standard deviation s has the density s sqrt(2 step) at every frequency.
     """
     from scipy.signal import welch
 

@@ -1,4 +1,4 @@
-"""A fit or a diagnosis in a folder of its own: model and report, and the residual to look at."""
+"""A fit or a diagnosis in a folder of its own, with model, report and residuals."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _STUDIES_MAX = 10_000
 
 @dataclass(frozen=True)
 class Task:
-    """What is to be done with which recordings.
+    """Settings of a study.
 
     ``diagnose`` or else identify, with Maxwell ``branches``, a ``spring`` (for identify) and
     ``drive`` command or monitor. ``train`` are fitted, ``validation`` read once at the end.
@@ -55,7 +55,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Trace:
-    """A curve with its name, in SI units."""
+    """A named curve in SI units."""
 
     name: str
     x: np.ndarray
@@ -64,7 +64,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class Residual:
-    """What is left of one recording, first with the thesis's model and then with what was found.
+    """Residual of one recording, with the thesis's model and then with the effects found.
 
     ``over_time`` (measured less model, m or Pa) and ``density`` (its amplitude density per root Hz)
     have one trace each, or two. ``noise`` is the floor of one reading and ``floor`` its density.
@@ -84,7 +84,7 @@ class Residual:
 
 @dataclass(frozen=True)
 class Study:
-    """What came of a task: the outcome, the residual of every fitted recording, and the files."""
+    """Result of a task: outcome, residuals of the recordings, and the files written."""
 
     task: Task
     outcome: IdentifyOutcome | DiagnoseOutcome
@@ -103,9 +103,9 @@ def study(
 ) -> Study:
     """Do ``task`` in a new folder within ``folder``: study-1, study-2, ...
 
-    ``write_report`` makes the page that lies beside the model. A first ctrl-C during a diagnosis
-    keeps what had been found. Raises ``InputError`` for what cannot be done; the folder is made
-    only when there is something to put into it.
+    ``write_report`` writes the page next to the model. The first ctrl-C during a diagnosis keeps
+    what was found. Raises ``InputError`` for a task that cannot be done; the folder is made only
+    after the computation, when there is something to put into it.
     """
     if not task.train:
         raise InputError("no recording was chosen to fit; choose one or more")
@@ -134,7 +134,7 @@ def study(
 
 
 def _new_folder(folder: Path) -> Path:
-    """A folder that nobody else has: study-1, or the next that is free."""
+    """Make and return a new folder: study-1, or the next number that is free."""
     where = folder
     try:
         for number in range(1, _STUDIES_MAX):
@@ -152,7 +152,7 @@ def _new_folder(folder: Path) -> Path:
 
 
 def _rig_of(task: Task) -> RigFile | None:
-    """The limits of the rig with the film and load of the recordings, as far as they name any."""
+    """Return the limits of the rig with the film and load of the recordings, if they name them."""
     if task.limits is None:
         return None
     for path in task.train:

@@ -48,7 +48,7 @@ _COLUMNS = 20_000  # of a plot that can be zoomed into
 
 @dataclass(frozen=True)
 class RecordingSummary:
-    """One file of a folder. ``trouble`` says why it cannot be read; then most else is empty.
+    """Summary of one file of a folder; ``trouble`` says why the file cannot be read.
 
     ``started`` is ISO time, ``duration`` in s. ``thumbnail`` are ``(time, signal)`` of a few points
     in SI units. ``errors`` are against the model that was asked for, ``unfit`` says why there are
@@ -80,11 +80,11 @@ class RecordingSummary:
 
 @dataclass(frozen=True)
 class Curves:
-    """One recording as it is plotted: ``(time s, value)`` pairs in SI units, peaks kept.
+    """Curves of one recording for a plot: ``(time s, value)`` pairs in SI units, peaks kept.
 
-    ``model`` and ``residual`` are None where the model has nothing to say of it, and ``unfit`` says
-    why. ``about`` are lines (what, value) on all that is known of it. ``declared`` are label, unit
-    and curve of the channels that the rig file declared.
+    ``model`` and ``residual`` are None where the model does not apply, and ``unfit`` says why.
+    ``about`` are (name, value) lines of its metadata. ``declared`` are label, unit and curve of the
+    channels that the rig file declared.
     """
 
     path: Path
@@ -104,14 +104,14 @@ class Curves:
 
 @dataclass(frozen=True)
 class Difference:
-    """A condition in which recordings differ: what it is, and its value in each."""
+    """A condition in which recordings differ, with its value in each."""
 
     what: str
     values: tuple[str, ...]
 
 
 def recordings_in(folder: Path) -> dict[Path, tuple[float, int]]:
-    """Files in ``folder`` that may be recordings, with the time of their last change and bytes.
+    """Return the files in ``folder`` that may be recordings, with time of last change and size.
 
     Raises ``InputError`` where the folder cannot be read.
     """
@@ -129,9 +129,9 @@ def recordings_in(folder: Path) -> dict[Path, tuple[float, int]]:
 def summarise(
     path: Path, model: Path | None, drive: str = "command", progress: Progress = quiet
 ) -> RecordingSummary:
-    """Look at the file at ``path`` beside ``model`` (None is the thesis's); it never raises.
+    """Summarise the file at ``path`` with its errors against ``model`` (None is the thesis's).
 
-    A file that cannot be read is a part of the folder like any other.
+    It never raises: a file that cannot be read is listed with the reason.
     """
     try:
         recording = open_recording(path)
@@ -171,7 +171,7 @@ def summarise(
 def curves(
     path: Path, model: Path | None, drive: str = "command", progress: Progress = quiet
 ) -> Curves:
-    """The recording at ``path`` beside ``model`` (None is the thesis's), to be drawn.
+    """Return the curves of the recording at ``path`` and of ``model`` (None is the thesis's).
 
     Raises ``InputError`` where the recording cannot be read.
     """
@@ -211,7 +211,7 @@ def curves(
 
 
 def differences(paths: Sequence[Path], progress: Progress = quiet) -> tuple[Difference, ...]:
-    """In which conditions the recordings at ``paths`` differ; what they share is left out.
+    """Return the conditions in which the recordings at ``paths`` differ.
 
     Raises ``InputError`` where one cannot be read.
     """
@@ -225,7 +225,7 @@ def differences(paths: Sequence[Path], progress: Progress = quiet) -> tuple[Diff
 
 
 def recover_file(path: Path, progress: Progress = quiet) -> str:
-    """Recover the recording at ``path``; what was done, in words. Raises ``InputError``."""
+    """Recover the recording at ``path`` and return a sentence on it. Raises ``InputError``."""
     done = recover(path)
     progress(path.stem, 1.0)
     samples = open_recording(path).samples
@@ -242,7 +242,7 @@ def export_file(path: Path, to: str, out: Path, progress: Progress = quiet) -> P
 
 
 def _model(path: Path | None, recording: Recording) -> tuple[Actuator | Strip, frozenset[str]]:
-    """The model to compare with, and the checksums of what it was fitted to."""
+    """Return the model to compare with, and the checksums of the recordings it was fitted to."""
     if path is not None:
         file = load_model(path)
         return file.model, file.fitted
@@ -254,7 +254,7 @@ def _short(time: np.ndarray, values: np.ndarray, columns: int) -> tuple[np.ndarr
     return decimate(time, values, columns) if time.size > 1 else (time, values)
 
 
-#: Lines of a recording's description that say what came of it, not under what it was made.
+#: Lines of a recording's description that are results, not conditions.
 _RESULTS = (
     "recording",
     "noise floor",
@@ -266,10 +266,10 @@ _RESULTS = (
 
 
 def _conditions(recording: Recording) -> dict[str, str]:
-    """Under what a recording was made, one line each: sample, instruments, settings, sequence."""
+    """Return the conditions of a recording: sample, instruments, settings, sequence."""
     rows = describe_rows(recording)
     found = {what: value for what, value in rows if what not in _RESULTS and " at " not in what}
-    if "start time" in found:  # in two words, which a narrow column can break
+    if "start time" in found:  # two words, so that a narrow column can break it
         found["start time"] = found["start time"][:19].replace("T", " ")
     found |= {"sequence": recording.title, "events": str(len(recording.events))}
     for what, text in (
@@ -281,11 +281,11 @@ def _conditions(recording: Recording) -> dict[str, str]:
 
 
 def _flat(toml: str) -> dict[str, str]:
-    """The keys of a TOML text with their values, as ``segment 2.to_kV``."""
+    """Return the keys of a TOML text with their values, as ``segment 2.to_kV``."""
     try:
         data = tomllib.loads(toml)
     except tomllib.TOMLDecodeError:
-        return {}  # text that an instrument kept in its own way: nothing to set side by side
+        return {}  # text that is not TOML has no keys to compare
     found: dict[str, str] = {}
 
     def visit(value: Any, place: str) -> None:

@@ -162,7 +162,7 @@ class _Model:
 
     @property
     def words(self) -> str:
-        return self._words if self.overlay is None else self.overlay.words
+        return self._words if self.overlay is None else self.overlay.failure
 
     def advance(self, block: Block) -> np.ndarray:
         if self.overlay is None:

@@ -45,7 +45,7 @@ def stepped(actuator: Actuator, rows: np.ndarray, cuts: list[int], **more: objec
     for part in np.split(rows, cuts, axis=1):
         parts.append(overlay.advance(Block(start, part)))
         start += part.shape[1]
-    assert overlay.words == ""
+    assert overlay.failure == ""
     return np.concatenate(parts)
 
 
@@ -86,7 +86,7 @@ def test_a_film_that_runs_away_ends_in_nan_with_a_word() -> None:
     found = overlay.advance(Block(0, rows))
     assert np.isfinite(found[:1000]).all()
     assert np.isnan(found[-1])
-    assert "pull-in" in overlay.words
+    assert "pull-in" in overlay.failure
     assert np.isnan(overlay.advance(Block(4000, rows))).all()
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dearig.analysis.compatibility import check_apart
-from dearig.analysis.quality import beyond, check_enough, inspect, overlap
+from dearig.analysis.quality import check_enough, extrapolated, inspect, overlap
 from dearig.analysis.records import as_record, compare, recording_drive
 from dearig.errors import InputError
 from dearig.model.actuator import Actuator
@@ -319,7 +319,7 @@ class TestThermometer:
 class TestWhatGoesBeyondTheTraining:
     def test_a_like_run_does_not(self, tmp_path):
         train = saved(tmp_path / "train.h5", lobes())
-        assert beyond([train], [saved(tmp_path / "other.h5", lobes(1))]) == ()
+        assert extrapolated([train], [saved(tmp_path / "other.h5", lobes(1))]) == ()
 
     def test_higher_and_longer_ones_do(self, tmp_path):
         train = saved(tmp_path / "train.h5", lobes(seconds=4.0))
@@ -327,7 +327,7 @@ class TestWhatGoesBeyondTheTraining:
         higher["voltage_command"] = 1.2 * higher["voltage_command"]
         higher["displacement"] = 1.44 * higher["displacement"]
         long = saved(tmp_path / "long.h5", lobes(2, seconds=20.0))
-        said = beyond([train], [saved(tmp_path / "higher.h5", higher), long])
+        said = extrapolated([train], [saved(tmp_path / "higher.h5", higher), long])
         assert len(said) == 2
         assert "7.2 kV, those that were fitted to 6 kV" in said[0]
         assert "lasts" not in said[0]
@@ -337,6 +337,6 @@ class TestWhatGoesBeyondTheTraining:
         train = saved(tmp_path / "train.h5", cycles())
         further = cycles(1)
         further["stretch"] = 1.0 + 2.0 * (further["stretch"] - 1.0)
-        (said,) = beyond([train], [saved(tmp_path / "further.h5", further)])
+        (said,) = extrapolated([train], [saved(tmp_path / "further.h5", further)])
         assert said.startswith("further goes to a stretch of 3, those that were fitted to 2")
         assert said.endswith("its error is extrapolated")
