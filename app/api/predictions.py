@@ -83,7 +83,10 @@ class Prediction:
     def _repr_html_(self) -> str:
         found, shown = self.prediction, SHOWN[self.prediction.kind]
         long = float(self.time[-1] - self.time[0])
-        span = [significant(float(f(self.response)) * shown.factor) for f in (np.min, np.max)]
+        # what the solver leaves at rest is rounding, not a displacement
+        rest = 1e-9 * float(np.ptp(self.response))
+        ends = [float(f(self.response)) for f in (np.min, np.max)]
+        span = [significant(end * shown.factor if abs(end) > rest else 0.0) for end in ends]
         rows = [
             ("samples", f"{self.time.size:,}, {seconds(long)}"),
             (shown.quantity.lower(), f"{span[0]} to {span[1]} {shown.unit}"),

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Sequence", "SequenceSource", "as_loaded"]
 
+_TO_ZERO = {"kind": "ramp", "to_kV": 0.0, "duration_s": 1.0}
+
 
 class Sequence:
     """A sequence of voltage segments, at 0 V before and after.
@@ -38,8 +40,8 @@ class Sequence:
             .hold(duration_s=2.0)
         )
 
-    The keys are those of a sequence file; ``dearig.Sequence.kinds()`` lists the kinds. What a
-    sequence file would be refused for raises ``InputError`` at once.
+    The keys are those of a sequence file; ``dearig.Sequence.kinds()`` lists the kinds. A wrong key
+    or value raises ``InputError`` at once, a sequence that does not end at 0 V when it is used.
 
     Parameters
     ----------
@@ -72,14 +74,14 @@ class Sequence:
         self._set(data, Path(folder), f"sequence {name!r}")
 
     def _set(self, data: dict[str, Any], folder: Path, label: str, toml: str = "") -> None:
-        self._data, self._folder, self._label = data, folder, label
+        self._data, self._folder, self._label, self._text = data, folder, label, toml
         self._loaded: LoadedSequence | None = None
-        if data.get("segment"):
-            try:
-                text = toml or tomli_w.dumps(data)
-            except TypeError as error:
-                raise InputError(f"{label}: {error}") from error
-            self._loaded = parse_sequence(text, label, folder)
+        if data.get("segment") and not toml:
+            # more segments may follow, which bring the voltage back to 0
+            self._parse(tomli_w.dumps({**data, "segment": [*data["segment"], _TO_ZERO]}))
+
+    def _parse(self, text: str) -> LoadedSequence:
+        return parse_sequence(text, self._label, self._folder)
 
     @classmethod
     def _of(cls, data: dict[str, Any], folder: Path, label: str, toml: str = "") -> Sequence:
@@ -154,12 +156,17 @@ class Sequence:
 
     @property
     def loaded(self) -> LoadedSequence:
-        """The sequence as a run takes it. Raises ``InputError`` for one without segments."""
-        if self._loaded is None:
+        """The sequence as a run takes it.
+
+        Raises ``InputError`` for one without segments, or that cannot be played as a whole.
+        """
+        if not self._data.get("segment"):
             raise InputError(
                 f"{self._label} has no segments: add one, such as "
                 f".half_sine(amplitude_kV=6.0, frequency_Hz=1.0)"
             )
+        if self._loaded is None:
+            self._loaded = self._parse(self._text or tomli_w.dumps(self._data))
         return self._loaded
 
     @property
@@ -197,13 +204,12 @@ class Sequence:
         return write_page(path, self.name, self._repr_html_())
 
     def __repr__(self) -> str:
-        """Return name, duration and segments in a line."""
+        """Return name and segments in a line."""
         kinds = ", ".join(str(segment.get("kind")) for segment in self._data.get("segment", []))
-        long = f"{self.duration_s:.4g} s" if self._loaded is not None else "empty"
-        return f"<Sequence {self.name!r}: {long}; {kinds or 'no segments'}>"
+        return f"<Sequence {self.name!r}: {kinds or 'no segments'}>"
 
     def _repr_html_(self) -> str:
-        if self._loaded is None:
+        if not self._data.get("segment"):
             return card(self.name, facts([("segments", "none")]))
         voltage = self.sample(float(RigFile().card.sample_rate_Hz))[1]
         kinds = ", ".join(str(segment["kind"]) for segment in self._data["segment"])

@@ -25,6 +25,12 @@ def test_segments_are_added_in_order_and_the_first_sequence_stays() -> None:
         start.toml  # noqa: B018
 
 
+def test_a_sequence_that_does_not_end_at_0_is_refused_when_it_is_used() -> None:
+    up = dearig.Sequence("up").ramp(to_kV=4.0, duration_s=1.0)
+    with pytest.raises(dearig.InputError, match="put a ramp to 0 at the end"):
+        up.sample(1000.0)
+
+
 def test_a_sequence_is_sampled_in_volts() -> None:
     time, voltage = lobes().sample(1000.0)
     assert time[-1] == pytest.approx(lobes().duration_s, abs=1e-3)
@@ -77,7 +83,7 @@ def test_a_wrong_key_value_or_kind_is_said_in_a_sentence() -> None:
 
 
 def test_a_sequence_shows_itself(tmp_path: Path) -> None:
-    assert repr(lobes()) == "<Sequence 'lobes': 6.5 s; half_sine, hold>"
+    assert repr(lobes()) == "<Sequence 'lobes': half_sine, hold>"
     html = lobes()._repr_html_()
     assert "half_sine, hold" in html
     assert "<svg" in html
