@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 from collections.abc import Callable
 from importlib import metadata
@@ -9,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.tools.command import dearig, done
+from tests.tools.command import dearig, done, strict_json, write
 
 
 def items(section: str) -> dict[str, dict[str, str]]:
@@ -69,7 +71,7 @@ def test_folders_are_named_and_a_locked_one_is_told(
     assert str(tmp_path / "log" / "deep") in folders["log"]["found"]
     assert folders["log"]["verdict"] == "ok"
     assert folders["disk"]["found"].split()[1] == "GB"
-    allowed = __import__("os").access
+    allowed = os.access
     monkeypatch.setattr(
         "dearig.cli.doctor.os.access",
         lambda path, mode: Path(path) != tmp_path and allowed(path, mode),
@@ -86,24 +88,29 @@ def test_the_kernel_cache_is_named() -> None:
     assert str(cache_folder()) in items("kernels")["compiled kernels"]["found"]
 
 
-def test_a_plug_in_that_fails_is_told_with_the_reason(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Of another distribution, as pip would have installed it."""
+def test_a_plug_in_that_fails_is_told_with_the_reason(tmp_path: Path) -> None:
+    """Of another distribution, as pip would have installed it; seen by a process of its own."""
     about = tmp_path / "other-1.2.dist-info"
     about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: other\nVersion: 1.2\n")
-    (about / "entry_points.txt").write_text(
-        "[dearig.instruments]\ngood = other_laser:LASER\nbad = other_broken:LASER\n"
+    write(about / "METADATA", "Metadata-Version: 2.1\nName: other\nVersion: 1.2\n")
+    write(
+        about / "entry_points.txt",
+        "[dearig.exporters]\ntxt = other_good:EXPORTER\n"
+        "[dearig.segments]\nwobble = other_broken:SEGMENT\n",
     )
-    (tmp_path / "other_laser.py").write_text("LASER = 1\n")
-    (tmp_path / "other_broken.py").write_text("raise RuntimeError('no such port')\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    found = items("plug-ins")
-    good, bad = found["instruments: good"], found["instruments: bad"]
-    assert (good["verdict"], good["found"]) == ("ok", "other_laser:LASER of other 1.2")
+    write(tmp_path / "other_good.py", "from dearig.recording.exporters.csv_file import EXPORTER\n")
+    write(tmp_path / "other_broken.py", "raise RuntimeError('no such wobble')\n")
+    ended = subprocess.run(
+        [sys.executable, "-m", "dearig", "doctor", "--json", "-"],
+        capture_output=True, text=True, check=False, timeout=200,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
+    found = {item["name"]: item for item in strict_json(ended.stdout)["items"]}
+    good, bad = found["exporters: txt"], found["segments: wobble"]
+    assert (good["verdict"], good["found"]) == ("ok", "other_good:EXPORTER of other 1.2")
     assert bad["verdict"] == "wrong"
-    assert "RuntimeError: no such port" in bad["found"]
+    assert "of other is left out: no such wobble" in bad["found"]
 
 
 def test_what_is_broken_does_not_end_the_examination(monkeypatch: pytest.MonkeyPatch) -> None:
