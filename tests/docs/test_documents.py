@@ -31,7 +31,7 @@ from tests.tools.command import done, write
 #: Pages whose commands are run in the order shown, in one folder for each page.
 RUN = [p for p in documents() if p.startswith("app/docs/") or "/" not in p]
 #: Options of ``dearig`` itself.
-GENERAL = {"--help", "-h", "--version"}
+GENERAL = {"--help", "-h", "--version", "--install-completion", "--show-completion"}
 COMMANDS: dict[str, Any] = get_command(app).commands  # type: ignore[attr-defined]
 
 
@@ -164,6 +164,13 @@ def test_every_json_format_is_on_the_page() -> None:
     page = (reference.FOLDER / "json.md").read_text(encoding="utf-8")
     assert written
     assert [name for name in sorted(written) if f"`{name}`" not in page] == []
+
+
+def test_new_imports_of_the_changelog_exist() -> None:
+    table = (ROOT / "CHANGELOG.md").read_text("utf-8").partition("| old | new |")[2]
+    new = re.findall(r"`(dearig(?:\.[a-z_]+)+)`", table)
+    assert len(new) > 10
+    assert [name for name in new if importlib.util.find_spec(name) is None] == []
 
 
 def test_no_block_is_left_out_without_a_reason() -> None:
