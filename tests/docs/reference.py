@@ -35,8 +35,8 @@ server). `SEQUENCE` is a file or the name of a preset.
 Outputs are checked before the work. What exists is replaced with `--force` only. Bad input is
 answered with one sentence. An unexpected error names the log file that has its details.
 `dearig --version` prints the version, `dearig --install-completion` lets the shell complete
-commands and options, and `-v` shows more messages. Exit codes and the documents of `--json` are on the page
-[JSON](json.md).
+commands and options, and `-v` shows more messages. Exit codes and the documents of `--json` are on
+the page [JSON](json.md).
 """
 _RIG_FILE = """\
 # Rig file
