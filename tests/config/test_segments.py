@@ -105,54 +105,16 @@ def test_the_page_explains_every_key_of_every_kind() -> None:
                 assert f"| `{key}` | {info.description} |" in section
 
 
-SAWTOOTH = '''
-from dataclasses import dataclass
-from typing import Literal
-
-import numpy as np
-from pydantic import Field
-
-from dearig.config.segments import Positive, SegmentTable, Voltage
-
-
-class Sawtooth(SegmentTable):
-    """From 0 kV to the amplitude at one slope, and straight back."""
-
-    example = {"amplitude_kV": 3.0, "rise_s": 1.0}
-
-    kind: Literal["sawtooth"]
-    amplitude_kV: Voltage = Field(description="voltage at the tip")
-    rise_s: Positive = Field(description="duration of the rise")
-    fall_s: Positive = Field(default=0.05, description="duration of the fall")
-
-    def build(self, folder):
-        return Wave(self.amplitude_kV * 1e3, self.rise_s, self.fall_s)
-
-
-@dataclass(frozen=True)
-class Wave:
-    amplitude: float
-    rise: float
-    fall: float
-    start = end = 0.0
-
-    @property
-    def duration(self):
-        return self.rise + self.fall
-
-    def voltage(self, t):
-        up, down = t / self.rise, (self.duration - t) / self.fall
-        return self.amplitude * np.clip(np.minimum(up, down), 0.0, 1.0)
-
-    def after(self, end):
-        return self
-'''
+def readme_example() -> str:
+    """Return the kind that the how-to writes, so that the how-to is tested."""
+    text = (Path(__file__).parents[2] / "app/config/segments/README.md").read_text("utf-8")
+    return text.split("```python\n", 1)[1].split("```", 1)[0]
 
 
 def test_a_kind_of_another_distribution_is_found_everywhere(tmp_path: Path) -> None:
     found = run_with_distribution(
         tmp_path,
-        {"sawtooth.py": SAWTOOTH},
+        {"sawtooth.py": readme_example()},
         {"dearig.segments": {"sawtooth": "sawtooth:Sawtooth"}},
         """
         from pathlib import Path

@@ -122,58 +122,10 @@ def test_parquet_without_pyarrow_is_a_sentence(
     assert {path.name for path in tmp_path.iterdir()} == {"in.parquet"}
 
 
-SPACED = """
-import numpy as np
-
-from dearig.errors import InputError
-from dearig.recording.exporters import Exporter
-from dearig.recording.exporters.table import columns_of
-from dearig.recording.importers import Importer
-from dearig.recording.importers.source import no_such_column
-
-MAGIC = "%spaced"
-
-
-class Columns:
-    about = {}
-
-    def __init__(self, path):
-        self.path = path
-        try:
-            head, names, *rows = path.read_text("utf-8").splitlines()
-            if head != MAGIC:
-                raise ValueError("its first line is not %spaced")
-            self.names = names.split()
-            self.table = np.array([[float(c) for c in row.split()] for row in rows], ndmin=2)
-            if self.table.shape[1:] != (len(self.names),) or not self.table.size:
-                raise ValueError("its rows have different lengths, or there are none")
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path} cannot be read: {error}") from error
-
-    def named(self, name):
-        return [n for n in self.names if n == name]
-
-    def check(self, name):
-        if name not in self.names:
-            raise no_such_column(self, name)
-
-    def read(self, names):
-        return {n: self.table[:, self.names.index(n)] for n in names}
-
-    def row(self, index):
-        return f"line {index + 3}"
-
-
-def write(recording, path):
-    columns = columns_of(recording)
-    lines = [MAGIC, " ".join(columns)]
-    lines += [" ".join(map(repr, row)) for row in zip(*(c.tolist() for c in columns.values()))]
-    path.write_text("\\n".join(lines) + "\\n", "utf-8")
-
-
-IMPORTER = Importer("Spaced", (".spaced",), Columns, lambda head: head.startswith(b"%spaced"))
-EXPORTER = Exporter("Spaced", write)
-"""
+def readme_example() -> str:
+    """Return the format that the how-to writes, so that the how-to is tested."""
+    text = (Path(__file__).parents[2] / "app/recording/importers/README.md").read_text("utf-8")
+    return text.split("```python\n", 1)[1].split("```", 1)[0]
 
 
 def test_a_format_of_another_distribution_is_imported_and_exported(
@@ -183,7 +135,7 @@ def test_a_format_of_another_distribution_is_imported_and_exported(
     (tmp_path / "copies").mkdir()
     found = run_with_distribution(
         tmp_path,
-        {"spaced.py": SPACED},
+        {"spaced.py": readme_example()},
         {
             "dearig.importers": {"spaced": "spaced:IMPORTER"},
             "dearig.exporters": {"spaced": "spaced:EXPORTER"},
