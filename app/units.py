@@ -1,4 +1,4 @@
-"""In which unit each quantity is shown."""
+"""Units in which quantities are shown to people."""
 
 from __future__ import annotations
 
@@ -54,10 +54,10 @@ SHOWN = MappingProxyType(
 
 
 def parameter_unit(unit: str) -> tuple[float, str]:
-    """``(factor, unit)`` in which a parameter of SI ``unit`` is shown to people."""
+    """Return ``(factor, unit)`` in which a parameter of SI ``unit`` is shown."""
     return (1e-3, "kPa") if unit == "Pa" else (1.0, unit)
 
 
 def readable(text: str) -> str:
-    """``text`` with the sign of the micrometre, which the model does without."""
+    """Return ``text`` with um written as the sign of the micrometre."""
     return re.sub(r"(?<=\d) um\b", " \N{MICRO SIGN}m", text)

@@ -1,1 +1,1 @@
-"""Files that a person keeps: rig, sequence and model files, and the named sequences."""
+"""Files that people write: rig, sequence and model files, and the presets."""

@@ -156,7 +156,7 @@ def load_model(path: str | Path) -> ModelFile:
 
 
 def load_actuator(path: str | Path) -> Actuator:
-    """The actuator in a model file; ``InputError`` for a bare film."""
+    """Return the actuator in a model file; ``InputError`` for a bare film."""
     model = load_model(path).model
     if isinstance(model, Actuator):
         return model
@@ -187,7 +187,7 @@ def _build(file: _File) -> Actuator | Strip:
 
 
 def model_toml(name: str, model: Actuator | Strip, history: Mapping[str, Any]) -> str:
-    """The model as the text of a model file."""
+    """Return the model as the text of a model file."""
     data: dict[str, Any] = {"format": FORMAT, "name": _plain(name)}
     if isinstance(model, Strip):
         data["kinematics"] = model.kinematics
@@ -223,7 +223,7 @@ def save_model(
     history: Mapping[str, Any],
     overwrite: bool = False,
 ) -> Path:
-    """Write a model file, whole or not at all; ``InputError`` where it may not be written."""
+    """Write a model file completely or not at all; ``InputError`` where it may not be written."""
     out = check_output(path, overwrite)
     with replaced_when_done(out) as partial:
         partial.write_text(model_toml(name, model, history), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Sequences that are known by name: the thesis's own, and a richer one."""
+"""Presets: the sequences of the thesis, and a richer one."""
 
 from __future__ import annotations
 

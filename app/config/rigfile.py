@@ -1,4 +1,4 @@
-"""The rig file: film, load, instruments and limits, which the operator keeps once (TOML)."""
+"""The rig file (TOML): film, load, instruments and limits."""
 
 from __future__ import annotations
 
@@ -63,13 +63,13 @@ class LoadSection(Section):
 
 
 class RigFile(RigSettings):
-    """Everything a rig file says; without a file it is the rig of the thesis."""
+    """Contents of a rig file; the defaults are the rig of the thesis."""
 
     film: FilmSection = FilmSection()
     load: LoadSection = LoadSection()
 
     def as_film(self) -> Film:
-        """The film as the model takes it, in SI units."""
+        """Return the film in SI units, for the model."""
         film = self.film
         # divided, not multiplied by 1e-3: 72 mm is then 0.072 m to the last bit
         return Film(
@@ -82,12 +82,12 @@ class RigFile(RigSettings):
         )
 
     def as_load(self) -> Load:
-        """The load as the model takes it, in SI units."""
+        """Return the load in SI units, for the model."""
         rest = self.load.rest_length_mm
         return Load(mass=self.load.mass_g / 1e3, rest_length=None if rest is None else rest / 1e3)
 
     def gate_limits(self) -> Limits:
-        """The limits as the gate takes them, in SI units."""
+        """Return the limits in SI units, for the gate."""
         return self.limits.gate_limits(self.film.name)
 
     @model_validator(mode="after")
@@ -174,7 +174,7 @@ def _section_class(info: FieldInfo) -> type[BaseModel]:
 
 
 def _sentence(error: ValidationError) -> str:
-    """One sentence for the first fault; a wrong name before the wrong values it may have caused."""
+    """Return a sentence on the first fault; unknown keys come before the faults they may cause."""
     faults = error.errors(include_url=False)
     first = min(faults, key=lambda fault: fault["type"] != "extra_forbidden")
     more = len(faults) - 1

@@ -1,4 +1,4 @@
-"""A rig file as a form: what is wrong with it, key by key, and its text with one value changed."""
+"""Editing a rig file: faults by key, and the text with one value changed."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ SECTIONS: dict[str, type[BaseModel]] = {
 
 
 def parse_rig_file(text: str) -> RigFile:
-    """The rig file that ``text`` says. Raises ``InputError`` with every fault, a sentence each."""
+    """Return the rig file in ``text``. Raises ``InputError`` with a sentence for every fault."""
     found = faults_of(text)
     if found:
         raise InputError("the rig file: " + "; ".join(found.values()))
@@ -72,7 +72,7 @@ def faults_of(text: str) -> dict[tuple[str, str], str]:
 
 
 def section_values(text: str, table: str) -> dict[str, Any]:
-    """The keys of ``table`` that ``text`` gives. Raises ``InputError`` where it is not TOML."""
+    """Return the keys of ``table`` in ``text``. Raises ``InputError`` where it is not TOML."""
     found = parse_toml(text, "the rig file").get(table, {})
     return dict(found) if isinstance(found, dict) else {}
 
@@ -112,7 +112,7 @@ def with_value(text: str, table: str, key: str, value: Any) -> str:
 
 
 def _value_end(body: str, start: int) -> int:
-    """Where the value ends that begins at ``start``: values of rig files stand on one line."""
+    """Return the end of the value that begins at ``start``; values stand on one line."""
     quoted = re.match(r"\"(?:[^\"\\]|\\.)*\"|'[^']*'", body[start:])
     if quoted:
         return start + quoted.end()

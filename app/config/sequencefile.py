@@ -1,4 +1,4 @@
-"""Sequence files: from TOML or the name of a preset to the segments that the model plays."""
+"""Sequence files: a sequence read from TOML, or a preset by its name."""
 
 from __future__ import annotations
 
@@ -169,11 +169,11 @@ _NO_SEGMENTS = (
 
 
 def _sentence(error: ValidationError, data: dict[str, Any]) -> str:
-    """One sentence for the first fault; a wrong name before the wrong values it may have caused."""
+    """Return a sentence on the first fault; unknown keys come before the faults they may cause."""
     faults = error.errors(include_url=False)
     first = min(faults, key=lambda fault: fault["type"] != "extra_forbidden")
     if first["type"] == "extra_forbidden":
-        # what is missing beside a wrong name is what was meant by it
+        # a missing key beside an unknown one is probably the key that was meant
         beside = first["loc"][:-1]
         faults = [f for f in faults if f["type"] != "missing" or f["loc"][:-1] != beside]
     more = len(faults) - 1

@@ -1,4 +1,4 @@
-"""Reading TOML that people write: where it is broken, and what a key may hold, in words."""
+"""Reading TOML that people write, with messages about what is wrong and what is allowed."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Table(BaseModel):
 
 
 def read_text(path: Path, what: str) -> str:
-    """Text of the ``what`` (rig file, sequence) at ``path``; ``InputError`` where it is none."""
+    """Return the text of the ``what`` (rig file, sequence) at ``path``. Raises ``InputError``."""
     try:
         raw = path.read_bytes()
     except OSError as error:
@@ -50,7 +50,7 @@ def read_text(path: Path, what: str) -> str:
 
 
 def parse_toml(text: str, name: str) -> dict[str, Any]:
-    """Tables of the TOML ``text`` of what is called ``name``; ``InputError`` with the line."""
+    """Return the tables of the TOML ``text`` called ``name``; ``InputError`` with the line."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -64,7 +64,7 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
 
 
 def allowed(info: FieldInfo, item: bool = False) -> str:
-    """What a key may hold, in words: ``a number from 0.1 to 10``.
+    """Return the allowed values of a key in words: ``a number from 0.1 to 10``.
 
     ``item``: what one value in its list may be.
     """
@@ -83,7 +83,7 @@ def allowed(info: FieldInfo, item: bool = False) -> str:
 
 
 def _bare(kind: Any, metadata: list[Any]) -> tuple[Any, list[Any]]:
-    """A type without ``| None`` and without its constraints, and these."""
+    """Return a type without ``| None`` and constraints, and the constraints."""
     if get_origin(kind) in (Union, types.UnionType):
         kind = next(part for part in get_args(kind) if part is not type(None))
     if get_origin(kind) is Annotated:
@@ -130,13 +130,13 @@ def _toml_fault(message: str, text: str) -> str:
 
 
 def shown(value: object) -> str:
-    """A value as it stands in a message: short."""
+    """Return a value for a message, shortened."""
     text = json.dumps(value, default=str, ensure_ascii=False)
     return text if len(text) <= 40 else f"{text[:37]}..."
 
 
 def meant(key: str, known: Mapping[str, FieldInfo], parents: str = "") -> str | None:
-    """What the unknown ``key`` should probably have been: a sentence's end, or None."""
+    """Return the end of a sentence with the key that was probably meant, or None."""
     for name in known:
         if _stem(key) and _stem(name) == _stem(key):
             unit = name.removeprefix(_stem(name)).strip("_")
@@ -147,7 +147,7 @@ def meant(key: str, known: Mapping[str, FieldInfo], parents: str = "") -> str | 
 
 
 def _stem(key: str) -> str:
-    """A key without the unit at its end: ``slew_max`` of ``slew_max_kV_per_s``."""
+    """Return a key without its unit: ``slew_max`` of ``slew_max_kV_per_s``."""
     parts = key.split("_")
     while parts and parts[-1].lower() in _UNITS:
         parts.pop()

@@ -1,4 +1,4 @@
-"""The values of a recording, read from its file when they are asked for."""
+"""Values of a recording, read from its file on first use."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Arrays:
         self._read: dict[str, np.ndarray] = {}
 
     def read(self, name: str) -> np.ndarray:
-        """All of ``name``, (N,); read once and kept."""
+        """Return all values (N,) of ``name``; they are read once and kept."""
         if name not in self._read:
             values = self.window(name, 0, self.samples)
             if name in self.stored:
@@ -95,7 +95,7 @@ class Arrays:
         return Overview(time, *reduced(values, values, points))
 
     def lead_in(self, step: float) -> int:
-        """Samples at 0 V at the start, where a voltage below ``step`` V cannot be resolved."""
+        """Count the samples at 0 V at the start; ``step`` V is the resolution of the voltage."""
         if "voltage_command" in self._derived:
             return self._of_entry(lambda entry: self._counts(entry).lead_in())
         return lead_in(self.read("voltage_command"), step)
@@ -124,7 +124,7 @@ class Arrays:
         return counts
 
     def _check(self, name: str, values: np.ndarray) -> None:
-        # the overlay may have had nothing to show at times
+        # the overlay model may have no value at times
         finite = np.isfinite(values)
         if not finite.all() and name != "displacement_model":
             at = int(np.argmin(finite))

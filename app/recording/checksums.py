@@ -21,7 +21,7 @@ NAME = "checksums"
 
 
 def checksum(counts: np.ndarray, before: int = 0) -> int:
-    """CRC-32 (as of zip files) of int16 ``counts`` (n,) as they lie in the file."""
+    """Return the CRC-32 (as of zip files) of int16 ``counts`` (n,) as they are in the file."""
     return zlib.crc32(np.ascontiguousarray(counts, dtype="<i2").data, before)
 
 
@@ -85,7 +85,7 @@ def complete_checksums(
 def wrong_blocks(
     entry: h5py.Group, samples: int, read: Callable[[int, int], np.ndarray]
 ) -> tuple[int, list[tuple[int, int, int]]]:
-    """How many samples of each channel were compared; (channel, start, stop) of what differs."""
+    """Return the number of samples compared, and (channel, start, stop) of each difference."""
     dataset = entry[NAME]
     size = int(dataset.attrs["block_samples"])
     compared, wrong = 0, []

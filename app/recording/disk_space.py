@@ -1,4 +1,4 @@
-"""Room on the disk for a run: what it will take, what there is, and what ended it, in words."""
+"""Disk space for a run: the estimate, the free space, and advice on errors of the disk."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dearig.recording.finish import OVERVIEW, PHYSICAL_MAX
 
 __all__ = ["LEFT_FREE", "advice", "check_room", "estimate_bytes", "free_bytes"]
 
-#: Bytes that a run leaves free: a disk filled to its end harms more than this run.
+#: Bytes that a run leaves free: a full disk harms other programs too.
 LEFT_FREE = 2**26
 
 #: Metadata, texts and the first chunks of everything.
@@ -35,7 +35,7 @@ _ADVICE = MappingProxyType(
         errno.ENODEV: "the disk was removed: record to another one",
         errno.ENXIO: "the disk was removed: record to another one",
         errno.ENAMETOOLONG: "the path is too long: choose a shorter one",
-        # not every system has these
+        # these codes are missing on some systems
         getattr(errno, "EDQUOT", -1): "your share of the disk is used up: make room, or record to "
         "another one",
         getattr(errno, "ESTALE", -2): "the network disk is gone: record to a local one",
@@ -87,7 +87,7 @@ def _size(amount: float) -> str:
 
 
 def advice(error: Exception) -> str:
-    """What to do about an ``error`` that the disk or HDF5 gave, in words."""
+    """Return what to do about an ``error`` of the disk or of HDF5, in words."""
     number = errno_of(error)
     otherwise = "see that the disk has room and that no other program holds the file"
     return otherwise if number is None else _ADVICE.get(number, otherwise)

@@ -66,7 +66,7 @@ def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Pat
 
 
 def errno_of(error: Exception) -> int | None:
-    """The operating system's number for ``error``, also where HDF5 has it in its text only."""
+    """Return the system's error number, also where HDF5 gives it only in its text."""
     if isinstance(error, OSError) and error.errno:
         return error.errno
     found = re.search(r"errno = (\d+)", str(error))
@@ -74,13 +74,13 @@ def errno_of(error: Exception) -> int | None:
 
 
 def in_words(error: Exception) -> str:
-    """What the operating system says of ``error``, without its number and without the path."""
+    """Return the system's text of ``error``, without its number and without the path."""
     number = errno_of(error)
     return one_line(error) if number is None else os.strerror(number)
 
 
 def one_line(error: Exception, most: int = 300) -> str:
-    """The text of another library's ``error``, fit for a sentence: printable, and not too long."""
+    """Return another library's error text as part of a sentence: printable and short."""
     text = " ".join("".join(c if c.isprintable() else " " for c in str(error)).split())
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
@@ -103,7 +103,7 @@ def replaced_when_done(path: Path) -> Iterator[Path]:
 
 
 def old_of(path: Path) -> Path:
-    """What the file at ``path`` is called until another is in its place."""
+    """Return the name of the file at ``path`` while another one is written in its place."""
     return path.with_name(f"{path.name}.old")
 
 
@@ -124,12 +124,12 @@ def set_aside(path: Path) -> Path | None:
 
 
 def put_back(old: Path | None, path: Path) -> None:
-    """Give ``path`` back the file that was set aside as ``old``, if any."""
+    """Move the file that was set aside as ``old``, if any, back to ``path``."""
     if old is not None and old.exists():
         old.replace(path)
 
 
 def file_sha256(path: Path) -> str:
-    """SHA-256 of a file's bytes, in hexadecimal."""
+    """Return the SHA-256 of a file, in hexadecimal."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()

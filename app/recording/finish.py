@@ -1,4 +1,4 @@
-"""The end of a recording: physical values beside the counts, and what is known only then."""
+"""Finishing a recording: physical values, overview, dimension scales and closing metadata."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def _write_physical(entry: h5py.Group) -> int:
 
 
 def _trim(entry: h5py.Group, samples: int) -> None:
-    """Take away rows that a kill left without what belongs in them, or moments without samples."""
+    """Remove empty events and notes of flushes whose samples are missing, as a kill leaves them."""
     notes = flush_notes(entry)
     if notes is not None:
         entry["wall_clock"].resize((int(np.sum(notes["sample"] <= samples)),))
@@ -123,7 +123,7 @@ def _trim(entry: h5py.Group, samples: int) -> None:
 
 
 def _write_overview(entry: h5py.Group, counts: Counts) -> None:
-    """What a viewer shows of a run too long to be shown: an envelope, as a line up and down."""
+    """Write the overview of a long run: its envelope, as a line between least and greatest."""
     group = entry.create_group("overview")
     group.attrs["NX_class"] = fixed("NXdata")
     group.attrs["signal"] = fixed(SIGNALS["actuator"])

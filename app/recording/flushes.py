@@ -1,4 +1,4 @@
-"""What every flush of a run says of itself: /entry/wall_clock, the last that HDF5 writes in it."""
+"""Notes of the flushes of a run: /entry/wall_clock, which HDF5 writes last in each flush."""
 
 from __future__ import annotations
 

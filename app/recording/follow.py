@@ -1,4 +1,4 @@
-"""A recording followed while it is written: what is new in it, whenever one asks."""
+"""Following a recording while another process writes it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["Follower", "News"]
 
 @dataclass(frozen=True, eq=False)
 class News:
-    """What came since the last look: ``values`` by name, (n,) each, from sample ``start`` on.
+    """New samples since the last look: ``values`` by name, (n,) each, from sample ``start`` on.
 
     ``time`` is among them; SI units. ``ended``: the run was closed, and there will be no more.
     """
@@ -32,7 +32,7 @@ class News:
 
 
 class Follower:
-    """Looks at the recording at ``path``, of a run that another process makes.
+    """Follows the recording at ``path`` of a run in another process.
 
     Between looks it holds nothing open. Displacement is counted from the mean of the lead-in, or,
     until that is over, of what of it there is.
@@ -45,7 +45,7 @@ class Follower:
         self._rest: Rest | None = None
 
     def look(self, most: int | None = None) -> News:
-        """What is new since the last look, of which at most ``most`` samples.
+        """Return what is new since the last look, at most ``most`` samples.
 
         A flush makes new samples visible, four times a second. Raises ``InputError`` for what is
         no recording of a run.

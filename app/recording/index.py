@@ -1,4 +1,4 @@
-"""What lies in a folder of recordings, quickly: a glance at each, kept until the file changes."""
+"""Index of a folder of recordings: a summary of each file, cached until the file changes."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from dearig.recording.text import text_of
 __all__ = ["ENDINGS", "Entry", "glance", "index_folder", "lines"]
 
 ENDINGS = (".h5", ".hdf5", ".nxs")
-#: Of the kept glances; another one is not read.
+#: Version of the cache; another one is not read.
 KEPT = "dearig-index/1"
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One file: what a person looks for it by. ``trouble`` says why it is no recording, or ""."""
+    """Summary of one file. ``trouble`` says why it is no recording, or is ""."""
 
     path: str
     bytes: int
@@ -97,7 +97,7 @@ def _files(folder: Path) -> Iterator[tuple[str, int, int]]:
 
 
 def glance(path: Path, name: str, size: int) -> Entry:
-    """What can be said of the file at ``path`` without its samples."""
+    """Return the summary of the file at ``path``; its samples are not read."""
     try:
         return read_from(path, lambda file: _entry(file, name, size))
     except InputError as error:
@@ -154,7 +154,7 @@ def _cache_of(folder: Path) -> Path:
 
 
 def _load(cache: Path) -> dict[str, tuple[tuple[int, int], Entry]]:
-    """What was kept; nothing, where that is gone, of another version, or not in order."""
+    """Return the cache; empty where it is missing, of another version, or damaged."""
     try:
         kept = json.loads(cache.read_text("utf-8"))
         if kept["format"] != KEPT:
@@ -173,12 +173,12 @@ def _save(cache: Path, entries: dict[str, Entry], stamps: dict[str, tuple[int, i
         with replaced_when_done(cache) as partial:
             partial.write_text(json.dumps({"format": KEPT, "files": files}), encoding="utf-8")
     except (OSError, InputError):
-        # a home that may not be written makes the next look slower, and is no reason to fail
+        # without the cache the next index is slower; that is no reason to fail
         return
 
 
 def lines(entries: Sequence[Entry]) -> list[str]:
-    """A line for each of ``entries``: start, length, what it is, and where."""
+    """Return a line for each entry: start, length, content and path."""
     if not entries:
         return ["no recordings"]
     shown = []

@@ -25,12 +25,12 @@ MAGIC = b"dearig-journal/1"
 PAGE = 4096
 HEAD = struct.Struct("<16sQQQ")  # magic, size before, size after, pages
 PIECE = struct.Struct("<QI")  # offset, length; then the old bytes, then the new ones
-#: No finishing touches more than this; what claims to is no journal.
+#: Bytes of a journal, at most: finishing a recording never needs more.
 LARGEST = 2**28
 
 
 def journal_of(path: Path) -> Path:
-    """Where the journal of the file ``path`` lies."""
+    """Return the path of the journal of the file ``path``."""
     return path.with_name(f"{path.name}.journal")
 
 
@@ -90,7 +90,7 @@ class Patched(io.RawIOBase):
             if not more:
                 if at + len(view) > self.edge:
                     raise OSError(f"the file ends before byte {at + len(view)}")
-                # what was truncated away and grown again reads as nothing written
+                # bytes that were cut off and added again read as zeros
                 view[got:] = bytes(len(view) - got)
                 return
             got += more
@@ -128,10 +128,10 @@ class Patched(io.RawIOBase):
         return self.end
 
     def flush(self) -> None:
-        """Nothing waits."""
+        """Do nothing: every write goes to the file at once."""
 
     def original(self, number: int) -> bytes:
-        """What stands in the file in the place of page ``number``, up to the edge."""
+        """Return the bytes of the file at page ``number``, up to the edge."""
         size = min(PAGE, self.edge - number * PAGE)
         held = bytearray(size)
         self._fill(number * PAGE, memoryview(held))
@@ -234,7 +234,7 @@ def _either(here: bytes, old: bytes, new: bytes) -> bool:
 
 
 def carry_out(path: Path) -> bool:
-    """Do what a journal beside ``path`` has left; True if there was one. Raises ``OSError``."""
+    """Carry out the journal beside ``path``; True if there was one. Raises ``OSError``."""
     found = whole_journal(path)
     if found is not None:
         _, after, pages = found

@@ -1,4 +1,4 @@
-"""The layout of a recording file: names, units and types of everything in it.
+"""Layout of a recording file: names, units and types.
 
 /                       format, default="entry"
 /entry                  NXentry: format, kind, complete, outcome, samples, default="data"
@@ -55,7 +55,7 @@ __all__ = [
 FORMAT_NAME = "dearig-recording"
 FORMAT = f"{FORMAT_NAME}/1"
 
-#: The one library version under which a file was found to survive a kill at every write boundary.
+#: The only library version under which a file survived a kill at every write boundary.
 LIBVER = ("v110", "v110")
 
 #: Samples in a chunk of physical values, at most.
@@ -64,10 +64,10 @@ CHUNK = 2**17
 #: The two kinds: a film driven by voltage, and a film specimen driven by stretch.
 KINDS = ("actuator", "film")
 
-#: What is plotted by default, and what a model of the film has to reproduce.
+#: The measured quantity: the default plot, and what a model has to reproduce.
 SIGNALS = MappingProxyType({"actuator": "displacement", "film": "nominal_stress"})
 
-#: Values without which a recording of a kind says nothing.
+#: Values that a recording of each kind must have.
 REQUIRED = MappingProxyType(
     {
         "actuator": ("time", "displacement", "voltage_command"),
@@ -101,7 +101,7 @@ LONG_NAMES = MappingProxyType(
     }
 )
 
-#: How a voltage goes between its samples: a converter holds it, imported data is a polyline.
+#: The voltage between samples: a converter holds it, imported data are linear.
 ZERO_ORDER, LINEAR = "zero-order", "linear"
 
 EVENT_LEVELS = ("info", "warning", "fault")
@@ -120,12 +120,12 @@ WALL_CLOCK_TYPE = np.dtype([("sample", "<i8"), ("unix_time", "<f8")])
 
 
 def counts_name(channel: str) -> str:
-    """Name of the raw counts that stand beside the physical values of ``channel``."""
+    """Return the name of the raw counts of ``channel``."""
     return f"{channel}_counts"
 
 
 def iso_time(moment: float) -> str:
-    """ISO 8601 in UTC of a Unix time ``moment`` in s."""
+    """Return the Unix time ``moment`` in s as ISO 8601 in UTC."""
     return datetime.fromtimestamp(moment, tz=UTC).isoformat(timespec="milliseconds")
 
 
@@ -175,7 +175,7 @@ def create_field(
         name,
         shape=(samples,),
         dtype="<f8",
-        # chunks of one size: the last one takes all of its room
+        # chunks of equal size: HDF5 stores the last one in full
         chunks=(-(-samples // -(-samples // CHUNK)),) if samples else None,
         fletcher32=bool(samples),
     )
@@ -206,7 +206,7 @@ def make_own_scale(rows: h5py.Dataset) -> None:
 
 
 def lay_out(file: h5py.File, kind: str, title: str, started: float) -> h5py.Group:
-    """Make the root, /entry and an empty /entry/data of a new file; returns /entry."""
+    """Create the root, /entry and an empty /entry/data of a new file; return /entry."""
     file.attrs["NX_class"] = fixed("NXroot")
     file.attrs["format"] = fixed(FORMAT)
     file.attrs["default"] = fixed("entry")

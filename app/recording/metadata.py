@@ -1,4 +1,4 @@
-"""Metadata of a run: all that a recording says of itself beside its samples."""
+"""Metadata of a run: everything in a recording beside its samples and instruments."""
 
 from __future__ import annotations
 

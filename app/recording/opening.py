@@ -1,4 +1,4 @@
-"""An HDF5 file opened for reading, in whatever state a run or a kill has left it."""
+"""Opening an HDF5 file for reading, also one that is being written or was left by a kill."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from dearig.recording.journal import Patched, whole_journal
 from dearig.recording.safe import Refused
 from dearig.recording.superblock import SIZE, flags_of, mend_superblock
 
-#: The flag of a file that is written so that it can be read at any time.
+#: Consistency flag of a file in SWMR mode.
 WRITTEN_IN_ORDER = 4
-#: Beyond the end of every file.
+#: A size beyond the end of every file.
 FAR = 2**60
 BEING_WRITTEN = "is being written by another program, or was killed before its first sample"
 
@@ -25,10 +25,10 @@ __all__ = ["UNREADABLE", "damage", "opened", "read_from"]
 
 T = TypeVar("T")
 
-#: How often a file that is being written is looked at before it counts as damaged.
+#: Attempts at reading a file that is being written before it counts as damaged.
 LOOKS = 5
 
-#: What HDF5 raises for damage, and what items of another type than this layout's lead to.
+#: Exceptions of HDF5 for damage, and of items whose type is not that of this layout.
 UNREADABLE = (
     AttributeError,
     LookupError,
@@ -42,7 +42,7 @@ UNREADABLE = (
 
 
 def damage(path: Path, error: Exception) -> InputError:
-    """What to tell of an ``UNREADABLE`` that came while ``path`` was read."""
+    """Return the error to raise for an ``UNREADABLE`` exception while reading ``path``."""
     text = one_line(error)
     if "filter returned failure" in text:
         text = "a checksum is wrong: the file was changed, or its disk fails"
@@ -50,7 +50,7 @@ def damage(path: Path, error: Exception) -> InputError:
 
 
 def read_from(path: Path, look: Callable[[h5py.File], T]) -> T:
-    """What ``look`` makes of the file at ``path``; ``InputError`` for one that cannot be read.
+    """Return what ``look`` returns for the file at ``path``; ``InputError`` if it is unreadable.
 
     A file that is being written is looked at again: a look may fall between two of its writes.
     """
@@ -69,7 +69,7 @@ def read_from(path: Path, look: Callable[[h5py.File], T]) -> T:
 
 @contextmanager
 def opened(path: Path) -> Iterator[h5py.File]:
-    """The HDF5 file at ``path`` open for reading; ``InputError`` where it cannot be."""
+    """Open the HDF5 file at ``path`` for reading. Raises ``InputError`` where it cannot be."""
     with ExitStack() as stack:
         flags: int | None = 0
         try:

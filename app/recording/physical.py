@@ -1,4 +1,4 @@
-"""From the counts that a run wrote to physical values, as much of them at a time as is wanted."""
+"""Physical values computed from the counts of a run, for any range of samples."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ __all__ = [
 #: Units in which a rig may give its temperature; recordings hold degrees Celsius.
 TEMPERATURE_UNITS = ("degC", "°C", "C", "K")
 KELVIN = 273.15
-#: Samples that are gone through at a time: memory stays the same however long a run was.
+#: Samples processed at a time, so that memory does not grow with the length of the run.
 SLICE = 2**20
-#: Chunks from the end that are looked at one by one: more than any flush writes.
+#: Chunks from the end that are checked one by one: more than any flush writes.
 BACK = 8
-#: Samples of the lead-in whose mean is the rest: more would not make it any better.
+#: Samples of the lead-in that are averaged, at most: more would not be more accurate.
 REST_MAX = 2**22
 
 
@@ -122,11 +122,11 @@ def _backed(counts: h5py.Dataset) -> int:
 
 
 def _readable(counts: h5py.Dataset, at: int) -> bool:
-    """Whether the chunk with sample ``at`` lies in the file."""
+    """Return True if the chunk with sample ``at`` is in the file and can be read."""
     if counts.id.get_chunk_info_by_coord((at,)).byte_offset is None:
         return False
     try:
-        # all of it is read for one
+        # reading one value reads the whole chunk
         counts[at]
     except (OSError, RuntimeError):
         return False
@@ -134,7 +134,7 @@ def _readable(counts: h5py.Dataset, at: int) -> bool:
 
 
 def resolution(channel: Channel) -> float:
-    """What one count means, in the channel's unit."""
+    """Return the size of one count in the channel's unit."""
     ends = channel.scaling.physical(np.array([0, 1], dtype=np.int16))
     return float(abs(ends[1] - ends[0]))
 
@@ -159,7 +159,7 @@ class Counts:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What there are values of, ``time`` among them, in the order of the layout."""
+        """Names of the values, ``time`` among them, in the order of the layout."""
         known = tuple(n for n in UNITS if n == "time" or n in self._by_name)
         return (*known, *(n for n in self._by_name if n not in UNITS))
 
@@ -170,7 +170,7 @@ class Counts:
 
     @property
     def rest(self) -> Rest:
-        """What displacement is counted from: as the file says, or from the lead-in."""
+        """Rest from which displacement is measured: as stored, else from the lead-in."""
         if self._rest is None:
             self._rest = self._stored_rest() or self.measured_rest()
         return self._rest
@@ -184,7 +184,7 @@ class Counts:
         return Rest(float(attrs["rest_reading"]), int(attrs["rest_samples"]))
 
     def measured_rest(self) -> Rest:
-        """The mean over the lead-in, whatever the file says."""
+        """Return the mean over the lead-in, whatever is stored."""
         if not self.samples or not {"voltage_command", "displacement"} <= self._by_name.keys():
             return Rest(0.0, 0)
         quiet = self.lead_in()
@@ -198,7 +198,7 @@ class Counts:
         largest = float(np.maximum(np.abs(low), np.abs(high)).max(initial=0.0))
         threshold = max(resolution(channel), NEGLIGIBLE * largest)
         for start, stop in self.slices():
-            # most of a lead-in is passed over by its extremes
+            # the extremes decide for most slices of a lead-in
             _, low, high = self.extremes("voltage_command", start, stop, 1)
             if float(np.maximum(np.abs(low), np.abs(high)).max()) > threshold:
                 loud = np.abs(self._reading("voltage_command", start, stop)) > threshold
@@ -211,11 +211,11 @@ class Counts:
             yield start, min(start + SLICE, self.samples)
 
     def raw(self, start: int, stop: int) -> np.ndarray:
-        """Counts (channels, n) of the samples from ``start`` to before ``stop``."""
+        """Return the counts (channels, n) of the samples from ``start`` to before ``stop``."""
         return np.array([self.data[counts_name(c.name)][start:stop] for c in self.channels])
 
     def window(self, name: str, start: int, stop: int) -> np.ndarray:
-        """Values (n,) of ``name``, of the samples from ``start`` to before ``stop``."""
+        """Return the values (n,) of ``name`` from sample ``start`` to before ``stop``."""
         if name == "time":
             return np.arange(start, stop) / self.rate
         values = self._reading(name, start, stop)

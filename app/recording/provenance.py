@@ -1,4 +1,4 @@
-"""Where a recording comes from: program versions, configuration, host, operator."""
+"""Provenance of a recording: program versions, configuration, host, operator."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LONGEST_ATTRIBUTE = 1000
 
 
 def git_revision(root: Path = ROOT) -> str:
-    """Revision of the checkout at ``root``, ``-dirty`` behind it if it was changed; "" if none."""
+    """Return the git revision at ``root``, with ``-dirty`` if files changed; "" if none."""
     git = shutil.which("git")
     # not a parent's repository: an installed copy may lie inside somebody else's
     if git is None or not (root / ".git").exists():
@@ -81,7 +81,7 @@ def write_provenance(entry: h5py.Group, provenance: Mapping[str, object]) -> Non
 
 
 def read_provenance(group: h5py.Group) -> dict[str, object]:
-    """``entry/provenance`` as plain texts, numbers and booleans."""
+    """Return ``entry/provenance`` as plain texts, numbers and booleans."""
     found: dict[str, object] = {}
     for name, value in group.attrs.items():
         if name == "NX_class":

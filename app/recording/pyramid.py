@@ -1,4 +1,4 @@
-"""Least and greatest counts over ever wider bins, stored so that a long run is drawn at once."""
+"""Least and greatest counts over bins of growing width, for quick plots of long runs."""
 
 from __future__ import annotations
 

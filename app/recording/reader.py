@@ -1,4 +1,4 @@
-"""A recording file, read back and checked."""
+"""Reading and checking a recording file."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ def open_recording(path: str | Path) -> Recording:
 
 
 def is_finished(path: Path) -> bool:
-    """True if the run in the recording at ``path`` was closed, or has been recovered."""
+    """Return True if the run at ``path`` was closed, or has been recovered."""
     with opened(path) as file:
         return "samples" in file["entry"].attrs or "time" in file["entry/data"]
 
 
 def read_events(path: Path, entry: h5py.Group) -> tuple[RecordedEvent, ...]:
-    """The events in ``entry`` of the file ``path``, which is for messages."""
-    # those that a full disk did not take are missing, and no reason to give up the rest
+    """Return the events in ``entry``; ``path`` is for messages."""
+    # events that a full disk refused are missing; the rest can still be read
     rows = item(entry, "events", stored=False)
     if not isinstance(rows, h5py.Dataset) or rows.id.get_storage_size() == 0:
         return ()
@@ -218,7 +218,7 @@ class _Reader:
         return rate
 
     def _stored(self, data: h5py.Group) -> tuple[str, ...]:
-        """Names of the physical values that are there."""
+        """Return the names of the physical values that are stored."""
         found = []
         declared = {
             name: text_of(data[counts_name(name)].attrs["physical_units"])

@@ -1,4 +1,4 @@
-"""A recording: its values, read when they are asked for, and all that is known about them."""
+"""A recording: its values, read on first use, and its metadata."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 __all__ = ["RecordedEvent", "Recording"]
 
-#: Samples of a lead-in from which its noise is read: more would not make it any better.
+#: Samples of the lead-in that the noise is computed from, at most: more add no accuracy.
 NOISE_MAX = 2**22
 
 
 @dataclass(frozen=True)
 class RecordedEvent:
-    """Something that happened at ``sample``, ``time`` s: ``level`` is info, warning or fault."""
+    """An event at ``sample``, ``time`` s; ``level`` is info, warning or fault."""
 
     sample: int
     time: float
@@ -40,7 +40,7 @@ class RecordedEvent:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What ``open_recording`` found. Arrays are (N,) float64 and read-only; None is "not there".
+    """A recording as read. Arrays are (N,) float64 and read-only; None means "not recorded".
 
     They are read from the file when they are first asked for, so that a recording of hours opens
     at once; ``overview`` and ``window`` read no more than what they show.
@@ -85,47 +85,47 @@ class Recording:
 
     @property
     def time(self) -> np.ndarray:
-        """s, of the sample clock."""
+        """Time of the sample clock in s."""
         return self.arrays.read("time")
 
     @property
     def displacement(self) -> np.ndarray | None:
-        """m, from the loaded rest state."""
+        """Displacement from the loaded rest state in m."""
         return self._row("displacement")
 
     @property
     def voltage_command(self) -> np.ndarray | None:
-        """V at the film."""
+        """Commanded voltage at the film in V."""
         return self._row("voltage_command")
 
     @property
     def voltage_monitor(self) -> np.ndarray | None:
-        """V at the film, as read back."""
+        """Monitored voltage at the film in V."""
         return self._row("voltage_monitor")
 
     @property
     def current_monitor(self) -> np.ndarray | None:
-        """A."""
+        """Monitored current in A."""
         return self._row("current_monitor")
 
     @property
     def temperature(self) -> np.ndarray | None:
-        """Degrees Celsius."""
+        """Temperature in degrees Celsius."""
         return self._row("temperature")
 
     @property
     def displacement_model(self) -> np.ndarray | None:
-        """m, the live overlay."""
+        """Displacement of the overlay model in m."""
         return self._row("displacement_model")
 
     @property
     def stretch(self) -> np.ndarray | None:
-        """Length over length at rest."""
+        """Stretch: length over length at rest."""
         return self._row("stretch")
 
     @property
     def nominal_stress(self) -> np.ndarray | None:
-        """Pa."""
+        """Nominal stress in Pa."""
         return self._row("nominal_stress")
 
     @property
@@ -153,22 +153,22 @@ class Recording:
 
     @property
     def values(self) -> dict[str, np.ndarray]:
-        """Every array that is there, by name, ``time`` first."""
+        """All arrays by name, ``time`` first."""
         return {name: self.arrays.read(name) for name in self.arrays.names}
 
     @property
     def signal(self) -> np.ndarray:
-        """What the film answered: displacement in m, or nominal stress in Pa."""
+        """The measured quantity: displacement in m, or nominal stress in Pa."""
         return self.arrays.read(SIGNALS[self.kind])
 
     @property
     def samples(self) -> int:
-        """N."""
+        """Number of samples N."""
         return self.arrays.samples
 
     @property
     def duration(self) -> float:
-        """s, from the first to the last sample."""
+        """Time from the first to the last sample in s."""
         n = self.samples
         first, last = (float(self.arrays.window("time", i, i + 1)[0]) for i in (0, n - 1))
         return last - first

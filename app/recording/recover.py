@@ -1,4 +1,4 @@
-"""The rescue of a recording whose run was killed: mended in place, and finished like any other."""
+"""Recovery of a recording whose run was killed: repaired in place and finished."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dearig.recording.superblock import mend_superblock
 
 __all__ = ["recover"]
 
-#: s since the last change within which a file may still be in the hands of a run.
+#: s since the last change within which a run may still be writing the file.
 STILL_RUNNING = 10.0
 
 
@@ -40,7 +40,7 @@ def recover(path: str | Path, now: Callable[[], float] = time.time) -> bool:
                 f"{path} changed {max(age, 0.0):.1f} s ago and may still be recorded to; "
                 f"recover it when the run has ended"
             )
-        # a run that was killed while it closed has left this to be done
+        # the run was killed while it closed
         if carry_out(path):
             return True
         finish(

@@ -1,4 +1,4 @@
-"""The quiet lead-in of a run, where the film hangs at 0 V: its length, its rest, its noise."""
+"""Length, rest and noise of the lead-in of a run, where the film hangs at 0 V."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dearig.model.noise import noise_at_rest
 
 __all__ = ["MIN_QUIET", "NEGLIGIBLE", "lead_in", "mean_beyond_noise", "noise_floor"]
 
-#: Fewer samples than this say nothing about noise.
+#: Samples that an estimate of the noise needs, at least.
 MIN_QUIET = 20
 
 #: Of the largest voltage: the film's force goes with the square, so this moves it a millionth.

@@ -1,4 +1,4 @@
-"""The folder into which a command puts everything it makes."""
+"""The folder for the results of a command."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["result_folder"]
 
 
 def result_folder(out: Path, overwrite: bool) -> Path:
-    """Make the folder ``out``; ``InputError`` where it holds something, unless ``overwrite``."""
+    """Create the folder ``out``; ``InputError`` if it is not empty, unless ``overwrite``."""
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; give a folder for the results")
     if out.is_dir() and any(out.iterdir()) and not overwrite:

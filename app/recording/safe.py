@@ -1,4 +1,4 @@
-"""What is read of a file that anybody may have made: its own, and no more than it holds.
+"""Safe access to items of a file from an unknown source.
 
 Links that lead out of the file, virtual datasets and values that lie in other files are not
 followed. A dataset that claims more values than are stored is refused before room is made for it.
@@ -10,12 +10,12 @@ import h5py
 
 __all__ = ["Refused", "dataset", "group", "item"]
 
-#: More than this times its size in the file nothing is unpacked to.
+#: A dataset may claim at most so many times its size in the file.
 PACKED_MAX = 100
 
 
 class Refused(Exception):  # noqa: N818  (what happened to the file, said by the reader)
-    """Why an item is not read."""
+    """An item is not read; the text says why."""
 
 
 def item(parent: h5py.Group, name: str, stored: bool = True) -> h5py.Group | h5py.Dataset | None:
@@ -38,13 +38,13 @@ def item(parent: h5py.Group, name: str, stored: bool = True) -> h5py.Group | h5p
 
 
 def group(parent: h5py.Group, name: str) -> h5py.Group | None:
-    """The group ``name`` in ``parent``, None if there is none."""
+    """Return the group ``name`` in ``parent``, None if there is none."""
     found = item(parent, name)
     return found if isinstance(found, h5py.Group) else None
 
 
 def dataset(parent: h5py.Group, name: str) -> h5py.Dataset | None:
-    """The dataset ``name`` in ``parent``, None if there is none."""
+    """Return the dataset ``name`` in ``parent``, None if there is none."""
     found = item(parent, name)
     return found if isinstance(found, h5py.Dataset) else None
 

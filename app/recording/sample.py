@@ -1,4 +1,4 @@
-"""The film and its load, as /entry/sample holds them."""
+"""Film and load in /entry/sample."""
 
 from __future__ import annotations
 
@@ -60,12 +60,12 @@ def _values(parent: h5py.Group, owner: type[Film] | type[Load]) -> dict[str, obj
 
 
 def read_film(sample: h5py.Group) -> Film | None:
-    """The film, None if the recording does not know it. Raises ``ModelError``, ``TypeError``."""
+    """Return the film, None if it is unknown. Raises ``ModelError``, ``TypeError``."""
     film = group(sample, "film")
     return None if film is None else Film(**_values(film, Film))  # type: ignore[arg-type]
 
 
 def read_load(sample: h5py.Group) -> Load | None:
-    """The load, None if the recording does not know it. Raises ``ModelError``, ``TypeError``."""
+    """Return the load, None if it is unknown. Raises ``ModelError``, ``TypeError``."""
     load = group(sample, "load")
     return None if load is None else Load(**_values(load, Load))  # type: ignore[arg-type]

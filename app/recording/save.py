@@ -1,4 +1,4 @@
-"""A recording written at once, from arrays: imported data, or what a model predicts."""
+"""Writing a recording from arrays: imported data, or the prediction of a model."""
 
 from __future__ import annotations
 

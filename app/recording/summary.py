@@ -1,4 +1,4 @@
-"""What is in a recording, as plain values for a program or as lines for a person."""
+"""Summary of a recording, as plain values for programs or as lines for people."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EVEN = 1e-6
 
 
 def describe(recording: Recording, checksum: bool = True) -> dict[str, Any]:
-    """Everything worth knowing but the arrays, ready for JSON; SI units, and names that say so.
+    """Return the metadata of a recording for JSON, in SI units with units in the names.
 
     ``checksum``: of the whole file too, which takes some time for a file of gigabytes.
     """
@@ -87,7 +87,7 @@ def describe(recording: Recording, checksum: bool = True) -> dict[str, Any]:
 
 def _channel(recording: Recording, name: str) -> dict[str, Any]:
     whole = recording.overview(name, 2000)
-    # an overlay may have had nothing to show at times
+    # the overlay model may have no value at times
     known = np.isfinite(whole.low)
     low = high = None
     if known.any():
@@ -98,7 +98,7 @@ def _channel(recording: Recording, name: str) -> dict[str, Any]:
     return told
 
 
-#: Units in which a person reads them: what they are multiplied by, and the name.
+#: Factors and units in which values are shown to people.
 _READABLE = MappingProxyType(
     {
         "displacement": (1e6, "um"),
@@ -114,7 +114,7 @@ _READABLE = MappingProxyType(
 
 
 def describe_rows(recording: Recording) -> list[tuple[str, str]]:
-    """The same as (what, value) pairs of text, in the order in which a person wants them."""
+    """Return the metadata as (what, value) pairs of text, the most important first."""
     d = describe(recording, checksum=False)
     rows = [("recording", f"{d['name']} ({d['kind']}, {d['title']})")]
     ended = d["outcome"] if d["complete"] else f"INCOMPLETE: {d['outcome']}"

@@ -1,4 +1,4 @@
-"""The superblock of an HDF5 file, as far as rescuing one needs it.
+"""The superblock of an HDF5 file, as far as a recovery needs it.
 
 Version 3 (HDF5 File Format Specification, section II.A): 8 bytes of signature, version, sizes of
 offsets and lengths, consistency flags (byte 11), base address, extension address, end of file

@@ -19,19 +19,19 @@ def _encoded(text: str) -> bytes:
 
 
 def fixed(text: str | Sequence[str]) -> np.ndarray:
-    """``text``, or a row of texts, as an array to give to an attribute or a dataset."""
+    """Return ``text``, or a row of texts, as an array for an attribute or a dataset."""
     raw = _encoded(text) if isinstance(text, str) else [_encoded(t) for t in text]
     longest = len(raw) if isinstance(raw, bytes) else max(map(len, raw), default=0)
     return np.array(raw, dtype=h5py.string_dtype("utf-8", max(longest, 1)))
 
 
 def put_text(group: h5py.Group, name: str, text: str) -> None:
-    """Make the dataset ``name`` that holds ``text``."""
+    """Create the dataset ``name`` that holds ``text``."""
     group.create_dataset(name, data=fixed(text))
 
 
 def clip_text(text: str, size: int) -> bytes:
-    """UTF-8 of ``text`` in at most ``size`` bytes, cut between characters, marked with ``...``."""
+    """Return ``text`` as UTF-8 in at most ``size`` bytes; ``...`` marks where it was cut."""
     raw = _encoded(text)
     if len(raw) <= size:
         return raw
@@ -39,7 +39,7 @@ def clip_text(text: str, size: int) -> bytes:
 
 
 def text_of(value: object) -> str:
-    """A string attribute or dataset's value as ``str``, however the program that wrote it did."""
+    """Return the value of a string attribute or dataset as ``str``, whatever its type is."""
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.reshape(-1)[0]
     if isinstance(value, bytes):

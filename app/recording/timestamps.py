@@ -1,4 +1,4 @@
-"""Time that does not go forward: where, and in which of the two ways."""
+"""Check of time stamps: the first one that does not increase."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["not_forward"]
 
 
 def not_forward(time: np.ndarray) -> tuple[int, str] | None:
-    """First sample of ``time`` (N,) that is not after the one before, and how it is not; else None.
+    """Return the first sample of ``time`` (N,) that does not increase, and how; else None.
 
     The words are ``goes back`` or ``stands still``, for a sentence that begins with time.
     """

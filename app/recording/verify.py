@@ -1,4 +1,4 @@
-"""A recording held against all its claims: what is wrong with it, in words."""
+"""Verification of a recording: whether its data agree with everything that it states."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from dearig.recording.text import text_of
 
 __all__ = ["Verification", "verify"]
 
-#: Rounding of the same formula by another library.
+#: Relative difference that rounding may cause where another library computes the same.
 ROUNDING = 1e-12
 #: Of the sample clock against the computer's, over runs of at least so many s: more is a fault.
 CLOCKS_APART, CLOCKS_OVER = 0.01, 10.0
-#: More of one sort is not listed one by one.
+#: Faults of one sort that are listed one by one, at most.
 LISTED = 5
 
 
 @dataclass
 class Verification:
-    """What was found: ``faults`` contradict the file's claims, ``notes`` are to be known."""
+    """Result of a verification: ``faults`` are contradictions, ``notes`` are information."""
 
     path: Path
     checked: list[str] = field(default_factory=list)
@@ -48,12 +48,12 @@ class Verification:
 
     @property
     def sound(self) -> bool:
-        """True if nothing contradicts anything."""
+        """True if there are no faults."""
         return not self.faults
 
 
 def verify(path: str | Path) -> Verification:
-    """Hold the recording at ``path`` against what it says of itself; every sample is read.
+    """Verify the recording at ``path``; every sample is read.
 
     Raises ``InputError`` only if there is no such file.
     """
@@ -121,7 +121,7 @@ class _Check:
         return f"samples {start} to {stop - 1}"
 
     def stored(self) -> None:
-        """Every stored value can be read: HDF5 holds each chunk against its checksum."""
+        """Check that every stored value can be read: HDF5 checks each chunk's checksum."""
         arrays = self.recording.arrays
         for name in arrays.stored:
             before = -np.inf
@@ -316,7 +316,7 @@ class _Check:
             self.found.notes.append(f"it ended at {moments[1]}, before its start at {moments[0]}")
 
     def for_viewers(self) -> None:
-        """What a viewer of NeXus files follows to the default plot."""
+        """Check the attributes that lead a NeXus viewer to the default plot."""
         shown = text_of(self.entry.attrs.get("default", ""))
         plot = group(self.entry, shown) if shown else None
         if plot is None:
@@ -334,7 +334,7 @@ class _Check:
         self.done("the default plot")
 
     def dimension_scales(self) -> None:
-        """Every row over ``time`` has it as its dimension scale, or none has, in older files."""
+        """Check that ``time`` is the scale of every row; files of earlier versions have none."""
         for plot in (self.data, group(self.entry, "overview")):
             if plot is None or "time" not in plot or not plot["time"].is_scale:
                 continue

@@ -1,4 +1,4 @@
-"""A recording as it is written during a run: counts, appended so that a kill loses nothing flushed.
+"""Writing a recording during a run: counts are appended, and a kill loses nothing flushed.
 
 Tried with kills at random moments and with every write boundary replayed: what survives all of
 them is the library version of ``layout.LIBVER``, the whole layout made first, then SWMR mode, and
@@ -183,7 +183,7 @@ class RecordingWriter:
 
     @property
     def path(self) -> Path:
-        """The file."""
+        """Path of the file."""
         return self._path
 
     @property
@@ -193,7 +193,7 @@ class RecordingWriter:
 
     @property
     def samples_flushed(self) -> int:
-        """Samples that a kill can no longer take."""
+        """Samples that are safe from a kill."""
         return self._flushed
 
     @property
@@ -238,14 +238,14 @@ class RecordingWriter:
         )
 
     def event(self, sample: int, level: str, message: str) -> None:
-        """Note ``message`` at ``sample``; ``level`` is info, warning or fault."""
+        """Record an event at ``sample``; ``level`` is info, warning or fault."""
         with self._writing():
             self._append_events((Event(sample, level, message),))
             self._flush_when_due()
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """Anything that writes to the file; after a failure there is no more of it."""
+        """Guard a write to the file; after a failure nothing more is written."""
         if self._failure is not None:
             raise self._failure
         try:
@@ -261,7 +261,7 @@ class RecordingWriter:
             raise self._failure from error
 
     def _check_room(self) -> None:
-        # asked before it is too late: once HDF5 has met a full disk, what it writes is not in order
+        # checked before each write: after a full disk HDF5 writes in no useful order
         if shutil.disk_usage(self._path.parent).free < self._margin:
             raise OSError(errno.ENOSPC, "no room for the next second")
 

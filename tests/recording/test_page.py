@@ -17,20 +17,28 @@ from tests.tools.recordings import write_run
 PAGE = Path(__file__).parents[2] / "recordings" / "README.md"
 
 
+def code() -> list[str]:
+    return re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+
+
+def ran(block: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run(
+        [sys.executable, "-c", block], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done
+
+
 @pytest.mark.parametrize("long", [False, True])
 def test_the_ten_lines_on_the_page_read_a_recording(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, long: bool
 ) -> None:
     if long:
         monkeypatch.setattr("dearig.recording.finish.PHYSICAL_MAX", 1000)
-    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
-    assert len(blocks) == 1
-    assert len(blocks[0].strip().splitlines()) <= 10
+    (block,) = [block for block in code() if "import h5py" in block]
+    assert len(block.strip().splitlines()) <= 10
     write_run(tmp_path / "run.h5")
-    done = subprocess.run(
-        [sys.executable, "-c", blocks[0]], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
+    done = ran(block, tmp_path)
     run = open_recording(tmp_path / "run.h5")
     assert run.displacement is not None
     assert "actuator" in done.stdout
@@ -39,6 +47,14 @@ def test_the_ten_lines_on_the_page_read_a_recording(
     # from the counts, and the same as it is stored
     assert len(said) == (1 if long else 2)
     assert len(set(said)) == 1
+
+
+def test_the_lines_for_xarray_read_a_recording(tmp_path: Path) -> None:
+    pytest.importorskip("xarray")
+    pytest.importorskip("h5netcdf")
+    (block,) = [block for block in code() if "import xarray" in block]
+    write_run(tmp_path / "run.h5")
+    assert "time" in ran(block, tmp_path).stdout
 
 
 def test_the_samples_are_what_the_page_says() -> None:
@@ -53,7 +69,7 @@ def test_the_samples_are_what_the_page_says() -> None:
 
 def test_importing_the_package_leaves_the_heavy_libraries_out() -> None:
     look = (
-        "import sys, app.recording; "
+        "import sys, dearig.recording; "
         "print([m for m in ('pyarrow', 'scipy.io', 'nptdms') if m in sys.modules])"
     )
     done = subprocess.run(

@@ -1,4 +1,4 @@
-"""What a recording that was exported said of itself, read back."""
+"""Metadata of an exported recording, read back."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Exported:
 
 
 def exported(about: Mapping[str, str]) -> Exported:
-    """What ``about`` says, texts by name as ``exporters`` wrote them; nothing, of other files."""
+    """Return the metadata in ``about``, texts by name as an exporter wrote them; else empty."""
     if about.get("format") != FORMAT:
         return Exported()
     kinematics = about.get("kinematics")

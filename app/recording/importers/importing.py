@@ -1,4 +1,4 @@
-"""Measured data made elsewhere, turned into a recording."""
+"""Import of measured data from other programs as a recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What looks like a wrong unit in imported values, in words."""
+"""Plausibility of imported values: sentences about what looks like a wrong unit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def _span(values: np.ndarray) -> float:
 
 
 def doubts(values: Mapping[str, np.ndarray], film: Film | None) -> list[str]:
-    """One sentence for each of ``values`` (by the recording's names and units) that is doubtful."""
+    """Return a sentence for each of ``values`` (in the recording's units) that is doubtful."""
     found = []
 
     def check(name: str, wrong: bool, sentence: str) -> None:

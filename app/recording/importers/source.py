@@ -1,4 +1,4 @@
-"""What a file of measured data offers, whatever its format."""
+"""Interface of a file of measured data, whatever its format."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dearig.recording.importers.columns import suggestion
 
 __all__ = ["PARSER_FAILURES", "Source", "listing", "no_such_column", "printable"]
 
-#: What the libraries that parse binary formats were seen to raise, or may, on damaged files.
+#: Exceptions of the libraries that parse binary formats, on damaged files.
 PARSER_FAILURES = (
     ArithmeticError,
     AssertionError,
@@ -33,7 +33,7 @@ PARSER_FAILURES = (
     zlib.error,
 )
 
-#: More names than this do not help in a message.
+#: Names listed in a message, at most.
 LISTED = 12
 
 
@@ -47,16 +47,16 @@ class Source(Protocol):
 
     @property
     def about(self) -> Mapping[str, str]:
-        """What a recording that was exported to it said of itself; empty for all others."""
+        """Metadata of a recording that was exported to it, as texts; empty for other files."""
         ...
 
     @property
     def names(self) -> Sequence[str]:
-        """Every column there is, as it is called in ``--column NAME=SOURCE``."""
+        """Names of all columns, as in ``--column NAME=SOURCE``."""
         ...
 
     def named(self, name: str) -> list[str]:
-        """The columns whose own name (apart from where they lie) is ``name``."""
+        """Return the columns whose own name, without group or path, is ``name``."""
         ...
 
     def check(self, name: str) -> None:
@@ -71,23 +71,23 @@ class Source(Protocol):
         ...
 
     def row(self, index: int) -> str:
-        """Where sample ``index`` (from 0) stands in the file, in words."""
+        """Return the place of sample ``index`` (from 0) in the file, in words."""
         ...
 
 
 def printable(name: str) -> str:
-    """``name`` with a question mark for what would break a line or a terminal."""
+    """Return ``name`` with a question mark in place of control characters."""
     return "".join(c if c.isprintable() else "?" for c in name)
 
 
 def listing(names: Sequence[str]) -> str:
-    """``names`` for a message, the first dozen."""
+    """Return ``names`` for a message, the first dozen."""
     shown = ", ".join(printable(name) for name in names[:LISTED]) or "none"
     return shown if len(names) <= LISTED else f"{shown} and {len(names) - LISTED} more"
 
 
 def no_such_column(source: Source, name: str) -> InputError:
-    """The error for a column that was asked for by ``name`` and is not there."""
+    """Return the error for a column ``name`` that is not there."""
     return InputError(
         f"{source.path}: there is no column {name!r}; there are: {listing(source.names)}"
         f"{suggestion([name], source.names)}"

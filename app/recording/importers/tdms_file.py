@@ -99,7 +99,7 @@ def _load(path: Path) -> tuple[dict[str, np.ndarray], set[tuple[float, float, in
     from nptdms import TdmsFile
     from nptdms.log import log_manager
 
-    # what it complains of is told in the error, not on the terminal
+    # its complaints are part of the error, not of the terminal
     log_manager.set_level(logging.ERROR)
     columns: dict[str, np.ndarray] = {}
     timing: set[tuple[float, float, int]] = set()
