@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import dearig
@@ -23,6 +22,8 @@ class TestIdentify:
         assert again.parameters["mu_0"].value == pytest.approx(fit.parameters["mu_0"].value)
 
     def test_parameters_go_to_pandas(self, fit) -> None:
+        import pandas as pd
+
         stiffness = fit.parameters["mu_0"]
         assert stiffness.unit == "Pa"
         assert stiffness.low95 < stiffness.value < stiffness.high95

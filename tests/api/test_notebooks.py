@@ -4,21 +4,32 @@ from __future__ import annotations
 
 import ast
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import nbformat
 import pytest
-from nbclient import NotebookClient
 
 import dearig.docs
+
+if TYPE_CHECKING:
+    import nbformat
 
 FOLDER = Path(dearig.docs.__file__).parent / "notebooks"
 NOTEBOOKS = sorted(path.name for path in FOLDER.glob("*.ipynb"))
 
 
+def read(name: str) -> nbformat.NotebookNode:
+    """The notebook ``name`` as it is kept."""
+    import nbformat
+
+    return nbformat.read(FOLDER / name, as_version=4)
+
+
 @pytest.fixture(scope="module", params=NOTEBOOKS)
 def executed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
     """A notebook after all its cells ran, in an empty folder."""
-    notebook = nbformat.read(FOLDER / request.param, as_version=4)
+    from nbclient import NotebookClient
+
+    notebook = read(request.param)
     # no time-out of a cell: the test run has one, and the machine may be busy
     client = NotebookClient(
         notebook, timeout=None, kernel_name="python3",
@@ -62,7 +73,7 @@ def test_a_notebook_runs_and_shows_its_values(executed) -> None:
 
 @pytest.mark.parametrize("name", NOTEBOOKS)
 def test_a_notebook_is_kept_without_results(name: str) -> None:
-    notebook = nbformat.read(FOLDER / name, as_version=4)
+    notebook = read(name)
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
     assert all(not cell.outputs and cell.execution_count is None for cell in code)
 
