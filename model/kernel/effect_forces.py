@@ -10,7 +10,7 @@ import numpy as np
 
 from dearig.model.coefficients import FORCE, INERTIA
 from dearig.model.effects import assembly
-from dearig.model.jit import jit
+from dearig.model.jit import inlined, jit
 from dearig.model.network import branch_count
 
 __all__ = [
@@ -51,7 +51,7 @@ DRAGS, COMMIT, HYSTERETIC = (
 _NEARBY = 1e-4  # of the stretch: the difference by which a stiffness is taken
 
 
-@jit
+@inlined
 def affected(
     acting: int,
     c: np.ndarray,
@@ -81,7 +81,7 @@ def affected(
     return pull - held_back
 
 
-@jit
+@inlined
 def supplied_at_start(
     acting: int, c: np.ndarray, m: np.ndarray, t: float, lam: float, speed: float, va: float
 ) -> tuple[float, float]:
@@ -95,7 +95,7 @@ def supplied_at_start(
     return va, ea
 
 
-@jit
+@inlined
 def supplied(
     acting: int,
     c: np.ndarray,
