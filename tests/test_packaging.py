@@ -151,6 +151,8 @@ def test_it_records_beside_files_named_after_modules(
     assert recording.samples == 301
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(900)  # the simulated card may have to compile its kernels first
 def test_it_records_from_a_card_with_its_guardian_beside_such_files(
     installed: Path, folder: Path
 ) -> None:
