@@ -186,6 +186,7 @@ def told(tmp_path_factory):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)  # the kernels are compiled with the made effects
 @pytest.mark.parametrize("name", BODIES)
 def test_the_contract_tells_a_wrong_effect(name, told):
     assert re.search(EXPECTED[name], told[name]), told[name]
@@ -193,5 +194,6 @@ def test_the_contract_tells_a_wrong_effect(name, told):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)  # the kernels are compiled with the made effects
 def test_the_worked_example_of_the_readme_keeps_the_contract(told):
     assert told["fading drag"] == ""
