@@ -18,6 +18,12 @@ from dearig.window.worker import Estimate, Job, Worker
 _PATIENCE = 60_000
 
 
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work in another folder: a child imports nothing from the working one, this module neither."""
+    monkeypatch.chdir(tmp_path)
+
+
 def doubled(number: int, progress: Progress) -> int:
     progress("doubling", 0.5)
     progress("doubling", 0.5001)
