@@ -1,8 +1,8 @@
-"""The high-voltage amplifier: a first-order lag that cannot change faster than its limits allow.
+"""High-voltage amplifier: a first-order lag with limits of slew rate and current.
 
-Between two samples the input stands still, so the output is known in closed form: a straight line
-while the slew rate or the current into the film's capacitance limits it, then an exponential
-towards the target. Nothing is stepped in time.
+The input is constant between two samples, so the output has a closed form: a straight line while
+the slew rate or the current into the film's capacitance limits it, then an exponential towards the
+target. No time stepping is needed.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from dearig.model.jit import jit
 
 __all__ = ["Amplifier", "AmplifierRows", "AmplifierState"]
 
-_SETTLED = 1e-3  # of the range: nearer than that to its target, the output has arrived
+_SETTLED = 1e-3  # of the range; an output nearer than this to its target counts as settled
 
 
 @jit
 def _approach(
     start: float, target: float, tau: float, slew: float, elapsed: float
 ) -> tuple[float, float, float]:
-    """Output, its slope and the integral of its square, ``elapsed`` s after ``target`` was set."""
+    """Return output, slope and integral of the square, ``elapsed`` s after ``target`` was set."""
     gap = target - start
     line = max(0.0, abs(gap) / slew - tau)  # the limit binds while |gap| > slew tau
     sign = 1.0 if gap > 0.0 else -1.0
@@ -52,7 +52,7 @@ def _follow(
     start: np.ndarray,
     effective: np.ndarray,
 ) -> float:
-    """Carry the output along ``target`` (N,); fill its start and signed RMS in each interval."""
+    """Follow ``target`` (N,); fill the output's start value and signed RMS in each interval."""
     for k in range(target.shape[0]):
         start[k] = output
         output, _, square = _approach(output, target[k], tau, slew, interval)
@@ -76,19 +76,19 @@ def _outputs_at(
 
 @dataclass(frozen=True)
 class AmplifierState:
-    """Present ``output`` in V at the film."""
+    """State of the amplifier: its present ``output`` in V at the film."""
 
     output: float = 0.0
 
 
 @dataclass(frozen=True)
 class AmplifierRows:
-    """What the amplifier did in each of N equal intervals.
+    """Output of the amplifier in each of N equal intervals.
 
-    ``start`` (N,) V is the output at the start of each, ``target`` (N,) V where it was heading, and
-    ``effective`` (N,) V the steady voltage that pulls on the film as hard as the real course did
-    (its root mean square, since the pull goes with the square). ``settled`` (N,) is False where
-    the output did not arrive within its interval. ``slew`` V/s was the limit.
+    ``start`` (N,) V is the output at the start of an interval, ``target`` (N,) V its target there.
+    ``effective`` (N,) V is the constant voltage with the same mean Maxwell stress: the root mean
+    square, since the stress is proportional to the square. ``settled`` (N,) is False where the
+    output did not reach its target within the interval. ``slew`` V/s is the limit that held.
     """
 
     start: np.ndarray
@@ -99,7 +99,7 @@ class AmplifierRows:
 
 
 class Amplifier:
-    """The amplifier with the given settings; holds no state of its own."""
+    """Amplifier with the given settings; the state is passed in and out."""
 
     def __init__(self, settings: AmplifierSettings) -> None:
         self._gain = settings.gain_V_per_V
@@ -124,7 +124,7 @@ class Amplifier:
     def outputs(
         self, rows: AmplifierRows, intervals: slice, elapsed: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Output in V and its slope in V/s, ``elapsed`` s into each of some ``intervals``."""
+        """Return output in V and slope in V/s, ``elapsed`` s into each of some ``intervals``."""
         start, target = rows.start[intervals], rows.target[intervals]
         output, slope = np.empty_like(start), np.empty_like(start)
         _outputs_at(start, target, self._tau, rows.slew, elapsed, output, slope)

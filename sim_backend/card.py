@@ -1,4 +1,4 @@
-"""The multifunction card: 16-bit converters with their calibration, timebase and finite buffer."""
+"""Multifunction card: 16-bit converters with calibration, timebase and a finite buffer."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RATE_TOO_HIGH = -200077  #: DAQmx: a requested value is not supported
 
 
 class Card:
-    """The card of a rig with ``settings``; its calibration is drawn once from ``streams``."""
+    """Card of a rig with ``settings``; its calibration is drawn once from ``streams``."""
 
     def __init__(self, settings: RigSettings, streams: Streams) -> None:
         self._settings = settings
@@ -26,10 +26,10 @@ class Card:
         for name, limit in settings.ranges().items():
             step = limit / (COUNT_MAX + 1)
             if name == "voltage_command":
-                # the output is corrected by the card itself
+                # the card corrects its output itself, so the nominal scaling holds
                 coefficients[name] = (0.0, step)
                 continue
-            # what the inputs' calibration says of them: an offset, a gain, a slight bend
+            # calibration polynomial of an input: an offset, a gain, a small curvature
             offset, gain, square, cube = generator.uniform(-spread, spread, 4)
             coefficients[name] = (
                 offset * limit,
@@ -38,16 +38,16 @@ class Card:
                 0.1 * cube * step / COUNT_MAX**2,
             )
         self._channels = {c.name: c for c in settings.channels(coefficients)}
-        # volts only: what is behind the terminals is the business of other instruments
+        # in volts: the other instruments scale them to physical quantities
         self._converters = {n: Scaling(c, 1.0) for n, c in coefficients.items()}
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Channels in the order of blocks."""
+        """Return the channels in the order of a block's rows."""
         return tuple(self._channels.values())
 
     def actual_rate(self, rate: float) -> float:
-        """The rate in Hz nearest to ``rate`` that the timebase can be divided down to.
+        """Return the rate in Hz nearest to ``rate`` that a division of the timebase gives.
 
         Raises ``RigError`` where the card cannot run at ``rate`` or scan its inputs within it.
         """
@@ -57,7 +57,7 @@ class Card:
         if not 0.0 < rate <= fastest:
             raise RigError(
                 f"card {card.device}: a sample rate of {rate:g} Hz on {inputs} inputs is not "
-                f"possible; up to {fastest:g} Hz are",
+                f"possible; choose up to {fastest:g} Hz",
                 RATE_TOO_HIGH,
             )
         scan = self._settings.skew(inputs - 1) * 1e6 + card.convert_interval_us
@@ -72,19 +72,19 @@ class Card:
         return timebase / max(1, round(timebase / rate))
 
     def command_counts(self, voltage: np.ndarray) -> np.ndarray:
-        """Output counts (N,) int16 for ``voltage`` (N,) V at the film."""
+        """Return the output counts (N,) int16 for ``voltage`` (N,) V at the film."""
         return self._channels["voltage_command"].scaling.counts(voltage)
 
     def put_out(self, counts: np.ndarray) -> np.ndarray:
-        """Volts (N,) at the output terminal for ``counts``."""
+        """Return the volts (N,) at the output terminal for ``counts``."""
         return self._converters["voltage_command"].physical(counts)
 
     def convert(self, channel: str, volts: np.ndarray) -> np.ndarray:
-        """Counts (N,) int16 for ``volts`` (N,) at the input of ``channel``, saturating."""
+        """Return counts (N,) int16 for ``volts`` (N,) at the input of ``channel``, saturated."""
         return self._converters[channel].counts(volts)
 
     def check_buffer(self, waiting: int) -> None:
-        """Raise ``RigError`` when more samples wait than the input buffer holds."""
+        """Raise ``RigError`` where more samples are unread than the input buffer holds."""
         size = self._settings.card.ai_buffer_samples
         if waiting > size:
             raise RigError(

@@ -1,4 +1,4 @@
-"""Clocks of a simulated rig: the only place that reads the time or waits."""
+"""Clocks of a simulated rig. No other module of the simulation reads the time or waits."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Clock(Protocol):
 
 
 class ManualClock:
-    """A clock that stands still until a caller waits for it, and then jumps there.
+    """A clock that stands still until a caller waits, and then jumps to that time.
 
-    A rig on it runs as fast as it can, and a test moves it by hand with ``advance``.
+    A rig on this clock runs as fast as it can. A test moves the clock with ``advance``.
     """
 
     def __init__(self) -> None:
@@ -35,9 +35,9 @@ class ManualClock:
         return self._now
 
     def advance(self, seconds: float) -> None:
-        """Let ``seconds`` pass."""
+        """Move the clock forward by ``seconds``."""
         if not seconds >= 0.0:
-            raise ValueError(f"time goes forward, not by {seconds!r} s")
+            raise ValueError(f"a clock moves forward by 0 s or more, not by {seconds!r} s")
         self._now += seconds
 
     def wait(self, until: float, wake: threading.Event) -> None:

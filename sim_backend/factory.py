@@ -1,4 +1,4 @@
-"""Open a simulated rig by its address: ``sim`` obeys the model, ``sim:SEED`` hides an effect."""
+"""Open a simulated rig by its address: ``sim`` follows the model, ``sim:SEED`` hides an effect."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ def open_simulated_rig(
 ) -> SimulatedRig:
     """Open the rig at ``address``.
 
-    ``sim`` is a film of ``actuator``, by default ``film`` under ``load`` with the network of the
-    thesis's Table 3. ``sim:SEED`` is a film of that make with something hidden, or nothing: SEED
-    decides. The instruments' noise follows SEED and ``seed`` together, so that another ``seed``
-    records the same rig again. ``paced`` runs in real time, else as fast as it is read; ``clock``
-    replaces either. ``faults`` go wrong in every run.
+    ``sim`` is a film with the model ``actuator``, by default ``film`` under ``load`` with the
+    network of the thesis's Table 3. ``sim:SEED`` is a film of the same make; SEED decides which
+    effects are hidden in it, if any. SEED and ``seed`` together seed the instruments' noise, so
+    that another ``seed`` records the same rig again. ``paced`` runs in real time; otherwise the
+    rig runs as fast as it is read. ``clock`` replaces either. ``faults`` occur in every run.
 
-    Raises ``AddressError`` for an address that is neither, ``ModelError`` or ``ValueError`` for a
-    film that cannot hang at rest, ``ValueError`` for faults that this rig cannot have.
+    Raises ``AddressError`` for any other address, ``ModelError`` or ``ValueError`` for a film
+    without a rest state, ``ValueError`` for faults that this rig cannot have.
     """
     plant, hidden = plant_of(address, film, load, actuator)
     return SimulatedRig(
@@ -71,6 +71,6 @@ def plant_of(
     if found[1] is None:
         return ModelPlant.at_rest(actuator or Actuator(film, load, TABLE_3)), None
     if actuator is not None:
-        raise AddressError(f"rig {address!r} brings its own film; only sim takes an actuator")
+        raise AddressError(f"rig {address!r} has its own film; only sim takes an actuator")
     hidden = int(found[1])
     return cases.draw(hidden, film, load).plant(), hidden

@@ -1,4 +1,4 @@
-"""Faults that a simulated rig has on purpose: which, and when."""
+"""Planned faults of a simulated rig: their kinds and times."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Fault", "FaultKind", "FaultPlan"]
 
 
 class FaultKind(StrEnum):
-    """The faults that a simulated rig can have."""
+    """Kinds of faults that a simulated rig can have."""
 
     # in the high voltage and on the film
     ARC = "arc"
@@ -37,7 +37,7 @@ class FaultKind(StrEnum):
     SERIAL_GARBAGE = "serial-garbage"
 
 
-#: s that a fault lasts where it is not said; the others stay.
+#: Default duration of a fault in s. Kinds that are not listed last until the run ends.
 _LASTS = {
     FaultKind.ARC: 0.01,
     FaultKind.SENSOR_NOISE_BURST: 0.2,
@@ -46,7 +46,7 @@ _LASTS = {
 }
 
 
-#: What does not become whole again by itself.
+#: Faults that are permanent and take no duration.
 _FOR_GOOD = {FaultKind.FILM_RUPTURE, FaultKind.AMPLIFIER_TRIP}
 
 _NEVER = 2**62  # samples
@@ -56,7 +56,7 @@ _NEVER = 2**62  # samples
 class Fault:
     """``kind`` sets in ``at`` s after the start of a run's sample clock, for ``duration`` s.
 
-    Raises ``ValueError`` for times that are none, and for a duration of what lasts for good.
+    Raises ``ValueError`` for invalid times, and for a duration of a permanent fault.
     """
 
     kind: FaultKind
@@ -69,34 +69,34 @@ class Fault:
                 f"fault {self.kind} at {self.at!r} s for {self.duration!r} s: write times from 0 up"
             )
         if self.kind in _FOR_GOOD and math.isfinite(self.duration):
-            raise ValueError(f"fault {self.kind} lasts for good: leave its duration away")
+            raise ValueError(f"fault {self.kind} is permanent: leave its duration out")
 
     @property
     def end(self) -> float:
-        """When it is over, in s after the start of the run."""
+        """Return the end of the fault, in s after the start of the run."""
         return self.at + self.duration
 
     def samples(self, rate: float) -> tuple[int, int]:
-        """The first sample of the fault and the first one after it, on a clock of ``rate`` Hz."""
+        """Return the first sample of the fault and the first one after it, at ``rate`` Hz."""
         return _sample(self.at, rate), _sample(self.end, rate)
 
 
 def _sample(time: float, rate: float) -> int:
-    """First sample at or after ``time`` s, but for rounding."""
+    """Return the first sample at or after ``time`` s, up to rounding."""
     return math.ceil(time * rate - 1e-6) if math.isfinite(time) else _NEVER
 
 
 @dataclass(frozen=True)
 class FaultPlan:
-    """The faults of a run, in the order of their beginnings."""
+    """Faults of a run, in the order of their start times."""
 
     faults: tuple[Fault, ...] = field(default=())
 
     @staticmethod
     def parse(items: Iterable[str]) -> FaultPlan:
-        """From items such as ``arc@3.2`` or ``late-reply@1.5+0.8`` (at 1.5 s, for 0.8 s).
+        """Parse items such as ``arc@3.2`` or ``late-reply@1.5+0.8`` (at 1.5 s, for 0.8 s).
 
-        Raises ``ValueError`` with a sentence for an item that is not understood.
+        Raises ``ValueError`` for an invalid item.
         """
         faults = []
         for item in items:
@@ -112,11 +112,11 @@ class FaultPlan:
         return FaultPlan(tuple(sorted(faults, key=lambda fault: fault.at)))
 
     def of(self, *kinds: FaultKind) -> tuple[Fault, ...]:
-        """The faults that are of one of ``kinds``."""
+        """Return the faults whose kind is one of ``kinds``."""
         return tuple(fault for fault in self.faults if fault.kind in kinds)
 
     def active(self, first: int, samples: int, rate: float, *kinds: FaultKind) -> np.ndarray:
-        """Whether one of ``kinds`` is there, (samples,) from sample ``first`` on at ``rate`` Hz."""
+        """Return where one of ``kinds`` is active: (samples,) from ``first`` on at ``rate`` Hz."""
         there = np.zeros(samples, dtype=bool)
         for fault in self.of(*kinds):
             begin, end = (min(max(0, s - first), samples) for s in fault.samples(rate))

@@ -1,7 +1,7 @@
-"""The LK-G5000 laser controller on its serial line: bytes in, bytes out, time as an argument.
+"""LK-G5000 laser controller on its serial line: bytes in, bytes out, time as an argument.
 
-It knows the commands that ``dearig.drivers.keyence`` sends and no others, and takes its letters
-from the same table: it shows that the driver copes, not that the table is right.
+It knows only the commands that ``dearig.drivers.keyence`` sends, and takes their letters from the
+same table. It therefore tests the driver's behaviour, not whether the table is right.
 """
 
 from __future__ import annotations
@@ -20,40 +20,40 @@ __all__ = ["Behaviour", "Responder", "SimulatedController", "SimulatedLine"]
 
 _REPLY_DELAY = 0.003  # s
 _COMMAND_MAX = 200  # bytes
-_UNIT = 1  # number of the display unit: 0.001 mm, which leaves room for +-999.999 mm
+_UNIT = 1  # number of the display unit: 0.001 mm, with a range of +-999.999 mm
 
 
 class Behaviour(StrEnum):
-    """What sits at the end of the line."""
+    """Behaviour of the instrument at the end of the line."""
 
     CONTROLLER = "controller"
     SILENT = "silent"
-    OTHER = "other"  # another instrument, which answers everything in its own way
-    BABBLING = "babbling"  # sends all the time, unasked, and never comes to an end
+    OTHER = "other"  # another instrument, with its own replies to everything
+    BABBLING = "babbling"  # sends without a pause, unasked
 
 
 class Responder(Protocol):
-    """Something at the end of a serial line; ``now`` is in s and does not go back."""
+    """Instrument at the end of a serial line; ``now`` is in s and never decreases."""
 
     def receive(self, data: bytes, now: float) -> None:
-        """Bytes have come."""
+        """Take bytes that arrived."""
         ...
 
     def due(self, now: float) -> bytes:
-        """What has been sent by ``now``, once."""
+        """Return the bytes sent by ``now`` that were not returned before."""
         ...
 
     def next_due(self) -> float | None:
-        """When there is more to send, or None."""
+        """Return the time in s of the next bytes to send, or None."""
         ...
 
 
 class SimulatedController:
-    """A controller set as ``settings`` say, for the OUT that they name.
+    """Controller with the settings of ``settings``, for the OUT that they name.
 
-    ``reading`` gives the measured value in m at a time, or None where the target is out of sight.
-    Faults of ``SERIAL_GARBAGE`` put noise in place of replies while they last; ``seed`` decides
-    which. A change of mode takes ``mode_change`` s.
+    ``reading`` returns the measured value in m at a time, or None where the target is out of
+    range. Faults of ``SERIAL_GARBAGE`` replace replies with noise while they last; ``seed`` seeds
+    the noise. A change of mode takes ``mode_change`` s.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class SimulatedController:
         self._pending: list[tuple[float, bytes]] = []
 
     def receive(self, data: bytes, now: float) -> None:
-        """Bytes have come; replies to whole commands become due."""
+        """Take bytes that arrived; replies to complete commands become due."""
         self._held += data
         while b"\r" in self._held:
             command, _, self._held = self._held.partition(b"\r")
@@ -90,7 +90,7 @@ class SimulatedController:
             self._held = b""
 
     def due(self, now: float) -> bytes:
-        """What has been sent by ``now``, once."""
+        """Return the bytes sent by ``now`` that were not returned before."""
         sent = b"".join(reply for at, reply in self._pending if at <= now)
         self._pending = [(at, reply) for at, reply in self._pending if at > now]
         if self._behaviour is Behaviour.BABBLING:
@@ -98,14 +98,14 @@ class SimulatedController:
         return sent
 
     def next_due(self) -> float | None:
-        """When there is more to send, or None."""
+        """Return the time in s of the next bytes to send, or None."""
         return min((at for at, _ in self._pending), default=None)
 
     def _garbled(self, now: float) -> bool:
         return any(fault.at <= now < fault.end for fault in self._faults)
 
     def _reply(self, command: str, now: float) -> tuple[bytes, float]:
-        """Reply to a command, and after how many s it comes."""
+        """Return the reply to a command, and its delay in s."""
         if self._behaviour in (Behaviour.SILENT, Behaviour.BABBLING):
             return b"", 0.0
         if self._behaviour is Behaviour.OTHER:
@@ -118,7 +118,7 @@ class SimulatedController:
         return ",".join(answer).encode() + b"\r", delay
 
     def _answer(self, main: str, parameters: list[str], now: float) -> list[str] | int:
-        """Fields of the reply, or the code of an error."""
+        """Return the fields of the reply, or an error code."""
         if main in ("Q0", "R0"):
             wanted = main == "Q0"
             if parameters:
@@ -146,7 +146,7 @@ class SimulatedController:
         return [main]
 
     def _value(self, now: float) -> str:
-        """The measured value as it is sent: a sign and seven characters."""
+        """Return the measured value as text: a sign and seven characters."""
         seen = self._reading(now)
         if seen is None:
             return "XXXXXXXX"
@@ -159,7 +159,7 @@ class SimulatedController:
 
     def _setting(self, parameters: list[str]) -> list[str] | int:
         settings = self._settings
-        # points at the ends of the range, as an operator would set them
+        # scaling points at the ends of the range, as an operator would set them
         far = settings.mm_per_V * 1e-3 * settings.analog_range_V
         volts = settings.direction * settings.analog_range_V
         of_out = {
@@ -184,15 +184,15 @@ class SimulatedController:
                 return 50
 
     def _sampling(self) -> int:
-        """Number of the offered sampling cycle that is nearest to the one that is set."""
+        """Return the number of the offered sampling cycle nearest to the one in the settings."""
         nearest = min(SAMPLING_US, key=lambda cycle: abs(cycle - self._settings.sampling_us))
         return SAMPLING_US.index(nearest)
 
 
 class SimulatedLine:
-    """The driver's end of a line to ``responder``, in one process, on a time of its own.
+    """Driver's end of a line to ``responder``, in one process, with its own simulated time.
 
-    Time passes only while the driver waits, and is read by ``now``.
+    Time passes only while the driver waits; ``now`` returns it.
     """
 
     def __init__(self, responder: Responder, baud_rate: int = 115200) -> None:
@@ -208,12 +208,12 @@ class SimulatedLine:
 
     @property
     def in_waiting(self) -> int:
-        """Bytes that can be read at once."""
+        """Return the number of bytes that can be read at once."""
         self._came += self._responder.due(self._now)
         return len(self._came)
 
     def read(self, size: int = 1, /) -> bytes:
-        """Up to ``size`` bytes; waits for them for as long as a port does."""
+        """Return up to ``size`` bytes; waits for them as long as a port does."""
         if not self.in_waiting:
             until = self._now + POLL
             due = self._responder.next_due()

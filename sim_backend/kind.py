@@ -1,4 +1,4 @@
-"""Simulated rigs, as the registry of rigs has them; and what an inspection of one finds."""
+"""Registry entry of the simulated rigs, with their inspection."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _SAMPLES_MIN = 16
 
 
 class SimulatedKind:
-    """A rig that obeys the model (``sim``) or hides an effect (``sim:SEED``); see ``RigKind``."""
+    """Rig that follows the model (``sim``) or hides an effect (``sim:SEED``); see ``RigKind``."""
 
     addresses: tuple[str, ...] = ("sim", "sim:SEED such as sim:7")
     simulated = True
@@ -45,7 +45,7 @@ class SimulatedKind:
     def inspect(
         self, address: str, settings: RigSettings, options: RigOptions
     ) -> tuple[Finding, ...]:
-        """Play 0 V on the rig and read it; ask a simulated controller where ``laser.port`` is set.
+        """Play 0 V on the rig and read it; query a simulated controller if ``laser.port`` is set.
 
         Raises as ``open``.
         """
@@ -80,12 +80,12 @@ class SimulatedKind:
 
 
 class _NotSimulated:
-    """Stands for a laser's driver whose instrument is not simulated; see ``LaserDriver``."""
+    """Driver of a laser whose instrument is not simulated; see ``LaserDriver``."""
 
     role: Literal["laser"] = "laser"
 
     def inspect(self, settings: LaserSettings) -> LaserInspection:
-        """Return that nothing was asked."""
+        """Return one finding: the instrument was not queried."""
         unasked = Finding(
             settings.model, "serial port", f"not asked: {settings.driver} is not simulated",
             verdict="not wired",
@@ -96,7 +96,7 @@ class _NotSimulated:
 def _simulated_laser(
     settings: RigSettings, displacement: float, faults: FaultPlan
 ) -> tuple[RigSettings, LaserDriver | None]:
-    """Return the driver to inspect a simulated rig's laser with, and the settings that say so.
+    """Return the driver for the inspection of a simulated rig's laser, and its settings.
 
     Only the Keyence controller is simulated. The port of the rig file is never opened.
     """
@@ -118,11 +118,11 @@ def _simulated_laser(
 def _at_zero(
     rig: Rig, settings: RigSettings, film: Film, channels: tuple[Channel, ...]
 ) -> tuple[float, dict[str, float]]:
-    """Sample rate in Hz, and means of ``channels`` in SI units, with 0 V at the output."""
+    """Return the sample rate in Hz and the means of ``channels`` in SI units at 0 V output."""
     limits = settings.limits.gate_limits()
     rate = float(settings.card.sample_rate_Hz)
     zero = np.zeros(max(_SAMPLES_MIN, round(_SECONDS * rate)))
-    # 0 V is within the limits of any film
+    # any film's limits admit 0 V
     prediction = Prediction(np.full(zero.size, 1.0 / film.thickness), film.electric_volume)
     rate = rig.load(admit(zero, rate, limits, prediction))
     rig.arm()
@@ -148,5 +148,5 @@ def _card(settings: RigSettings, identity: RigIdentity, rate: float) -> Iterator
         yield Finding(name, "high-voltage enable", "no line in the rig file", verdict="not wired")
 
 
-#: As the registry has it.
+#: Entry of the registry.
 KIND = SimulatedKind()

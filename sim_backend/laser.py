@@ -1,8 +1,8 @@
-"""The laser displacement sensor: a moving average on its own clock, put out as a voltage.
+"""Laser displacement sensor: a moving average on its own clock, output as a voltage.
 
-The position between the nodes of the film's motion is the cubic through positions and velocities at
-both ends. A moving average over thousands of internal samples then costs no more than one over a
-few, because the sum of a cubic over evenly spaced instants has a closed form.
+Between two nodes of the film's motion the position is the cubic Hermite interpolant of position and
+velocity. The sum of a cubic over evenly spaced instants has a closed form, so a moving average over
+thousands of internal samples costs no more than one over a few.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["Laser", "LaserRows", "LaserState"]
 
 @jit
 def _instants_before(time: float, phase: float, period: float) -> int:
-    """Number of the first instant ``phase + j period`` at or after ``time``."""
+    """Return the number j of the first instant ``phase + j period`` at or after ``time``."""
     return math.ceil((time - phase) / period)
 
 
@@ -35,12 +35,12 @@ def _partial_sum(
     step: float,
     count: int,
 ) -> float:
-    """Sum of ``count`` positions in one interval, at ``first``, ``first + step``, .. s into it."""
+    """Return the sum of ``count`` positions in one interval, at ``first + k step`` s into it."""
     p0, v0 = position[node], velocity[node] * spacing
     rise, v1 = position[node + 1] - p0, velocity[node + 1] * spacing
     c2 = 3.0 * rise - 2.0 * v0 - v1
     c3 = v0 + v1 - 2.0 * rise
-    # the cubic in the number i of the sample: theta = a + b i
+    # the cubic as a function of the sample number i: theta = a + b i
     a, b = first / spacing, step / spacing
     k0 = p0 + a * (v0 + a * (c2 + a * c3))
     k1 = b * (v0 + a * (2.0 * c2 + 3.0 * a * c3))
@@ -64,9 +64,9 @@ def _sum_up_to(
     numbers: np.ndarray,
     sums: np.ndarray,
 ) -> float:
-    """Sum of all positions from the first node up to and including ``instant``.
+    """Return the sum of all positions from the first node up to and including ``instant``.
 
-    Before the first node the film stood still where it is there: the sum then counts backwards.
+    Before the first node the film rests at its position there; the sum is then negative.
     """
     if instant < numbers[0]:
         return float(-position[0] * (numbers[0] - 1 - instant))
@@ -94,7 +94,7 @@ def _averages(
     times: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Moving averages that stand on the output at ``times`` (N,) s, all within the nodes' span."""
+    """Return the moving averages on the output at ``times`` (N,) s, all within the nodes' span."""
     nodes = position.shape[0]
     numbers = np.empty(nodes, dtype=np.int64)
     sums = np.zeros(nodes)
@@ -119,11 +119,11 @@ def _averages(
 
 @dataclass(frozen=True)
 class LaserState:
-    """What the average still needs of the past.
+    """Past samples that the moving average still needs.
 
-    ``position`` and ``velocity`` (K,) are the nodes since ``first_node``, none before the first
-    read; ``draws`` (Q, 2) is the noise of the last sample intervals, ``alarm`` whether the film is
-    out of range.
+    ``position`` and ``velocity`` (K,) are the nodes since ``first_node``; there are none before the
+    first read. ``draws`` (Q, 2) is the noise of the last sample intervals. ``alarm`` is True while
+    the film is out of range.
     """
 
     first_node: int
@@ -135,14 +135,14 @@ class LaserState:
 
 @dataclass(frozen=True)
 class LaserRows:
-    """Analog output ``volts`` (N,) and whether the sensor reported ``alarm`` (N,), out of range."""
+    """Analog output ``volts`` (N,), and ``alarm`` (N,), True where the film is out of range."""
 
     volts: np.ndarray
     alarm: np.ndarray
 
 
 class Laser:
-    """The sensor during one run, read once every ``interval`` s; holds no state of its own."""
+    """Sensor in one run, read once every ``interval`` s; the state is passed in and out."""
 
     def __init__(
         self, settings: LaserSettings, streams: Streams, run: int, interval: float, spacing: float
@@ -159,7 +159,7 @@ class Laser:
         self._before = generator.standard_normal((int(self._whole) + 1, 2))
 
     def start(self) -> LaserState:
-        """State before the first read."""
+        """Return the state before the first read."""
         return LaserState(0, np.zeros(0), np.zeros(0), self._before)
 
     def read(
@@ -171,10 +171,10 @@ class Laser:
         chunk_samples: int,
         state: LaserState,
     ) -> tuple[LaserRows, LaserState]:
-        """Read at ``times`` (N,) s the film's ``position`` m and ``velocity`` m/s at nodes (K,).
+        """Read at ``times`` (N,) s a film with ``position`` m and ``velocity`` m/s at nodes (K,).
 
-        The first node is the last one of the read before (the state's), if there was one; times lie
-        within the nodes.
+        The first node is the last one of the previous read (kept in the state), if there was one.
+        The times lie within the nodes.
         """
         settings = self._settings
         if state.position.size:
@@ -201,7 +201,7 @@ class Laser:
         alarm = np.abs(reading) > limit
         reading = np.clip(reading, -limit, limit)
         volts = settings.direction * reading * 1e3 / settings.mm_per_V
-        # the window's oldest instant is asked for by the next read's first time
+        # the first time of the next read needs the oldest instant of the window
         keep = math.ceil((settings.averaging + 1) * self._period / self._spacing) + 1
         cut = max(0, position.size - 1 - keep)
         after = LaserState(
@@ -212,12 +212,12 @@ class Laser:
     def _noise(
         self, samples: int, chunk: int, chunk_samples: int, before: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """(N,) noise of unit variance, correlated where averaging windows of readings overlap.
+        """Return (N,) noise of unit variance, correlated where the readings' windows overlap.
 
-        White noise averaged over a window is the increment of a random walk over it. The window is
-        ``whole`` sample intervals and a ``part``, so each interval's increment is drawn in two
-        pieces, before and after the window's far edge, and readings that share pieces correlate as
-        they should.
+        White noise averaged over a window is the increment of a random walk over it. The window
+        spans ``whole`` sample intervals and a ``part`` of one. Each interval's increment is
+        therefore drawn in two pieces, before and after the window's far edge. Readings that share
+        pieces then have the correlation of overlapping windows.
         """
         generator = self._streams.of_chunk("laser", self._run, chunk)
         fresh = generator.standard_normal((chunk_samples, 2))[:samples]

@@ -1,4 +1,4 @@
-"""A film that obeys the model exactly, so that identification should recover its parameters."""
+"""Film that follows the model exactly, so that identification should recover its parameters."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["ModelPlant"]
 
 @dataclass(frozen=True)
 class ModelPlant:
-    """``actuator`` with its kernel coefficients, rest stretch and present kernel state."""
+    """Plant of ``actuator``: kernel coefficients, rest stretch and present kernel state."""
 
     actuator: Actuator
     coefficients: np.ndarray
@@ -27,7 +27,7 @@ class ModelPlant:
 
     @classmethod
     def at_rest(cls, actuator: Actuator) -> ModelPlant:
-        """The film relaxed under its load. Raises ``ModelError`` where it has no rest state."""
+        """Return the film relaxed under its load. Raises ``ModelError`` without a rest state."""
         actuator.rest()
         coefficients = actuator.coefficients()
         _, rest = at_rest(coefficients)
@@ -37,17 +37,17 @@ class ModelPlant:
 
     @property
     def capacitance(self) -> float:
-        """Present capacitance in F."""
+        """Return the present capacitance in F."""
         return float(self.actuator.film.capacitance(self.state[:1])[0])
 
     def renewed(self, generator: np.random.Generator) -> ModelPlant:  # noqa: ARG002
-        """The same: nothing of a model is left to generator."""
+        """Return the film unchanged: nothing in a model is random."""
         return self
 
     def advance(
         self, time: np.ndarray, voltage: np.ndarray, hold: bool
     ) -> tuple[Motion, ModelPlant]:
-        """See ``Plant.advance``. A film that has failed stays where it was."""
+        """Follow a voltage; see ``Plant.advance``. A failed film keeps its last position."""
         stretch, rate = np.full(time.size, self.state[0]), np.zeros(time.size)
         fault, fault_at = None, 0
         after = self

@@ -1,4 +1,4 @@
-"""The plant: the film under its load, between amplifier and laser, whatever computes it."""
+"""Interface of the plant: the film under its load, between amplifier and laser."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ __all__ = ["Motion", "Plant"]
 
 @dataclass(frozen=True)
 class Motion:
-    """The film at N nodes in time, each array (N,).
+    """Motion of the film at N nodes in time, each array (N,).
 
     ``displacement`` m from the loaded rest state (longer is positive), ``velocity`` m/s,
-    ``capacitance`` F, ``leakage`` A through the film, ``heating`` K above the room. ``fault`` says
-    in words why the film did not go on beyond node ``fault_at``; it is None when all is well.
+    ``capacitance`` F, ``leakage`` A through the film, ``heating`` K above the room. ``fault`` is
+    the reason why the motion stops at node ``fault_at``, or None without a fault.
     """
 
     displacement: np.ndarray
@@ -29,24 +29,24 @@ class Motion:
 
 
 class Plant(Protocol):
-    """A film in some state. It is a value: advancing gives the film as it is afterwards.
+    """A film with its present state. It is immutable: ``advance`` returns the film afterwards.
 
-    So a run can be taken up again from any point that was kept, which is how a run that is stopped
-    early shares every sample up to there with one that is not.
+    A run can therefore continue from any state that was kept. A run that is stopped early has the
+    same samples up to the stop as one that is not.
     """
 
     @property
     def capacitance(self) -> float:
-        """Present capacitance in F."""
+        """Return the present capacitance in F."""
         ...
 
     def renewed(self, generator: np.random.Generator) -> Plant:
-        """The film at rest as another run finds it: what is of one run alone is drawn anew."""
+        """Return the film at rest for another run, with the effects that vary by run redrawn."""
         ...
 
     def advance(self, time: np.ndarray, voltage: np.ndarray, hold: bool) -> tuple[Motion, Plant]:
-        """Follow ``voltage`` (N,) V on ``time`` (N,) s; with ``hold`` each stands until the next.
+        """Follow ``voltage`` (N,) V at ``time`` (N,) s; with ``hold`` each is held until the next.
 
-        Node 0 is the present state, so the last node of one call is the first of the next.
+        Node 0 is the present state: the last node of one call is the first of the next.
         """
         ...

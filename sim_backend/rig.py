@@ -1,4 +1,4 @@
-"""The simulated rig: the simulated instruments behind the interface of every rig."""
+"""Simulated rig: the simulated instruments behind the common interface of rigs."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from dearig.sim_backend.streams import Streams
 
 __all__ = ["OUTPUT_STARVED", "SimulatedRig"]
 
-OUTPUT_STARVED = -200290  #: DAQmx: the output came to the end of what was written
+OUTPUT_STARVED = -200290  #: DAQmx: the output ran out of written samples
 
-# a tick that the clock has reached but for rounding has been reached
+# tolerance of the clock's rounding when ticks are counted
 _TICK_TOLERANCE = 1e-6
 
 # faults that only a card behind a server, or a laser at a serial port, can have
@@ -37,14 +37,14 @@ _CARD_ERRORS = {
     ),
     FaultKind.AO_UNDERFLOW: (
         OUTPUT_STARVED,
-        "the output came to the end of what was written to it; enlarge card.ao_buffer_s, or leave "
-        "the computer to the rig alone",
+        "the output ran out of written samples; enlarge card.ao_buffer_s, or close other programs "
+        "on this computer",
     ),
 }
 
 
 class _Run:
-    """One waveform being played: what was played, computed and delivered."""
+    """One waveform being played, with its computed and delivered samples."""
 
     def __init__(
         self, waveform: GatedWaveform, counts: np.ndarray, path: SignalPath, state: PathState
@@ -54,12 +54,12 @@ class _Run:
         self.started = 0.0  # s on the rig's clock
         self.delivered = 0  # samples handed to the reader
         self.stopped = False
-        self.replied: set[Fault] = set()  # late replies that have been waited for
+        self.replied: set[Fault] = set()  # late replies that are over
         self.silent_until = 0.0  # s on the rig's clock
         self.events: list[Event] = []
         self._path = path
         self._state = state  # after the newest chunk
-        self._before = state  # before it
+        self._before = state  # before the newest chunk
         self._chunks = 0  # computed so far
         self._ready = np.empty((0, 0), dtype=np.int16)  # computed, not delivered
 
@@ -68,7 +68,7 @@ class _Run:
         return self.command.size
 
     def take(self, end: int) -> np.ndarray:
-        """Counts (channels, n) of the samples after the delivered ones, up to ``end``."""
+        """Return counts (channels, n) of the samples after the delivered ones, up to ``end``."""
         while self._chunks * CHUNK < end:
             self._compute()
         samples = end - self.delivered
@@ -77,17 +77,17 @@ class _Run:
         return counts
 
     def replace_from(self, sample: int, counts: np.ndarray) -> None:
-        """Play ``counts`` in place of everything from ``sample`` on.
+        """Replace the waveform from ``sample`` on with ``counts``.
 
-        ``sample`` is later than all that was delivered, so only the newest chunk can hold samples
-        that were computed ahead and are not true any more: it is computed again from its start.
+        ``sample`` is later than all delivered samples, so only the newest chunk can hold samples
+        that were computed ahead and are no longer valid. That chunk is computed again.
         """
         self.command = np.concatenate((self.command[:sample], counts))
         if self._chunks * CHUNK > sample:
             self._chunks -= 1
             self._state = self._before
             self._ready = self._ready[:, :0]
-            # what had not been delivered of it comes again with the new computation
+            # the new computation also returns the undelivered samples of this chunk
             self.events = [e for e in self.events if e.sample < self._chunks * CHUNK]
 
     def _compute(self) -> None:
@@ -103,12 +103,11 @@ class _Run:
 
 
 class SimulatedRig:
-    """A rig on a ``clock``, whose film is ``plant``; see ``dearig.drivers.rig.Rig`` for the calls.
+    """Simulated rig on a ``clock`` with the film ``plant``; see ``dearig.drivers.rig.Rig``.
 
-    ``plant`` is the film at rest: every run starts from it, as if the operator had waited for it to
-    relax. Blocks hold ``block_samples`` samples, or a tenth of a second when that is None; their
-    length changes nothing in the data. ``faults`` go wrong in every run. All calls may come from
-    any thread.
+    ``plant`` is the film at rest. Every run starts from it, as if the operator had let the film
+    relax. Blocks hold ``block_samples`` samples, or a tenth of a second where that is None; the
+    data do not depend on their length. ``faults`` occur in every run. All methods are thread-safe.
     """
 
     def __init__(
@@ -128,8 +127,8 @@ class SimulatedRig:
         self._faults = faults or FaultPlan()
         for fault in self._faults.of(*_ELSEWHERE):
             raise ValueError(
-                f"fault {fault.kind} needs a server or a serial port in between: an in-process rig "
-                f"cannot have it"
+                f"fault {fault.kind} needs a server or a serial port: an in-process rig cannot "
+                f"have it"
             )
         self._settings = settings
         self._plant = plant
@@ -148,12 +147,12 @@ class SimulatedRig:
 
     @property
     def state(self) -> RigState:
-        """State of the rig."""
+        """Return the state of the rig."""
         return self._state
 
     @property
     def output(self) -> float:
-        """Voltage in V that is commanded at the film now."""
+        """Return the present command in V at the film."""
         with self._lock:
             run = self._run
             if self._state is not RigState.RUNNING or run is None:
@@ -162,7 +161,7 @@ class SimulatedRig:
             return float(self._card.channels[0].scaling.physical(run.command[at : at + 1])[0])
 
     def identify(self) -> RigIdentity:
-        """Return what the rig is made of; the output does not move."""
+        """Return the rig's instruments; the output does not change."""
         with self._lock:
             self._expect("identify", *(s for s in RigState if s is not RigState.CLOSED))
         return RigIdentity(
@@ -179,10 +178,10 @@ class SimulatedRig:
         )
 
     def load(self, waveform: GatedWaveform) -> float:
-        """Take a waveform that has passed the gate; returns the actual sample rate in Hz.
+        """Load a waveform that has passed the gate; returns the actual sample rate in Hz.
 
-        Raises ``RigError`` for a waveform that passed under wider limits than this rig's, or at a
-        rate the card cannot do.
+        Raises ``RigError`` for a waveform that passed under wider limits than this rig's, or for a
+        rate that the card cannot run at.
         """
         if not isinstance(waveform, GatedWaveform):
             raise TypeError(
@@ -204,7 +203,7 @@ class SimulatedRig:
             return rate
 
     def arm(self) -> None:
-        """Get ready to start without delay; the output stays at 0 V."""
+        """Prepare for a start without delay; the output stays at 0 V."""
         with self._lock:
             self._expect("arm", RigState.LOADED)
             self._state = RigState.ARMED
@@ -217,11 +216,11 @@ class SimulatedRig:
             self._state = RigState.RUNNING
 
     def read(self) -> Block | None:
-        """Return the next block, waiting for it; None when the waveform has been played.
+        """Wait for the next block and return it, or None after the last one.
 
-        Raises ``RigError`` with DAQmx's code -200279 when the reader came so late that samples were
-        overwritten, or for a planned fault of the card; the output is at 0 V then. Raises
-        ``RigStateError`` when the rig was made safe.
+        Raises ``RigError`` with DAQmx's code -200279 where the reader was so late that samples were
+        overwritten, or for a planned fault of the card; the output is then at 0 V. Raises
+        ``RigStateError`` where the rig was made safe.
         """
         while True:
             with self._lock:
@@ -249,7 +248,7 @@ class SimulatedRig:
 
     @property
     def waiting(self) -> float:
-        """Delay of the reader in s: samples that were acquired and not read."""
+        """Return the reader's delay in s: samples that were acquired and not read."""
         with self._lock:
             run = self._run
             if self._state is not RigState.RUNNING or run is None:
@@ -257,13 +256,13 @@ class SimulatedRig:
             return (min(self._ticks(run), run.total) - run.delivered) / self._rate
 
     def stop(self) -> None:
-        """End the run early: ramp to 0 V in the set time; acquired samples stay readable."""
+        """End the run early with a ramp to 0 V; acquired samples stay readable."""
         with self._lock:
             if self._state is RigState.DONE:
-                return  # it ended by itself in the same moment
+                return  # the waveform ended just before the call
             self._expect("stop", RigState.RUNNING)
             run = self._running()
-            played = self._ticks(run) + 1  # with the sample that stands on the output now
+            played = self._ticks(run) + 1  # with the sample that is on the output now
             if run.stopped or played >= run.total:
                 return
             seconds = self._settings.limits.ramp_down_s
@@ -302,16 +301,16 @@ class SimulatedRig:
             return Block(start, counts)
         due = sorted((e for e in run.events if e.sample < end), key=lambda event: event.sample)
         run.events = [e for e in run.events if e.sample >= end]
-        if end == run.total:  # an event of a ramp of no length lies beyond the last sample
+        if end == run.total:  # the event of an empty ramp is one sample beyond the last
             due, run.events = due + run.events, []
         return Block(start, counts, tuple(due))
 
     def _block_size(self, run: _Run) -> int:
-        """Samples of the next block: fewer where a short read is due."""
+        """Return the number of samples in the next block, fewer where a short read is planned."""
         size = self._block_samples or max(1, round(0.1 * self._rate))
         for fault in self._faults.of(FaultKind.SHORT_READ):
             first, end = fault.samples(self._rate)
-            wanted = first + 1 - run.delivered  # up to the moment of the fault
+            wanted = first + 1 - run.delivered  # up to the start of the fault
             if 0 < wanted <= size:
                 return max(1, min(wanted, size - 1))
             if first < run.delivered < end:
@@ -320,13 +319,13 @@ class SimulatedRig:
 
     def _card_fails(self, run: _Run) -> None:
         for fault in self._faults.of(*_CARD_ERRORS):
-            # the same sum as in _due: who waited until then finds it has come
+            # the same sum as in _due, so that a reader that waited until then finds the fault
             if self._clock.now() >= run.started + fault.at:
                 code, words = _CARD_ERRORS[fault.kind]
                 raise RigError(f"card {self._settings.card.device}: {words}", code)
 
     def _silent(self, run: _Run) -> bool:
-        """Whether the reader is kept waiting by a late reply."""
+        """Return True while a late reply delays the reader."""
         now = self._clock.now()
         for fault in self._faults.of(FaultKind.LATE_REPLY):
             if fault not in run.replied and now >= run.started + fault.at:
@@ -335,13 +334,13 @@ class SimulatedRig:
         return now < run.silent_until
 
     def _due(self, run: _Run, end: int) -> float:
-        """When, in s on the clock, something next happens before sample ``end`` is there."""
+        """Return the clock's time in s of sample ``end``, or of an earlier fault."""
         events = self._faults.of(*_CARD_ERRORS, FaultKind.LATE_REPLY)
         times = (run.started + fault.at for fault in events if fault not in run.replied)
         return min(run.started + end / self._rate, *times, math.inf)
 
     def _ticks(self, run: _Run) -> int:
-        """Whole sample intervals that have passed since the start."""
+        """Return the number of whole sample intervals since the start."""
         return int((self._clock.now() - run.started) * self._rate + _TICK_TOLERANCE)
 
     def _running(self) -> _Run:

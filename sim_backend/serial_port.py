@@ -1,4 +1,4 @@
-"""A simulated serial port: a pseudo-terminal where the system has them, else a loopback port."""
+"""Simulated serial port: a pseudo-terminal where the system has them, else a loopback port."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _LONGEST_WAIT = 3600.0  # s
 
 @contextmanager
 def serve_on_socket(responder: Responder, clock: Clock | None = None) -> Iterator[str]:
-    """Let ``responder`` be reached at a loopback port while the body runs.
+    """Serve ``responder`` at a loopback port while the body runs.
 
-    Gives its name as pyserial takes it, ``socket://127.0.0.1:PORT``. One caller after another.
+    Yields its name for pyserial, ``socket://127.0.0.1:PORT``. Callers are served one at a time.
     """
     with socket.create_server(("127.0.0.1", 0)) as listener:
         address = f"socket://127.0.0.1:{listener.getsockname()[1]}"
@@ -34,10 +34,11 @@ def serve_on_socket(responder: Responder, clock: Clock | None = None) -> Iterato
 def serve_on_pty(
     responder: Responder, clock: Clock | None = None, baud_rate: int | None = None
 ) -> Iterator[str]:
-    """Let ``responder`` be reached on a pseudo-terminal while the body runs; gives its name.
+    """Serve ``responder`` on a pseudo-terminal while the body runs; yields its name.
 
-    With ``baud_rate``, a caller who sets another one is not understood, as on a wire. Raises
-    ``OSError`` on Windows, which has none; ``serve_on_socket`` works everywhere.
+    With ``baud_rate``, bytes of a caller that sets another rate arrive garbled, as on a real line.
+    Raises ``OSError`` on Windows, which has no pseudo-terminals; ``serve_on_socket`` works
+    everywhere.
     """
     if sys.platform == "win32":
         raise OSError("Windows has no pseudo-terminals of this kind; use a loopback port")
@@ -45,11 +46,11 @@ def serve_on_pty(
     import termios
     import tty
 
-    # both ends stay open here: callers may come and go
+    # both ends stay open here, so that callers can connect again
     ours, theirs = pty.openpty()
     try:
         os.set_blocking(ours, False)
-        tty.setraw(theirs)  # a line that echoes is none of an instrument
+        tty.setraw(theirs)  # an instrument's line does not echo
 
         def same_speed() -> bool:
             set_by_caller = termios.tcgetattr(theirs)[5]
@@ -72,20 +73,20 @@ class _Served:
         self._told, self._tell = socket.socketpair()
 
     def end(self) -> None:
-        """Tell the loop to end; from any thread."""
+        """Make the loop end. Any thread may call it."""
         self._tell.send(b"x")
 
     def close(self) -> None:
-        """Release what the loop used, after it has ended."""
+        """Release the loop's resources, after it has ended."""
         self._told.close()
         self._tell.close()
 
     def run(self) -> None:
-        """Carry bytes until told to end."""
+        """Carry bytes until ``end`` is called."""
         raise NotImplementedError
 
     def _wait(self, *sources: socket.socket | int) -> list[socket.socket | int] | None:
-        """Sources that can be read, none when a reply is due; None when it is time to end."""
+        """Return the readable sources, none where a reply is due, or None to end the loop."""
         due = self._responder.next_due()
         seconds = _LONGEST_WAIT if due is None else max(0.0, due - self._clock.now())
         ready, _, _ = select.select([self._told, *sources], [], [], seconds)
@@ -93,7 +94,7 @@ class _Served:
 
 
 class _Calls(_Served):
-    """Callers at a listening socket."""
+    """Service of callers at a listening socket."""
 
     def __init__(self, responder: Responder, clock: Clock, listener: socket.socket) -> None:
         super().__init__(responder, clock)
@@ -102,7 +103,7 @@ class _Calls(_Served):
     def run(self) -> None:
         """Serve one caller after another."""
         while (ready := self._wait(self._listener)) is not None:
-            if not ready:  # a reply to a client that has left
+            if not ready:  # a reply to a caller that has disconnected
                 self._responder.due(self._clock.now())
                 continue
             caller, _ = self._listener.accept()
@@ -111,7 +112,7 @@ class _Calls(_Served):
                     return
 
     def _serve(self, caller: socket.socket) -> bool:
-        """Serve until the caller leaves; False when it is time to end."""
+        """Serve until the caller disconnects; returns False to end the loop."""
         while (ready := self._wait(caller)) is not None:
             try:
                 if ready:
@@ -120,7 +121,7 @@ class _Calls(_Served):
                         return True
                     self._responder.receive(data, self._clock.now())
                 caller.sendall(self._responder.due(self._clock.now()))
-            except ConnectionError:  # it left in the middle
+            except ConnectionError:  # the caller disconnected during a reply
                 return True
         return False
 
@@ -141,13 +142,13 @@ class _Line(_Served):
             if ready:
                 self._responder.receive(self._heard(os.read(self._line, 4096)), self._clock.now())
             data = self._heard(self._responder.due(self._clock.now()))
-            # what is not read from a serial line is lost
+            # bytes that nobody reads from a serial line are lost
             with suppress(BlockingIOError):
                 while data:
                     data = data[os.write(self._line, data) :]
 
     def _heard(self, data: bytes) -> bytes:
-        """What arrives of ``data``: at another speed bits are taken for others."""
+        """Return ``data`` as received: another baud rate corrupts its bits."""
         return data if self._same_speed() else bytes(byte ^ 0x55 | 0x80 for byte in data)
 
 

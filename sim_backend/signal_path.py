@@ -1,4 +1,4 @@
-"""The signal path of the rig: converter, amplifier, film, laser, converter."""
+"""Signal path of the simulated rig: converter, amplifier, film, laser, converter."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from dearig.sim_backend.streams import Streams
 
 __all__ = ["CHUNK", "PathState", "SignalPath"]
 
-#: Samples that are computed at a time, counted from the start of the run whatever the reader asks
-#: for: the kernels may round differently where a record is cut, and the data must not.
+#: Samples in a chunk. Chunks are counted from the start of the run, whatever the reader's block
+#: length: the kernels may round differently at a chunk's edge, and the data must not depend on it.
 CHUNK = 4096
 
-_NODE_SPACING = 1e-3  # s; a cubic follows the film's ringing over that to 1e-4 of its amplitude
+_NODE_SPACING = 1e-3  # s; a cubic over it is within 1e-4 of the amplitude of the film's ringing
 
 _GRAVITY = 9.81  # m/s^2
-_FLOOR = 0.2  # m below its rest the load lies when the film has ruptured
-_NO_VOLTAGE = 10.0  # V; a command below this drives no current to speak of into a short
-_BURST = 4e-3  # m, RMS of a sensor's noise burst
+_FLOOR = 0.2  # m; where the load comes to lie below its rest position after the film ruptures
+_NO_VOLTAGE = 10.0  # V; below this command the current into a short is negligible
+_BURST = 4e-3  # m, RMS of the sensor's noise burst
 
 _SHORTED = (FaultKind.ARC, FaultKind.FILM_RUPTURE)
 _DEAD = (*_SHORTED, FaultKind.AMPLIFIER_TRIP)
@@ -36,10 +36,10 @@ _DEAD = (*_SHORTED, FaultKind.AMPLIFIER_TRIP)
 
 @dataclass(frozen=True)
 class PathState:
-    """State of the rig between two chunks.
+    """State of the signal path between two chunks.
 
-    ``torn`` is where the load was in m, and how fast it was in m/s, when the film ruptured;
-    ``stuck`` the count at which the laser got stuck. Either is None while that has not happened.
+    ``torn`` is the load's position in m and velocity in m/s when the film ruptured. ``stuck`` is
+    the laser's count when it got stuck. Each is None until that happens.
     """
 
     plant: Plant
@@ -51,7 +51,7 @@ class PathState:
 
 
 class SignalPath:
-    """The rig during one run at ``rate`` Hz with ``faults``; holds no state of its own."""
+    """Signal path in one run at ``rate`` Hz with ``faults``; the state is passed in and out."""
 
     def __init__(
         self,
@@ -68,7 +68,7 @@ class SignalPath:
         self._card = card
         self._streams = streams
         self._run = run
-        # nodes of the film's motion: as many to each sample as accuracy asks for
+        # nodes of the film's motion: at least one a sample, spaced by _NODE_SPACING at most
         self._nodes = max(1, math.ceil(1.0 / (rate * _NODE_SPACING) - 1e-9))
         self._spacing = 1.0 / (rate * self._nodes)
         self._amplifier = Amplifier(settings.amplifier)
@@ -77,16 +77,16 @@ class SignalPath:
         self._skews = {name: settings.skew(i) for i, name in enumerate(self._names[1:])}
 
     def start(self, plant: Plant) -> PathState:
-        """State before the first sample, with what this run of ``plant`` has of its own."""
+        """Return the state before the first sample, with ``plant`` redrawn for this run."""
         plant = plant.renewed(self._streams.before_run("film", self._run))
         return PathState(plant, AmplifierState(), self._laser.start())
 
     def advance(
         self, chunk: int, command: np.ndarray, state: PathState
     ) -> tuple[np.ndarray, list[Event], PathState]:
-        """Play chunk number ``chunk``, ``command`` (n,) int16 counts, n up to ``CHUNK``.
+        """Play chunk number ``chunk``: ``command`` (n,) int16 counts, n up to ``CHUNK``.
 
-        Returns counts (channels, n) int16, events, and the state after it.
+        Returns counts (channels, n) int16, events, and the state after the chunk.
         """
         first, samples, nodes = chunk * CHUNK, command.size, self._nodes
         dead = self._active(first, samples, *_DEAD)
@@ -125,7 +125,7 @@ class SignalPath:
         reading, laser = self._laser.read(
             motion.displacement, motion.velocity, time[at] + into, chunk, CHUNK, state.laser
         )
-        # the burst takes the next numbers of this generator: no other noise shifts
+        # the burst draws last from this generator, so that all other noise stays the same
         reading = self._disturb(reading, first, generator)
         laser = replace(laser, alarm=bool(reading.alarm[-1]))
         counts[3], stuck = self._stick(
@@ -154,7 +154,7 @@ class SignalPath:
     def _amplify(
         self, command: np.ndarray, dead: np.ndarray, state: PathState
     ) -> tuple[AmplifierRows, AmplifierState]:
-        """The amplifier's output under ``command`` (n,) counts, 0 V where it is ``dead`` (n,)."""
+        """Return the amplifier's output under ``command`` (n,) counts, 0 V where ``dead`` (n,)."""
         nodes, capacitance = self._nodes, state.plant.capacitance
         volts = np.repeat(self._card.put_out(command), nodes)
         edges = [0, *(np.flatnonzero(np.diff(dead)) + 1), command.size]
@@ -176,11 +176,11 @@ class SignalPath:
         return AmplifierRows(start, target, effective, settled, pieces[0].slew), now
 
     def _wanted(self, command: np.ndarray) -> np.ndarray:
-        """Voltage (n,) V that ``command`` (n,) counts ask for at the film."""
+        """Return the voltage (n,) V at the film that ``command`` (n,) counts ask for."""
         return self._card.channels[0].scaling.physical(command)
 
     def _into_short(self, command: np.ndarray) -> np.ndarray:
-        """Current (n,) A into a short under ``command`` (n,) counts."""
+        """Return the current (n,) A into a short under ``command`` (n,) counts."""
         wanted = self._wanted(command)
         limit = self._settings.amplifier.current_limit_mA * 1e-3
         return np.where(np.abs(wanted) < _NO_VOLTAGE, 0.0, np.copysign(limit, wanted))
@@ -188,7 +188,7 @@ class SignalPath:
     def _fall(
         self, motion: Motion, time: np.ndarray, first: int, torn: tuple[float, float] | None
     ) -> tuple[Motion, tuple[float, float] | None]:
-        """``motion`` with the load falling from where it was when the film ruptured."""
+        """Return ``motion`` with the load in free fall from where it was when the film ruptured."""
         nodes = self._nodes
         for fault in self._faults.of(FaultKind.FILM_RUPTURE)[:1]:
             node = (fault.samples(self._rate)[0] - first) * nodes
@@ -209,7 +209,7 @@ class SignalPath:
         return motion, torn
 
     def _disturb(self, reading: LaserRows, first: int, generator: np.random.Generator) -> LaserRows:
-        """What the laser's output becomes through faults of the sensor."""
+        """Return the laser's output with the sensor's faults."""
         laser, samples = self._settings.laser, reading.volts.size
         burst = self._active(first, samples, FaultKind.SENSOR_NOISE_BURST)
         lost = self._active(first, samples, FaultKind.SENSOR_OUT_OF_RANGE)
@@ -223,7 +223,7 @@ class SignalPath:
     def _stick(
         self, counts: np.ndarray, first: int, stuck: int | None
     ) -> tuple[np.ndarray, int | None]:
-        """``counts`` (n,) of the laser with those held at which it is stuck."""
+        """Return the laser's ``counts`` (n,), held where the laser is stuck."""
         held = counts.copy()
         for fault in self._faults.of(FaultKind.SENSOR_STUCK):
             begin, end = (s - first for s in fault.samples(self._rate))
@@ -236,7 +236,7 @@ class SignalPath:
         return held, stuck
 
     def _converted(self, channel: str, samples: int) -> tuple[slice, float]:
-        """Intervals between nodes in which ``channel`` is converted, and how far into them in s."""
+        """Return the node intervals in which ``channel`` is converted, and the s into each."""
         skew = self._skews[channel]
         node = int(skew / self._spacing)
         return slice(node, samples * self._nodes, self._nodes), skew - node * self._spacing
@@ -244,7 +244,7 @@ class SignalPath:
     def _current(
         self, motion: Motion, at: slice, voltage: np.ndarray, slope: np.ndarray
     ) -> np.ndarray:
-        """Current (n,) A into the film: its charge is C V, and both change; and the leakage."""
+        """Return the current (n,) A into the film: d(C V)/dt, both changing, and the leakage."""
         growth = np.diff(motion.capacitance)[at] / self._spacing
         charging, leakage = motion.capacitance[:-1][at] * slope, motion.leakage[:-1][at]
         current: np.ndarray = charging + growth * voltage + leakage
@@ -295,6 +295,6 @@ def _laser_events(first: int, reading: LaserRows, before: bool) -> list[Event]:
 
 
 def _changes(flags: np.ndarray, before: bool) -> list[tuple[int, bool]]:
-    """Where ``flags`` (N,) change, with what they change to."""
+    """Return the places where ``flags`` (N,) change, with the new value."""
     changed = np.flatnonzero(np.diff(flags, prepend=before))
     return [(int(at), bool(flags[at])) for at in changed]

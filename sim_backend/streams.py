@@ -1,7 +1,7 @@
-"""Random numbers of the simulated instruments, all from the one seed of a rig.
+"""Random generators of the simulated instruments, all derived from the seed of a rig.
 
-Every draw has its own place (instrument, run, chunk), so that a chunk of a run can be computed
-again, or not at all, without shifting the noise of anything else.
+Each instrument, run and chunk has its own generator. A chunk can therefore be computed again, or
+left out, and all other noise stays the same.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ _INSTRUMENTS = ("card", "amplifier", "laser", "thermometer", "film", "channels")
 
 @dataclass(frozen=True)
 class Streams:
-    """The generators of one rig; ``seed`` is any row of whole numbers from 0 up."""
+    """Generators of one rig; ``seed`` is a sequence of whole numbers from 0 up."""
 
     seed: tuple[int, ...]
 
     def of_instrument(self, instrument: str) -> np.random.Generator:
-        """Return the generator of what an instrument always has, such as its calibration."""
+        """Return the generator of an instrument's permanent properties, such as its calibration."""
         return self._generator(_INSTRUMENTS.index(instrument))
 
     def before_run(self, instrument: str, run: int) -> np.random.Generator:

@@ -1,4 +1,4 @@
-"""Hidden effects by seed: a case for every seed, always the same one."""
+"""Hidden effects by seed: each seed always gives the same case."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ __all__ = ["FORMS", "KINDS", "UNKNOWN", "TruthCase", "draw"]
 
 UNKNOWN = "unknown"
 
-#: Forms of each family, and of what is in none, in the order of the signal path.
+#: Forms of each family and of the effects in no family, in the order of the signal path.
 FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
     {
         "amplifier": (
@@ -96,20 +96,20 @@ FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
 )
 _COVERED = tuple(family for family in FORMS if family != UNKNOWN)
 
-#: How often each kind of case is drawn.
+#: Probability of each kind of case.
 KINDS: Mapping[str, float] = MappingProxyType(
     {"clean": 0.10, "covered": 0.62, "pair": 0.13, UNKNOWN: 0.15}
 )
 
-# standard deviations of the logarithms, from film to film
+# standard deviations of the logarithms between films
 _MODULI, _TIMES = 0.15, 0.20
 
 
 @dataclass(frozen=True)
 class TruthCase:
-    """What the rig of ``seed`` hides, in a film of its own ``network``.
+    """Hidden effects of the rig of ``seed``, in a film with its own ``network``.
 
-    For tests and scores only: no program shows it to anybody.
+    For tests and scores only: no program displays it.
     """
 
     seed: int
@@ -120,23 +120,24 @@ class TruthCase:
 
     @property
     def families(self) -> tuple[str, ...]:
-        """Families of the effects, in the order of the list."""
+        """Return the families of the effects, in the order of the list."""
         return tuple(effect.family for effect in self.effects)
 
     @property
     def description(self) -> str:
-        """The effects in words."""
+        """Return a description of the effects."""
         return "; ".join(effect.description for effect in self.effects)
 
     def plant(self) -> TruthPlant:
-        """The film at rest."""
+        """Return the film at rest."""
         return TruthPlant.at_rest(self._numbers(), self.effects)
 
     def size(self, time: np.ndarray, voltage: np.ndarray) -> float:
-        """RMS in m by which the effects change what the sensor sees under ``voltage`` (N,) V.
+        """Return the RMS in m of the change that the effects cause under ``voltage`` (N,) V.
 
-        It is the raw difference at ``time`` (N,) s to the same film without them: how much of it a
-        fit of the film's own numbers can hide is not asked. ``inf`` when the film fails.
+        It is the difference of what the sensor sees at ``time`` (N,) s to the same film without
+        effects. It includes the part that a fit of the film's parameters could absorb. It is
+        ``inf`` where the film fails.
         """
         hiding, _ = self.plant().advance(time, voltage, True)
         plain, _ = TruthPlant.at_rest(self._numbers()).advance(time, voltage, True)
@@ -147,9 +148,10 @@ class TruthCase:
     def of_one_run(
         self, time: np.ndarray, voltage: np.ndarray, generator: np.random.Generator
     ) -> np.ndarray:
-        """Return what the sensor sees only in the run that draws from ``generator``, (N,) m.
+        """Return the part (N,) m of the reading that belongs to the run of ``generator`` alone.
 
-        No other run of the rig contains it; under ``voltage`` (N,) V at ``time`` (N,) s.
+        No other run of the rig contains it. It is computed under ``voltage`` (N,) V at ``time``
+        (N,) s.
         """
         repeated = [effect for effect in self.effects if effect.redrawn is None]
         if len(repeated) == len(self.effects):
@@ -164,7 +166,7 @@ class TruthCase:
 
 
 def _drawn_network(generator: np.random.Generator) -> Network:
-    """Table 3, as another film of the same make would have it."""
+    """Draw a network like that of Table 3, for another film of the same make."""
 
     def spring(of: Spring) -> Spring:
         return Spring(of.modulus * np.exp(generator.normal(0.0, _MODULI)), of.limit, of.kind)
@@ -185,20 +187,20 @@ def _drawn_families(generator: np.random.Generator, kind: str) -> list[str]:
         return []
     if kind in FORMS:
         return [kind]
-    # in the order of the signal path, which is that of the table
+    # in the order of the table, which is that of the signal path
     places = generator.choice(len(_COVERED), size=2 if kind == "pair" else 1, replace=False)
     return [_COVERED[place] for place in sorted(places)]
 
 
 def draw(seed: int, film: Film, load: Load, kind: str = "any") -> TruthCase:
-    """The case of ``seed``.
+    """Return the case of ``seed``.
 
-    ``kind`` is ``any``, one of ``KINDS``, or a family of ``FORMS``; ``ValueError`` for another.
-    The film of a seed is the same for every kind.
+    ``kind`` is ``any``, one of ``KINDS``, or a family of ``FORMS``; raises ``ValueError`` for any
+    other. The film of a seed is the same for every kind.
     """
     if kind not in ("any", *KINDS, *FORMS):
         offered = ", ".join(("any", *KINDS, *_COVERED))
-        raise ValueError(f"no case of kind {kind!r}: it is one of {offered}")
+        raise ValueError(f"no case of kind {kind!r}: choose one of {offered}")
     generator = np.random.default_rng(seed)
     network = _drawn_network(generator)
     effects = []

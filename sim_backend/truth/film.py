@@ -1,9 +1,9 @@
-"""The film of the truth: its own equation of motion with its own integrator.
+"""Film with hidden effects: an equation of motion and integrator independent of the model's.
 
 The network of Gent springs is written in the logarithmic elastic stretch z_i = ln(lam/xi_i) of each
-branch, in which the flow reads z_i' = lam'/lam - e pull(e)/(T_i lam) with e = exp(z_i), and it is
-integrated by the fifth-order Runge-Kutta formula of Dormand and Prince in fixed steps. Effects come
-in as numbers, which stand at values that change nothing until an effect sets them.
+branch, in which the flow reads z_i' = lam'/lam - e pull(e)/(T_i lam) with e = exp(z_i). It is
+integrated by the fifth-order Runge-Kutta formula of Dormand and Prince in fixed steps. Effects are
+numbers whose defaults have no influence.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ __all__ = [
     "rest_stretch",
 ]
 
-LOST = 1  #: status: the stretch ran away or a spring locked
+LOST = 1  #: status: the stretch diverged or a spring locked
 
 #: Rows of a course: factors on the load, on the Maxwell stress and on all moduli, and the room's
-#: warming in K (which a thermometer sees; what it does to the moduli stands in their row).
+#: warming in K (for a thermometer; its influence on the moduli is in their row).
 COURSE_PULL, COURSE_ELECTRIC, COURSE_STIFFNESS, COURSE_HEATING = range(4)
 NO_COURSE = (1.0, 1.0, 1.0, 0.0)
 
 _STRETCH_MAX = 20.0
-_STABLE = 1.0  # of a step times the fastest decay: the formula is stable up to 3.3
-_STEPS_MAX = 1e4  # in an interval: what runs away may do so
+_STABLE = 1.0  # maximum of step times fastest decay rate; the formula is stable up to 3.3
+_STEPS_MAX = 1e4  # in an interval; limits the work on a diverging film
 
-# Dormand and Prince's RK5(4)7M, J. Comp. Appl. Math. 6 (1980), the fifth-order solution
+# fifth-order solution of RK5(4)7M, Dormand and Prince, J. Comp. Appl. Math. 6 (1980)
 _STAGES = np.array(
     [
         [0.0, 0.0, 0.0, 0.0, 0.0],
@@ -60,10 +60,10 @@ _WEIGHTS = np.array(
 
 
 class Hidden(NamedTuple):
-    """Numbers of the effects within the equation of motion; the defaults change nothing.
+    """Parameters of the effects within the equation of motion; the defaults have no influence.
 
-    Formulas and sources stand in the files of ``effects``. Lengths are stretches (of L1), forces
-    nominal stresses.
+    The files of ``effects`` give formulas and sources. Lengths are given as stretches (of L1),
+    forces as nominal stresses.
     """
 
     # drag: (linear + quadratic |r| + power |r|^1/2) r for the rate r = lam'; Pa s, Pa s^2, Pa s^1.5
@@ -129,7 +129,7 @@ _NOTHING = Hidden()
 
 
 class _Body(NamedTuple):
-    """The film itself, as the compiled equation reads it."""
+    """Parameters of the film for the compiled equation."""
 
     inertia: float
     pull: float
@@ -140,7 +140,7 @@ class _Body(NamedTuple):
 
 @dataclass(frozen=True)
 class FilmState:
-    """``y``: stretch, rate, what ``_BRISTLE`` and following name, z_1..n. ``memory``: see there."""
+    """State ``y``: stretch, rate, places from ``_BRISTLE`` on, z_1..n; ``memory``: see there."""
 
     y: np.ndarray
     memory: np.ndarray
@@ -148,14 +148,14 @@ class FilmState:
 
 @dataclass(frozen=True)
 class FilmNumbers:
-    """All numbers of the equation of motion, SI units; an effect hands back a changed copy.
+    """Parameters of the equation of motion in SI units; an effect returns a changed copy.
 
     ``moduli`` mu_0..n Pa, ``limits`` J_0..n, ``times`` T_1..n s. ``inertia`` kg/m multiplies
     lam'', ``pull`` Pa is the load's nominal stress, ``electric`` Pa/V^2 times phi^2 lam the nominal
     Maxwell stress. ``length`` L1 m and ``section`` L2 Z m^2 turn stretch into travel and stress
     into force; ``capacitance`` F is the unstretched film's. ``stops`` are pairs of reach and
-    stiffness Pa of elements that slip. ``step`` s is the longest integration step: it carries the
-    70 Hz of a film without a moving load to a nanometre, and a stiff effect asks for less.
+    stiffness Pa of elements that slip. ``step`` s is the longest integration step: it resolves the
+    70 Hz of a film without a moving load to a nanometre; a stiff effect needs a shorter one.
     """
 
     moduli: tuple[float, ...]
@@ -173,9 +173,9 @@ class FilmNumbers:
 
     @classmethod
     def of(cls, film: Film, load: Load, network: Network) -> FilmNumbers:
-        """The thesis's film: nothing hidden.
+        """Return the thesis's film without hidden effects.
 
-        Raises ``ValueError`` for a film or network that the truth cannot stand for.
+        Raises ``ValueError`` for a film or network that this plant cannot simulate.
         """
         if film.kinematics != "constrained-width":
             raise ValueError(
@@ -203,27 +203,27 @@ class FilmNumbers:
         return replace(numbers, moduli=(modulus, *numbers.moduli[1:]))
 
     def hiding(self, **numbers: float) -> FilmNumbers:
-        """The film with some numbers of ``Hidden`` set."""
+        """Return the film with some parameters of ``Hidden`` set."""
         return replace(self, hidden=self.hidden._replace(**numbers))
 
     def stepping(self, step: float) -> FilmNumbers:
-        """The film integrated in steps of at most ``step`` s."""
+        """Return the film with integration steps of at most ``step`` s."""
         return replace(self, step=min(self.step, step))
 
     def body(self, rest: float) -> _Body:
-        """The film as ``follow`` reads it, with its rest stretch."""
+        """Return the film's parameters for ``follow``, with the rest stretch."""
         return _Body(self.inertia, self.pull, self.electric, self.capacitance, rest)
 
     def springs(self) -> np.ndarray:
-        """Rows (3, 1 + n) of moduli, limits and times; the equilibrium spring never relaxes."""
+        """Return rows (3, 1 + n): moduli, limits, times; the equilibrium spring never relaxes."""
         return np.array([self.moduli, self.limits, (math.inf, *self.times)])
 
     def slipping(self) -> np.ndarray:
-        """Rows (2, m) of reaches and stiffnesses of ``stops``."""
+        """Return rows (2, m) of reaches and stiffnesses of ``stops``."""
         return np.array(self.stops, dtype=float).reshape(-1, 2).T.copy()
 
     def at_rest(self, rest: float) -> FilmState:
-        """State at stretch ``rest``: relaxed branches carry no elastic stretch, z_i = 0."""
+        """Return the state at stretch ``rest``; in relaxed branches z_i = 0."""
         y = np.zeros(_BRANCH + len(self.times))
         memory = np.zeros(_SLIPPED + len(self.stops))
         y[0] = memory[_START] = memory[_LARGEST] = rest
@@ -242,7 +242,7 @@ _START, _LARGEST, _SLIPPED = 0, 1, 2
 
 @jit
 def _gent(modulus: float, limit: float, e: float) -> float:
-    """Nominal stress in Pa of a Gent spring at its own stretch ``e`` with the width held."""
+    """Return the nominal stress in Pa of a Gent spring at stretch ``e``, with the width held."""
     squared = e * e
     strain = squared + 1.0 / squared - 2.0
     return modulus * (e - 1.0 / (squared * e)) / (1.0 - strain / limit)
@@ -250,7 +250,7 @@ def _gent(modulus: float, limit: float, e: float) -> float:
 
 @jit
 def _leak(h: Hidden, v: float, lam: float) -> tuple[float, float]:
-    """Current in A through the film under ``v`` >= 0 V, and its slope in S."""
+    """Return the current in A through the film under ``v`` >= 0 V, and its slope in S."""
     if h.leak_hopping > 0.0:
         k = h.leak_hopping * lam
         return h.leak_conductance / k * math.sinh(k * v), h.leak_conductance * math.cosh(k * v)
@@ -270,10 +270,10 @@ def _leak(h: Hidden, v: float, lam: float) -> tuple[float, float]:
 
 @jit
 def _behind_leak(h: Hidden, voltage: float, lam: float) -> float:
-    """Voltage that the leakage current leaves of ``voltage`` behind the series resistance."""
+    """Return the voltage at the film behind the series resistance, under ``voltage``."""
     source = abs(voltage)
     v = source
-    for _ in range(30):  # the current is convex: Newton's steps come down without overshoot
+    for _ in range(30):  # the current is convex: Newton's steps decrease without overshoot
         current, slope = _leak(h, v, lam)
         change = (v + h.leak_series * current - source) / (1.0 + h.leak_series * slope)
         v = max(v - change, 0.0)
@@ -292,13 +292,13 @@ def leakage(h: Hidden, voltage: np.ndarray, stretch: np.ndarray, current: np.nda
 
 @jit
 def _slipped(start: float, reach: float, moved: float) -> float:
-    """Strain of an element that slips beyond ``reach``."""
+    """Return the strain of an element that slips beyond ``reach``."""
     return min(max(start + moved, -reach), reach)
 
 
 @jit
 def _bristles(h: Hidden, x: float, rate: float) -> tuple[float, float]:
-    """Friction stress in Pa and the rate of the bristles' deflection ``x``."""
+    """Return the friction stress in Pa and the rate of the bristles' deflection ``x``."""
     ratio = abs(rate) / h.friction_stribeck
     if h.friction_easing > 0.0:
         eased = math.exp(-(ratio**h.friction_easing))
@@ -332,7 +332,7 @@ def _derivative(
     stiffness: float,
     dy: np.ndarray,
 ) -> None:
-    """dy/dt under ``voltage`` and the present factors of the course."""
+    """Return dy/dt under ``voltage`` and the present factors of the course."""
     lam, rate = y[0], y[1]
     away = lam - body.rest
     for j in range(2, _BRANCH):
@@ -412,9 +412,10 @@ def _derivative(
 
 @jit
 def _fastest(body: _Body, h: Hidden, rate: float) -> float:
-    """How fast in 1/s drag and friction bring anything to rest at ``rate``: what limits a step.
+    """Return the fastest decay rate in 1/s of drag and friction at ``rate``; it limits the step.
 
-    Bristles begin to slip at a corner, so that a step may bend them by a quarter of their reach.
+    Slip of the bristles sets in at a corner, so a step bends them by a quarter of their reach at
+    most.
     """
     slope = h.drag + 2.0 * h.drag_quadratic * rate + 1.5 * h.drag_power * math.sqrt(rate)
     bending = 4.0 * rate / h.friction_reach if h.friction > 0.0 else 0.0
@@ -423,7 +424,7 @@ def _fastest(body: _Body, h: Hidden, rate: float) -> float:
 
 @jit
 def _sound(springs: np.ndarray, y: np.ndarray) -> bool:
-    """True while the film is whole: finite, not run away, no spring at its locking strain."""
+    """Return True while the film is intact: finite, not diverging, no spring locked."""
     if not (0.0 < y[0] < _STRETCH_MAX and math.isfinite(y[1])):
         return False
     for i in range(springs.shape[1]):
@@ -448,11 +449,11 @@ def follow(
     memory: np.ndarray,
     rows: np.ndarray,
 ) -> tuple[int, int]:
-    """Carry ``y`` and ``memory`` in place through ``voltage`` (N,) V on ``time`` (N,) s.
+    """Integrate ``y`` and ``memory`` in place under ``voltage`` (N,) V at ``time`` (N,) s.
 
     ``courses`` (4, N) hold from node to node. Fills ``rows`` (3, N): stretch, its rate in 1/s, the
     film's warming in K. Returns ``(status, reached)``: 0, or ``LOST`` with the node from which the
-    rows only repeat the last sound stretch.
+    rows repeat the last valid stretch.
     """
     n = y.shape[0]
     nodes = time.shape[0]
@@ -526,13 +527,13 @@ def follow(
 
 
 def rest_stretch(numbers: FilmNumbers) -> float:
-    """Stretch at which the equilibrium spring carries the load, by bisection.
+    """Return the stretch at which the equilibrium spring carries the load, by bisection.
 
-    Raises ``ValueError`` where none does.
+    Raises ``ValueError`` where there is none.
     """
     modulus, limit = numbers.moduli[0], numbers.limits[0]
     low, high = 1.0, 1.0
-    # the spring locks where (e - 1/e)^2 reaches J: short of that it carries anything
+    # the spring locks where (e - 1/e)^2 reaches J; below that its stress has no bound
     locked = 0.5 * (math.sqrt(limit) + math.sqrt(limit + 4.0))
     while high < min(locked, _STRETCH_MAX) and _gent(modulus, limit, high) < numbers.pull:
         low, high = high, min(1.01 * high, _STRETCH_MAX, locked * (1.0 - 1e-12))

@@ -1,4 +1,4 @@
-"""Compiled loops of the stages that have a state; they take numbers and arrays."""
+"""Compiled loops of the stages with a state; arguments are numbers and arrays."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ def polarise(
     slow: np.ndarray,
     effective: np.ndarray,
 ) -> None:
-    """Voltage (N,) V whose square is voltage times polarisation, held from node to node.
+    """Return the voltage (N,) V, held between nodes, whose square is voltage times polarisation.
 
-    ``slow`` (m,) V are the relaxing parts, with ``shares`` (m,) of the polarisation and relaxation
-    ``times`` (m,) s, carried in place up to the last node. Each is averaged over its interval.
+    ``slow`` (m,) V are the relaxing parts, updated in place up to the last node. They have
+    ``shares`` (m,) of the polarisation and relaxation ``times`` (m,) s. Each is averaged over its
+    interval.
     """
     nodes = time.shape[0]
     share = 0.0
@@ -49,9 +50,9 @@ def polarise(
 def limit_slew(
     time: np.ndarray, voltage: np.ndarray, slew: float, output: float, effective: np.ndarray
 ) -> float:
-    """Follow ``voltage`` (N,) V at no more than ``slew`` V/s from ``output``, which is returned.
+    """Follow ``voltage`` (N,) V at ``slew`` V/s at most from ``output``; returns the new output.
 
-    ``effective`` (N,) V is the root mean square of the straight course in each interval.
+    Fills ``effective`` (N,) V with the root mean square of the straight line in each interval.
     """
     nodes = time.shape[0]
     for k in range(nodes - 1):
@@ -75,8 +76,8 @@ def lag_voltage(
 ) -> None:
     """Follow ``voltage`` (N,) V, held, by y'' + 2 d w y' + w^2 (y - v) = 0 with d below 1.
 
-    ``state`` (2,) is y V and y' V/s, carried in place; ``effective`` (N,) V the mean of y at both
-    ends of each interval.
+    ``state`` (2,) is y V and y' V/s, updated in place. Fills ``effective`` (N,) V with the mean of
+    y at both ends of each interval.
     """
     nodes = time.shape[0]
     sigma = damping * frequency
@@ -97,7 +98,7 @@ def lag_voltage(
 def low_pass(time: np.ndarray, rows: np.ndarray, tau: float, state: np.ndarray) -> None:
     """Pass ``rows`` (2, N), position and velocity, through two equal lags of ``tau`` s, in place.
 
-    The input runs straight between nodes. ``state`` (2,) m holds both lags, carried in place.
+    The input is linear between nodes. ``state`` (2,) m holds both lags, updated in place.
     """
     first, second = state[0], state[1]
     before = rows[0, 0]
@@ -121,9 +122,9 @@ def low_pass(time: np.ndarray, rows: np.ndarray, tau: float, state: np.ndarray) 
 def moving_average(
     time: np.ndarray, rows: np.ndarray, first: int, window: float, out: np.ndarray
 ) -> None:
-    """Mean of the cubic through ``rows`` (2, N) over the last ``window`` s at nodes from ``first``.
+    """Average the cubic through ``rows`` (2, N) over the last ``window`` s, from node ``first`` on.
 
-    Before node 0 the film stood still where it was there. Fills ``out`` (2, N - first).
+    Before node 0 the film rests at its position there. Fills ``out`` (2, N - first).
     """
     j = 0
     for k in range(first, time.shape[0]):
@@ -164,10 +165,10 @@ def sway(
     state: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Displacement of w'' + 2 d f w' + f^2 w = -g x'' for the motion ``rows`` (2, N) of x.
+    """Solve w'' + 2 d f w' + f^2 w = -g x'' for the motion ``rows`` (2, N) of x.
 
-    In W = w + g x no acceleration is needed. ``state`` (2,) is W and W', carried in place;
-    ``out`` (2, N) is w and w'. One Runge-Kutta step of fourth order an interval.
+    With W = w + g x no acceleration is needed. ``state`` (2,) is W and W', updated in place. Fills
+    ``out`` (2, N) with w and w'. Takes one fourth-order Runge-Kutta step an interval.
     """
     slopes = np.empty((4, 2))
     for k in range(time.shape[0]):

@@ -1,4 +1,4 @@
-"""A film with hidden effects, in the place where the rig expects its film."""
+"""Plant with hidden effects, for the simulated rig."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ __all__ = ["TruthPlant"]
 
 @dataclass(frozen=True)
 class TruthPlant:
-    """The film of ``numbers`` with its present state, and what stands before and after it.
+    """Film of ``numbers`` with its present state and the stages before and after it.
 
-    ``plain`` are the numbers without what ``effects`` change in them.
+    ``plain`` are the numbers without the changes of ``effects``.
     """
 
     plain: FilmNumbers
@@ -43,7 +43,7 @@ class TruthPlant:
 
     @classmethod
     def at_rest(cls, plain: FilmNumbers, effects: Sequence[TruthEffect] = ()) -> TruthPlant:
-        """The film of ``plain`` numbers relaxed under its load, with ``effects`` in it.
+        """Return the film of ``plain`` numbers, relaxed under its load, with ``effects``.
 
         Raises ``ValueError`` where it has no rest state.
         """
@@ -68,13 +68,13 @@ class TruthPlant:
 
     @property
     def capacitance(self) -> float:
-        """Present capacitance in F: the area grows by lam, the thickness falls by it."""
+        """Return the capacitance in F: the area grows by lam, the thickness falls by lam."""
         return self.numbers.capacitance * float(self.state.y[0]) ** 2
 
     def advance(
         self, time: np.ndarray, voltage: np.ndarray, hold: bool
     ) -> tuple[Motion, TruthPlant]:
-        """See ``sim_backend.plant.Plant.advance``. A film that has failed stays where it was."""
+        """Follow a voltage; see ``Plant.advance``. A failed film keeps its last position."""
         carries = list(self.carries)
         voltage = voltage.copy()
         for i, stage in enumerate(self.on_voltage):

@@ -100,7 +100,7 @@ def test_what_is_no_fault_is_named(item):
 
 @pytest.mark.parametrize("kind", ["film-rupture", "amplifier-trip"])
 def test_what_does_not_heal_has_no_duration(kind):
-    with pytest.raises(ValueError, match=f"fault {kind} lasts for good"):
+    with pytest.raises(ValueError, match=f"fault {kind} is permanent"):
         FaultPlan.parse([f"{kind}@1+2"])
 
 

@@ -1,8 +1,8 @@
-"""The amplifier does not put out what its monitor says.
+"""Amplifier whose output differs from its monitor.
 
-``offset``: so many volts more or less, of its output stage. ``saturation``: the algebraic sigmoid
+``offset``: a constant voltage, from the output stage. ``saturation``: the algebraic sigmoid
 v/(1 + (v/v_s)^n)^(1/n). ``slew``: a straight line where the command is faster. ``second_order``:
-y'' + 2 d w y' + w^2 (y - v) = 0, a loop that is slow because its supply is weak.
+y'' + 2 d w y' + w^2 (y - v) = 0, a control loop that is slow because its supply is weak.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["offset", "saturation", "second_order", "slew"]
 _OFFSET = (12.0, 500.0)  # V
 _LOST = (0.005, 0.15)  # share lost at 8 kV
 _LOBE = 25e3  # V/s, fastest rise of 8 kV at 1 Hz
-_SHORT = (0.09, 0.62)  # of that
+_SHORT = (0.09, 0.62)  # slew limit, as a share of that
 _DELAY = (3.5e-3, 120e-3)  # s behind a steady rise
 
 
@@ -30,17 +30,17 @@ def _stage(stage: Stage, words: str) -> TruthEffect:
 
 
 def offset(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A constant voltage more or less."""
+    """Draw a constant offset of the output."""
     volts = either_sign(generator) * log_uniform(generator, *_OFFSET)
 
     def stage(time: np.ndarray, v: np.ndarray, carry: object) -> tuple[np.ndarray, object]:  # noqa: ARG001
         return v + volts, carry
 
-    return _stage(stage, f"the output stands {volts:.3g} V off")
+    return _stage(stage, f"the output has an offset of {volts:.3g} V")
 
 
 def saturation(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """An output that falls behind at high voltage."""
+    """Draw an output that saturates at high voltage."""
     lost = log_uniform(generator, *_LOST)
     exponent = generator.uniform(2.5, 8.0)
     at = 8000.0 / ((1.0 - lost) ** -exponent - 1.0) ** (1.0 / exponent)
@@ -52,7 +52,7 @@ def saturation(generator: np.random.Generator, load: Load) -> TruthEffect:  # no
 
 
 def slew(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """An output that cannot rise as fast as it should."""
+    """Draw an output with a limited slew rate."""
     fastest = _LOBE * (1.0 - log_uniform(generator, *_SHORT))
 
     def stage(time: np.ndarray, v: np.ndarray, carry: object) -> tuple[np.ndarray, object]:
@@ -64,7 +64,7 @@ def slew(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: AR
 
 
 def second_order(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """An output that follows late and swings over a little."""
+    """Draw an output that lags and overshoots slightly."""
     delay = log_uniform(generator, *_DELAY)
     damping = generator.uniform(0.5, 0.95)
     frequency = 2.0 * damping / delay

@@ -1,7 +1,7 @@
-"""The film goes on creeping for minutes: more Maxwell branches than a fit will have, all slow.
+"""Creep of the film for minutes: slow Maxwell branches, more than a fit has.
 
 ``fractional``: a springpot, relaxation modulus G t^-a (Koeller, J. Appl. Mech. 51, 1984) between
-two times: branches at times spaced evenly in the logarithm, moduli in proportion to T^-a.
+two times: branches with logarithmically spaced times and moduli in proportion to T^-a.
 ``broad``: a flat spectrum between two times, which creeps with the logarithm of time.
 """
 
@@ -46,7 +46,7 @@ def _creeping(shares: np.ndarray, times: np.ndarray, words: str) -> TruthEffect:
 
 
 def fractional(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A power law of time."""
+    """Draw creep by a power law of time."""
     exponent = generator.uniform(0.1, 0.35)
     times = log_uniform(generator, 1.5, 4.0) * np.geomspace(1.0, 150.0, _BRANCHES)
     shares = times**-exponent
@@ -55,7 +55,7 @@ def fractional(generator: np.random.Generator, load: Load) -> TruthEffect:  # no
 
 
 def broad(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """The logarithm of time."""
+    """Draw creep by the logarithm of time."""
     times = log_uniform(generator, 1.0, 3.0) * np.geomspace(1.0, 300.0, _BRANCHES)
     shares = np.full(_BRANCHES, log_uniform(generator, *_BROAD) / _BRANCHES)
     return _creeping(shares, times, "by the logarithm of time")

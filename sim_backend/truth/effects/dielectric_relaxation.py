@@ -1,7 +1,7 @@
-"""Part of the polarisation follows the field late, so the pull rises after the voltage.
+"""Dielectric relaxation: part of the polarisation lags behind the field, and so does the stress.
 
-The pull goes with the voltage times the polarisation, in which each part w obeys
-w' = (v - w)/T; parts add up to the permittivity written in the film's data, which is that of rest.
+The Maxwell stress is proportional to voltage times polarisation, in which each part w obeys
+w' = (v - w)/T. The parts add up to the static permittivity, which is that of the film's data.
 ``three_terms``: three Debye terms drawn one by one. ``cole_cole``: the broad spectrum of Cole and
 Cole, J. Chem. Phys. 9 (1941), in eight terms.
 """
@@ -40,7 +40,7 @@ def _relaxing(shares: np.ndarray, times: np.ndarray, words: str) -> TruthEffect:
 
 
 def three_terms(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Three Debye terms a decade or so apart."""
+    """Draw three Debye terms about a decade apart."""
     times = np.array([0.02, 0.2, 2.0]) * np.exp(generator.uniform(-0.8, 0.8, 3))
     shares = log_uniform(generator, _LEAST, _MOST) * generator.dirichlet((3.0, 3.0, 3.0))
     late = ", ".join(f"{time:.2g}" for time in times)
@@ -48,7 +48,7 @@ def three_terms(generator: np.random.Generator, load: Load) -> TruthEffect:  # n
 
 
 def cole_cole(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A broad spectrum about one time."""
+    """Draw a broad spectrum about one time."""
     share = log_uniform(generator, _LEAST, _MOST)
     centre = log_uniform(generator, 0.05, 0.8)
     alpha = generator.uniform(0.25, 0.55)

@@ -1,8 +1,8 @@
-"""The load moves through air, oil or a greased guide, which resist the faster it goes.
+"""Drag on the load from air, oil or a greased guide; it grows with the speed.
 
-``mixed``: c v + d |v| v, a viscous guide and the wake of a paddle, with d such that both are equal
-at a drawn speed. ``air_film``: k |v|^1.5 sign(v), between the two, as of a boundary layer (Blasius:
-skin friction of a plate goes with v^1.5).
+``mixed``: c v + d |v| v, a viscous guide and the wake of a paddle, with d such that both terms are
+equal at a drawn speed. ``air_film``: k |v|^1.5 sign(v), between the two, as for a boundary layer
+(Blasius: skin friction of a plate is proportional to v^1.5).
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from dearig.sim_backend.truth.sampling import log_uniform
 
 __all__ = ["air_film", "mixed"]
 
-_SPEED = 0.003  # m/s, of a lobe: where the sizes are compared
+_SPEED = 0.003  # m/s, typical of a lobe; sizes are compared at this speed
 _LEAST, _MOST = 0.8, 18.0  # N s/m at that speed
 
 
 def mixed(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A linear and a quadratic drag together."""
+    """Draw a linear and a quadratic drag together."""
     size = log_uniform(generator, _LEAST, _MOST)
     equal_at = log_uniform(generator, 0.002, 0.02)
     linear = size / (1.0 + _SPEED / equal_at)
@@ -45,7 +45,7 @@ def mixed(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: A
 
 
 def air_film(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A drag with the speed to the power of 1.5."""
+    """Draw a drag in proportion to the speed to the power of 1.5."""
     factor = log_uniform(generator, _LEAST, _MOST) / _SPEED**0.5
 
     def on_film(numbers: FilmNumbers) -> FilmNumbers:

@@ -1,8 +1,8 @@
-"""The reading wanders although the film does not.
+"""Sensor drift: the reading changes although the film does not move.
 
 ``root``: A (sqrt(1 + t/t_0) - 1) over its value after 25 s, a sensor head that settles.
-``wander``: five slow cosines with phases of their own, as of a bench that follows the building: it
-takes another way in each run, which nothing that was recorded before can tell.
+``wander``: five slow cosines with random phases, as of an optical bench that moves with the
+building. It differs in each run and cannot be predicted from earlier records.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _SLOWEST, _FASTEST = 0.01, 0.06  # Hz
 
 
 def root(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A drift that slows down."""
+    """Draw a drift that slows down."""
     size = either_sign(generator) * log_uniform(generator, *_ROOT)
     time = log_uniform(generator, 0.5, 8.0)
     scale = size / (math.sqrt(1.0 + 25.0 / time) - 1.0)
@@ -46,7 +46,7 @@ def root(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: AR
 
 
 def wander(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A smooth random walk, another one in each run."""
+    """Draw a smooth random drift, a different one in each run."""
     return _walk(log_uniform(generator, *_WANDER), generator)
 
 

@@ -1,9 +1,9 @@
-"""Carbon electrodes take time to charge the film through their own resistance.
+"""Resistance of the carbon electrodes, through which the film charges with a delay.
 
-``ladder``: the electrode as a line of two sections, each of half the film's present capacitance
-C = C0 lam^2; the sections lie side by side, so the mean of their squared voltages pulls.
-``percolating``: one section whose resistance grows as exp(g (lam - lam_rest)), as that of carbon
-particles which lose contact.
+``ladder``: the electrode as a line of two sections, each with half the film's present capacitance
+C = C0 lam^2. The sections lie side by side, so the Maxwell stress is that of the mean of their
+squared voltages. ``percolating``: one section whose resistance grows as exp(g (lam - lam_rest)),
+like that of carbon particles that lose contact.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _GAUGE = (8.0, 30.0)
 
 
 def ladder(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A line of two sections."""
+    """Draw a line of two sections."""
     whole = log_uniform(generator, *_LADDER)
     ratio = log_uniform(generator, *_RATIO)
     first, second = whole / (1.0 + ratio), whole * ratio / (1.0 + ratio)
@@ -46,7 +46,7 @@ def ladder(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: 
 
 
 def percolating(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """One section that loses contact as it is stretched."""
+    """Draw one section whose resistance grows with stretch."""
     resistance = log_uniform(generator, *_PERCOLATING)
     gauge = log_uniform(generator, *_GAUGE)
 

@@ -1,6 +1,7 @@
-"""The load touches something beyond some travel: in no family.
+"""End stop: the load touches something beyond some travel. In no family.
 
-A soft contact of Hunt and Crossley, J. Appl. Mech. 42 (1975): k d^1.5 (1 + c d'), never pulling.
+A soft contact of Hunt and Crossley, J. Appl. Mech. 42 (1975): k d^1.5 (1 + c d'), in compression
+only.
 """
 
 from __future__ import annotations
@@ -23,13 +24,13 @@ _DAMPING = 20.0  # s/m
 
 
 def end_stop(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """An elastic stop within the film's stroke."""
+    """Draw an elastic stop within the film's stroke."""
     travel = generator.uniform(*_TRAVEL)
     force = log_uniform(generator, *_FORCE)
 
     def on_film(numbers: FilmNumbers) -> FilmNumbers:
         stiffness = force / numbers.section / (_DEPTH / numbers.length) ** 1.5
-        # the stop's own slope at 1.5 mm of depth
+        # slope of the stop at a depth of 1.5 mm
         slope = 1.5 * stiffness * math.sqrt(1.5e-3 / numbers.length)
         return numbers.stepping(0.5 / math.sqrt(slope / numbers.inertia)).hiding(
             stop_travel=travel / numbers.length,

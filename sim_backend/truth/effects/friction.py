@@ -1,12 +1,12 @@
-"""The load rubs against its guide: bristles bend before they slip, and slip easier when fast.
+"""Friction of the load in its guide: bristles bend before they slip, with a Stribeck curve.
 
 ``lugre``: Canudas de Wit, Olsson, Astrom and Lischinsky, IEEE Trans. Autom. Control 40 (1995):
 x' = v - |v| x / x_s(v), force s0 x + s1 x', with x_s = (Fc + (Fs - Fc) exp(-(v/vs)^2))/s0 after
 Stribeck. ``elasto_plastic``: Dupont, Hayward, Armstrong and Altpeter, same Trans. 47 (2002): up to
-a share of x_s the bristles only bend, so the load does not creep under a swinging force.
-``tustin``: as the first, but easing as exp(-|v|/vs) does (Tustin, J. IEE 94 (1947)), with a corner
-at rest. ``oiled``: as the first, but easing as 1/(1 + (v/vs)^2) does, of a contact in oil (Hess and
-Soom, J. Tribology 112 (1990)): some of it is left at any speed.
+a share of x_s the bristles only bend, so the load does not creep under an oscillating force.
+``tustin``: as the first, but weakening with speed as exp(-|v|/vs) (Tustin, J. IEE 94 (1947)), with
+a corner at rest. ``oiled``: as the first, but weakening as 1/(1 + (v/vs)^2), for a contact in oil
+(Hess and Soom, J. Tribology 112 (1990)), so that some of it remains at any speed.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _LEAST, _MOST = 0.4e-3, 18e-3  # N
 _REACH = (4e-6, 30e-6)  # m
 _RATIO = (1.05, 1.6)  # static over Coulomb
 _STRIBECK = (0.5e-3, 5e-3)  # m/s
-_DAMPING = 0.3  # of critical, on the film's own mass
+_DAMPING = 0.3  # of the critical damping of the film's mass
 
 
 def _friction(
@@ -63,21 +63,21 @@ def _friction(
 
 
 def lugre(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Bristles that slip a little at once."""
+    """Draw bristles that slip from the first deflection on."""
     return _friction(generator, 0.0, "friction (LuGre)")
 
 
 def elasto_plastic(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Bristles that only bend at first."""
+    """Draw bristles that are elastic up to a share of the slip deflection."""
     share = generator.uniform(0.4, 0.8)
     return _friction(generator, share, f"friction (elastic up to {share:.2f} of slip)")
 
 
 def tustin(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Bristles that slip a little at once, and slip easier at any speed."""
+    """Draw LuGre bristles whose friction falls with exp(-|v|/vs)."""
     return _friction(generator, 0.0, "friction (Tustin)", easing=1.0)
 
 
 def oiled(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Bristles that slip a little at once, and lose what eases late."""
+    """Draw LuGre bristles whose friction falls with 1/(1 + (v/vs)^2)."""
     return _friction(generator, 0.0, "friction (Hess and Soom)", easing=0.0)

@@ -1,6 +1,6 @@
-"""The mains are in the reading, with their third harmonic.
+"""Mains interference in the reading, with its third harmonic.
 
-A (sin(w t + a) + r sin(3 w t + b)); the mains run a little off 50 or 60 Hz, as mains do.
+A (sin(w t + a) + r sin(3 w t + b)), at a frequency near 50 or 60 Hz, as that of real mains.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _LEAST, _MOST = 3.5e-6, 60e-6  # m
 
 
 def mains(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Mains hum of any phase."""
+    """Draw mains hum of any phase."""
     size = log_uniform(generator, _LEAST, _MOST)
     hertz = float(generator.choice((50.0, 60.0)) + generator.uniform(-0.05, 0.05))
     third = generator.uniform(0.05, 0.5)

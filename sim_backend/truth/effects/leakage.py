@@ -1,12 +1,12 @@
-"""The film conducts, and what it takes is lost over the resistor in series with it.
+"""Leakage: the film conducts, and the resistor in series with it takes part of the voltage.
 
-``poole_frenkel``: I = G v exp(b sqrt(v lam)), traps emptied by the field (Frenkel, Phys. Rev. 54,
+``poole_frenkel``: I = G v exp(b sqrt(v lam)), emission from traps (Frenkel, Phys. Rev. 54,
 1938). ``hopping``: I = G/k sinh(k v), hops over equal barriers (Mott and Gurney). The field in the
-stretched film is v lam/Z, hence lam. ``space_charge``: I = G v^2 lam^4/V_0, limited by the charge
-that is in the film (Mott and Gurney's law, by the square of the voltage, the inverse cube of the
-thickness and the area). ``tunnelling``: I = G v^2/B exp(-B/(v lam)), through barriers that a field
-makes thinner (Fowler and Nordheim, Proc. R. Soc. A 119, 1928). The film charges through the series
-resistor in far less than a sample: that is left out.
+stretched film is v lam/Z, hence lam. ``space_charge``: I = G v^2 lam^4/V_0, limited by the space
+charge in the film (Mott and Gurney's law: square of the voltage, inverse cube of the thickness,
+and area). ``tunnelling``: I = G v^2/B exp(-B/(v lam)), through barriers that the field makes
+thinner (Fowler and Nordheim, Proc. R. Soc. A 119, 1928). The charging of the film through the
+series resistor is neglected: it takes far less than a sample.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ __all__ = ["hopping", "poole_frenkel", "space_charge", "tunnelling"]
 _SERIES = (1e6, 3e6)  # ohm
 _LEAST, _MOST = 25.0, 500.0  # V lost at 8 kV
 _AT = 8000.0  # V
-_STRETCH = 1.2  # about that of the thesis's film: where the sizes are compared
+_STRETCH = 1.2  # about that of the thesis's film; sizes are compared at this stretch
 
 
 def poole_frenkel(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Conduction by traps."""
+    """Draw Poole-Frenkel conduction."""
     series, current = _drawn(generator)
     exponent = generator.uniform(1.5, 4.5)
     return _leak(
@@ -42,7 +42,7 @@ def poole_frenkel(generator: np.random.Generator, load: Load) -> TruthEffect:  #
 
 
 def hopping(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Conduction by hops."""
+    """Draw hopping conduction."""
     series, current = _drawn(generator)
     exponent = generator.uniform(1.0, 4.0)
     return _leak(
@@ -55,7 +55,7 @@ def hopping(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa:
 
 
 def space_charge(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Conduction that is limited by the charge on its way."""
+    """Draw conduction limited by space charge."""
     series, current = _drawn(generator)
     return _leak(
         "space charge, by the square",
@@ -67,7 +67,7 @@ def space_charge(generator: np.random.Generator, load: Load) -> TruthEffect:  # 
 
 
 def tunnelling(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Conduction through barriers."""
+    """Draw conduction by tunnelling."""
     series, current = _drawn(generator)
     exponent = generator.uniform(1.0, 5.0)
     barrier = exponent * _AT * _STRETCH
@@ -81,7 +81,7 @@ def tunnelling(generator: np.random.Generator, load: Load) -> TruthEffect:  # no
 
 
 def _drawn(generator: np.random.Generator) -> tuple[float, float]:
-    """The resistance in series in ohm, and the current at 8 kV in A."""
+    """Return a drawn series resistance in ohm, and the current at 8 kV in A."""
     series = log_uniform(generator, *_SERIES)
     return series, log_uniform(generator, _LEAST, _MOST) / series
 

@@ -1,4 +1,4 @@
-"""The hung mass has to be moved too, with the fixture that it hangs on."""
+"""Inertia of the load: the hung mass and its fixture move with the film."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from dearig.sim_backend.truth.sampling import log_uniform
 
 __all__ = ["hung", "moving"]
 
-# of the hung mass: what moves may be less (a guided load, a counterweight) or more (clamp, target)
+# of the hung mass; the moving mass is smaller with a guide or counterweight, larger with a clamp
 _LEAST, _MOST = 0.6, 1.2
 
 
 def moving(mass: float) -> TruthEffect:
-    """``mass`` in kg moves with the film's lower edge: m L1 lam'' over the section L2 Z."""
+    """Return the effect of ``mass`` kg at the film's lower edge: stress m L1 lam''/(L2 Z)."""
 
     def on_film(numbers: FilmNumbers) -> FilmNumbers:
         return replace(numbers, inertia=numbers.inertia + mass * numbers.length / numbers.section)
@@ -32,5 +32,5 @@ def moving(mass: float) -> TruthEffect:
 
 
 def hung(generator: np.random.Generator, load: Load) -> TruthEffect:
-    """A moving mass near the hung one."""
+    """Draw a moving mass near the hung one."""
     return moving(load.mass * log_uniform(generator, _LEAST, _MOST))

@@ -1,7 +1,7 @@
-"""The lead touches the electrode only when the voltage is high enough: in no family.
+"""Loose contact: the lead touches the electrode only at high voltage. In no family.
 
-The contact closes above one voltage, opens below another; open, it passes nothing and the film
-discharges at once. Between the two it stays as it was.
+The contact closes above one voltage and opens below another; between the two it keeps its state.
+While it is open, no voltage reaches the film, which discharges at once.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _OPENS = (0.3, 0.9)  # of that
 
 
 def loose_contact(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A contact that arcs over."""
+    """Draw a contact with two threshold voltages."""
     closes = log_uniform(generator, *_CLOSES)
     opens = closes * generator.uniform(*_OPENS)
 
@@ -30,10 +30,10 @@ def loose_contact(generator: np.random.Generator, load: Load) -> TruthEffect:  #
     ) -> tuple[np.ndarray, object]:
         size = np.abs(voltage)
         decided = (size >= closes) | (size < opens)
-        # each node as the last decided one before it; the contact before node 0 comes first
+        # each node takes the state of the last one that was decided, from the carried state on
         last = np.maximum.accumulate(np.where(decided, np.arange(1, size.size + 1), 0))
         closed = np.append(bool(carry), size >= closes)[last]
-        # the last node's voltage is not there yet: the state is that of the interval before it
+        # the last node's voltage is not valid yet: take the state of the interval before it
         return np.where(closed, voltage, 0.0), bool(closed[-2] if closed.size > 1 else carry)
 
     return TruthEffect(

@@ -1,9 +1,9 @@
-"""The permittivity is not a constant: it changes with strain or with field.
+"""Permittivity that depends on strain or on the field.
 
-The value in the film's data is that of the film as it hangs, without voltage.
-``with_strain``: 1 + a u/sqrt(1 + u^2), u = (lam - lam_rest)/s: chains turn until they are aligned.
-``with_field``: 1/(1 + (E/E_0)^2): dipoles saturate (as Johnson's law does to second order, J. Appl.
-Phys. 33, 1962).
+The value in the film's data is that of the film at its loaded rest state, without voltage.
+``with_strain``: 1 + a u/sqrt(1 + u^2), u = (lam - lam_rest)/s: chains rotate until they are
+aligned. ``with_field``: 1/(1 + (E/E_0)^2): dipoles saturate (as in Johnson's law to second order,
+J. Appl. Phys. 33, 1962).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _FIELD = (0.006, 0.25)  # (E/E_0)^2 at 8 kV over the film at a stretch of 1.2
 
 
 def with_strain(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A change that saturates with strain."""
+    """Draw a change that saturates with strain."""
     reach = log_uniform(generator, *_REACH)
     change = either_sign(generator) * log_uniform(generator, *_STRAIN)
 
@@ -46,7 +46,7 @@ def with_strain(generator: np.random.Generator, load: Load) -> TruthEffect:  # n
 
 
 def with_field(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A permittivity that falls with the field."""
+    """Draw a permittivity that falls with the field."""
     size = log_uniform(generator, *_FIELD)
     per_square = size / (8000.0 * 1.2) ** 2
 

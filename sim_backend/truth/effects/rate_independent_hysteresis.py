@@ -1,9 +1,9 @@
-"""Filler clusters in the film stick and slide: a loop that does not shrink when it is run slowly.
+"""Rate-independent hysteresis: filler clusters slide, and slow cycles keep the loop's width.
 
 ``bouc_wen``: stress K b with b' = lam'/a (1 - |b|^n (1 - s + s sign(lam' b))) (Wen, J. Eng. Mech.
-Div. ASCE 102, 1976), n off 1. ``iwan``: many stops in parallel whose reaches follow a power law
-(Iwan, J. Appl. Mech. 33, 1966; density as in Segalman, J. Appl. Mech. 72, 2005), so that the loss
-in a small loop goes with a power of its width.
+Div. ASCE 102, 1976), n different from 1. ``iwan``: many stops in parallel whose reaches follow a
+power law (Iwan, J. Appl. Mech. 33, 1966; density as in Segalman, J. Appl. Mech. 72, 2005), so that
+the loss in a small loop is a power of its width.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from dearig.sim_backend.truth.sampling import log_uniform
 
 __all__ = ["bouc_wen", "iwan"]
 
-_LEAST, _MOST = 5.0, 350.0  # Pa, nominal, fully slid
+_LEAST, _MOST = 5.0, 350.0  # Pa, nominal stress after full sliding
 _REACH = (30e-6, 400e-6)  # m
 _ELEMENTS = 12
 
 
 def bouc_wen(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A smooth loop of Bouc and Wen."""
+    """Draw a smooth loop of Bouc and Wen."""
     stress = log_uniform(generator, _LEAST, _MOST)
     reach = log_uniform(generator, *_REACH)
     exponent = generator.uniform(1.3, 3.0)
@@ -51,7 +51,7 @@ def bouc_wen(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa
 
 
 def iwan(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Twelve stops whose reaches follow a power law."""
+    """Draw twelve stops whose reaches follow a power law."""
     stress = log_uniform(generator, _LEAST, _MOST)
     longest = log_uniform(generator, 4.0 * _REACH[0], 3.0 * _REACH[1])
     power = generator.uniform(-0.7, 0.3)

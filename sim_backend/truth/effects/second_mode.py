@@ -1,8 +1,8 @@
-"""Something else swings along, weakly damped: in no family.
+"""Second mode: another weakly damped oscillator. In no family.
 
-``hanger``: part of the load hangs on a spring of its own, u'' + 2 d w u' + w^2 u = -x'', and pulls
-at the film with m (w^2 u + 2 d w u'). ``frame``: the sensor's stand is shaken by the load, answers
-with the same equation times a coupling, and its own displacement is in the reading.
+``hanger``: part of the load hangs on its own spring, u'' + 2 d w u' + w^2 u = -x'', and pulls on
+the film with m (w^2 u + 2 d w u'). ``frame``: the load shakes the sensor's stand, which follows the
+same equation times a coupling; its displacement adds to the reading.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _COUPLING = (0.4, 2.0)  # times the square of the frequency in 5 Hz
 
 
 def hanger(generator: np.random.Generator, load: Load) -> TruthEffect:
-    """A mass on a spring below the film."""
+    """Draw a mass on a spring below the film."""
     hertz = log_uniform(generator, *_HANGER_HERTZ)
     damping = log_uniform(generator, *_HANGER_DAMPING)
     mass = load.mass * log_uniform(generator, *_MASS)
@@ -52,7 +52,7 @@ def hanger(generator: np.random.Generator, load: Load) -> TruthEffect:
 
 
 def frame(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A stand that is shaken."""
+    """Draw a stand that the load shakes."""
     hertz = log_uniform(generator, *_FRAME_HERTZ)
     damping = log_uniform(generator, *_FRAME_DAMPING)
     coupling = log_uniform(generator, *_COUPLING) * (hertz / 5.0) ** 2

@@ -1,7 +1,7 @@
-"""The controller filters more than the rig file says.
+"""Sensor lag: the controller filters more than the rig file states.
 
 ``moving_average``: the mean of the position over a window. ``low_pass``: two equal first-order lags
-in a row, the controller's low-pass filter.
+in series, the controller's low-pass filter.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _LEAST, _MOST = 3.5e-3, 120e-3  # s, mean age of a reading
 
 
 def moving_average(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A window of equal weights."""
+    """Draw a window of equal weights."""
     window = 2.0 * log_uniform(generator, _LEAST, _MOST)
 
     def on_motion(time: np.ndarray, rows: np.ndarray, carry: object) -> tuple[np.ndarray, object]:
@@ -32,7 +32,7 @@ def moving_average(generator: np.random.Generator, load: Load) -> TruthEffect:  
         times = np.concatenate((past, time[1:]))
         motion = np.concatenate((seen, rows[:, 1:]), axis=1)
         loops.moving_average(times, motion, past.size - 1, window, rows)
-        # the next call looks back by the window from this call's last node
+        # the next call needs the window before this call's last node
         keep = max(0, int(np.searchsorted(times, time[-1] - window, side="right")) - 1)
         return rows, (times[keep:].copy(), motion[:, keep:].copy())
 
@@ -45,7 +45,7 @@ def moving_average(generator: np.random.Generator, load: Load) -> TruthEffect:  
 
 
 def low_pass(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Two lags in a row."""
+    """Draw two lags in series."""
     tau = 0.5 * log_uniform(generator, _LEAST, _MOST)
 
     def on_motion(time: np.ndarray, rows: np.ndarray, carry: object) -> tuple[np.ndarray, object]:

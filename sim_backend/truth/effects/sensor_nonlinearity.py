@@ -1,8 +1,8 @@
-"""The reading is a curve over the true position, not a line.
+"""Sensor nonlinearity: the reading is a nonlinear function of the position.
 
-``cubic``: A (x/1 mm)^3, of a tilted target on a curved characteristic. ``ripple``: A (sin(2 pi x/p
-+ phase) - sin(phase)), a periodic error of the sensor's detector. ``soft_clip``: beyond x_0 travel
-y counts as y/(1 + y/s), a spot that leaves the detector.
+``cubic``: A (x/1 mm)^3, from a tilted target on a curved characteristic. ``ripple``: A (sin(2 pi
+x/p + phase) - sin(phase)), a periodic error of the sensor's detector. ``soft_clip``: a travel y
+beyond x_0 reads y/(1 + y/s), as the spot leaves the detector.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _Curve = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def _bent(curve: _Curve, words: str) -> TruthEffect:
-    """``curve`` (x) gives reading and slope."""
+    """Return the effect of ``curve``, which maps positions to readings and slopes."""
 
     def on_motion(t: np.ndarray, rows: np.ndarray, carry: object) -> tuple[np.ndarray, object]:  # noqa: ARG001
         reading, slope = curve(rows[0])
@@ -40,7 +40,7 @@ def _bent(curve: _Curve, words: str) -> TruthEffect:
 
 
 def cubic(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A cubic characteristic."""
+    """Draw a cubic characteristic."""
     size = either_sign(generator) * log_uniform(generator, *_CUBIC)
 
     def curve(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -51,7 +51,7 @@ def cubic(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: A
 
 
 def ripple(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A periodic error."""
+    """Draw a periodic error."""
     size = log_uniform(generator, *_RIPPLE)
     wave = 2.0 * math.pi / log_uniform(generator, *_PERIOD)
     phase = generator.uniform(0.0, 2.0 * math.pi)
@@ -68,10 +68,10 @@ def ripple(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: 
 
 
 def soft_clip(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A reading that falls behind beyond some travel."""
+    """Draw a reading that saturates beyond some travel."""
     lost = log_uniform(generator, *_CLIP)
     corner = log_uniform(generator, *_CORNER)
-    scale = 1e-3 * (1e-3 - lost) / lost  # so that 1 mm beyond the corner counts for 1 mm - lost
+    scale = 1e-3 * (1e-3 - lost) / lost  # so that 1 mm beyond the corner reads 1 mm - lost
 
     def curve(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         beyond = np.maximum(x - corner, 0.0)

@@ -1,8 +1,8 @@
-"""The film gets softer by being used; the equilibrium spring loses a share of its modulus.
+"""Softening with use: the equilibrium spring loses a share of its modulus.
 
-``first_loading``: a damage d = a q/(1 + q), q = (reach of the largest stretch so far / s)^p, which
-does not heal (the idea is Mullins's, the algebraic law its own). ``ageing``: d = a ln(1 + path/s)
-over the path travelled, as of fatigue that slows down.
+``first_loading``: a permanent damage d = a q/(1 + q), q = (reach of the largest stretch so far /
+s)^p (the Mullins effect, with an algebraic law of our own). ``ageing``: d = a ln(1 + path/s) over
+the path travelled, as of fatigue that slows down.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from dearig.sim_backend.truth.sampling import log_uniform
 
 __all__ = ["ageing", "first_loading"]
 
-_FIRST = (0.00015, 0.006)  # share lost at a reach of s, doubled in the end
+_FIRST = (0.00015, 0.006)  # share lost at a reach of s; the limit is twice that
 _PATH = (0.00012, 0.008)  # share lost for each unit of the logarithm
 
 
 def first_loading(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Damage by the largest stretch so far."""
+    """Draw damage by the largest stretch so far."""
     lost = log_uniform(generator, *_FIRST)
     reach = log_uniform(generator, 0.4e-3, 1.5e-3)
     exponent = generator.uniform(1.0, 2.0)
@@ -43,7 +43,7 @@ def first_loading(generator: np.random.Generator, load: Load) -> TruthEffect:  #
 
 
 def ageing(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Damage by the path travelled."""
+    """Draw damage by the path travelled."""
     lost = log_uniform(generator, *_PATH)
     reach = log_uniform(generator, 1e-3, 8e-3)
 

@@ -1,8 +1,8 @@
-"""Something gives way at one moment: in no family.
+"""Sudden change at one moment. In no family.
 
-``load_slips``: part of the weight comes to rest on something, or slips onto the hook.
-``mount_slips``: the sensor jumps. ``electrode_tears``: part of the electrode is cut off and pulls
-no more. Each happens in every run at the same time after its start.
+``load_slips``: part of the weight comes to rest on a support, or slips onto the hook.
+``mount_slips``: the sensor jumps. ``electrode_tears``: part of the electrode is cut off and no
+longer contributes to the Maxwell stress. Each occurs in every run at the same time after the start.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def _step(row: int, moment: float, factor: float) -> Course:
 
 
 def load_slips(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A step in the load."""
+    """Draw a step in the load."""
     moment = generator.uniform(*_MOMENT)
     change = either_sign(generator) * log_uniform(generator, *_WEIGHT)
     return TruthEffect(
@@ -43,7 +43,7 @@ def load_slips(generator: np.random.Generator, load: Load) -> TruthEffect:  # no
 
 
 def electrode_tears(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A step in the Maxwell stress."""
+    """Draw a step in the Maxwell stress."""
     moment = generator.uniform(*_MOMENT)
     lost = log_uniform(generator, *_AREA)
     return TruthEffect(
@@ -55,7 +55,7 @@ def electrode_tears(generator: np.random.Generator, load: Load) -> TruthEffect: 
 
 
 def mount_slips(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """A step in the reading."""
+    """Draw a step in the reading."""
     moment = generator.uniform(*_MOMENT)
     jump = either_sign(generator) * log_uniform(generator, *_JUMP)
 

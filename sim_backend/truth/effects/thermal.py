@@ -1,9 +1,9 @@
-"""The film gets warmer, and all its moduli change with temperature.
+"""Warming of the film; all its moduli change with temperature.
 
-``self_heating``: losses that go with the square of the voltage warm the film, which warms frame and
-air about it: two bodies, two exponentials. Rubber elasticity stiffens by 1/T, a filled network
-softens: either sign. ``room``: a lamp or a heater in the room, a power law of time since start,
-A (1 - (1 + t/t_0)^-p). A thermometer near the film sees either.
+``self_heating``: losses in proportion to the square of the voltage warm the film, which warms frame
+and air around it: two bodies, two exponentials. Rubber elasticity stiffens by 1/T, a filled network
+softens, so either sign occurs. ``room``: a lamp or a heater in the room, a power law of the time
+since the start, A (1 - (1 + t/t_0)^-p). A thermometer near the film measures either.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ __all__ = ["room", "self_heating"]
 
 _PER_KELVIN = (-0.006, 0.0034)
 _HEAT = (0.02, 0.25)  # K/s under 5 kV
-_ROOM = (0.1, 3.5)  # K in the end
+_ROOM = (0.1, 3.5)  # K, final warming
 
 
 def _coefficient(generator: np.random.Generator) -> float:
-    """Relative change of moduli per K: a filled network's or an ideal rubber's, within a third."""
+    """Draw the change of moduli per K: of a filled network or ideal rubber, within a third."""
     return float(generator.choice(_PER_KELVIN) * generator.uniform(0.67, 1.0))
 
 
 def self_heating(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Warmed by its own losses."""
+    """Draw warming by the film's losses."""
     heat = log_uniform(generator, *_HEAT)
     time, time_2 = log_uniform(generator, 4.0, 15.0), log_uniform(generator, 40.0, 200.0)
     share = generator.uniform(0.05, 0.4)
@@ -55,7 +55,7 @@ def self_heating(generator: np.random.Generator, load: Load) -> TruthEffect:  # 
 
 
 def room(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
-    """Warmed from outside."""
+    """Draw warming from outside."""
     end = log_uniform(generator, *_ROOM)
     time, power = log_uniform(generator, 3.0, 15.0), generator.uniform(0.4, 1.2)
     coefficient = _coefficient(generator)
