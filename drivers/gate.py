@@ -1,7 +1,7 @@
-"""The one gate: no sample reaches a rig's output that has not passed here.
+"""Gate: every sample passes it before it reaches a rig's output.
 
-Drivers take a ``GatedWaveform`` and nothing else, and only ``admit`` can make one. Limits are
-errors raised by ordinary code, never ``assert``, which an optimising interpreter would drop.
+Drivers take only a ``GatedWaveform``, and only ``admit`` can make one. Ordinary code enforces the
+limits and raises errors. It never uses ``assert``, which an optimising interpreter removes.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from dearig.drivers.errors import RefusedWaveform, RigError
 __all__ = ["GatedWaveform", "Limits", "Margin", "Prediction", "admit", "ramp_down"]
 
 _KEY = object()
-_PIECE = 2**20  # samples judged at a time: a run of hours must not need its memory many times over
+_PIECE = 2**20  # samples checked at a time; bounds the temporary memory for a run of hours
 
 
 @dataclass(frozen=True)
 class Limits:
     """Limits of the film and the amplifier, in SI units.
 
-    ``voltage_min`` and ``voltage_max`` in V bound the voltage at the film (their signs are the
-    polarity that is allowed), ``slew`` in V/s its rate, ``field`` in V/m the true electric field,
-    ``energy`` in J what the amplifier charges into the film over all rises of a run, and
-    ``time_at_voltage`` in s how long it may stand at ``at_voltage`` V or more without a pause.
-    ``film`` names the film they are for; empty, they are for any.
+    ``voltage_min`` and ``voltage_max`` in V bound the voltage at the film; their signs give the
+    allowed polarity. ``slew`` in V/s bounds its rate and ``field`` in V/m the true electric field.
+    ``energy`` in J bounds the energy that the amplifier charges into the film over all rises of a
+    run, and ``time_at_voltage`` in s the time at ``at_voltage`` V or more without a pause. ``film``
+    names the film of these limits; an empty name stands for any film.
     """
 
     voltage_min: float
@@ -41,7 +41,7 @@ class Limits:
     film: str = ""
 
     def within(self, other: Limits) -> bool:
-        """True where nothing passes these limits that ``other`` would refuse."""
+        """Return True where ``other`` admits every waveform that these limits admit."""
         return (
             self.voltage_max <= other.voltage_max
             and self.voltage_min >= other.voltage_min
@@ -56,14 +56,14 @@ class Limits:
 
 @dataclass(frozen=True)
 class Prediction:
-    """Prediction of the film under a waveform of N samples; this layer has no model.
+    """Prediction of the film under a waveform of N samples, made by a layer above.
 
-    ``field_per_volt`` (M,) 1/m is the reciprocal of the film's thickness, so that the true field is
-    its product with the voltage: one number for each ``stride`` samples, M = ceil(N/stride), as a
-    film moves slowly against a fast clock. ``electric_volume`` in F m is its permittivity times
-    its volume, which stays, so that its capacitance is that times the square of
-    ``field_per_volt``. ``pull_in`` says in words that the film would collapse, and is empty where
-    it would not. ``film`` names the film that was asked for.
+    ``field_per_volt`` (M,) 1/m is the reciprocal of the film's thickness: the true field is its
+    product with the voltage. There is one number for each ``stride`` samples, M = ceil(N/stride),
+    since a film moves slowly compared with a fast clock. ``electric_volume`` in F m is permittivity
+    times volume, which is constant: the capacitance is its product with the square of
+    ``field_per_volt``. ``pull_in`` describes the film's collapse, and is empty without one.
+    ``film`` names the predicted film.
     """
 
     field_per_volt: np.ndarray
@@ -75,7 +75,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Margin:
-    """How close a waveform comes to one limit: ``reached`` and ``allowed`` in ``unit``."""
+    """Margin of a waveform to one limit: ``reached`` and ``allowed`` in ``unit``."""
 
     quantity: str
     reached: float
@@ -85,9 +85,9 @@ class Margin:
 
 @final
 class GatedWaveform:
-    """A voltage waveform that has passed the gate; neither changed nor copied afterwards.
+    """A voltage waveform that has passed the gate; it cannot be changed or copied.
 
-    ``voltage`` (N,) V at the film on an even clock of ``rate`` Hz, starting and ending at 0 V.
+    ``voltage`` (N,) V at the film is sampled evenly at ``rate`` Hz, and starts and ends at 0 V.
     """
 
     __slots__ = ("_limits", "_margins", "_rate", "_voltage")
@@ -106,8 +106,8 @@ class GatedWaveform:
         key: object,
     ) -> None:
         if key is not _KEY:
-            raise TypeError("a GatedWaveform comes from drivers.gate.admit and from nowhere else")
-        # an array over bytes: unlike one with its flag cleared, it cannot be made writeable again
+            raise TypeError("only drivers.gate.admit can make a GatedWaveform")
+        # an array over bytes cannot be made writeable again, unlike one with its flag cleared
         held = np.frombuffer(np.asarray(voltage, dtype=np.float64).tobytes())
         object.__setattr__(self, "_voltage", held)
         object.__setattr__(self, "_rate", rate)
@@ -115,33 +115,33 @@ class GatedWaveform:
         object.__setattr__(self, "_margins", margins)
 
     def __init_subclass__(cls, **kwargs: object) -> NoReturn:
-        raise TypeError("a GatedWaveform cannot be derived from: it would open the gate")
+        raise TypeError("a GatedWaveform cannot be derived from: that would bypass the gate")
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
-        raise AttributeError(f"a GatedWaveform is not changed after the gate ({name!r})")
+        raise AttributeError(f"a GatedWaveform cannot be changed after the gate ({name!r})")
 
     def __reduce_ex__(self, protocol: object) -> NoReturn:
-        # copying and unpickling build objects without passing __init__
-        raise TypeError("a GatedWaveform is not copied or pickled: admit the waveform again")
+        # copying and unpickling build objects without calling __init__
+        raise TypeError("a GatedWaveform cannot be copied or pickled: admit the waveform again")
 
     @property
     def voltage(self) -> np.ndarray:
-        """(N,) V, read-only."""
+        """Return the voltage (N,) V, read-only."""
         return self._voltage
 
     @property
     def rate(self) -> float:
-        """Sample rate in Hz."""
+        """Return the sample rate in Hz."""
         return self._rate
 
     @property
     def limits(self) -> Limits:
-        """The limits under which it passed."""
+        """Return the limits under which it passed."""
         return self._limits
 
     @property
     def margins(self) -> tuple[Margin, ...]:
-        """How close it comes to each limit."""
+        """Return the margin to each limit."""
         return self._margins
 
     def check_within(self, limits: Limits) -> None:
@@ -149,12 +149,12 @@ class GatedWaveform:
         if not self._limits.within(limits):
             raise RigError(
                 f"the waveform passed the gate under wider limits ({self._limits}) than this "
-                f"rig's ({limits}); admit it under the rig's own"
+                f"rig's ({limits}); admit it under this rig's limits"
             )
 
     @property
     def duration(self) -> float:
-        """s, from the first to the last sample."""
+        """Return the time in s from the first to the last sample."""
         return (self._voltage.size - 1) / self._rate
 
 
@@ -163,17 +163,17 @@ def admit(
 ) -> GatedWaveform:
     """Return the admitted waveform, or raise ``RefusedWaveform`` with a sentence per broken limit.
 
-    ``voltage`` is (N,) V at the film, ``rate`` Hz, ``prediction`` how the film will respond.
+    ``voltage`` is (N,) V at the film, ``rate`` is in Hz, ``prediction`` is the film's response.
 
-    Slew is judged sample to sample, as the converter steps; the steps from and to the 0 V before
-    and after the run are none, because the waveform must start and end at 0 V.
+    The slew rate is computed from sample to sample, as the converter steps. There are no further
+    steps before and after the run, because the waveform must start and end at 0 V.
     """
-    # a copy: what is judged is what goes out, whatever the caller does to its array meanwhile
+    # a copy: the checked samples are those that go out, even if the caller changes its array
     voltage = np.array(voltage, dtype=np.float64)
     field_per_volt = np.asarray(prediction.field_per_volt, dtype=np.float64)
     for name, limit in vars(limits).items():
         if isinstance(limit, float) and math.isnan(limit):
-            raise RefusedWaveform((f"the limit {name} is nan, and lets nothing pass",))
+            raise RefusedWaveform((f"the limit {name} is nan, which admits no waveform",))
     if not (math.isfinite(rate) and rate > 0.0):
         raise RefusedWaveform((f"the sample rate {rate!r} Hz is not a finite number above 0",))
     predicted = (-(-voltage.size // prediction.stride),) if prediction.stride >= 1 else (0,)
@@ -185,7 +185,7 @@ def admit(
             )
         )
     for values, step in ((voltage, 1), (field_per_volt, prediction.stride)):
-        if not np.isfinite(values.sum()):  # quick; a sum may overflow, and then we look closer
+        if not np.isfinite(values.sum()):  # fast; a sum may overflow, so check each value then
             at = int(np.argmin(np.isfinite(values))) * step
             if not np.isfinite(values[at // step]):
                 raise RefusedWaveform(
@@ -200,10 +200,10 @@ def admit(
             raise RefusedWaveform((f"{quantity} is predicted as {value:.4g} {unit}, not above 0",))
 
     reached = _Reached()
-    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is beyond every limit
+    with np.errstate(over="ignore", invalid="ignore"):  # an overflow exceeds every limit
         for first in range(0, voltage.size, _PIECE):
             last = min(first + _PIECE, voltage.size)
-            before = max(0, first - 1)  # the sample before the piece: its step and rise count
+            before = max(0, first - 1)  # include the step and the rise from the previous piece
             strides = np.arange(before, last) // prediction.stride
             reached.take(
                 voltage[before:last],
@@ -221,14 +221,14 @@ def admit(
         quantity: str, peak: tuple[float, int], allowed: float, unit: str, scale: float
     ) -> Margin:
         value, at = peak
-        # not (<=), so that what is not a number is refused
+        # not (<=), so that NaN is refused
         if not value <= allowed:
             where = f" at {at / rate:.4g} s" if at >= 0 else ""
             reasons.append(
                 f"{quantity} reaches {value * scale:.6g} {unit}{where}, "
                 f"{allowed * scale:.6g} {unit} is allowed"
             )
-        # + 0.0: a waveform that never goes negative reaches 0, not -0
+        # + 0.0: show 0 instead of -0 for a waveform without negative voltage
         return Margin(quantity, value * scale + 0.0, allowed * scale + 0.0, unit)
 
     standing = reached.longest / rate
@@ -259,13 +259,13 @@ def admit(
 
 
 class _Reached:
-    """The most of each quantity in the pieces taken so far, and the sample at which it was."""
+    """Maximum of each quantity in the pieces so far, with its sample."""
 
     def __init__(self) -> None:
         self.high = self.low = self.slew = self.field = (-math.inf, 0)
         self.energy = 0.0
         self.longest = 0  # samples in a row at voltage
-        self._standing = 0  # of them, up to the end of the last piece
+        self._standing = 0  # samples in a row at voltage at the end of the last piece
 
     def take(
         self,
@@ -277,11 +277,11 @@ class _Reached:
         limits: Limits,
         prediction: Prediction,
     ) -> None:
-        """The next piece from sample ``first``; the arrays (n,) begin at sample ``start``."""
+        """Include the piece from sample ``first``; the arrays (n,) begin at sample ``start``."""
         slew = np.abs(np.diff(voltage)) * rate
         charge = prediction.electric_volume * field_per_volt**2 * voltage
         rises = 0.5 * (voltage[1:] + voltage[:-1]) * np.diff(charge)
-        self.energy += float(np.sum(np.maximum(rises, 0.0)))  # a NaN stays one, and is refused
+        self.energy += float(np.sum(np.maximum(rises, 0.0)))  # a NaN propagates and is refused
         self.slew = _higher(self.slew, slew, start)
         new = slice(first - start, None)
         self.high = _higher(self.high, voltage[new], first)
@@ -298,20 +298,20 @@ class _Reached:
 
 
 def _higher(peak: tuple[float, int], values: np.ndarray, first: int) -> tuple[float, int]:
-    """The greater of ``peak`` and the greatest of ``values`` (n,), which begin at ``first``."""
+    """Return the greater of ``peak`` and the maximum of ``values`` (n,) from ``first`` on."""
     if values.size == 0:
         return peak
-    at = int(np.argmax(values))  # a NaN is found before every number
+    at = int(np.argmax(values))  # argmax returns the first NaN if there is one
     value = float(values[at])
     return peak if peak[0] >= value or math.isnan(peak[0]) else (value, first + at)
 
 
 def ramp_down(waveform: GatedWaveform, last: int, duration: float) -> np.ndarray:
-    """(M,) V that take the output from sample ``last`` of ``waveform`` to 0 V in a straight line.
+    """Return (M,) V that ramp the output from sample ``last`` of ``waveform`` to 0 V linearly.
 
-    ``duration`` in s is lengthened where the waveform's slew limit asks for it. These are the only
-    samples that reach an output without having been in the waveform; they lie between one that
-    passed the gate and 0 V. Empty when sample ``last`` already is 0 V.
+    ``duration`` in s is lengthened where the waveform's slew limit requires it. Only these samples
+    reach an output without being part of the waveform; they lie between a sample that passed the
+    gate and 0 V. The ramp is empty where sample ``last`` is 0 V already.
     """
     voltage = float(waveform.voltage[last])
     if voltage == 0.0:

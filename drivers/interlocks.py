@@ -1,7 +1,7 @@
-"""Interlocks: conditions that end a run, judged sample by sample from what the rig reads.
+"""Interlocks: conditions that end a run, evaluated on every sample that the rig reads.
 
-They take blocks and return trips; they read no clock and move no output. Their state from block to
-block makes the result independent of where the samples are cut.
+They take blocks and return trips; they read no clock and set no output. They keep state between
+blocks, so that the result does not depend on the block length.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from dearig.drivers.settings import Action, RigSettings
 __all__ = ["Interlocks", "Trip", "would_trip"]
 
 _JUMP_WITHIN = 2e-3  # s
-# s; at longer sample intervals what a film can do between samples looks like a jump
+# s; at longer sample intervals the film's ordinary motion between samples looks like a jump
 _JUMP_INTERVAL = 4e-3
 
 _NOMINAL = (0.0, 10.0 / 32768)  # V over counts of a converter of +-10 V
-_AT_END = 0.999  # of the laser's range: where an alarm holds the analog output
-_FOLLOWS = 2  # counts between a command and the plan that it follows
+_AT_END = 0.999  # of the laser's range; an alarm holds the analog output beyond it
+_FOLLOWS = 2  # counts; a command that is nearer to the plan than this follows it
 
 
 @dataclass(frozen=True)
 class Trip:
-    """``interlock`` tripped at ``sample`` of the run; ``action`` is due, ``message`` says why."""
+    """Trip of ``interlock`` at ``sample`` of the run; ``message`` says why ``action`` is taken."""
 
     interlock: str
     sample: int
@@ -38,13 +38,12 @@ class Trip:
 
 
 class Interlocks:
-    """The interlocks of one run on a rig with ``settings`` whose ``channels`` run at ``rate`` Hz.
+    """Interlocks of one run on a rig with ``settings``, whose ``channels`` run at ``rate`` Hz.
 
     ``predicted`` (N,) m is the displacement from the loaded rest state that a model predicts under
-    the voltage ``planned`` (N,) V, NaN where it predicts none: whether the film follows is judged
-    by it for as long as the command is the planned one. Without ``predicted`` that is not judged;
-    without ``planned`` the command is taken for the planned one to the end. Each interlock trips at
-    most once.
+    the voltage ``planned`` (N,) V, NaN where there is no prediction. The interlock ``following``
+    compares the film with it while the command is the planned one; without ``predicted`` it is off.
+    Without ``planned`` every command counts as the planned one. Each interlock trips at most once.
 
     Raises ``ValueError`` for a prediction and a plan of different lengths.
     """
@@ -60,7 +59,7 @@ class Interlocks:
         if predicted is not None and planned is not None and predicted.shape != planned.shape:
             raise ValueError(
                 f"{predicted.size} predicted displacements for {planned.size} planned voltages: "
-                f"one for each is needed"
+                f"give one for each"
             )
         scalings = {channel.name: channel.scaling for channel in channels}
         self._scalings = scalings
@@ -75,7 +74,7 @@ class Interlocks:
         self._predicted = predicted
         self._planned = None if planned is None else self._command.counts(planned)
 
-        # thresholds in counts, so that a sample that is in order costs next to nothing
+        # thresholds in counts, so that samples within bounds need no scaling
         limit = locks.current_max_mA * 1e-3
         self._current_ends = _sorted(self._current.counts(np.array([-limit, limit])))
         reach = settings.laser.range_mm * 1e-3 * _AT_END
@@ -87,15 +86,15 @@ class Interlocks:
         self._jump = locks.displacement_jump_mm * 1e-3 * slow**2  # m
         self._jump_counts = max(1, math.ceil(self._jump / _step(self._laser)))
 
-        # what is remembered from block to block
+        # state between blocks
         self._tripped: set[str] = set()
         self._watched = 0  # samples
         self._last_command = self._zero
         self._last_readings = np.empty(0, dtype=np.int32)
         self._quiet_sum = self._quiet_samples = 0  # readings of the lead-in
-        self._rest: float | None = None  # m, what the laser reads at the loaded rest state
+        self._rest: float | None = None  # m, the laser's reading at the loaded rest state
         self._rest_from = 0  # sample
-        self._departed = False  # the command is not the planned one any more
+        self._departed = False  # True once the command has left the plan
         self._still = _Still()
         self._broken = {
             name: _Debounce(self._samples(seconds))
@@ -112,9 +111,9 @@ class Interlocks:
         }
 
     def watch(self, block: Block) -> list[Trip]:
-        """The interlocks that trip within ``block``, in the order of their samples.
+        """Return the interlocks that trip within ``block``, in the order of their samples.
 
-        Raises ``ValueError`` for a block that does not follow the one before.
+        Raises ``ValueError`` for a block that does not continue the previous one.
         """
         if block.start != self._watched:
             raise ValueError(
@@ -142,7 +141,7 @@ class Interlocks:
         return sorted(trips, key=lambda trip: (trip.sample, trip.action != "at once"))
 
     def late(self, waiting_s: float) -> Trip | None:
-        """For samples that have waited ``waiting_s`` s for the program to read them."""
+        """Return the trip for samples that have waited unread for ``waiting_s`` s, or None."""
         locks = self._locks
         if "late" in self._tripped or waiting_s < locks.late_s:
             return None
@@ -155,7 +154,7 @@ class Interlocks:
         )
 
     def disk(self, free_bytes: int) -> Trip | None:
-        """For a disk that has ``free_bytes`` left for the recording."""
+        """Return the trip for a disk with ``free_bytes`` left for the recording, or None."""
         locks = self._locks
         if "disk" in self._tripped or free_bytes >= locks.disk_free_min_MB * 1e6:
             return None
@@ -164,20 +163,20 @@ class Interlocks:
             0,
             locks.disk_action,
             f"the disk had {free_bytes * 1e-6:.4g} MB left, {locks.disk_free_min_MB:.4g} MB must "
-            f"stay free: it is nearly full; make room before the next run",
+            f"stay free: delete or move files before the next run",
         )
 
     def _find_rest(self, command: np.ndarray, reading: np.ndarray) -> None:
-        """Take the mean reading of the lead-in, while the command is 0, for the rest state."""
+        """Set the rest state to the mean reading of the lead-in, while the command is 0."""
         if self._rest is not None:
             return
         driven = command != self._zero
         quiet = int(np.argmax(driven)) if driven.any() else command.size
-        # whole numbers: their sum does not depend on how the samples are cut
+        # integers, so that their sum does not depend on the block length
         self._quiet_sum += int(reading[:quiet].sum(dtype=np.int64))
         self._quiet_samples += quiet
         if quiet < command.size:
-            # driven from the first sample on, the film is still at rest there
+            # with a command from the first sample on, the film is still at rest at that sample
             samples = self._quiet_samples
             mean = self._quiet_sum / samples if samples else float(reading[0])
             self._rest = _physical(self._laser, mean)
@@ -190,7 +189,7 @@ class Interlocks:
         watched = self._live("monitor"), self._live("breakdown") and locks.breakdown_fraction > 0.0
         if not any(watched):
             return
-        # while one is sampled the amplifier may be on its way from the command before to this one
+        # at a sample, the amplifier may still be between the previous command and this one
         now = self._command.physical(command)
         before = np.append(_physical(self._command, self._last_command), now[:-1])
         low, high = np.minimum(now, before), np.maximum(now, before)
@@ -238,7 +237,7 @@ class Interlocks:
         if not self._live("current"):
             return
         low, high = self._current_ends
-        # at the end of what the input can read, it may be any current
+        # a reading at the end of the input's range may stand for any current
         at = self._broken["current"].first((counts <= low) | (counts >= high))
         if at is not None:
             locks = self._locks
@@ -307,10 +306,10 @@ class Interlocks:
             return
         lag = self._lag
         readings = np.concatenate((self._last_readings, reading), dtype=np.int32)
-        if not self._watched:  # as if it had stood still before
+        if not self._watched:  # assume that the film was at rest before
             readings = np.concatenate((np.full(2 * lag, readings[0]), readings))
         self._last_readings = readings[-2 * lag :].copy()
-        # from the straight line through the readings before: a fast film is not a jump
+        # distance to the straight line through earlier readings: fast motion is not a jump
         beside = readings[2 * lag :] - 2 * readings[lag:-lag] + readings[: -2 * lag]
         at = self._broken["jump"].first(np.abs(beside) >= self._jump_counts)
         if at is not None:
@@ -347,7 +346,7 @@ class Interlocks:
         judged = far > locks.following_above_mm * 1e-3
         judged[: max(0, self._rest_from - self._watched)] = False
         behind = np.copysign(1.0, predicted) * moved < locks.following_fraction * far
-        # what lies between is no evidence either way: a fast drive comes back to 0 all the time
+        # skip samples near 0: a fast drive returns there often, and they decide nothing
         at = self._broken["following"].first(behind[judged])
         if at is not None:
             at = int(np.flatnonzero(judged)[at])
@@ -357,12 +356,12 @@ class Interlocks:
                 locks.following_action,
                 f"the film had moved {moved[at] * 1e3:.2f} mm where the model predicts "
                 f"{predicted[at] * 1e3:.2f} mm, less than {locks.following_fraction:.0%} of it: an "
-                f"electrode or its lead is open, the laser is stuck, or it is another film than "
-                f"the rig file says",
+                f"electrode or its lead is open, the laser is stuck, or the film is not the one in "
+                f"the rig file",
             )
 
     def _watch_declared(self, counts: np.ndarray) -> Iterator[Trip]:
-        """Watch the channels that the rig file declares with limits."""
+        """Check the channels that the rig file declares with limits."""
         for channel in self._settings.channel:
             interlock = f"channel {channel.name}"
             if not channel.limited or not self._live(interlock):
@@ -371,7 +370,7 @@ class Interlocks:
             values = self._scalings[channel.name].physical(row)
             low = -math.inf if channel.limit_min is None else channel.limit_min
             high = math.inf if channel.limit_max is None else channel.limit_max
-            # at the end of what the input can read, it may be any value
+            # a reading at the end of the input's range may stand for any value
             clipped = (row == COUNT_MIN) | (row == COUNT_MAX)
             at = self._broken[interlock].first((values < low) | (values > high) | clipped)
             if at is not None:
@@ -387,11 +386,11 @@ class Interlocks:
         return name not in self._tripped
 
     def _samples(self, seconds: float) -> int:
-        """Samples that span ``seconds``, each standing for the interval that it begins."""
+        """Return the number of sample intervals that cover ``seconds``."""
         return max(1, math.ceil(seconds * self._rate * (1.0 - 1e-9)))
 
     def _trip(self, name: str, at: int, action: Action, words: str) -> Trip:
-        """Trip ``name`` at place ``at`` in the block that is being watched."""
+        """Trip ``name`` at place ``at`` in the present block."""
         self._tripped.add(name)
         sample = self._watched + at
         return Trip(name, sample, action, f"at {sample / self._rate:.4g} s {words}")
@@ -404,14 +403,14 @@ def would_trip(
     displacement: np.ndarray,
     predicted: np.ndarray | None = None,
 ) -> tuple[str, ...]:
-    """Names of the interlocks that would end a run at ``rate`` Hz in which all goes as planned.
+    """Return the names of the interlocks that would trip in a run that goes as planned.
 
-    The amplifier follows ``voltage`` (N,) V, and the film moves by ``displacement`` (N,) m.
-    ``predicted`` is what the run would be judged by, as ``Interlocks`` takes it. That a reading
-    stands still tells nothing here, where it has no noise.
+    At ``rate`` Hz the amplifier follows ``voltage`` (N,) V, and the film moves by ``displacement``
+    (N,) m. ``predicted`` is the prediction for ``Interlocks``. The interlock for a stuck laser is
+    off, because these readings have no noise.
     """
     locks = settings.interlocks.model_copy(update={"laser_stuck_s": 0.0})
-    # there is no prediction of the channels that the rig file declares
+    # without limits: there is no prediction for the channels that the rig file declares
     free = tuple(
         c.model_copy(update={"limit_min": None, "limit_max": None}) for c in settings.channel
     )
@@ -425,14 +424,14 @@ def would_trip(
 
 
 class _Debounce:
-    """Finds where a condition has held for ``needed`` samples in a row."""
+    """Detector of a condition that holds for ``needed`` samples in a row."""
 
     def __init__(self, needed: int) -> None:
         self._needed = needed
-        self._held = 0  # samples in a row up to now
+        self._held = 0  # samples in a row so far
 
     def first(self, broken: np.ndarray) -> int | None:
-        """Place in ``broken`` (n,), which follows what came before, or None."""
+        """Return the first such place in ``broken`` (n,), which continues the last one, or None."""
         if not broken.size:
             return None
         if not broken.any():
@@ -448,17 +447,17 @@ class _Debounce:
 
 
 class _Still:
-    """Finds a reading that does not change while the command does."""
+    """Detector of a reading that does not change while the command does."""
 
     def __init__(self) -> None:
         self._count: int | None = None  # of the newest reading
-        self._samples = 0  # for which it has stood
-        self._low, self._high = COUNT_MAX, COUNT_MIN  # of the command meanwhile
+        self._samples = 0  # since this count last changed
+        self._low, self._high = COUNT_MAX, COUNT_MIN  # of the command since then
 
     def first(
         self, reading: np.ndarray, command: np.ndarray, needed: int, swing: int
     ) -> int | None:
-        """Where a count has stood for ``needed`` samples, and the command moved by ``swing``."""
+        """Return where a count is ``needed`` samples old and the command moved by ``swing``."""
         edges = np.concatenate(([0], np.flatnonzero(np.diff(reading)) + 1, [reading.size]))
         if reading[0] != self._count:
             self._forget()
@@ -491,10 +490,10 @@ def _physical(scaling: Scaling, count: float | np.integer) -> float:
 
 
 def _step(scaling: Scaling) -> float:
-    """Physical value of one count, to first order."""
+    """Return the physical value of one count, to first order."""
     return abs(scaling.gain * scaling.coefficients[1])
 
 
 def _sorted(pair: np.ndarray) -> tuple[int, int]:
-    """Lower and upper of two counts: a gain below 0 turns them round."""
+    """Return the lower and the upper of two counts; a negative gain reverses their order."""
     return int(pair.min()), int(pair.max())

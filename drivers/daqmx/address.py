@@ -12,14 +12,14 @@ __all__ = ["Address"]
 
 @dataclass(frozen=True)
 class Address:
-    """``device`` as it is named in NI MAX; ``server`` is ``host:port``, None for this computer."""
+    """Address: ``device`` is the name in NI MAX, ``server`` is ``host:port`` or None (local)."""
 
     device: str
     server: str | None = None
 
     @staticmethod
     def parse(text: str) -> Address:
-        """Raises ``AddressError`` for an address that names no card."""
+        """Return the address in ``text``; raises ``AddressError`` where it names no card."""
         found = re.fullmatch(r"daqmx:([A-Za-z][\w-]*)(?:@([^@\s/]+):(\d{1,5}))?", text)
         if not found or not (found[3] is None or 0 < int(found[3]) < 65536):
             raise AddressError(
@@ -29,5 +29,5 @@ class Address:
         return Address(found[1], None if found[2] is None else f"{found[2]}:{found[3]}")
 
     def __str__(self) -> str:
-        """As it is written on the command line."""
+        """Return the address as on the command line."""
         return f"daqmx:{self.device}" + (f"@{self.server}" if self.server else "")

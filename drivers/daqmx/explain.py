@@ -1,6 +1,6 @@
-"""NI-DAQmx's errors as one sentence each: the code, the likely cause and what to do.
+"""NI-DAQmx's errors in one sentence each: code, likely cause, what to do.
 
-Codes and their meaning are those of ``nidaqmx.error_codes.DAQmxErrors``.
+Codes and meanings are those of ``nidaqmx.error_codes.DAQmxErrors``.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from dearig.drivers.errors import RigError
 __all__ = ["INPUT_OVERWRITTEN", "RESERVED", "TIMEOUT", "explained", "instrument_errors"]
 
 RESERVED = -50103  #: another task holds the card
-TIMEOUT = -200284  #: samples did not come in time
-INPUT_OVERWRITTEN = -200279  #: the reader came too late
+TIMEOUT = -200284  #: samples did not arrive in time
+INPUT_OVERWRITTEN = -200279  #: the reader was too late
 
 #: code -> (what happened and why, what to do)
 _KNOWN: dict[int, tuple[str, str]] = {
@@ -32,11 +32,11 @@ _KNOWN: dict[int, tuple[str, str]] = {
         "compare card.ao_command and card.ai_... with the card's pins",
     ),
     -200077: (
-        "it cannot do what was asked: a range, rate or terminal configuration it does not have",
+        "it does not have the requested range, rate or terminal configuration",
         "compare the ranges and rates in [card] with the card's manual",
     ),
     -200332: (
-        "the sample rate is more than it can do on so many channels",
+        "the sample rate is too high for so many channels",
         "lower card.sample_rate_Hz",
     ),
     -200081: ("the sample rate is out of its range", "change card.sample_rate_Hz"),
@@ -45,36 +45,36 @@ _KNOWN: dict[int, tuple[str, str]] = {
         "close other programs, lower card.sample_rate_Hz or enlarge card.ai_buffer_samples",
     ),
     -200361: (
-        "its input memory overflowed: samples came faster than the computer took them",
+        "its input memory overflowed: samples came faster than the computer read them",
         "lower card.sample_rate_Hz, or move the card to a bus that it does not share",
     ),
     -200290: (
-        "the output ran out of samples: the program wrote too late, and the last value stood",
+        "the output ran out of samples: the program wrote too late, and the last value was held",
         "close other programs, lower card.sample_rate_Hz or enlarge card.ao_buffer_s",
     ),
     -200621: (
-        "its output memory ran empty: the computer brought samples too slowly",
+        "its output memory ran empty: the computer sent samples too slowly",
         "lower card.sample_rate_Hz, or move the card to a bus that it does not share",
     ),
     -200284: (
         "no samples came in time: its sample clock does not run",
-        "see that nothing else uses the card's clocks; reset it and try again",
+        "check that nothing else uses the card's clocks; reset it and try again",
     ),
     -200561: (
-        "it was written more channels than the task has",
-        "this is a fault of the program; report it",
+        "the program wrote more channels than the task has",
+        "this is an error in the program; report it",
     ),
     -200560: (
-        "the task did not end in the time it should take",
-        "see that the card's clock runs; reset it and try again",
+        "the task did not end in the expected time",
+        "check that the card's clock runs; reset it and try again",
     ),
     -200088: (
         "its task is gone: the card was reset, or another program took it over",
-        "see what else uses the card; the output was taken to 0 V if the guardian did it",
+        "check what else uses the card; the output is at 0 V if the guardian took over",
     ),
     -201003: (
         "it does not answer: unplugged, without power, or lost its bus",
-        "see that the card is there in NI MAX",
+        "check that NI MAX shows the card",
     ),
     -88708: ("it was removed or reset during a task", "check that no other program uses it"),
     -88709: ("it was removed or reset during a task", "check that no other program uses it"),
@@ -82,7 +82,7 @@ _KNOWN: dict[int, tuple[str, str]] = {
 
 
 def explained(device: str, code: int, said: str) -> str:
-    """Return ``code`` on ``device`` as a sentence; for an unknown code, what DAQmx ``said``."""
+    """Return ``code`` on ``device`` as a sentence; for an unknown code DAQmx's text ``said``."""
     if code in _KNOWN:
         why, do = _KNOWN[code]
         return f"card {device}: {why} (DAQmx {code}); {do}"
@@ -93,7 +93,7 @@ def explained(device: str, code: int, said: str) -> str:
 
 @contextmanager
 def instrument_errors(device: str, server: str | None) -> Iterator[None]:
-    """Turn whatever nidaqmx raises into ``RigError`` with a sentence."""
+    """Convert every error of nidaqmx into ``RigError`` with a sentence."""
     import nidaqmx.errors
 
     try:
@@ -113,8 +113,8 @@ def instrument_errors(device: str, server: str | None) -> Iterator[None]:
     except nidaqmx.errors.RpcError as error:
         raise RigError(
             f"card {device}: its server {server} does not answer "
-            f"({getattr(error.rpc_code, 'name', error.rpc_code)}); see that it runs and that the "
-            f"network is there"
+            f"({getattr(error.rpc_code, 'name', error.rpc_code)}); check that it runs and that the "
+            f"network works"
         ) from error
     except nidaqmx.errors.Error as error:
         raise RigError(f"card {device}: {error}") from error

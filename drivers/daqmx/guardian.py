@@ -1,7 +1,7 @@
-"""The run's side of the guardian: a process that takes the output to 0 V when the run does not.
+"""Guardian, seen from the run: a process that sets 0 V when the run no longer can.
 
-It notices when the run dies (the pipe between them closes) or freezes (no beat comes). The run says
-when there is nothing to guard. It has its own interpreter and its own connection to the card.
+It detects that the run dies (the pipe between them closes) or freezes (no beat arrives). The run
+tells it when there is nothing to guard. It has its own interpreter and connection to the card.
 """
 
 from __future__ import annotations
@@ -23,31 +23,32 @@ from dearig.drivers.settings import RigSettings
 
 __all__ = ["WORD", "Guardian", "GuardianProcess"]
 
-#: What a line of the guardian's begins with that is meant for the run. Everything else on its
-#: error stream comes from Python or from a library.
+#: Prefix of the guardian's lines for the run. All other lines on its error stream come from Python
+#: or from a library.
 WORD = "guardian> "
 
 _STARTS_WITHIN = 60.0  # s: an interpreter, the driver's library, a connection
-_TAKES_OVER_WITHIN = 5.0  # s; it goes on trying after that, but the person must be told
+_TAKES_OVER_WITHIN = 5.0  # s; it keeps trying after that, but the operator must be told
 _ENDS_WITHIN = 5.0  # s
-_EXPLAINS_WITHIN = 0.5  # s: one that has ended has; the message must not wait for another one
-_LINES_KEPT = 20  # of its error stream: the last one of a traceback says what went wrong
-_LINE_MAX = 2000  # characters of one of them
+# s; a process that has ended has written its error by then, and the message must not wait longer
+_EXPLAINS_WITHIN = 0.5
+_LINES_KEPT = 20  # of its error stream; the last line of a traceback names the error
+_LINE_MAX = 2000  # characters of a line
 
 
 class Guardian(Protocol):
-    """What takes over when a run dies or freezes."""
+    """Guardian: takes over when a run dies or freezes."""
 
     def arm(self) -> None:
-        """Watch from now on: silence means a frozen run. Raises ``RigError`` if it has ended."""
+        """Start to watch: silence means a frozen run. Raises ``RigError`` if it has ended."""
         ...
 
     def beat(self) -> bool:
-        """Report that the run is alive; returns False when the guardian is not."""
+        """Report that the run is alive; returns False if the guardian is not."""
         ...
 
     def last_error(self) -> str:
-        """Return why a guardian that is not alive has ended, as far as that is known."""
+        """Return why the guardian has ended, as far as that is known."""
         ...
 
     def disarm(self) -> None:
@@ -55,7 +56,7 @@ class Guardian(Protocol):
         ...
 
     def take_over(self) -> None:
-        """Request 0 V now, because the run cannot set it."""
+        """Request 0 V now, where the run cannot set it."""
         ...
 
     def close(self) -> None:
@@ -72,12 +73,12 @@ class GuardianProcess:
 
     def __init__(self, address: Address, settings: RigSettings) -> None:
         self._guards = self._trying = False
-        self._said: queue.Queue[str | None] = queue.Queue()  # None: it has ended
+        self._said: queue.Queue[str | None] = queue.Queue()  # None: the guardian has ended
         self._errors: deque[str] = deque(maxlen=_LINES_KEPT)
         config = {
             "device": address.device,
             "server": address.server,
-            # of a rig file, only what says how the instruments are wired and judged
+            # only the settings that give wiring, scaling and limits
             "settings": RigSettings.model_validate(
                 {name: getattr(settings, name) for name in RigSettings.model_fields}
             ).model_dump(mode="json"),
@@ -93,14 +94,14 @@ class GuardianProcess:
                 json.dumps(config),
             ],
             stdin=subprocess.PIPE,
-            # its standard output is the terminal's error stream, which outlives a run that dies:
-            # what it tells the person must not go through this process
+            # its standard output is the terminal's error stream, which outlives the run: its
+            # messages to the operator must not pass through this process
             stdout=_terminal(),
             stderr=subprocess.PIPE,
             encoding="utf-8",
             errors="replace",
             env=child_environment(),
-            # a ctrl-C at the terminal is for the run: the guardian must outlive it
+            # ctrl-C at the terminal ends the run only: the guardian must outlive it
             start_new_session=os.name == "posix",
             creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
         )
@@ -118,7 +119,7 @@ class GuardianProcess:
         return self._process.pid
 
     def arm(self) -> None:
-        """Watch from now on: silence means a frozen run. Raises ``RigError`` if it has ended."""
+        """Start to watch: silence means a frozen run. Raises ``RigError`` if it has ended."""
         if not self._tell("arm"):
             raise RigError(
                 f"the guardian process has ended ({self.last_error()}): nothing would take the "
@@ -127,11 +128,11 @@ class GuardianProcess:
         self._guards = True
 
     def beat(self) -> bool:
-        """Report that the run is alive; returns False when the guardian is not."""
+        """Report that the run is alive; returns False if the guardian is not."""
         return self._tell("beat")
 
     def last_error(self) -> str:
-        """Return why a guardian that is not alive has ended, as far as that is known."""
+        """Return why the guardian has ended, as far as that is known."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(_EXPLAINS_WITHIN)
         self._listener.join(_EXPLAINS_WITHIN)
@@ -155,10 +156,10 @@ class GuardianProcess:
         self._trying = False
 
     def close(self) -> None:
-        """End it; one that still tries to reach the card is left to it, and says how that ends."""
+        """End the guardian; one that still tries to reach the card goes on and reports the end."""
         self._tell("bye")
         if self._process.stdin is not None:
-            with contextlib.suppress(OSError):  # it is gone, with its end of the pipe
+            with contextlib.suppress(OSError):  # it has ended and closed its end of the pipe
                 self._process.stdin.close()
         if self._trying:
             return
@@ -189,10 +190,10 @@ class GuardianProcess:
         if said is None:
             raise RigError(f"the guardian process has ended ({self.last_error()})")
         if said != word:
-            raise RigError(f"the guardian process cannot do its work: {said}")
+            raise RigError(f"the guardian process does not work: {said}")
 
     def _listen(self) -> None:
-        """Take what comes as it comes, so that the guardian never waits for this process."""
+        """Read the guardian's lines at once, so that it never waits for this process."""
         stream = self._process.stderr
         while stream is not None and (line := stream.readline(_LINE_MAX)):
             if line.startswith(WORD):
@@ -203,9 +204,9 @@ class GuardianProcess:
 
 
 def _terminal() -> int:
-    """Return the file descriptor of this program's error stream, or of nowhere."""
+    """Return the file descriptor of this program's error stream, or of the null device."""
     try:
         os.fstat(2)
-    except OSError:  # a program with a window and no console has none
+    except OSError:  # a windowed program without a console has no error stream
         return subprocess.DEVNULL
     return 2

@@ -1,8 +1,8 @@
-"""The guardian's own process: beats come in on standard input, and when they do not, 0 V goes out.
+"""Process of the guardian: it reads beats on standard input, and sets 0 V when they stop.
 
 Words in, one a line: ``arm``, ``beat``, ``disarm``, ``take over``, ``bye``. Words out, on the error
-stream with ``WORD`` before each: ``ready``, ``safe`` after a take-over, or a sentence that says
-what does not work. Standard output is the terminal's, for the person.
+stream with the prefix ``WORD``: ``ready``, ``safe`` after a take-over, or a sentence about a fault.
+Standard output goes to the terminal, for the operator.
 """
 
 from __future__ import annotations
@@ -30,10 +30,11 @@ _GIVE_UP = 20.0  # s of trying to reach a card that does not answer
 
 @dataclass
 class Guard:
-    """The guardian's response to each word, and to silence; ``zero`` takes the output to 0 V.
+    """Guardian's response to each word and to silence; ``zero`` takes the output to 0 V.
 
-    ``say`` answers the run, ``tell`` the person at the terminal. After a take-over it is not armed
-    until the run arms it again: a run that continues finds its tasks gone and makes itself safe.
+    ``say`` replies to the run, ``tell`` informs the operator at the terminal. After a take-over it
+    is not armed until the run arms it again: a run that continues finds its tasks cleared and makes
+    itself safe.
     """
 
     zero: Callable[[], None]
@@ -42,7 +43,7 @@ class Guard:
     armed: bool = field(default=False)
 
     def hear(self, word: str | None) -> bool:
-        """Act on ``word``, None being the end of the run's pipe; False when it is time to end."""
+        """Act on ``word``, None for the end of the run's pipe; returns False to end."""
         if word == "arm":
             self.armed = True
         elif word == "disarm":
@@ -56,11 +57,11 @@ class Guard:
         return True
 
     def silence(self) -> None:
-        """No word came in time."""
+        """Act on silence: no word arrived in time."""
         self.take_over("the run is frozen")
 
     def take_over(self, why: str) -> None:
-        """0 V, and the enable line low."""
+        """Set 0 V and the enable line low."""
         self.armed = False
         try:
             self.zero()
@@ -74,7 +75,7 @@ class Guard:
 
 def main() -> int:
     """Guard until the run says ``bye`` or ends."""
-    # the run answers to ctrl-C; its guardian must outlive it
+    # ctrl-C ends the run only; the guardian must outlive it
     for name in ("SIGINT", "SIGHUP", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
@@ -83,7 +84,7 @@ def main() -> int:
     try:
         link = Link(config["server"], settings.guardian.link_timeout_s)
         outputs = Outputs(link, config["device"], settings)
-        outputs.read("voltage_monitor")  # everything is loaded and connected before it is needed
+        outputs.read("voltage_monitor")  # loads and connects everything before it is needed
     except RigError as error:
         _say(str(error))
         return 1
@@ -105,7 +106,7 @@ def main() -> int:
 
 
 def _insist(outputs: Outputs) -> None:
-    """To 0 V, again and again while the card or its server does not answer."""
+    """Set 0 V, and repeat it while the card or its server does not answer."""
     until = time.monotonic() + _GIVE_UP
     while True:
         try:
@@ -125,7 +126,7 @@ def _listen(words: queue.SimpleQueue[str | None]) -> None:
 
 
 def _say(word: str) -> None:
-    with contextlib.suppress(OSError):  # the run that would read it is gone
+    with contextlib.suppress(OSError):  # the run has ended
         print(WORD + " ".join(word.split()), file=sys.stderr, flush=True)
 
 

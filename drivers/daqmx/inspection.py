@@ -1,4 +1,4 @@
-"""Inspection of the card and of what is wired to it, without putting out a volt."""
+"""Inspection of the card and of the instruments wired to it, without any output voltage."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["Inspection", "inspect"]
 
 @dataclass(frozen=True)
 class Inspection:
-    """Findings on the card, and the readings of its inputs, None where they could not be read.
+    """Findings on the card, and readings of its inputs, None where they could not be read.
 
     ``displacement_volts`` is the laser's analog output; ``readings`` are those of the channels
     that the rig file declares, by name, in their units.
@@ -76,7 +76,7 @@ def inspect(device: str, server: str | None, settings: RigSettings) -> Inspectio
 
 
 def _card(name: str, card: Any, settings: RigSettings) -> list[Finding]:
-    """Return what the card reports of itself, against what the rig file needs of it."""
+    """Compare the card's own report with what the rig file needs."""
     wanted = settings.card
     model = card.product_type
     same = model.split()[-1] == wanted.model.split()[-1]
@@ -131,7 +131,7 @@ def _has(name: str, item: str, there: bool, wanted: str) -> Finding:
 
 
 def _timing(name: str, link: Link, device: str, settings: RigSettings) -> Finding:
-    """Reserve the card as a run does, which fails where it is in use; nothing is put out."""
+    """Reserve the card as a run does, which fails where it is in use; no output changes."""
     tasks = ClockedTasks(link, device, settings)
     try:
         skews = [channel.skew for channel in tasks.channels()[1:]]
@@ -145,5 +145,5 @@ def _timing(name: str, link: Link, device: str, settings: RigSettings) -> Findin
         ", ".join(f"{skew * 1e6:.3g}" for skew in skews) + " us after the tick",
         ", ".join(f"{skew * 1e6:.3g}" for skew in asked),
         "ok" if near else "warning",
-        "" if near else "the times that the card really has are the ones that are recorded",
+        "" if near else "recordings contain the card's actual times",
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""NI's driver and the cards in this computer, looked up without touching a card."""
+"""Lookup of NI's driver and of the cards in this computer, without access to a card."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ __all__ = ["Installed", "installed"]
 
 @dataclass(frozen=True)
 class Installed:
-    """Version of the NI-DAQmx driver, and the cards that it knows as ``Dev1 (PCIe-6353)``."""
+    """Version of the NI-DAQmx driver, and its cards in the form ``Dev1 (PCIe-6353)``."""
 
     version: str
     cards: tuple[str, ...]
 
 
 def installed() -> Installed:
-    """Return what NI's driver says.
+    """Return the version and cards that NI's driver reports.
 
     Raises ``ModuleNotFoundError`` without the package ``nidaqmx``, ``LookupError`` without the
     driver, ``nidaqmx.errors.DaqError`` where the driver fails.

@@ -1,4 +1,4 @@
-"""Rigs on an NI card, as the registry of rigs has them."""
+"""Registry entry of rigs on an NI card."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["KIND", "DaqmxKind"]
 
 
 class DaqmxKind:
-    """A card through NI-DAQmx, in this computer or behind a server; see ``RigKind``."""
+    """Rig on a card through NI-DAQmx, in this computer or behind a server; see ``RigKind``."""
 
     addresses: tuple[str, ...] = ("daqmx:Dev1", "daqmx:Dev1@HOST:PORT")
     simulated = False
@@ -29,7 +29,7 @@ class DaqmxKind:
         settings: RigSettings,
         options: RigOptions,  # noqa: ARG002
     ) -> tuple[Finding, ...]:
-        """Return what the card, amplifier, laser and declared channels say."""
+        """Return the findings on card, amplifier, laser and declared channels."""
         where = Address.parse(address)
         card = inspection.inspect(where.device, where.server, settings)
         return (
@@ -39,5 +39,5 @@ class DaqmxKind:
         )
 
 
-#: As the registry has it.
+#: Entry of the registry.
 KIND = DaqmxKind()

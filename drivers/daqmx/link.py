@@ -1,4 +1,4 @@
-"""The connection to the driver: the library in this computer, or a server with a deadline."""
+"""Connection to the DAQmx driver: the library in this computer, or a server with a deadline."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
 
 __all__ = ["Link"]
 
-# s: a server that did not answer is asked again, but many questions must not take many timeouts
+# s; after a time-out further calls fail sooner, so that many calls do not take many time-outs
 _LOST_TIMEOUT = 0.2
 
 
 class Link:
     """A connection to the DAQmx driver behind ``server``, or in this computer when that is None.
 
-    ``timeout`` in s is how long a server may take for an answer: without it, a call to a server
-    that froze would never end. Raises ``RigError`` where nidaqmx is not installed.
+    ``timeout`` in s limits the server's time for an answer; without it, a call to a frozen server
+    would never end. Raises ``RigError`` where nidaqmx is not installed.
     """
 
     def __init__(self, server: str | None, timeout: float) -> None:
@@ -37,7 +37,7 @@ class Link:
 
     @property
     def session(self) -> GrpcSessionOptions | None:
-        """What nidaqmx calls ``grpc_options``."""
+        """Return the ``grpc_options`` for nidaqmx."""
         if self._channel is None:
             return None
         from nidaqmx import GrpcSessionOptions
@@ -45,7 +45,7 @@ class Link:
         return GrpcSessionOptions(self._channel, "")
 
     def close(self) -> None:
-        """Close the connection; what ran on the server stays there."""
+        """Close the connection; tasks on the server remain there."""
         if self._channel is not None:
             self._channel.close()
 
@@ -82,7 +82,7 @@ def _channel_with_deadline(server: str, timeout: float) -> grpc.Channel:
         options=(
             ("grpc.max_receive_message_length", unlimited),
             ("grpc.max_send_message_length", unlimited),
-            # a proxy of the surroundings has no business between a rig and its card
+            # a proxy from the environment must not be used between a rig and its card
             ("grpc.enable_http_proxy", 0),
         ),
     )

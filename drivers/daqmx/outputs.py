@@ -1,4 +1,4 @@
-"""Single values without a clock: the output to 0 V, the enable line, the reading of an input.
+"""Single values without a clock: output to 0 V, enable line, reading of an input.
 
 The run and its guardian both use this, each with its own connection.
 """
@@ -14,11 +14,11 @@ from dearig.drivers.settings import RigSettings
 
 __all__ = ["Outputs"]
 
-_LOOKS = 20  # at the monitor: the amplifier's output falls in less than a millisecond
+_LOOKS = 20  # readings of the monitor; the amplifier's output falls in less than a millisecond
 
 
 class Outputs:
-    """The card ``device`` behind ``link``, of a rig with ``settings``.
+    """Outputs of the card ``device`` behind ``link``, of a rig with ``settings``.
 
     Every method raises ``RigError`` where the card or its server fails.
     """
@@ -29,7 +29,7 @@ class Outputs:
         self._settings = settings
 
     def zero(self, *, force: bool = False) -> None:
-        """0 V at the output, seen on the voltage monitor.
+        """Set 0 V at the output, and check it on the voltage monitor.
 
         With ``force``, a card that is in use is reset, which aborts every task and
         takes outputs and lines down in one step.
@@ -44,7 +44,7 @@ class Outputs:
         self.check_zero()
 
     def shut(self) -> None:
-        """Set 0 V and the enable line low, also on a card in use: what a guardian does."""
+        """Set 0 V and the enable line low, also on a card in use; for the guardian."""
         try:
             self.zero(force=True)
         finally:
@@ -78,7 +78,7 @@ class Outputs:
         )
 
     def read(self, channel: str) -> float:
-        """V at the input of ``channel`` now, the mean of ten readings."""
+        """Return the V at the input of ``channel`` now, the mean of ten readings."""
         settings = self._settings
         limit = settings.ranges()[channel]
         with instrument_errors(self._device, self._link.server):
@@ -95,7 +95,7 @@ class Outputs:
                 return float(np.mean([task.read() for _ in range(10)]))
 
     def _disable(self) -> None:
-        """The line that enables the amplifier's high voltage low, if it is wired."""
+        """Set the line that enables the amplifier's high voltage low, if it is wired."""
         line = self._settings.card.do_hv_enable
         if line is None:
             return
@@ -117,5 +117,5 @@ class Outputs:
                     min_val=-card.ao_range_V,
                     max_val=card.ao_range_V,
                 )
-                # what makes 0 V at the film, of an amplifier with an offset
+                # the command for 0 V at the film, which includes the amplifier's offset
                 task.write(-offset / self._settings.amplifier.gain_V_per_V, auto_start=True)

@@ -1,4 +1,4 @@
-"""A rig on a DAQmx card: output and inputs on one sample clock, guarded by a second process."""
+"""Rig on a DAQmx card: output and inputs on one sample clock, guarded by a second process."""
 
 from __future__ import annotations
 
@@ -25,29 +25,28 @@ __all__ = ["DaqmxRig", "open_daqmx_rig"]
 
 log = logging.getLogger(__name__)
 
-_BLOCK = 0.1  # s: reading ten times a second is what the library's users recommend
+_BLOCK = 0.1  # s; the library's users recommend ten reads a second
 _WAIT = 0.25  # s for samples, between two beats of the guardian
-_OVERDUE = 2.0  # s without a sample although the clock should run
+_OVERDUE = 2.0  # s without a sample while the clock should run
 
 
 def open_daqmx_rig(
     address: str, settings: RigSettings, *, block_samples: int | None = None
 ) -> DaqmxRig:
-    """The rig at ``address``, its output at 0 V, with a guardian process beside it.
+    """Return the rig at ``address``, its output at 0 V, with its guardian process.
 
-    Raises ``AddressError`` for an address that is none, ``RigError`` where the card, its driver or
-    its server is not there.
+    Raises ``AddressError`` for an invalid address, ``RigError`` where the card, its driver or its
+    server is missing.
     """
     where = Address.parse(address)
     return DaqmxRig(where, settings, GuardianProcess(where, settings), block_samples=block_samples)
 
 
 class DaqmxRig:
-    """The card at ``address``; see ``dearig.drivers.rig.Rig`` for the calls, which any thread may
-    make.
+    """Rig on the card at ``address``; see ``dearig.drivers.rig.Rig``. All methods are thread-safe.
 
-    Blocks hold ``block_samples`` samples, or a tenth of a second when that is None. ``clock`` says
-    how long nothing came.
+    Blocks hold ``block_samples`` samples, or a tenth of a second where that is None. ``clock``
+    measures the time without samples.
     """
 
     def __init__(
@@ -72,8 +71,8 @@ class DaqmxRig:
         self._outputs = Outputs(self._link, address.device, settings)
         try:
             self._card = identify_card(self._link, address.device, settings)
-            # a program that died before this one may have left a voltage; one that lives has the
-            # card, and was not disturbed
+            # a program that died earlier may have left a voltage; one that still runs holds the
+            # card, and is not disturbed
             self._outputs.zero()
         except RigError:
             self._guardian.close()
@@ -82,19 +81,19 @@ class DaqmxRig:
 
     @property
     def state(self) -> RigState:
-        """State of the rig."""
+        """Return the state of the rig."""
         return self._state
 
     @property
     def waiting(self) -> float:
-        """Delay of the reader in s: samples that were acquired and not read."""
+        """Return the reader's delay in s: samples that were acquired and not read."""
         with self._lock:
             if self._state is not RigState.RUNNING or self._run is None or self._tasks is None:
                 return 0.0
             return self._tasks.waiting() / self._run.rate
 
     def identify(self) -> RigIdentity:
-        """Return what the rig is made of; the output does not move."""
+        """Return the rig's instruments; the output does not change."""
         with self._lock:
             expect(self._state, "identify", *(s for s in RigState if s is not RigState.CLOSED))
         return RigIdentity(
@@ -110,7 +109,7 @@ class DaqmxRig:
         )
 
     def load(self, waveform: GatedWaveform) -> float:
-        """Take a waveform that has passed the gate; returns the actual sample rate in Hz.
+        """Load a waveform that has passed the gate; returns the actual sample rate in Hz.
 
         Raises ``RigError`` for a waveform that passed under wider limits than this rig's, or that
         the card cannot play.
@@ -137,7 +136,7 @@ class DaqmxRig:
             return rate
 
     def arm(self) -> None:
-        """Get ready to start without delay; the output is at 0 V, and guarded from now on."""
+        """Prepare for a start without delay; the output is at 0 V, and guarded from now on."""
         with self._lock:
             expect(self._state, "arm", RigState.LOADED)
             self._guardian.arm()
@@ -155,13 +154,13 @@ class DaqmxRig:
             self._state = RigState.RUNNING
 
     def read(self) -> Block | None:
-        """Return the next block, waiting for it; None when the waveform has been played.
+        """Wait for the next block and return it, or None after the last one.
 
-        Raises ``RigError`` where the card faults, where no sample comes, and, after a ramp to 0 V,
-        where the guardian process has died. Raises ``RigStateError`` when the rig was made safe.
+        Raises ``RigError`` for a fault of the card, for missing samples, and, after a ramp to 0 V,
+        for a guardian process that died. Raises ``RigStateError`` where the rig was made safe.
         """
         while True:
-            # the lock is given up between two waits, so that others can make the rig safe
+            # release the lock between two waits, so that other threads can make the rig safe
             with self._lock:
                 if self._state is RigState.DONE:
                     return None
@@ -183,17 +182,17 @@ class DaqmxRig:
                 return block
 
     def stop(self) -> None:
-        """End the run early: ramp to 0 V in the set time; acquired samples stay readable."""
+        """End the run early with a ramp to 0 V; acquired samples stay readable."""
         with self._lock:
             if self._state is RigState.DONE:
-                return  # it ended by itself in the same moment
+                return  # the waveform ended just before the call
             expect(self._state, "stop", RigState.RUNNING)
             self._stop(*self._loaded())
 
     def make_safe(self) -> None:
         """Take the output to 0 V at once, check it on the monitor, and discard the waveform.
 
-        Raises ``RigError`` where neither this program nor the guardian could.
+        Raises ``RigError`` where neither this program nor the guardian could do so.
         """
         with self._lock:
             if self._state is RigState.CLOSED:
@@ -222,10 +221,10 @@ class DaqmxRig:
                 self._link.close()
 
     def _fetch(self, tasks: ClockedTasks, run: _Run) -> Block | None:
-        """The samples that are due, or None after a short wait without any."""
+        """Return the samples that are due, or None after a short wait without any."""
         size = self._block_samples or max(1, round(_BLOCK * run.rate))
         size = min(size, run.total - run.delivered)
-        # a block that takes longer than a wait is put together from its parts
+        # a block that takes longer than one wait is assembled from parts
         counts = tasks.read(size, _WAIT)
         if counts.shape[1] == 0:
             tasks.check_output()
@@ -241,12 +240,12 @@ class DaqmxRig:
         return Block(start, np.vstack((run.command[start:end], counts)), due)
 
     def _stop(self, tasks: ClockedTasks, run: _Run) -> None:
-        """Leave the waveform where it is now, and go down to 0 V in a straight line."""
+        """Leave the waveform at its present sample, and ramp to 0 V linearly."""
         if run.stopped:
             return
         run.stopped = True
         before = self._clock()
-        # at least the first sample, which is 0 V: a run without one could not be recorded
+        # keep at least the first sample, which is 0 V: a recording needs one
         played = max(1, tasks.hold())
         if played >= run.total:
             return
@@ -278,13 +277,13 @@ class DaqmxRig:
         return self._tasks, self._run
 
     def _bring_down(self) -> None:
-        """0 V, seen on the monitor, and then the enable line low, which is done in any case."""
+        """Set 0 V and check it on the monitor; then set the enable line low in any case."""
         tasks, self._tasks, self._run = self._tasks, None, None
         try:
             if tasks is not None:
                 try:
                     tasks.release()
-                except RigError as error:  # a card that is reset needs no tasks cleared
+                except RigError as error:  # the reset clears all tasks
                     log.warning("%s", error)
             self._outputs.zero(force=True)
         finally:
@@ -298,14 +297,14 @@ class DaqmxRig:
 
 
 class _Run:
-    """One waveform on its way: ``command`` (total,) int16 is what goes out."""
+    """One waveform being played: ``command`` (total,) int16 are the output counts."""
 
     def __init__(self, waveform: GatedWaveform, command: np.ndarray, rate: float) -> None:
         self.waveform = waveform
         self.command = command
         self.rate = rate
         self.delivered = 0  # samples handed to the reader
-        self.heard = 0.0  # when the last samples came, s
+        self.heard = 0.0  # time of the last samples, s
         self.stopped = False
         self.unguarded = False
         self.events: list[Event] = []

@@ -1,8 +1,8 @@
-"""The card's tasks of one run: created, owned and cleared here and nowhere else.
+"""The card's tasks of one run; this module alone creates, owns and clears them.
 
-Inputs are converted on the ticks of the output's sample clock: two clocks would drift apart. So the
-inputs are started first and wait; they stand still whenever the output does, and the number of
-samples acquired is the number of samples put out.
+Inputs are converted on the ticks of the output's sample clock, because two clocks would drift
+apart. The inputs are therefore started first and wait. They pause whenever the output does, and as
+many samples are acquired as are output.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
 
 __all__ = ["Card", "ClockedTasks", "identify_card"]
 
-_READER_BUFFER = 4.0  # times the lateness that ends a run
-_ODD_BUFFER = 4095  # samples: an output buffer of exactly this size misbehaved on a 6361
+_READER_BUFFER = 4.0  # times the reader's delay that ends a run
+_ODD_BUFFER = 4095  # samples; an output buffer of exactly this size misbehaved on a 6361
 
 
 @dataclass(frozen=True)
 class Card:
-    """A card as it reports itself.
+    """Properties that a card reports.
 
-    ``channels`` in the order of blocks, with the card's own scaling and the timing it really has.
+    ``channels`` are in the order of blocks, with the card's own scaling and actual timing.
     """
 
     model: str
@@ -44,7 +44,7 @@ class Card:
 
 
 def identify_card(link: Link, device: str, settings: RigSettings) -> Card:
-    """Ask the card; nothing is put out. Raises ``RigError`` where it does not fit the settings."""
+    """Query the card without output. Raises ``RigError`` where it does not fit the settings."""
     with instrument_errors(device, link.server):
         from nidaqmx.system import Device
 
@@ -59,9 +59,9 @@ def identify_card(link: Link, device: str, settings: RigSettings) -> Card:
 
 
 class ClockedTasks:
-    """Output, inputs, enable line and watchdog of the card ``device`` behind ``link``.
+    """Tasks for output, inputs, enable line and watchdog of the card ``device`` behind ``link``.
 
-    Every method raises ``RigError`` in words where the card refuses.
+    Every method raises ``RigError`` where the card refuses.
     """
 
     def __init__(self, link: Link, device: str, settings: RigSettings) -> None:
@@ -74,14 +74,14 @@ class ClockedTasks:
         self._watchdog: WatchdogTask | None = None
         self._command = np.empty(0, dtype=np.int16)
         self._rate = 0.0
-        self._first = 0  # sample of the run with which the present output task began
+        self._first = 0  # first sample of the present output task
         self._written = 0  # samples of the command written so far
         self._buffer = 0  # samples that the output buffer holds
 
     def channels(self) -> tuple[Channel, ...]:
-        """The rig's channels with the card's own scaling and the skew it really has.
+        """Return the rig's channels with the card's own scaling and actual skew.
 
-        The inputs and the output are reserved for it: a card in use is noticed here.
+        It reserves the inputs and the output, which fails on a card in use.
         """
         from nidaqmx.constants import TaskMode
 
@@ -96,7 +96,7 @@ class ClockedTasks:
             }
             first = ai.timing.delay_from_samp_clk_delay
             interval = 1.0 / ai.timing.ai_conv_rate
-        # the output is corrected by the card itself: nominal counts are what it puts out
+        # the card corrects its output itself, so the nominal scaling holds
         step = settings.card.ao_range_V / 32768.0
         coefficients["voltage_command"] = (0.0, step)
         inputs = len(settings.channel_names) - 1
@@ -114,7 +114,7 @@ class ClockedTasks:
         return self._rate
 
     def arm(self) -> None:
-        """Inputs wait for the clock; the enable line goes high, with the watchdog on it."""
+        """Let the inputs wait for the clock; set the enable line high, with its watchdog."""
         import nidaqmx
         from nidaqmx.system import WatchdogTask
         from nidaqmx.types import DOExpirationState
@@ -145,7 +145,7 @@ class ClockedTasks:
             self._output().start()
 
     def read(self, samples: int, wait: float) -> np.ndarray:
-        """Counts (inputs, n) int16 of the next samples: ``samples``, or fewer after ``wait`` s."""
+        """Return counts (inputs, n) int16 of the next ``samples``, or fewer after ``wait`` s."""
         import nidaqmx.errors
         from nidaqmx.stream_readers import AnalogUnscaledReader
 
@@ -155,7 +155,7 @@ class ClockedTasks:
             if self._watchdog is not None:
                 self._watchdog.reset_timer()
             reader = AnalogUnscaledReader(ai.in_stream)
-            reader.verify_array_shape = False  # it is as it should be, and asking costs a call
+            reader.verify_array_shape = False  # the shape is right, and the check costs a call
             try:
                 read = reader.read_int16(counts, samples, wait)
             except nidaqmx.errors.DaqReadError as error:
@@ -164,31 +164,31 @@ class ClockedTasks:
                 read = error.samps_per_chan_read
         if read == samples:
             return counts
-        # rows come one after another, of the length that was read
+        # rows follow each other without gaps, at the length that was read
         return counts.reshape(-1)[: counts.shape[0] * read].reshape(counts.shape[0], read).copy()
 
     def waiting(self) -> int:
-        """Samples of each input that were acquired and not read."""
+        """Return the samples of each input that were acquired and not read."""
         with self._errors():
             return int(self._inputs().in_stream.avail_samp_per_chan)
 
     def refill(self, delivered: int) -> None:
-        """Write on where there is room: ``delivered`` samples at least have been put out."""
+        """Write further samples where there is room; at least ``delivered`` have been output."""
         if self._written == self._command.size:
             return
         room = self._buffer - (self._written - max(delivered, self._first))
-        # in few large pieces
+        # wait for room for a large piece
         if room >= self._buffer // 4 or room >= self._command.size - self._written:
             self._write(room)
 
     def hold(self) -> int:
-        """Stop the clock, the output standing where it is; returns the samples put out so far."""
+        """Stop the clock and hold the output; returns the number of samples output so far."""
         with self._errors():
             self._output().stop()
             return int(self._inputs().in_stream.total_samp_per_chan_acquired)
 
     def continue_with(self, command: np.ndarray, played: int) -> None:
-        """Go on with ``command`` from sample ``played``, at the same rate, on the same inputs."""
+        """Continue with ``command`` from sample ``played``, with the same rate and inputs."""
         self._command = command
         self._first = self._written = played
         if played == command.size:
@@ -198,7 +198,7 @@ class ClockedTasks:
             self._output().start()
 
     def check_output(self) -> None:
-        """Raise ``RigError`` where the output has failed, of which the inputs know nothing."""
+        """Raise ``RigError`` where the output has failed, which the inputs do not show."""
         with self._errors():
             self._output().is_task_done()
 
@@ -209,7 +209,7 @@ class ClockedTasks:
         self._all([task.close for task in (ao, ai) if task is not None])
 
     def disable(self) -> None:
-        """Take the enable line low and its watchdog off. Raises as ``close``."""
+        """Set the enable line low and end its watchdog. Raises as ``close``."""
         enable, watchdog = self._enable, self._watchdog
         self._enable = self._watchdog = None
         calls: list[Callable[[], object]] = []
@@ -221,8 +221,7 @@ class ClockedTasks:
     def close(self) -> None:
         """Clear every task.
 
-        Each is cleared although another one cannot be; raises ``RigError`` for the first that
-        could not.
+        Each one is cleared even if another fails; raises ``RigError`` for the first failure.
         """
         self._all([self.release, self.disable])
 
@@ -262,7 +261,7 @@ class ClockedTasks:
                 min_val=-ranges[name],
                 max_val=ranges[name],
             )
-        # whatever the rate, a reader that is late is seen by the interlock before samples are lost
+        # large enough at any rate for the interlock to see a late reader before samples are lost
         buffer = max(
             card.ai_buffer_samples, round(_READER_BUFFER * settings.interlocks.late_s * rate)
         )
@@ -279,11 +278,11 @@ class ClockedTasks:
         return ai
 
     def _time_output(self) -> None:
-        """Give the output its clock and buffer for what is left of the command, and fill it."""
+        """Set the output's clock and buffer for the rest of the command, and fill it."""
         from nidaqmx.constants import AcquisitionType, RegenerationMode, TaskMode
 
         ao = self._output()
-        # a finite generation has 2 samples or more: one more at 0 V, where the command ends anyway
+        # a finite generation needs 2 samples: add one at 0 V, where the command ends
         left = max(2, self._command.size - self._first)
         ao.timing.cfg_samp_clk_timing(
             self._rate, sample_mode=AcquisitionType.FINITE, samps_per_chan=left

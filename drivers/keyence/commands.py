@@ -1,20 +1,21 @@
-"""The command letters of the LK-G5000 on RS-232C, and what its numbers mean: the one table.
+"""Table of the LK-G5000's commands on RS-232C, with the meaning of its numbers.
 
-None of this was tried on hardware, and the unit's own manual has not been at hand. It was put
-together from what others publish; correct it here when the manual says otherwise.
+Nothing here was tried on hardware, and the controller's own manual was not available. The table is
+compiled from published sources; correct it here where the manual differs.
 
 - Framing, the error reply ``ER,command,code``, the form of values, ``+FFFFFFF`` and ``XXXXXXXX``:
   user's manual of the older LK-G series (LK-G-M-NO5-E, pages 5-5, 5-6).
 - ``MS`` with two digits for OUT, ``Q0``, ``R0``, codes 50 to 99, times of mode changes: open-source
   programs for the LK-G5000, which use them. ``VS``, ``WS``, ``PR``, ``SR,CA``, ``SR,OC``: likewise.
-- ``SR,OB``, ``OD``, ``OG``, ``OI``: programs that read all settings of an LK-G5000, and one
-  for each that names it. ``SR,OH`` as the analog scaling is the only one left over in that list,
-  whose order is that of the functions in the maker's library: the least certain of all.
+- ``SR,OB``, ``OD``, ``OG``, ``OI``: programs that read all settings of an LK-G5000, and for each
+  another program that names it. ``SR,OH`` as the analog scaling is the only one left over in that
+  list, whose order is that of the functions in the maker's library. It is the least certain one.
 - The numbers of the sampling cycles, filters and the like: header of the maker's library.
 
-In its measuring mode the controller takes measurement commands only, in its setting mode settings
-only, and does not measure then. It tells neither its type, serial number nor firmware. Which analog
-output carries which OUT (``SR,CG``) is not asked: sources disagree about the order of its numbers.
+In its measuring mode the controller accepts measurement commands only. In its setting mode it
+accepts settings only and does not measure. It reports no type, serial number or firmware version.
+Which analog output carries which OUT (``SR,CG``) is not queried: sources disagree about the order
+of its numbers.
 """
 
 from __future__ import annotations
@@ -37,23 +38,23 @@ __all__ = [
 
 _VALUE = re.compile(r"[+-](?=.{7}$)\d+\.?\d*|[+-]F{7}|X{8}|-{8}")  # a sign and seven characters
 _SETTING = re.compile(r"[+-](?=.{6,8}$)\d+\.?\d*")
-_CHOICE = re.compile(r"\d")  # one digit: with two it is the OUT of a reply that lost its end
+_CHOICE = re.compile(r"\d")  # one digit; two digits are the OUT of a truncated reply
 _NUMBER = re.compile(r"\d{1,2}")
 
-_REPLY = 0.5  # s; answers come within some 20 ms, and after an average has been taken anew
-_MODE_CHANGE = 6.0  # s; 0.6 s, and 0.75 s more for every unit that extends the controller
+_REPLY = 0.5  # s; replies take some 20 ms, or the time of a new average
+_MODE_CHANGE = 6.0  # s; a change takes 0.6 s, and 0.75 s more for each extension unit
 
 
 @dataclass(frozen=True)
 class Command:
-    """``letters`` with a place for OUT, ``values`` of the reply, s to wait for it."""
+    """Command: ``letters`` with a place for OUT, ``values`` of the reply, s to wait for it."""
 
     letters: str
     values: tuple[re.Pattern[str], ...] = ()
     timeout: float = _REPLY
 
     def text(self, out: int) -> str:
-        """The command for OUT ``out``, without its end."""
+        """Return the command for OUT ``out``, without its terminator."""
         return self.letters.format(out=out)
 
 
@@ -64,7 +65,7 @@ COMMANDS = {
     "auto-zero off": Command("WS,{out:02d}"),
     "setting mode": Command("Q0", timeout=_MODE_CHANGE),
     "measuring mode": Command("R0", timeout=_MODE_CHANGE),
-    # from here on in the setting mode only
+    # the following commands work in the setting mode only
     "sampling cycle": Command("SR,CA", (_CHOICE,)),
     "measurement scaling": Command("SR,OB,{out:02d}", (_SETTING,) * 4),
     "filter": Command("SR,OC,{out:02d}", (_CHOICE,) * 2),
@@ -87,13 +88,13 @@ DISPLAY_UNITS = (
     (1e-6, 1e-7), (1e-6, 1e-8), (1e-6, 1e-9),
 )  # fmt: skip
 
-STATUS_ERROR = 51  #: the command does not belong to the mode the controller is in
+STATUS_ERROR = 51  #: the command is not valid in the controller's present mode
 
 _DIFFERS = (
     "the letters may differ in this unit: compare drivers/keyence/commands.py with its manual"
 )
-_OLDER = "an older LK-G, whose commands are others, answers so"
-#: What an error code means, and what to do.
+_OLDER = "an older LK-G, which has other commands, replies like this"
+#: Meaning of each error code, and what to do.
 ERRORS = {
     0: ("command error or no head", f"check the head's cable; {_OLDER}"),
     1: ("status error or fault of head 1", f"check the head's cable; {_OLDER}"),

@@ -1,4 +1,4 @@
-"""The laser controller's settings against those of the rig file."""
+"""Comparison of the laser controller's settings with those of the rig file."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _ZERO_TOLERANCE = 1e-3  # of the range
 
 @dataclass(frozen=True)
 class ControllerSettings:
-    """What is set in a controller, for one OUT, in SI units.
+    """Settings of a controller for one OUT, in SI units.
 
-    ``sampling`` is in s; ``averaging`` None where the filter is no average. The points are two
-    pairs: measured and displayed m for ``measurement_points``, m and V for ``analog_points``.
+    ``sampling`` is in s; ``averaging`` is None where the filter is not an average. The points are
+    two pairs: measured and displayed m for ``measurement_points``, m and V for ``analog_points``.
     """
 
     program: int
@@ -32,27 +32,27 @@ class ControllerSettings:
 
     @property
     def metres_per_volt(self) -> float:
-        """Scale of the analog output, negative where it falls with the reading."""
+        """Return the scale of the analog output, negative where it falls with the reading."""
         (x1, v1), (x2, v2) = self.analog_points
         return (x2 - x1) / (v2 - v1)
 
     @property
     def metres_at_0_volts(self) -> float:
-        """Reading for which the analog output is 0 V."""
+        """Return the reading for which the analog output is 0 V."""
         x, volts = self.analog_points[0]
         return x - volts * self.metres_per_volt
 
     @property
     def measurement_gain(self) -> float:
-        """Displayed over measured displacement."""
+        """Return displayed over measured displacement."""
         (x1, y1), (x2, y2) = self.measurement_points
         return (y2 - y1) / (x2 - x1)
 
 
 def compare(settings: LaserSettings, found: ControllerSettings) -> list[str]:
-    """One sentence for each setting that falsifies a recording made with ``settings``.
+    """Return one sentence for each setting that falsifies a recording made with ``settings``.
 
-    Nothing is compared where ``settings.port`` is empty: then no controller was asked.
+    Returns none where ``settings.port`` is empty, since no controller was queried.
     """
     if not settings.port:
         return []
@@ -60,7 +60,7 @@ def compare(settings: LaserSettings, found: ControllerSettings) -> list[str]:
 
 
 def settings_findings(settings: LaserSettings, found: ControllerSettings) -> tuple[Finding, ...]:
-    """Every setting of the controller that the rig file speaks of."""
+    """Return a finding for every controller setting that the rig file has too."""
     name = settings.model
 
     def finding(

@@ -1,4 +1,4 @@
-"""A conversation with the laser controller: one command, one reply, and nothing hangs."""
+"""Serial communication with the laser controller: one command, one reply, in bounded time."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ __all__ = ["POLL", "Keyence", "LaserError", "NoReading", "Port", "open_port"]
 
 POLL = 0.05  #: s that one read of the port waits
 _ATTEMPTS = 3
-_PATIENCE = 1.0  # s; silence longer than this is not waited for again
-_LINE_MAX = 200  # bytes; the longest reply asked for here has 40
-_QUIET_MAX = 1.0  # s to wait for the end of what is no reply
-_NOISE_MAX = 20_000  # bytes to wait for it; 115200 Bd bring fewer in that time
-_SHOWN = 24  # bytes of what is no reply that a message shows
-_VOLTS_MAX = 11.0  # of the analog output
+_PATIENCE = 1.0  # s; after a longer silence a command is not repeated
+_LINE_MAX = 200  # bytes; the longest expected reply has 40
+_QUIET_MAX = 1.0  # s to wait for the end of unexpected data
+_NOISE_MAX = 20_000  # bytes of unexpected data to discard; 115200 Bd bring fewer in _QUIET_MAX
+_SHOWN = 24  # bytes of unexpected data that a message shows
+_VOLTS_MAX = 11.0  # V; no analog output exceeds it
 
 T = TypeVar("T")
 
 
 class LaserError(RigError):
-    """The laser controller does not do what it is asked: ``what`` happened, ``advice`` what to do.
+    """Fault of the laser controller: ``what`` happened, ``advice`` what to do.
 
-    ``code`` is that of the controller's error reply.
+    ``code`` is the code in the controller's error reply, if there was one.
     """
 
     def __init__(self, what: str, advice: str, code: int | None = None) -> None:
@@ -54,7 +54,7 @@ class LaserError(RigError):
 
 
 class NoReading(Enum):
-    """What the controller says where it has no number."""
+    """Reply of the controller instead of a number."""
 
     OVER_RANGE = "beyond the measuring range, on its positive side"
     UNDER_RANGE = "beyond the measuring range, on its negative side"
@@ -71,15 +71,14 @@ _STATES = {
 
 
 class Port(Protocol):
-    """What is needed of a serial port; pyserial's has it. Faults are ``OSError``.
+    """Interface of a serial port, which pyserial's ports have. Faults are ``OSError``.
 
-    ``read`` gives what comes within ``POLL`` s, up to ``size`` bytes; nothing means that nothing
-    came.
+    ``read`` returns the bytes that arrive within ``POLL`` s, up to ``size`` of them, or none.
     """
 
     @property
     def in_waiting(self) -> int:
-        """Bytes that can be read at once."""
+        """Return the number of bytes that can be read at once."""
         ...
 
     def read(self, size: int = 1, /) -> bytes:
@@ -87,7 +86,7 @@ class Port(Protocol):
         ...
 
     def write(self, data: bytes, /) -> object:
-        """Write all of it."""
+        """Write all of ``data``."""
         ...
 
     def close(self) -> None:
@@ -98,7 +97,7 @@ class Port(Protocol):
 def open_port(settings: LaserSettings) -> Port:
     """Open ``settings.port``, a name such as COM3 or a URL that pyserial knows.
 
-    Raises ``LaserError`` where that does not work.
+    Raises ``LaserError`` where the port cannot be opened.
     """
     try:
         import serial
@@ -120,7 +119,7 @@ def open_port(settings: LaserSettings) -> Port:
 def _cannot_open(name: str, error: Exception) -> LaserError:
     from serial.tools.list_ports import comports
 
-    # on Windows the cause stands in the text only
+    # on Windows only the text gives the cause
     text, number = str(error), getattr(error, "errno", None)
     denied = number == errno.EACCES or "PermissionError" in text
     if number == errno.ENOENT or "FileNotFoundError" in text:
@@ -133,8 +132,8 @@ def _cannot_open(name: str, error: Exception) -> LaserError:
         return LaserError(f"serial port {name} is in use", "close the program that uses it")
     if denied:
         return LaserError(
-            f"serial port {name} may not be opened by this user",
-            "become a member of the group that owns it, often dialout, and log in anew",
+            f"this user may not open serial port {name}",
+            "join the group that owns it, often dialout, and log in again",
         )
     return LaserError(
         f"serial port {name} cannot be opened: {text}",
@@ -142,8 +141,8 @@ def _cannot_open(name: str, error: Exception) -> LaserError:
     )
 
 
-class _Garbled(Exception):  # noqa: N818  (it is no error of the program)
-    """What came is no reply to what was asked."""
+class _Garbled(Exception):  # noqa: N818  (not an error of the program)
+    """The received data are not a reply to the command."""
 
     def __init__(self, data: bytes) -> None:
         super().__init__()
@@ -151,11 +150,11 @@ class _Garbled(Exception):  # noqa: N818  (it is no error of the program)
 
 
 class Keyence:
-    """A controller at the other end of ``port``; ``settings`` say which OUT, and how it is reached.
+    """Controller at the other end of ``port``; ``settings`` give its OUT and the port's settings.
 
-    Every method raises ``LaserError`` where the controller does not answer as it should, in bounded
-    time whatever the port delivers. The protocol has no checksum: a number that was falsified into
-    another number on its way is not noticed.
+    Every method raises ``LaserError`` where the controller does not reply correctly, in bounded
+    time whatever the port delivers. The protocol has no checksum: a number that the line corrupts
+    into another number goes unnoticed.
     """
 
     def __init__(
@@ -164,8 +163,8 @@ class Keyence:
         self._port = port
         self._settings = settings
         self._clock = clock
-        self._held = b""  # came, not looked at yet
-        self._unit: float | None = None  # of a value, m; known once it was asked for
+        self._held = b""  # received, not yet parsed
+        self._unit: float | None = None  # of a value, m; None until it is read
 
     def __enter__(self) -> Keyence:
         return self
@@ -193,9 +192,9 @@ class Keyence:
         return int(self._ask("program")[0])
 
     def read(self) -> float | NoReading:
-        """The measured value in m, or why there is none.
+        """Return the measured value in m, or the reason why there is none.
 
-        The first call reads the unit too, for which the controller stops measuring for a moment.
+        The first call reads the unit too; the controller stops measuring for that moment.
         """
         if self._unit is None:
             with self._setting_mode():
@@ -206,11 +205,11 @@ class Keyence:
         return float(text) * self._known_unit()
 
     def auto_zero(self, on: bool) -> None:
-        """Let values count from the present one (``on``), or from the reference again."""
+        """Set the zero of values to the present one (``on``), or back to the reference."""
         self._ask("auto-zero on" if on else "auto-zero off")
 
     def controller_settings(self) -> ControllerSettings:
-        """What is set in the controller; it does not measure while it is asked."""
+        """Return the controller's settings; the controller does not measure meanwhile."""
         program = self.program()
         with self._setting_mode():
             sampling = self._choice("sampling cycle", SAMPLING_US)
@@ -223,7 +222,7 @@ class Keyence:
             program=program,
             sampling=sampling * 1e-6,
             filter=self._known("filter", kind, FILTERS),
-            # the same digit is a number of averages or a cut-off frequency
+            # the digit stands for a number of averages or for a cut-off frequency
             averaging=self._known("filter", parameter, AVERAGING) if kind == "0" else None,
             calculation=calculation,
             measurement_points=(
@@ -241,8 +240,8 @@ class Keyence:
         ):
             if points[0][0] == points[1][0] or points[0][1] == points[1][1]:
                 raise LaserError(
-                    f"the {name} of OUT{self._settings.output} has two points that are one",
-                    "set it in the controller",
+                    f"the two points of the {name} of OUT{self._settings.output} are the same",
+                    "set two different points in the controller",
                 )
         if max(abs(volts) for _, volts in found.analog_points) > _VOLTS_MAX:
             raise LaserError(
@@ -257,12 +256,12 @@ class Keyence:
 
     @contextmanager
     def _setting_mode(self) -> Iterator[None]:
-        """Settings can be asked for in the body; the controller measures again after it."""
+        """Put the controller into its setting mode in the body, and measure again afterwards."""
         try:
             self._change_mode("setting mode")
             yield
         finally:
-            # always: a controller in its setting mode holds its output and measures nothing
+            # in any case: in its setting mode a controller holds its output and does not measure
             try:
                 self._change_mode("measuring mode")
             except LaserError as error:
@@ -277,7 +276,7 @@ class Keyence:
         try:
             self._ask(mode)
         except LaserError as error:
-            if error.code != STATUS_ERROR:  # it is in this mode already
+            if error.code != STATUS_ERROR:  # this code: the controller is in this mode already
                 raise
 
     def _read_unit(self) -> tuple[float, float]:
@@ -310,7 +309,7 @@ class Keyence:
     # ------------------------------------------------------------ one command, one reply
 
     def _ask(self, name: str) -> list[str]:
-        """Values of the reply to the command called ``name``; what got lost is asked for again."""
+        """Return the values of the reply to command ``name``; a lost reply is requested again."""
         command = COMMANDS[name]
         text = command.text(self._settings.output)
         seen: bytes = b""
@@ -340,7 +339,7 @@ class Keyence:
             raise self._refused(text, int(fields[2]))
         count = len(command.values)
         header, values = fields[: len(fields) - count], fields[len(fields) - count :]
-        # a reply repeats the command, with its OUT or without it
+        # a reply repeats the command, with or without its OUT
         named = 2 if asked[0] == "SR" else 1
         if len(header) < named or header != asked[: len(header)] or len(values) != count:
             raise _Garbled(line or b"\r")
@@ -349,7 +348,7 @@ class Keyence:
         return values
 
     def _line(self, timeout: float) -> bytes:
-        """What comes up to the next CR."""
+        """Return the bytes up to the next CR."""
         deadline = self._clock() + timeout
         while b"\r" not in self._held:
             if len(self._held) > _LINE_MAX or self._clock() >= deadline:
@@ -365,7 +364,7 @@ class Keyence:
             left -= came
 
     def _drop(self) -> None:
-        """Forget what has come unasked, such as a reply that was waited for in vain."""
+        """Discard unrequested data, such as a reply that came after its time-out."""
         self._held = b""
         if self._port.in_waiting:
             self._wait_for_quiet()
@@ -377,7 +376,7 @@ class Keyence:
 
     def _refused(self, text: str, code: int) -> LaserError:
         meaning, advice = ERRORS.get(
-            code, ("an error that is not known here", "look the code up in the unit's manual")
+            code, ("an unknown error", "look the code up in the controller's manual")
         )
         return LaserError(
             f"the laser controller refuses {text} with code {code:02d}: {meaning}", advice, code
@@ -388,22 +387,22 @@ class Keyence:
         if not seen:
             return LaserError(
                 f"nothing answers {text} on {where}",
-                "look whether the controller is on, the cable is the crossed one that belongs to "
-                "it, laser.port is its port, and laser.baud_rate as set in the controller",
+                "check that the controller is on, the cable is its own crossed one, laser.port is "
+                "its port, and laser.baud_rate is the rate set in the controller",
             )
         shown = ascii(seen[:_SHOWN].decode("ascii", "backslashreplace")).replace("\\\\", "\\")
         if all(byte in b"\r\n\t" or 32 <= byte < 127 for byte in seen):
             return LaserError(
-                f"what answers {text} on {where} says {shown}, which no LK-G5000 does",
-                "look whether laser.port is the controller's port: another instrument may be there",
+                f"the reply to {text} on {where} is {shown}, which no LK-G5000 sends",
+                "check that laser.port is the controller's port: another instrument may be there",
             )
         return LaserError(
-            f"what comes on {where} is no text: {shown}",
+            f"the data on {where} are not text: {shown}",
             "set laser.baud_rate as in the controller; if it is, check the cable and "
             "interference from the high voltage",
         )
 
 
 def _scaled(text: str, unit: float, step: float) -> float:
-    """A setting in units where it has a decimal point, else in smallest steps."""
+    """Return a setting in units if it has a decimal point, else in smallest steps."""
     return float(text) * (unit if "." in text else step)

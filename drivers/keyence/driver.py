@@ -1,4 +1,4 @@
-"""The Keyence controller's driver, as the registry of instruments has it."""
+"""Driver of the Keyence controller, for the registry of instruments."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ __all__ = ["DRIVER", "KeyenceDriver"]
 
 
 class KeyenceDriver:
-    """A laser with an LK-G5000 controller; see ``LaserDriver``.
+    """Driver of a laser with an LK-G5000 controller; see ``LaserDriver``.
 
-    ``opener`` opens the serial port, ``clock`` gives the time in s by which replies are late.
+    ``opener`` opens the serial port; ``clock`` returns the time in s for time-outs.
     """
 
     role: Literal["laser"] = "laser"
@@ -31,9 +31,9 @@ class KeyenceDriver:
         self._clock = clock
 
     def inspect(self, settings: LaserSettings) -> LaserInspection:
-        """Return whether it is there, set as ``settings`` say, and sees the film."""
+        """Return whether it answers, agrees with ``settings`` and sees the film."""
         return inspect(settings, self._opener, self._clock)
 
 
-#: As the registry has it.
+#: Entry of the registry.
 DRIVER = KeyenceDriver()

@@ -1,4 +1,4 @@
-"""Inspection of the laser controller: it answers, agrees with the rig file, sees the film."""
+"""Inspection of the laser controller: its replies, its settings, and its view of the film."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def inspect(
 ) -> LaserInspection:
     """Inspect the controller at ``settings.port``; faults are findings.
 
-    With an empty ``settings.port`` nothing is asked, and one finding says so.
+    With an empty ``settings.port`` the controller is not queried, and one finding says so.
     """
     name = settings.model
     if not settings.port:

@@ -92,7 +92,7 @@ def test_a_simulated_controller_is_asked_where_there_is_a_port() -> None:
     ("fault", "item", "said"),
     [
         ("sensor-out-of-range@0", "analog output", "check that the laser is on"),
-        ("serial-garbage@0", "serial port", "is no text"),
+        ("serial-garbage@0", "serial port", "not text"),
     ],
 )
 def test_faults_of_a_simulated_rig_are_found(fault: str, item: str, said: str) -> None:

@@ -125,7 +125,7 @@ def test_guardian_that_was_killed_is_not_armed_and_says_so():
 
 
 def test_guardian_without_a_card_says_what_it_lacks():
-    with pytest.raises(RigError, match="cannot do its work: card Dev1: NI-DAQmx"):
+    with pytest.raises(RigError, match="does not work: card Dev1: NI-DAQmx"):
         GuardianProcess(Address("Dev1"), RigFile())
 
 
