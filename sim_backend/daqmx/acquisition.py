@@ -1,4 +1,4 @@
-"""One run of the card's inputs: which samples there are, and what the rig reads at each."""
+"""One run of the card's inputs: the times of the samples and the counts at each."""
 
 from __future__ import annotations
 
@@ -15,39 +15,39 @@ __all__ = ["OwnTicks", "Run", "SharedTicks", "Ticks"]
 
 
 class OwnTicks:
-    """Samples on a clock of ``rate`` Hz that starts at ``start`` s, or not before it is known."""
+    """Samples on their own clock of ``rate`` Hz that starts at ``start`` s; None: not started."""
 
     def __init__(self, rate: float, start: float | None) -> None:
         self.rate = rate
         self.start = start
 
     def passed(self, now: float) -> int:
-        """Samples that are complete at ``now``."""
+        """Return the number of samples that are complete at ``now``."""
         if self.start is None:
             return 0
         return max(0, math.floor((now - self.start) * self.rate + TICK_TOLERANCE))
 
     def due(self, samples: int, now: float) -> float | None:  # noqa: ARG002
-        """When ``samples`` will be complete in s; None where that is not known."""
+        """Return the time in s at which ``samples`` are complete, or None where it is unknown."""
         return None if self.start is None else self.start + samples / self.rate
 
     def times(self, first: int, last: int) -> np.ndarray:
-        """Times (n,) s of the samples ``first`` to before ``last``."""
+        """Return the times (n,) s of the samples from ``first`` to before ``last``."""
         return (self.start or 0.0) + np.arange(first, last) / self.rate
 
     def commands(self, first: int, last: int, track: Track) -> np.ndarray:
-        """Counts (n,) on the output of ``track`` at these samples."""
+        """Return the counts (n,) on the output of ``track`` at these samples."""
         return track.at(self.times(first, last))
 
 
 @dataclass(frozen=True)
 class _Piece:
-    """From sample ``first`` on there is one at each tick of ``generation``, from ``tick`` on."""
+    """Piece of a record: from sample ``first`` on, one at each tick of ``generation``."""
 
     first: int
     generation: Generation
     tick: int
-    row: int | None  # of the output that the rig is wired to
+    row: int | None  # of the output that is wired to the rig
 
 
 class SharedTicks:
@@ -57,23 +57,23 @@ class SharedTicks:
         self._pieces: list[_Piece] = []
 
     def follow(self, generation: Generation, tick: int, row: int | None, now: float) -> None:
-        """Let the samples from now on come from ``generation``, the first at its ``tick``."""
+        """Take samples from now on at the ticks of ``generation``, the first at its ``tick``."""
         self._pieces.append(_Piece(self.passed(now), generation, tick, row))
 
     @property
     def rate(self) -> float:
-        """Rate in Hz of the output on whose clock it started."""
+        """Return the rate in Hz of the output on whose clock it started."""
         return self._pieces[0].generation.rate
 
     def passed(self, now: float) -> int:
-        """Samples that are complete at ``now``."""
+        """Return the number of samples that are complete at ``now``."""
         if not self._pieces:
             return 0
         piece = self._pieces[-1]
         return piece.first + max(0, piece.generation.ticks(now) - piece.tick)
 
     def due(self, samples: int, now: float) -> float | None:
-        """When ``samples`` will be complete in s; None where that is not known."""
+        """Return the time in s at which ``samples`` are complete, or None where it is unknown."""
         if not self._pieces:
             return None
         piece = self._pieces[-1]
@@ -81,16 +81,16 @@ class SharedTicks:
         generation = piece.generation
         if generation.finished(now) or (generation.total is not None and tick > generation.total):
             return None
-        # it may run out of samples before that: then this is when a reader should check again
+        # it may run out of samples before that; a reader then checks again at this time
         return generation.due(tick)
 
     def times(self, first: int, last: int) -> np.ndarray:
-        """Times (n,) s of the samples ``first`` to before ``last``."""
+        """Return the times (n,) s of the samples from ``first`` to before ``last``."""
         parts = [p.generation.start + t / p.generation.rate for p, t in self._split(first, last)]
         return np.concatenate(parts)
 
     def commands(self, first: int, last: int, track: Track) -> np.ndarray:
-        """Counts (n,) on the output of ``track`` at these samples."""
+        """Return the counts (n,) on the output of ``track`` at these samples."""
         parts = []
         for piece, ticks in self._split(first, last):
             if piece.row is None:
@@ -101,7 +101,7 @@ class SharedTicks:
         return np.concatenate(parts)
 
     def needs(self, generation: Generation, sample: int) -> int | None:
-        """First tick of ``generation`` that is asked for from ``sample`` on; None: none is."""
+        """Return the first tick of ``generation`` needed from ``sample`` on, or None."""
         ticks = [
             piece.tick + max(0, sample - piece.first)
             for piece in self._pieces
@@ -123,12 +123,11 @@ Ticks = OwnTicks | SharedTicks
 
 
 class Run:
-    """The rig from rest on, sample by sample, as ``command`` says what the output gets.
+    """Run of the rig from rest, sample by sample, under the counts of ``command``.
 
-    ``command(first, last)`` gives the counts (n,) of these samples. Those whose time has come are
-    for good; later ones are what is to be expected. A chunk that was computed on an expectation
-    which did not come true is computed again from its start, so that how reads and writes were cut
-    changes nothing.
+    ``command(first, last)`` returns the counts (n,) of these samples. Counts of past samples are
+    final; later ones are expected values. A chunk is computed again from its start where an
+    expected value was wrong. The result therefore does not depend on the sizes of reads and writes.
     """
 
     def __init__(
@@ -138,24 +137,24 @@ class Run:
         self._command = command
         self._chunk = -1
         self._before = state  # before the newest chunk
-        self._after = state  # after it
-        self._used = np.empty(0, dtype=np.int16)  # the commands it was computed from
-        self._checked = 0  # how many of them have been found to be true
+        self._after = state  # after the newest chunk
+        self._used = np.empty(0, dtype=np.int16)  # commands from which it was computed
+        self._checked = 0  # number of them that are known to be final
         self._counts = np.empty((0, 0), dtype=np.int16)
 
     @property
     def keeps(self) -> int:
-        """The first sample whose command may be asked for again."""
+        """Return the first sample whose command may be needed again."""
         return max(0, self._chunk) * CHUNK
 
     def read(self, first: int, last: int) -> np.ndarray:
-        """Counts (channels, n) int16 of samples ``first`` to before ``last``, never backwards."""
+        """Return counts (channels, n) int16 from ``first`` to before ``last``, in rising order."""
         parts = []
         while first < last:
             chunk = first // CHUNK
             end = min(last, (chunk + 1) * CHUNK)
             while self._chunk < chunk:
-                # what the next one starts from must have come true to its last sample
+                # the next chunk must start from final commands
                 if self._chunk >= 0:
                     self._confirm(CHUNK)
                 self._chunk += 1
@@ -167,7 +166,7 @@ class Run:
         return np.concatenate(parts, axis=1) if len(parts) != 1 else parts[0]
 
     def _confirm(self, samples: int) -> None:
-        """Make sure that the first ``samples`` of the chunk were computed from the truth."""
+        """Ensure that the first ``samples`` of the chunk were computed from final commands."""
         if samples <= self._checked:
             return
         start = self._chunk * CHUNK

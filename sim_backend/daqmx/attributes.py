@@ -1,4 +1,4 @@
-"""DAQmx's properties by group and number: how each is read, and how it is set where it can be."""
+"""DAQmx's properties by group and number, with getter and, if settable, setter."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from dearig.sim_backend.daqmx.tasks import AnalogInput, AnalogOutput, Kind, Line
 
 __all__ = ["SERIAL", "Asked", "get", "reset", "set_"]
 
-SERIAL = 0x0D1E1EC7  #: of a card that is not there
-DRIVER = (25, 0, 0)  #: the driver's version that the server says it has
+SERIAL = 0x0D1E1EC7  #: serial number of the simulated card
+DRIVER = (25, 0, 0)  #: driver version that the server reports
 
 _REGENERATION, _NO_REGENERATION = 10097, 10158
 _FINITE, _CONTINUOUS = 10178, 10123
@@ -30,9 +30,9 @@ _DO_NOT_OVERWRITE = 10159
 
 @dataclass(frozen=True)
 class Asked:
-    """What a property is asked of: the ``device``, and a ``task`` and the ``channel`` if any.
+    """Target of a property: the ``device``, and a ``task`` and ``channel`` if any.
 
-    ``channel`` is a name of channels in the task, of the device, or of lines, as the group has it.
+    ``channel`` names channels in the task, channels of the device, or lines, by the group.
     """
 
     device: Device
@@ -41,17 +41,17 @@ class Asked:
 
     @property
     def own(self) -> Task:
-        """The task, which there must be."""
+        """Return the task; raises an error without one."""
         if self.task is None:
             raise DaqmxError(Code.INVALID_TASK)
         return self.task
 
     def first(self) -> AnalogInput | AnalogOutput | Lines:
-        """The first of the task's channels that are meant."""
+        """Return the first of the addressed channels of the task."""
         task = self.own
         if not task.channels:
             raise DaqmxError(Code.NOT_WITHOUT_CHANNELS, f"Task Name: {task.name}")
-        # of a list or range of names such as Dev1/ai0:2, the first
+        # the first name of a list or range such as Dev1/ai0:2
         wanted = re.sub(r"(?<=\d):\d+$", "", self.channel.split(",")[0].strip())
         for channel in task.channels:
             if not wanted or channel.name == wanted:
@@ -59,14 +59,14 @@ class Asked:
         raise DaqmxError(Code.INVALID_CHANNEL_NAME, f"Channel Name: {self.channel}")
 
     def analog(self) -> AnalogInput | AnalogOutput:
-        """The same, where it has to be an analog one."""
+        """Return the same channel; raises an error unless it is analog."""
         channel = self.first()
         if isinstance(channel, Lines):
             raise DaqmxError(Code.NOT_SUPPORTED_IN_TASK, f"Task Name: {self.own.name}")
         return channel
 
     def input(self) -> AnalogInput:
-        """The same, where it has to be an analog input."""
+        """Return the same channel; raises an error unless it is an analog input."""
         channel = self.first()
         if not isinstance(channel, AnalogInput):
             raise DaqmxError(Code.NOT_SUPPORTED_IN_TASK, f"Task Name: {self.own.name}")
@@ -113,7 +113,7 @@ def _set_quantity(asked: Asked, *, finite: bool | None = None, samples: int | No
 
 
 def _only(*values: Any) -> Setter:
-    """Takes what the card does anyway, and nothing else."""
+    """Return a setter that accepts only the values that the card has anyway."""
 
     def check(_: Asked, value: Any) -> None:
         if value not in values:
@@ -147,7 +147,7 @@ def _acquired(asked: Asked) -> int:
     return asked.device.acquired(asked.own)
 
 
-#: group, number -> how it is read, and set
+#: group, number -> getter, setter
 TABLE: dict[tuple[str, int], tuple[Getter | None, Setter | None]] = {
     # the system and the device
     ("SystemInfo", 0x1272): (_always(DRIVER[0]), None),
@@ -292,7 +292,7 @@ TABLE: dict[tuple[str, int], tuple[Getter | None, Setter | None]] = {
     ),
 }
 
-#: What a reset of a property sets it to, where that is allowed.
+#: Value that a reset of a property sets, where a reset is allowed.
 DEFAULTS: dict[tuple[str, int], Any] = {
     ("Write", 0x1453): _REGENERATION,
     ("Chan", 0x182B): _BITS,
@@ -302,14 +302,14 @@ DEFAULTS: dict[tuple[str, int], Any] = {
 
 
 def level(value: int) -> bool:
-    """Whether DAQmx's ``value`` of a line is high; refuses what the card's watchdog cannot do."""
+    """Return True if DAQmx's ``value`` of a line is high; refuses states without support."""
     if value not in (_HIGH, _LOW):
         raise DaqmxError(Code.INVALID_VALUE, f"Property: Watchdog.DO.ExpirState; Value: {value}")
     return value == _HIGH
 
 
 def get(group: str, number: int, asked: Asked) -> Any:
-    """Value of a property, as its getter has it."""
+    """Return the value of a property."""
     getter, _ = _entry(group, number)
     if getter is None:
         raise DaqmxError(Code.PROPERTY_NOT_SUPPORTED, f"Property: {group} {number:#06x}")
@@ -325,7 +325,7 @@ def set_(group: str, number: int, asked: Asked, value: Any) -> None:
 
 
 def reset(group: str, number: int, asked: Asked) -> None:
-    """Set a property to what it was."""
+    """Set a property back to its default."""
     if (group, number) not in DEFAULTS:
         raise DaqmxError(Code.PROPERTY_NOT_SUPPORTED, f"Property: {group} {number:#06x}")
     set_(group, number, asked, DEFAULTS[group, number])
@@ -345,7 +345,7 @@ def _booleans(asked: Asked) -> int:
 
 
 def _wirings(asked: Asked) -> int:
-    """Bits of the wirings that an input can have: RSE, NRSE, and DIFF for the first of a pair."""
+    """Return the bits of an input's wirings: RSE, NRSE, and DIFF for the first of a pair."""
     name = asked.channel.rpartition("/")[2]
     if not (name.startswith("ai") and name[2:].isdigit() and int(name[2:]) < INPUTS):
         raise DaqmxError(Code.UNKNOWN_CHANNEL, f"Physical Channel: {asked.channel}")

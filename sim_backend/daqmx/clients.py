@@ -1,4 +1,4 @@
-"""The clients of the server: one that vanishes with a voltage up is noticed."""
+"""Clients of the server, and the response to one that is lost while there is a voltage."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ __all__ = ["Clients"]
 log = logging.getLogger(__name__)
 
 _OUTPUTS = (Kind.AO, Kind.DO, Kind.WATCHDOG)
-_DEADLINE_S = 0.05  # a call that ends with no more time left than this was given up by its client
+_DEADLINE_S = 0.05  # a call that ends with less time left than this has timed out
 
 
 class _Context(Protocol):
-    """What is needed of a call's context."""
+    """Interface of a call's context."""
 
     def add_callback(self, callback: object) -> bool: ...
 
@@ -31,17 +31,17 @@ class _Context(Protocol):
 
 @dataclass
 class _Client:
-    calls: int = 0  # that it waits for
-    heard: float = 0.0  # s on the link's clock
-    drives: bool = False  # it has had output tasks
+    calls: int = 0  # in progress
+    heard: float = 0.0  # time of the last call, s on the link's clock
+    drives: bool = False  # True once it has had output tasks
 
 
 class Clients:
-    """The clients of ``device`` on the link's ``clock``; each is a connection.
+    """Clients of ``device`` on the link's ``clock``; each one is a connection.
 
-    One that drives the output and is silent for ``timeout`` s while there is a voltage at the film,
-    or whose connection ends, has its tasks aborted, the output taken to 0 V and the enable line
-    low. A client that waits for an answer is not silent.
+    A client that drives the output is lost if it is silent for ``timeout`` s while there is a
+    voltage at the film, or if its connection ends. Its tasks are then aborted, the output is set to
+    0 V and the enable line low. A client that waits for an answer is not silent.
     """
 
     def __init__(self, device: Device, clock: Clock, timeout: float) -> None:
@@ -53,10 +53,9 @@ class Clients:
 
     @contextmanager
     def call(self, name: str, context: _Context) -> Iterator[None]:
-        """While a call of the client ``name`` is being answered.
+        """Track a call of the client ``name`` while the body answers it.
 
-        When its ``context`` ends before that, and not because the client had no more time, the
-        connection has ended.
+        If its ``context`` ends earlier, and not by the client's time-out, the connection has ended.
         """
         answered = threading.Event()
 
@@ -81,9 +80,9 @@ class Clients:
                 client.drives = client.drives or drives
 
     def listen(self, name: str, task: str, context: _Context) -> None:
-        """The client ``name`` listens to an event of ``task`` for as long as ``context`` lasts.
+        """Track an event of ``task`` to which the client ``name`` listens while ``context`` lasts.
 
-        When that ends and the task is still there, the client has not cleared it: it is gone.
+        If ``context`` ends before the client has cleared the task, the client is lost.
         """
         there = self._device.task(task)
 
@@ -94,7 +93,7 @@ class Clients:
         context.add_callback(ended)
 
     def gone(self, name: str) -> None:
-        """The connection of ``name`` has ended: its tasks are cleared too."""
+        """Handle the end of the connection of ``name``, and clear its tasks."""
         with self._lock:
             client = self._clients.pop(name, None)
         tasks = self._device.tasks_of(name)
@@ -105,14 +104,14 @@ class Clients:
             self._device.clear(task)
 
     def all_gone(self) -> None:
-        """No connection is left."""
+        """Handle the end of all connections."""
         with self._lock:
             names = list(self._clients)
         for name in names:
             self.gone(name)
 
     def check(self) -> None:
-        """Look for a client that is silent with a voltage at the film."""
+        """Find a client that is silent while there is a voltage at the film."""
         if not self._device.live():
             return
         now = self._clock.now()

@@ -1,4 +1,4 @@
-"""The simulated card as its clients see it: the calls of NI-DAQmx, each taking effect at once."""
+"""Simulated card with the calls of NI-DAQmx, each with immediate effect."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ _LONGEST_WATCHDOG = 429.0  # s; 2**32 ticks of 10 MHz
 
 
 class Device(TimingEngine):
-    """A PCIe-6361 with the rig of ``settings`` behind it, whose film is ``plant`` at rest.
+    """PCIe-6361 with the rig of ``settings`` behind it; ``plant`` is the film at rest.
 
-    Every run of its inputs starts with the film at rest. All calls may come from any thread, and
-    all may raise ``DaqmxError``; those that take a ``timeout`` in s (negative: for ever) wait.
+    Every run of its inputs starts with the film at rest. All methods are thread-safe, and all may
+    raise ``DaqmxError``. Those with a ``timeout`` in s (negative: unlimited) wait.
     """
 
-    # what a test may ask
+    # state for tests
 
     def wire_voltage(self) -> float:
-        """Voltage in V that is commanded at the film now."""
+        """Return the present command in V at the film."""
         with self._lock:
             return self._wire.film_voltage(self._settle())
 
     def displacement(self) -> float:
-        """What the laser read last, in m; with the film at rest before the first run."""
+        """Return the laser's last reading in m, or the film at rest before the first run."""
         laser = self.settings.laser
         with self._lock:
             if self._laser is None:
@@ -43,39 +43,39 @@ class Device(TimingEngine):
             return laser.direction * laser.mm_per_V * 1e-3 * counts * limit / (COUNT_MAX + 1)
 
     def live(self) -> bool:
-        """Whether there is more voltage at the film than the rig's limits take for none."""
+        """Return True while the voltage at the film exceeds the limits' tolerance for zero."""
         return abs(self.wire_voltage()) > self.settings.limits.zero_tolerance_kV * 1e3
 
     def drives(self, client: str) -> bool:
-        """Whether ``client`` was the last to move the output to the amplifier."""
+        """Return True if ``client`` was the last one to change the output to the amplifier."""
         return self._wire.client == client
 
     def output_voltage(self) -> float:
-        """Voltage in V at the output to the amplifier now."""
+        """Return the present voltage in V at the output to the amplifier."""
         with self._lock:
             return self._wire.output_voltage(self._settle())
 
     def history(self) -> tuple[Change, ...]:
-        """When the film's voltage left or reached zero, and what was set, in time's order."""
+        """Return the changes of the film's voltage from and to zero, and single values, by time."""
         with self._lock:
             self._settle()
             return tuple(self._wire.history)
 
     def line(self, name: str) -> bool:
-        """Level of the digital line ``name``, such as ``port0/line0``."""
+        """Return the level of the digital line ``name``, such as ``port0/line0``."""
         with self._lock:
             self._settle()
             return self._wire.levels[name]
 
     def fault(self, kind: FaultKind) -> Fault | None:
-        """A fault of ``kind`` that goes on now, counted from the start of the run's clock."""
+        """Return an active fault of ``kind``, timed from the start of the run's clock, or None."""
         with self._lock:
             elapsed = self._elapsed(self._settle())
         found = (f for f in self._faults.of(kind) if f.at <= elapsed < f.end)
         return next(found, None)
 
     def fires(self, kind: FaultKind) -> Fault | None:
-        """A fault of ``kind`` whose time has come, once in a run."""
+        """Return a fault of ``kind`` that is due, once in a run, or None."""
         with self._lock:
             elapsed = self._elapsed(self._settle())
             for fault in self._faults.of(kind):
@@ -87,7 +87,7 @@ class Device(TimingEngine):
     # tasks
 
     def create(self, name: str, client: str, *, attach: bool = True) -> tuple[Task, bool]:
-        """A task called ``name``, or like no other; and whether it is new."""
+        """Return the task called ``name`` (empty: a unique name), and whether it is new."""
         with self._lock:
             if name and name in self._tasks:
                 if attach:
@@ -100,7 +100,7 @@ class Device(TimingEngine):
             return task, True
 
     def create_watchdog(self, name: str, client: str, device: str, timeout: float) -> Task:
-        """A task of the watchdog timer that expires ``timeout`` s after its last reset."""
+        """Return a task of the watchdog timer, which expires ``timeout`` s after its last reset."""
         with self._lock:
             self.check_device(device)
             if timeout != -1.0 and not 0.0 < timeout <= _LONGEST_WATCHDOG:
@@ -112,14 +112,14 @@ class Device(TimingEngine):
             return task
 
     def task(self, name: str) -> Task:
-        """The task called ``name``."""
+        """Return the task called ``name``."""
         with self._lock:
             if name not in self._tasks:
                 raise DaqmxError(Code.INVALID_TASK, f"Task Name: {name}")
             return self._tasks[name]
 
     def tasks_of(self, client: str) -> list[Task]:
-        """The tasks that ``client`` made."""
+        """Return the tasks of ``client``."""
         with self._lock:
             return [task for task in self._tasks.values() if task.client == client]
 
@@ -148,7 +148,7 @@ class Device(TimingEngine):
             self._notify()
 
     def make_safe(self, client: str | None = None) -> None:
-        """Abort the tasks of ``client`` (None: of everybody), 0 V, and the enable line low."""
+        """Abort the tasks of ``client`` (None: all tasks), set 0 V and the enable line low."""
         with self._lock:
             now = self._settle()
             for task in self._tasks.values():
@@ -159,7 +159,7 @@ class Device(TimingEngine):
             self._notify()
 
     def scaling(self, task: Task, name: str) -> tuple[float, ...]:
-        """Volts over counts of the input called ``name``; counts over volts of an output."""
+        """Return volts over counts of the input ``name``, or counts over volts of an output."""
         for channel in task.inputs:
             if channel.name == name:
                 return self._wiring.coefficients(channel)
@@ -171,7 +171,7 @@ class Device(TimingEngine):
     # states
 
     def control(self, task: Task, action: int) -> None:
-        """DAQmx's task modes: start, stop, verify, commit, reserve, unreserve, abort."""
+        """Apply a task mode of DAQmx: start, stop, verify, commit, reserve, unreserve, abort."""
         with self._lock:
             if action == 0:
                 self.start(task)
@@ -223,7 +223,7 @@ class Device(TimingEngine):
             self._notify()
 
     def stop(self, task: Task) -> None:
-        """Stop ``task``; the output keeps its value. Raises what had stopped it before."""
+        """Stop ``task``; the output keeps its value. Raises the error that stopped it earlier."""
         with self._lock:
             now = self._settle()
             failed = task.failed
@@ -232,20 +232,20 @@ class Device(TimingEngine):
             if task.kept is State.VERIFIED:
                 self._release(task)
             elif not task.regenerates:
-                task.waveform = None  # what was put out is gone
+                task.waveform = None  # a new start needs a new waveform
             self._notify()
             if failed is not None:
                 raise DaqmxError(failed, f"Task Name: {task.name}")
 
     def is_done(self, task: Task) -> bool:
-        """True once ``task`` has done all it was asked for; raises what has stopped it."""
+        """Return True once ``task`` is complete; raises the error that stopped it."""
         with self._lock:
             now = self._settle()
             self._raise_failure(task)
             return self._done(task, now)
 
     def wait_done(self, task: Task, timeout: float) -> None:
-        """Wait until it is."""
+        """Wait until ``task`` is done."""
 
         def attempt(now: float, last: bool) -> tuple[bool | None, float | None]:
             self._raise_failure(task)
@@ -266,20 +266,20 @@ class Device(TimingEngine):
     # reading
 
     def available(self, task: Task) -> int:
-        """Samples a channel that wait for their reader."""
+        """Return the samples per channel that are acquired and not read."""
         with self._lock:
             now = self._settle()
             return self._acquired(task, now) - task.delivered
 
     def acquired(self, task: Task) -> int:
-        """Samples a channel since the start."""
+        """Return the samples per channel since the start."""
         with self._lock:
             return self._acquired(task, self._settle())
 
     def read(self, task: Task, samples: int, timeout: float, most: int | None = None) -> Reading:
-        """Next ``samples`` of every channel; -1: all there are, or will be of a finite task.
+        """Return the next ``samples`` of every channel; -1: all present, or all of a finite task.
 
-        All there are is no more than ``most``.
+        ``most`` bounds the number for -1.
         """
         self._of_kind(task, Kind.AI, Code.NOT_AN_INPUT)
         with self._lock:
@@ -332,10 +332,10 @@ class Device(TimingEngine):
     # writing
 
     def to_counts(self, task: Task, volts: np.ndarray) -> np.ndarray:
-        """Counts (channels, n) for ``volts`` (channels, n); refuses what the range has not."""
+        """Return counts (channels, n) for ``volts`` (channels, n); refuses values out of range."""
         counts = np.empty(volts.shape, dtype=np.int16)
         for row, values, channel in zip(counts, volts, task.outputs, strict=True):
-            beyond = ~(np.abs(values) <= channel.range)  # a NaN is beyond as well
+            beyond = ~(np.abs(values) <= channel.range)  # includes NaN
             if beyond.any():
                 raise DaqmxError(
                     Code.INVALID_SAMPLE,
@@ -349,7 +349,7 @@ class Device(TimingEngine):
         return counts
 
     def write(self, task: Task, counts: np.ndarray, auto_start: bool, timeout: float) -> int:
-        """Write ``counts`` (channels, n) to an output task; returns the samples a channel."""
+        """Write ``counts`` (channels, n) to an output task; returns the samples per channel."""
         with self._lock:
             now = self._settle()
             self._of_kind(task, Kind.AO, Code.NOT_AN_OUTPUT)
@@ -369,17 +369,17 @@ class Device(TimingEngine):
         return self._write_behind(task, counts, timeout)
 
     def written(self, task: Task) -> int:
-        """Samples a channel written since the task was set up or stopped."""
+        """Return the samples per channel written since the task was set up or stopped."""
         return task.waveform.written if task.waveform is not None else 0
 
     def space(self, task: Task) -> int:
-        """Samples a channel that the output buffer would take now."""
+        """Return the samples per channel that the output buffer has room for."""
         with self._lock:
             now = self._settle()
             return self._space(task, now)
 
     def generated(self, task: Task) -> int:
-        """Samples a channel that were put out since the start."""
+        """Return the samples per channel that were output since the start."""
         with self._lock:
             now = self._settle()
             return task.generation.ticks(now) if task.generation is not None else 0
@@ -402,7 +402,7 @@ class Device(TimingEngine):
     # the watchdog
 
     def set_expiration(self, task: Task, physical: str, high: bool) -> None:
-        """What the lines ``physical`` do when the watchdog of ``task`` expires."""
+        """Set the level that the lines ``physical`` take when the watchdog of ``task`` expires."""
         with self._lock:
             watchdog = self._watchdog(task)
             self._not_running(task)
@@ -410,7 +410,7 @@ class Device(TimingEngine):
                 watchdog.states[line] = high
 
     def expiration(self, task: Task, physical: str) -> bool:
-        """What the first of the lines ``physical`` does then."""
+        """Return the level that the first of the lines ``physical`` takes then."""
         with self._lock:
             line = self.lines_of(physical)[0]
             states = self._watchdog(task).states
@@ -419,13 +419,13 @@ class Device(TimingEngine):
             return states[line]
 
     def expired(self, task: Task) -> bool:
-        """Whether the watchdog of ``task`` has expired."""
+        """Return True if the watchdog of ``task`` has expired."""
         with self._lock:
             self._settle()
             return self._watchdog(task).expired
 
     def control_watchdog(self, task: Task, clear: bool) -> None:
-        """Reset the timer, or ``clear`` what its expiration has locked."""
+        """Reset the timer, or ``clear`` the lock after its expiration."""
         with self._lock:
             now = self._settle()
             watchdog = self._watchdog(task)

@@ -1,7 +1,6 @@
-"""The simulated card at work: clocks, buffers and reserved resources, on an injected clock.
+"""Timing of the simulated card: clocks, buffers and reserved resources, on an injected clock.
 
-It has no thread of its own: a call sees the card as it is at that moment, and everything that
-happened since the call before is computed then.
+It has no thread: each call first computes everything that happened since the previous call.
 """
 
 from __future__ import annotations
@@ -33,14 +32,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Reading:
-    """What a read brings: ``counts`` (channels, n) int16, all of it ``complete`` or not yet."""
+    """Result of a read: ``counts`` (channels, n) int16; ``complete`` unless it timed out."""
 
     counts: np.ndarray
     complete: bool
 
 
 class TimingEngine(Setup):
-    """What happens in time on the card of a rig with ``settings``; ``Device`` has the calls.
+    """Timing of the card of a rig with ``settings``; ``Device`` has the calls.
 
     ``plant`` is the film at rest, ``noise_seed`` that of the instruments' noise.
     """
@@ -67,18 +66,18 @@ class TimingEngine(Setup):
         self._reserved: dict[str, Task] = {}
         self._runs = 0
         self._readings = 0
-        self._laser: tuple[int, float] | None = None  # counts and range of its last reading
+        self._laser: tuple[int, float] | None = None  # counts and range of the last reading
         self._run_start: float | None = None
         self._fired: set[Fault] = set()
 
     # time
 
     def _now(self) -> float:
-        # counted from the card's birth: a tick's time in doubles is then exact enough for hours
+        # from the card's creation, so that a tick's time is exact enough in doubles for hours
         return self._clock.now() - self._born
 
     def _settle(self) -> float:
-        """Work out what has happened up to now; returns that time."""
+        """Compute everything up to now; returns the present time."""
         now = self._now()
         for task in list(self._tasks.values()):
             watchdog = task.watchdog
@@ -100,7 +99,7 @@ class TimingEngine(Setup):
         timeout: float,
         attempt: Callable[[float, bool], tuple[T | None, float | None]],
     ) -> T:
-        """Try until there is a result; ``attempt(now, last)`` says when to look again."""
+        """Repeat ``attempt(now, last)`` until it has a result; it returns the time to try again."""
         with self._lock:
             deadline = math.inf if timeout < 0.0 else self._now() + timeout
         while True:
@@ -115,7 +114,7 @@ class TimingEngine(Setup):
             if until < math.inf:
                 self._clock.wait(self._born + until, wake)
             else:
-                wake.wait()  # nothing that time could bring
+                wake.wait()  # only another call can help
             with self._lock:
                 self._waiting.discard(wake)
 
@@ -124,13 +123,13 @@ class TimingEngine(Setup):
             wake.set()
 
     def _elapsed(self, now: float) -> float:
-        """Time in s since the sample clock of the present run started; less than 0 before it."""
+        """Return the time in s since the present run's sample clock started; negative before."""
         return -1.0 if self._run_start is None else now - self._run_start
 
-    # what is still asked for
+    # data that is still needed
 
     def _oldest(self, generation: Generation) -> int:
-        """First tick of ``generation`` that a reader may still ask for; the last one: none may."""
+        """Return the first tick of ``generation`` that a reader may still need, or its last one."""
         oldest = generation.waveform.written
         for task in self._tasks.values():
             if task.ticks is None or not task.running:
@@ -146,7 +145,7 @@ class TimingEngine(Setup):
         return oldest
 
     def _looks_back(self, now: float) -> float:
-        """The earliest time in s whose output a task may still read."""
+        """Return the earliest time in s whose output a task may still read."""
         earliest = now
         for task in self._tasks.values():
             if task.ticks is not None and task.running and task.ticks.passed(now):
@@ -199,7 +198,7 @@ class TimingEngine(Setup):
     # starting and ending
 
     def _waits_for(self, task: Task, trigger: str, kind: Kind) -> bool:
-        """Whether ``task`` has to wait for the start of a task of ``kind`` that is not running."""
+        """Return True if ``task`` waits for the start of a task of ``kind`` that is not running."""
         if not task.trigger:
             return False
         started = any(
@@ -245,7 +244,7 @@ class TimingEngine(Setup):
                 self._generate(output, output.clock, now)
 
     def _generate(self, task: Task, clock: SampleClock, now: float) -> None:
-        """Let an output task generate, and with it the inputs that hang on its clock."""
+        """Start the generation of an output task, and the inputs on its clock."""
         waveform = task.waveform
         if waveform is None:
             raise DaqmxError(Code.OUTPUT_BUFFER_EMPTY, f"Task Name: {task.name}")
@@ -272,14 +271,14 @@ class TimingEngine(Setup):
                 generation.breaks = min(generation.breaks, at)
 
     def _share(self, task: Task, generation: Generation, tick: int, now: float) -> None:
-        """Let an input task convert on the ticks of ``generation``, from ``tick`` on."""
+        """Make an input task convert on the ticks of ``generation``, from ``tick`` on."""
         if isinstance(task.ticks, SharedTicks):
             task.ticks.follow(generation, tick, self._wire.row(generation), now)
         if self._run_start is None:
             self._run_start = now
 
     def _abort(self, task: Task, now: float) -> None:
-        """End ``task`` whatever it does; its client sees that in its next call."""
+        """End ``task`` in any state; its client gets the error in its next call."""
         busy = task.state is not State.VERIFIED
         self._end(task, now)
         self._release(task)
@@ -325,7 +324,7 @@ class TimingEngine(Setup):
         if task.run is None:
             task.run = self._new_run(task)
         counts = task.run.read(first, last)
-        # while the amplifier is not enabled the film gets 0 V whatever the output says
+        # while the amplifier is not enabled the film is at 0 V, whatever the output is
         output = counts[0]
         if self._wire.switched:
             output = ticks.commands(first, last, self._wire.track)
@@ -369,7 +368,7 @@ class TimingEngine(Setup):
         return int(counts.shape[1])
 
     def _write_ahead(self, task: Task, counts: np.ndarray) -> None:
-        """Write before the start, when the buffer takes what it has room for and no more."""
+        """Write before the start, up to the room in the buffer."""
         samples = counts.shape[1]
         if task.waveform is None:
             task.waveform = Waveform(len(task.outputs), task.regenerates)
@@ -387,7 +386,7 @@ class TimingEngine(Setup):
         waveform.append(counts)
 
     def _write_behind(self, task: Task, counts: np.ndarray, timeout: float) -> int:
-        """Write to a task that generates, waiting for room in its buffer."""
+        """Write to a task that generates; waits for room in its buffer."""
         total = counts.shape[1]
         done = 0
 
@@ -415,7 +414,7 @@ class TimingEngine(Setup):
                 )
             if generation is None:
                 return None, None
-            # when a good part of the buffer, or all that is wanted, has gone on to the converter
+            # when a quarter of the buffer, or all that is needed, has moved on to the converter
             need = min(total - done, max(1, self._buffer_room(task) // 4))
             gone = waveform.written + need - self._buffer_room(task)
             return None, generation.due(max(0, gone - self._card.ao_fifo_samples) + 1)
@@ -434,7 +433,7 @@ class TimingEngine(Setup):
             )
 
     def _buffer_room(self, task: Task) -> int:
-        """Size of the output buffer: as it was set, or as the first write made it."""
+        """Return the size of the output buffer: the set one, or that of the first write."""
         return task.buffer if task.buffer is not None else task.first_write
 
     def _space(self, task: Task, now: float) -> int:
@@ -445,7 +444,7 @@ class TimingEngine(Setup):
             return waveform.size
         gone = 0
         if task.generation is not None:
-            # the card's FIFO takes samples out of the buffer before they are put out
+            # the card's FIFO takes samples out of the buffer before they are output
             gone = task.generation.ticks(now) + self._card.ao_fifo_samples
         return max(0, self._buffer_room(task) - (waveform.written - min(waveform.written, gone)))
 

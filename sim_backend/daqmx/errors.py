@@ -1,4 +1,4 @@
-"""Errors of the simulated card: NI-DAQmx's codes with the driver's wording, shortened."""
+"""Errors of the simulated card: NI-DAQmx's codes with a shortened form of the driver's texts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["WORDS", "Code", "DaqmxError"]
 
 
 class Code(IntEnum):
-    """The codes of NI-DAQmx that the simulated card knows."""
+    """Codes of NI-DAQmx that the simulated card uses."""
 
     RESOURCE_RESERVED = -50103
     RUNTIME_ABORTED = -88709
@@ -131,9 +131,9 @@ WORDS: dict[int, str] = {
 
 
 class DaqmxError(Exception):
-    """A refusal with its ``code``; ``detail`` names values, ``read`` and ``written`` are samples.
+    """Error with its ``code``; ``detail`` names values, ``read`` and ``written`` are samples.
 
-    ``read`` or ``written`` is given where the error is one of a read or a write.
+    ``read`` or ``written`` is set for an error of a read or a write.
     """
 
     def __init__(

@@ -23,7 +23,7 @@ def open_device(
     clock: Clock | None = None,
     faults: FaultPlan | None = None,
 ) -> Device:
-    """The card of the rig at ``address``; see ``dearig.sim_backend.factory.open_simulated_rig``."""
+    """Return the card of the rig at ``address``; see ``factory.open_simulated_rig``."""
     plant, hidden = plant_of(address, film, load)
     return Device(
         settings,

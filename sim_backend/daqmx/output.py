@@ -1,4 +1,4 @@
-"""The card's analog outputs over time: generations of samples, and single values."""
+"""Analog outputs of the card over time: generations of samples, and single values."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 
 __all__ = ["TICK_TOLERANCE", "Generation", "Track", "Waveform"]
 
-#: A tick that the clock has reached but for this part of a tick has been reached.
+#: Tolerance in ticks of the clock's rounding when ticks are counted.
 TICK_TOLERANCE = 1e-3
 
 
 class Waveform:
-    """The samples (channels, n) int16 of an output task by tick, as far as they were written.
+    """Samples (channels, n) int16 of an output task by tick, as far as they were written.
 
-    Where ``loops``, what was written is repeated for ever, as the card does with regeneration.
+    With ``loops`` the written samples repeat without end, as with the card's regeneration.
     """
 
     def __init__(self, channels: int, loops: bool) -> None:
         self.loops = loops
-        self.written = 0  # samples a channel that the program has written
+        self.written = 0  # samples per channel that the program has written
         self._row = np.empty((channels, 0), dtype=np.int16)  # ticks from _first on
         self._first = 0
         self._used = 0
@@ -29,11 +29,11 @@ class Waveform:
 
     @property
     def size(self) -> int:
-        """Samples a channel in the buffer that is repeated; 0 where nothing is."""
+        """Return the samples per channel in the repeated buffer; 0 without repetition."""
         return self._loop.shape[1]
 
     def append(self, counts: np.ndarray) -> None:
-        """Write ``counts`` (channels, n) after what was written."""
+        """Append ``counts`` (channels, n) to the written samples."""
         self.written += counts.shape[1]
         if self.loops:
             self._loop = np.concatenate((self._loop, counts), axis=1)
@@ -41,7 +41,7 @@ class Waveform:
             self._store(counts)
 
     def replace(self, counts: np.ndarray, tick: int) -> None:
-        """Write into the repeated buffer, whose sample ``tick`` is being put out now."""
+        """Write into the repeated buffer, whose sample ``tick`` is on the output now."""
         end = self._first + self._used
         if tick + 1 > end:
             self._store(self.at(np.arange(end, tick + 1)))
@@ -51,7 +51,7 @@ class Waveform:
         self.written += counts.shape[1]
 
     def at(self, ticks: np.ndarray) -> np.ndarray:
-        """Samples (channels, k) at ``ticks`` (k,); beyond what was written the last one stands."""
+        """Return samples (channels, k) at ``ticks`` (k,); the last written one is held."""
         end = self._first + self._used
         if not self.loops:
             return self._row[:, np.clip(ticks - self._first, 0, self._used - 1)]
@@ -62,9 +62,9 @@ class Waveform:
         return counts
 
     def drop_before(self, tick: int) -> None:
-        """Forget the samples before ``tick``, but for the last one."""
+        """Discard the samples before ``tick`` except the last one."""
         drop = min(tick - self._first, self._used - 1)
-        if drop > max(self._used // 2, 100_000):  # seldom, and then much
+        if drop > max(self._used // 2, 100_000):  # rarely, and many at a time
             self._row = self._row[:, drop : self._used].copy()
             self._first += drop
             self._used -= drop
@@ -81,11 +81,11 @@ class Waveform:
 
 @dataclass(eq=False)
 class Generation:
-    """An output task at work: ``waveform`` at ``rate`` Hz from ``start`` s, ``total`` samples.
+    """Generation of an output task: ``waveform`` at ``rate`` Hz from ``start`` s, ``total`` samples.
 
-    ``total`` is None for one that goes on until it is stopped. ``ended`` is the number of samples
-    that were put out when it was stopped, or ran out of samples (``starved``). ``breaks`` is a
-    tick at which it fails whatever was written.
+    ``total`` is None for a continuous one. ``ended`` is the number of samples that were output when
+    it was stopped or ran out of samples (``starved``). ``breaks`` is a tick at which it fails
+    regardless of what was written.
     """
 
     waveform: Waveform
@@ -97,21 +97,21 @@ class Generation:
     starved: bool = False
 
     def ticks(self, now: float) -> int:
-        """Whole sample periods that have passed, and at its end the samples that were put out."""
+        """Return the number of whole sample periods so far, or of the output samples at its end."""
         if self.ended is not None:
             return self.ended
         passed = max(0, math.floor((now - self.start) * self.rate + TICK_TOLERANCE))
         return passed if self.total is None else min(passed, self.total)
 
     def finished(self, now: float) -> bool:
-        """True once all samples were put out, or it has failed."""
+        """Return True once all samples were output, or it has failed."""
         return self.ended is not None or (self.total is not None and self.ticks(now) >= self.total)
 
     def settle(self, now: float) -> float | None:
-        """Find out whether it ran out of samples up to ``now``; when it did, in s."""
+        """End it where it ran out of samples by ``now``; returns the time of that in s, or None."""
         if self.ended is not None:
             return None
-        # a generation that has its last sample needs no more of them
+        # a generation with all its samples cannot run out
         limit = self.breaks
         written = math.inf if self.waveform.loops else self.waveform.written
         if self.total is None or written < self.total:
@@ -122,22 +122,22 @@ class Generation:
         return self.start + self.ended / self.rate
 
     def stop(self, now: float) -> None:
-        """End it: the sample that stands now was the last one."""
+        """End the generation: the present sample is its last one."""
         if self.ended is None:
             self.ended = self._standing(now) + 1
 
     def due(self, samples: int) -> float:
-        """When ``samples`` sample periods will have passed, in s."""
+        """Return the time in s at which ``samples`` sample periods are over."""
         return self.start + samples / self.rate
 
     def at_times(self, times: np.ndarray) -> np.ndarray:
-        """Counts (channels, n) that stand at ``times`` (n,) s after the start."""
+        """Return the output counts (channels, n) at ``times`` (n,) s after the start."""
         return self.at_ticks(
             np.floor((times - self.start) * self.rate + TICK_TOLERANCE).astype(np.int64)
         )
 
     def at_ticks(self, ticks: np.ndarray) -> np.ndarray:
-        """Counts (channels, n) that stand from ``ticks`` (n,) on; after its end the last stands."""
+        """Return the output counts (channels, n) from ``ticks`` (n,) on; the last one is held."""
         return self.waveform.at(np.clip(ticks, 0, self._last()))
 
     def _last(self) -> int:
@@ -154,7 +154,7 @@ class Generation:
 
 @dataclass
 class _Stretch:
-    """From ``start`` s on the output follows a row of ``generation``, or stands at ``counts``."""
+    """Part of a track: from ``start`` s on a row of ``generation``, or constant ``counts``."""
 
     start: float
     counts: int
@@ -164,24 +164,24 @@ class _Stretch:
 
 @dataclass
 class Track:
-    """One output over time; it stands at 0 counts from the beginning."""
+    """One output over time; it starts at 0 counts."""
 
     _stretches: list[_Stretch] = field(default_factory=lambda: [_Stretch(-math.inf, 0)])
 
     def set(self, now: float, counts: int) -> None:
-        """Let the output stand at ``counts`` from ``now`` on."""
+        """Hold the output at ``counts`` from ``now`` on."""
         self._stretches.append(_Stretch(now, counts))
 
     def follow(self, generation: Generation, row: int) -> None:
-        """Let the output follow ``row`` of ``generation`` from its start on."""
+        """Make the output follow ``row`` of ``generation`` from its start on."""
         self._stretches.append(_Stretch(generation.start, 0, generation, row))
 
     def standing(self, now: float) -> int:
-        """Counts that stand at ``now``."""
+        """Return the output counts at ``now``."""
         return int(self.at(np.array([now]))[0])
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """Counts (n,) int16 that stand at ``times`` (n,) s, in order."""
+        """Return the output counts (n,) int16 at ``times`` (n,) s, in order."""
         counts = np.empty(times.size, dtype=np.int16)
         end = times.size
         for stretch in reversed(self._stretches):
@@ -201,6 +201,6 @@ class Track:
         return counts
 
     def forget_before(self, time: float) -> None:
-        """Drop what is over at ``time`` s."""
+        """Discard parts that end before ``time`` s."""
         while len(self._stretches) > 1 and self._stretches[1].start <= time:
             del self._stretches[0]

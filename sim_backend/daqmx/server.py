@@ -1,4 +1,4 @@
-"""The simulated card behind NI's gRPC device protocol, for the unmodified nidaqmx client."""
+"""Server of the simulated card with NI's gRPC device protocol, for the unmodified client."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ __all__ = ["DaqmxServer"]
 
 log = logging.getLogger(__name__)
 
-_THREADS = 32  # calls at a time; an event that a client listens to is one
-_LOOK_S = 0.05  # how often silent clients are looked for
+_THREADS = 32  # concurrent calls; an event that a client listens to is one
+_LOOK_S = 0.05  # period of the search for silent clients
 _OPTIONS = (
     ("grpc.max_send_message_length", -1),
     ("grpc.max_receive_message_length", -1),
-    ("grpc.so_reuseport", 0),  # a port in use is an error, not a share
-    # a client may look as often as it likes whether the link is up
+    ("grpc.so_reuseport", 0),  # a port in use is an error; it is not shared
+    # a client may check the link at any rate
     ("grpc.http2.max_ping_strikes", 0),
     ("grpc.http2.min_recv_ping_interval_without_data_ms", 50),
 )
-_PING_S = 0.1  # how often a client is asked whether it is there
+_PING_S = 0.1  # period of the check that a client is alive
 
 
 class DaqmxServer:
-    """Serves ``device`` on ``host`` and ``port`` (0: any that is free), a local address by default.
+    """Server of ``device`` on ``host`` and ``port`` (0: any free one), local by default.
 
-    With ``client_timeout`` in s a client that dies or falls silent with a voltage at the film has
-    the output taken to 0 V; None behaves as NI's server does: tasks and outputs stay as they are.
-    Likewise one that gives no sign of life for ``link_timeout`` s, its link cut without a word or
-    its process halted; too short a time mistakes a busy computer for that.
+    With ``client_timeout`` in s the output is set to 0 V when a client dies or is silent while
+    there is a voltage at the film. With None the server behaves as NI's: tasks and outputs stay
+    as they are. ``link_timeout`` in s does the same for a client without a sign of life, whose
+    link was cut or whose process was halted; too short a time mistakes a busy computer for that.
     ``link`` is the clock of the link; the card has its own.
     """
 
@@ -75,7 +75,7 @@ class DaqmxServer:
         self.port = 0
 
     def start(self) -> int:
-        """Listen; returns the port. Raises ``OSError`` where the address is not to be had."""
+        """Listen; returns the port. Raises ``OSError`` where the address is not available."""
         try:
             self.port = self._server.add_insecure_port(self._address)
         except RuntimeError as error:
@@ -105,7 +105,7 @@ class DaqmxServer:
         self.close()
 
     def _look(self) -> None:
-        """Look, until the server is closed, for clients that are silent and for its own end."""
+        """Check for silent clients and for the planned end of the server, until it is closed."""
         while not self._closing.wait(_LOOK_S):
             if self.clients is not None:
                 self.clients.check()
@@ -117,19 +117,19 @@ class DaqmxServer:
 
 
 def _pings(timeout: float) -> tuple[tuple[str, int], ...]:
-    """Options that notice within ``timeout`` s that the other end does not answer."""
+    """Return the options that detect within ``timeout`` s a peer that does not answer."""
     answer = max(50, round((timeout - _PING_S) * 1e3))
     return (
         ("grpc.keepalive_time_ms", round(_PING_S * 1e3)),
         ("grpc.keepalive_timeout_ms", answer),
-        ("grpc.http2.ping_timeout_ms", answer),  # the one that counts, though it is not for this
+        ("grpc.http2.ping_timeout_ms", answer),  # this one takes effect, though not meant for this
         ("grpc.keepalive_permit_without_calls", 1),
         ("grpc.http2.max_pings_without_data", 0),
     )
 
 
 class _Way(grpc.ServerInterceptor):
-    """What every call passes: faults of the link, who called, and refusals on their way back."""
+    """Interceptor of every call: faults of the link, the caller's identity, and error replies."""
 
     def __init__(self, server: DaqmxServer, link: Clock, closing: threading.Event) -> None:
         self._server = server
@@ -159,12 +159,12 @@ class _Way(grpc.ServerInterceptor):
         def answer(request: Any, context: grpc.ServicerContext) -> Any:
             clients = self._server.clients
             watched = nullcontext() if clients is None else clients.call(context.peer(), context)
-            # a call that is held does not get through: its client counts as silent
+            # a call that is held does not arrive, so its client counts as silent
             self._freeze()
             try:
                 with watched:
                     response = call(request, context)
-                    self._delay()  # of a late reply the client knows that it waits for it
+                    self._delay()  # a client that waits for a late reply is not silent
             except DaqmxError as error:
                 self._freeze()
                 refuse(context, error)
@@ -188,7 +188,7 @@ class _Way(grpc.ServerInterceptor):
         return answer
 
     def _freeze(self) -> None:
-        """Hold a call for as long as the server is frozen."""
+        """Hold a call while the server is frozen."""
         fault = self._server.device.fault(FaultKind.SERVER_FROZEN)
         if fault is None:
             return
@@ -198,7 +198,7 @@ class _Way(grpc.ServerInterceptor):
             self._closing.wait()
 
     def _delay(self) -> None:
-        """Give one reply late."""
+        """Delay one reply."""
         fault = self._server.device.fires(FaultKind.LATE_REPLY)
         if fault is not None:
             self._link.wait(self._link.now() + fault.duration, self._closing)

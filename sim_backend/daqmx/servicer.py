@@ -1,4 +1,4 @@
-"""NI's gRPC device protocol, translated to calls of the simulated card; it has no rules itself."""
+"""NI's gRPC device protocol, translated to calls of the simulated card without further rules."""
 
 # ruff: noqa: N802, ARG002  (names, arguments and messages are the protocol's)
 
@@ -27,7 +27,7 @@ __all__ = ["Servicer", "refuse"]
 _BY_CHANNEL = 0  # DAQmx: group by channel
 _FINITE, _CONTINUOUS = 10178, 10123
 _RISING = 10280
-_LOOK_S = 0.02  # how often an event's stream looks whether its time has come
+_LOOK_S = 0.02  # period at which an event's stream checks whether it is due
 _GROUPS = (
     "Buffer", "Chan", "Device", "PhysicalChan", "Read", "SystemInfo", "Task", "Timing", "Trig",
     "Watchdog", "Write",
@@ -43,13 +43,13 @@ def refuse(context: grpc.ServicerContext, error: DaqmxError) -> NoReturn:
         trailing.append(("ni-samps-per-chan-written", str(error.written)))
     context.set_trailing_metadata(tuple(trailing))
     context.abort(grpc.StatusCode.UNKNOWN, str(error))
-    raise error  # which abort has done already, in its own way
+    raise error  # not reached: abort raises
 
 
 class Servicer(pb_grpc.NiDAQmxServicer):
-    """Answers the calls; a ``DaqmxError`` is left to who calls it, with ``refuse``.
+    """Service of the calls; the caller handles ``DaqmxError`` with ``refuse``.
 
-    What is not here is answered with UNIMPLEMENTED by the class above.
+    The base class answers all other calls with UNIMPLEMENTED.
     """
 
     def __init__(self, device: Device, closing: threading.Event) -> None:
@@ -183,7 +183,7 @@ class Servicer(pb_grpc.NiDAQmxServicer):
     def ReadRaw(self, request: Any, context: grpc.ServicerContext) -> Any:
         room = request.array_size_in_bytes // 2
         reading = self._read(self._task(request), request, room)
-        # the card hands out scan after scan
+        # the card delivers scan after scan
         scans = np.ascontiguousarray(reading.counts.T).tobytes()
         return pb.ReadRawResponse(
             status=_status(reading),
@@ -277,13 +277,13 @@ class Servicer(pb_grpc.NiDAQmxServicer):
         self._device.control_watchdog(self._task(request), clear=action == 1)
         return pb.ControlWatchdogTaskResponse()
 
-    # events: each holds a thread for as long as a client listens
+    # events: each occupies a thread while a client listens
 
     def RegisterDoneEvent(self, request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
         task = self._task(request)
         key = f"done {task.name}"
         self._open_stream(task, key, context)
-        told = False  # of the present start
+        told = False  # True once the event of the present start was sent
         while self._listening(key, context):
             if not task.running:
                 told = False
@@ -338,7 +338,7 @@ class Servicer(pb_grpc.NiDAQmxServicer):
         self._streams.add(key)
         task.listened = True
         context.add_callback(lambda: self._streams.discard(key))
-        # the client waits for this before it goes on
+        # the client waits for this before it continues
         context.send_initial_metadata(())
 
     def _close_stream(self, what: str, task: Task) -> None:
@@ -346,17 +346,17 @@ class Servicer(pb_grpc.NiDAQmxServicer):
         self._streams.discard(f"{what} {task.name}")
 
     def _listening(self, key: str, context: grpc.ServicerContext) -> bool:
-        """Whether an event's stream goes on; takes a moment."""
+        """Wait one period; return True while an event's stream continues."""
         over = self._closing.wait(_LOOK_S)
         return not over and context.is_active() and key in self._streams
 
-    # what they share
+    # shared by the calls
 
     def _task(self, request: Any) -> Task:
         return self._device.task(request.task.name)
 
     def _asked(self, request: Any) -> Asked:
-        """What a property's request is about."""
+        """Return the target of a property's request."""
         fields = request.DESCRIPTOR.fields_by_name
         task = self._task(request) if "task" in fields else None
         if "device_name" in fields:
@@ -385,7 +385,7 @@ class Servicer(pb_grpc.NiDAQmxServicer):
             raise DaqmxError(Code.NOT_AN_OUTPUT, f"Task Name: {task.name}", written=0)
 
     def _to_write(self, task: Task, request: Any, kind: type) -> np.ndarray:
-        """(channels, n) of a request's array."""
+        """Return the array (channels, n) of a request."""
         self._outputs(task)
         rows, samples = len(task.outputs), request.num_samps_per_chan
         values: np.ndarray = np.fromiter(request.write_array, kind, len(request.write_array))
@@ -432,12 +432,12 @@ class Servicer(pb_grpc.NiDAQmxServicer):
 
 
 def _status(reading: Reading) -> int:
-    """A read that timed out is a reply like any other, with a status and what there was."""
+    """Return the status of a read; one that timed out is a reply with the samples so far."""
     return 0 if reading.complete else int(Code.SAMPLES_NOT_YET_AVAILABLE)
 
 
 def _laid_out(values: np.ndarray, request: Any, room: int) -> np.ndarray:
-    """(room,) of ``values`` (channels, n): channel after channel or scan after scan, then zeros."""
+    """Return ``values`` (channels, n) as (room,), by channel or by scan, padded with zeros."""
     laid = np.zeros(max(room, values.size), dtype=values.dtype)
     by_channel = (request.fill_mode_raw or request.fill_mode) == _BY_CHANNEL
     laid[: values.size] = values.ravel() if by_channel else values.T.ravel()
@@ -445,7 +445,7 @@ def _laid_out(values: np.ndarray, request: Any, room: int) -> np.ndarray:
 
 
 def _attribute_call(name: str, response: Any) -> Callable[[Servicer, Any, Any], Any] | None:
-    """What answers the call ``name``, such as ``GetTimingAttributeDouble``, with a ``response``."""
+    """Return the method for the call ``name``, such as ``GetTimingAttributeDouble``, or None."""
     found = re.match(r"(Get|Set|Reset)([A-Za-z]+)Attribute", name)
     if not found or found[2] not in _GROUPS:
         return None
@@ -472,7 +472,7 @@ def _attribute_call(name: str, response: Any) -> Callable[[Servicer, Any, Any], 
 
 
 def _add_attribute_calls() -> None:
-    """Every property's call by every type, of which the service has a hundred."""
+    """Add the calls for properties by type, of which the service has a hundred."""
     for method in pb.DESCRIPTOR.services_by_name["NiDAQmx"].methods:
         answer = _attribute_call(method.name, getattr(pb, method.output_type.name))
         if answer is not None:

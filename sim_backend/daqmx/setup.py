@@ -1,4 +1,4 @@
-"""Set-up of the card's channels and timing, and refusal of what the card does not have."""
+"""Set-up of the card's channels and timing, with errors for what the card does not have."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ DIFFERENTIAL, SINGLE, SINGLE_OWN_SENSE = 10106, 10083, 10078  #: DAQmx: DIFF, RS
 SECONDS, TICKS, PERIODS = 10364, 10304, 10286  #: DAQmx: units of the delay
 
 _SLOWEST = 2**32  # ticks of the timebase between two samples
-_SETTLE_US = 10.0  # the driver lets an input settle longer than it must, where there is time
-_FIRST_US = 0.25  # from the sample clock to the first conversion, unless it is set
-#: Input buffer of a task that goes on: up to a rate in Hz, in samples.
+_SETTLE_US = 10.0  # extra settling time that the driver gives an input where there is time
+_FIRST_US = 0.25  # default delay from the sample clock to the first conversion
+#: Default input buffer of a continuous task: up to a rate in Hz, in samples.
 _BUFFERS = ((100.0, 1000), (10e3, 10_000), (1e6, 100_000), (math.inf, 1_000_000))
 
 
 class Setup:
-    """The card of a rig with ``settings``, as far as setting up goes; nothing happens in time here.
+    """Set-up of the card of a rig with ``settings``, without any timing.
 
-    All calls may come from any thread, and all may raise ``DaqmxError``.
+    All methods are thread-safe, and all may raise ``DaqmxError``.
     """
 
     def __init__(self, settings: RigSettings) -> None:
@@ -56,7 +56,7 @@ class Setup:
     def add_inputs(
         self, task: Task, physical: str, name: str, wiring: int, limits: tuple[float, float]
     ) -> None:
-        """Add the inputs ``physical``, wired as ``wiring`` says (-1: as usual), ``limits`` V."""
+        """Add the inputs ``physical`` with ``wiring`` (-1: the default) and ``limits`` in V."""
         with self._lock:
             self._may_add(task, Kind.AI)
             taken = _range(limits, INPUT_RANGES)
@@ -109,7 +109,7 @@ class Setup:
             self._may_add(task, Kind.DO)
             lines = self.lines_of(physical)
             if together:
-                # not the range of lines: a client would take that for a name each
+                # not the range of lines, which a client would expand into one name each
                 port = lines[0].partition("/")[0]
                 given = name or f"{self.name}/{port}_{len(task.lines) + 1}"
                 groups = [(given, tuple(lines))]
@@ -121,7 +121,7 @@ class Setup:
             task.lines += [Lines(called, group) for called, group in groups]
 
     def lines_of(self, physical: str) -> list[str]:
-        """The digital lines in ``physical``: ``Dev1/port0/line0:3``, or a whole port."""
+        """Return the digital lines in ``physical``: ``Dev1/port0/line0:3``, or a whole port."""
         lines = []
         for name in physical_names(physical, self.name):
             found = [line for line in LINES if line == name or line.startswith(f"{name}/")]
@@ -158,13 +158,13 @@ class Setup:
         self.set_clock(task, rate, clock.source, clock.finite, clock.samples)
 
     def clock_of(self, task: Task) -> SampleClock:
-        """The sample clock of ``task``, which must have one."""
+        """Return the sample clock of ``task``; raises an error without one."""
         if task.clock is None:
             raise DaqmxError(Code.NOT_SUPPORTED_IN_TASK, f"Task Name: {task.name}")
         return task.clock
 
     def convert_ticks(self, task: Task) -> int:
-        """Ticks of the timebase between two conversions of an input task."""
+        """Return the ticks of the timebase between two conversions of an input task."""
         if task.convert_ticks is not None:
             return task.convert_ticks
         fastest = math.ceil(self._timebase / (1e3 * self._card.ai_rate_max_kHz))
@@ -188,13 +188,13 @@ class Setup:
             task.convert_ticks = round(self._timebase / rate)
 
     def delay_ticks(self, task: Task) -> int:
-        """Ticks of the timebase from a sample clock's edge to the first conversion."""
+        """Return the ticks of the timebase from a sample clock's edge to the first conversion."""
         if task.delay_ticks is not None:
             return task.delay_ticks
         return round(_FIRST_US * self._card.timebase_MHz)
 
     def delay(self, task: Task) -> float:
-        """The same in the unit that the program has chosen."""
+        """Return the same delay in the unit that the program has chosen."""
         ticks = self.delay_ticks(task)
         if task.delay_units == TICKS:
             return float(ticks)
@@ -202,7 +202,7 @@ class Setup:
         return seconds if task.delay_units == SECONDS else seconds * self.clock_of(task).rate
 
     def set_delay(self, task: Task, value: float) -> None:
-        """Set that delay, in the unit that the program has chosen."""
+        """Set the delay, in the unit that the program has chosen."""
         with self._lock:
             self._not_running(task)
             self._of_kind(task, Kind.AI)
@@ -218,7 +218,7 @@ class Setup:
             task.delay_ticks = round(ticks)
 
     def set_delay_units(self, task: Task, units: int) -> None:
-        """Choose the unit of that delay: ``SECONDS``, ``TICKS`` or ``PERIODS``."""
+        """Set the unit of the delay: ``SECONDS``, ``TICKS`` or ``PERIODS``."""
         if units not in (SECONDS, TICKS, PERIODS):
             raise DaqmxError(
                 Code.INVALID_VALUE, f"Property: DelayFromSampClk.DelayUnits; Value: {units}"
@@ -226,20 +226,20 @@ class Setup:
         task.delay_units = units
 
     def set_trigger(self, task: Task, source: str) -> None:
-        """Let ``task`` wait for a digital edge on ``source`` when it starts; empty: for nothing."""
+        """Make ``task`` wait for a digital edge on ``source`` at its start; empty: no wait."""
         with self._lock:
             self._not_running(task)
             task.trigger = self._terminal(source) if source else ""
 
     def set_buffer(self, task: Task, samples: int) -> None:
-        """Give the task's buffer room for ``samples`` a channel."""
+        """Set the size of the task's buffer to ``samples`` per channel."""
         with self._lock:
             if task.running:
                 raise DaqmxError(Code.PROPERTY_WHILE_RUNNING, f"Task Name: {task.name}")
             task.buffer = samples
 
     def set_regeneration(self, task: Task, allowed: bool) -> None:
-        """Say whether an output task repeats what was written."""
+        """Set whether an output task repeats the written samples."""
         with self._lock:
             if task.running:
                 raise DaqmxError(Code.PROPERTY_WHILE_RUNNING, f"Task Name: {task.name}")
@@ -247,7 +247,7 @@ class Setup:
             task.waveform = None
 
     def buffer_size(self, task: Task) -> int:
-        """Samples a channel that the task's buffer holds; 0 where there is none."""
+        """Return the size of the task's buffer in samples per channel; 0 without a buffer."""
         if task.buffer is not None:
             return task.buffer
         if task.clock is None:
@@ -267,7 +267,7 @@ class Setup:
         if task.clock is None or task.kind is not Kind.AI:
             return
         self._coerced(task, task.clock.rate, external=True)
-        # the converter must have begun with the last input when the next tick comes
+        # the last input's conversion must have begun before the next tick
         last = self.delay_ticks(task) + (len(task.inputs) - 1) * self.convert_ticks(task)
         if last >= self._timebase / task.clock.rate:
             raise DaqmxError(
@@ -278,7 +278,7 @@ class Setup:
             )
 
     def _coerced(self, task: Task, rate: float, *, external: bool) -> float:
-        """The rate in Hz that the card makes of ``rate``."""
+        """Return the rate in Hz that the card runs at for ``rate``."""
         most, least = self.fastest(task), self.slowest
         if not least <= rate <= most * (1.0 + 1e-9):
             raise DaqmxError(
@@ -294,23 +294,23 @@ class Setup:
 
     @property
     def fastest_input(self) -> float:
-        """Highest rate in Hz of one input alone: the card is twice as fast then."""
+        """Return the highest rate in Hz of a single input, which is twice that of several."""
         return 2e3 * self._card.ai_rate_max_kHz
 
     @property
     def slowest(self) -> float:
-        """Lowest rate in Hz that the timebase can be divided down to."""
+        """Return the lowest rate in Hz that the timebase can be divided down to."""
         return self._timebase / _SLOWEST
 
     def fastest(self, task: Task) -> float:
-        """Highest rate in Hz of the sample clock of ``task``."""
+        """Return the highest rate in Hz of the sample clock of ``task``."""
         if task.kind is not Kind.AI:
             return 1e3 * self._card.ao_rate_max_kHz
         several = len(task.inputs)
         return 1e3 * self._card.ai_rate_max_kHz / several if several > 1 else self.fastest_input
 
     def _terminal(self, source: str) -> str:
-        """A terminal such as ``/Dev1/ao/SampleClock`` without its device, in small letters."""
+        """Return a terminal such as ``/Dev1/ao/SampleClock`` without its device, in lower case."""
         text = source.strip().lower()
         if text.startswith("/"):
             owner, _, text = text[1:].partition("/")
@@ -324,7 +324,7 @@ class Setup:
         return text
 
     def _clock_source(self, task: Task, source: str) -> str:
-        """The terminal that clocks ``task``; empty for its own clock."""
+        """Return the terminal that clocks ``task``; empty for its own clock."""
         if not source or self._terminal(source) == "onboardclock":
             return ""
         terminal = self._terminal(source)
@@ -343,7 +343,7 @@ class Setup:
             raise DaqmxError(Code.MIXED_CHANNELS, f"Task Name: {task.name}")
 
     def _named(self, task: Task, terminals: list[str], name: str) -> Iterable[tuple[str, str]]:
-        """Each of ``terminals`` with the name of its channel, which no other has."""
+        """Yield each of ``terminals`` with the unique name of its channel."""
         names = [f"{self.name}/{terminal}" for terminal in terminals]
         given = [part.strip() for part in name.split(",")] if name else []
         if len(given) == 1 and len(terminals) > 1:
@@ -372,7 +372,7 @@ class Setup:
 
 
 def _range(limits: tuple[float, float], offered: Sequence[float]) -> float:
-    """The smallest of the ranges ``offered`` in V that takes ``limits``."""
+    """Return the smallest of the ranges ``offered`` in V that includes ``limits``."""
     low, high = limits
     if not low < high:
         raise DaqmxError(

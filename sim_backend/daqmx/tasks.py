@@ -24,7 +24,7 @@ __all__ = [
 
 
 class Kind(Enum):
-    """What a task does; its value is DAQmx's channel type."""
+    """Kind of a task; its value is DAQmx's channel type."""
 
     EMPTY = 0
     AI = 10100
@@ -34,7 +34,7 @@ class Kind(Enum):
 
 
 class State(Enum):
-    """How far a task has gone towards running."""
+    """State of a task, in the order from set-up to running."""
 
     VERIFIED = 0
     RESERVED = 1
@@ -44,7 +44,7 @@ class State(Enum):
 
 @dataclass
 class AnalogInput:
-    """An input channel: ``limits`` V were asked for, ``range`` V, plus and minus, was taken."""
+    """Input channel: ``limits`` V were requested, ``range`` V, plus and minus, is in use."""
 
     name: str
     terminal: str
@@ -55,7 +55,7 @@ class AnalogInput:
 
 @dataclass
 class AnalogOutput:
-    """An output channel, as above."""
+    """Output channel, with the same fields."""
 
     name: str
     terminal: str
@@ -65,7 +65,7 @@ class AnalogOutput:
 
 @dataclass
 class Lines:
-    """A channel of digital lines, such as ``port0/line0``."""
+    """Channel of digital lines, such as ``port0/line0``."""
 
     name: str
     lines: tuple[str, ...]
@@ -73,9 +73,9 @@ class Lines:
 
 @dataclass
 class SampleClock:
-    """``rate`` Hz as the card makes it, ``source`` empty for its own clock, ``samples`` asked for.
+    """Sample clock of actual ``rate`` Hz; ``source`` is empty for the task's own clock.
 
-    ``finite`` says whether it ends by itself after ``samples``.
+    ``samples`` is the requested number; with ``finite`` the task ends after it.
     """
 
     rate: float
@@ -86,7 +86,7 @@ class SampleClock:
 
 @dataclass
 class Watchdog:
-    """The timer of digital lines: ``timeout`` s, what the lines do then, and when that will be."""
+    """Watchdog timer: ``timeout`` s, the lines' levels on expiration, and its time."""
 
     timeout: float
     states: dict[str, bool] = field(default_factory=dict)
@@ -96,7 +96,7 @@ class Watchdog:
 
 @dataclass(eq=False)
 class Task:
-    """A task with all that was set, and what it is doing."""
+    """Task with its settings and its present state."""
 
     name: str
     client: str
@@ -107,49 +107,49 @@ class Task:
     watchdog: Watchdog | None = None
     clock: SampleClock | None = None
     trigger: str = ""
-    convert_ticks: int | None = None  # between two conversions, of the timebase
+    convert_ticks: int | None = None  # of the timebase, between two conversions
     delay_ticks: int | None = None  # from the sample clock to the first conversion
     delay_units: int = 10304
-    buffer: int | None = None  # as it was set
+    buffer: int | None = None  # set size; None for the default
     regenerates: bool = True
     state: State = State.VERIFIED
-    kept: State = State.VERIFIED  # where it goes back to when it stops
+    kept: State = State.VERIFIED  # state after a stop
     failed: Code | None = None
-    listened: bool = False  # a client listens to its events
-    # an output task's own
+    listened: bool = False  # True while a client listens to its events
+    # of an output task
     waveform: Waveform | None = None
-    first_write: int = 0  # samples; they make the buffer where no size was set
+    first_write: int = 0  # samples; the buffer's size where none was set
     generation: Generation | None = None
-    # an input task's own
+    # of an input task
     run: Run | None = None
     run_number: int = 0
     ticks: Ticks | None = None
     delivered: int = 0
-    by_read: bool = False  # it was started by reading
+    by_read: bool = False  # True if a read started it
 
     @property
     def running(self) -> bool:
-        """True from its start to its stop."""
+        """Return True from the task's start to its stop."""
         return self.state is State.RUNNING
 
     @property
     def channels(self) -> list[AnalogInput | AnalogOutput | Lines]:
-        """Its channels, which are of one kind."""
+        """Return the task's channels, which are of one kind."""
         return [*self.inputs, *self.outputs, *self.lines]
 
     @property
     def channel_names(self) -> list[str]:
-        """Names of its channels in their order."""
+        """Return the names of the channels in their order."""
         return [channel.name for channel in self.channels]
 
     @property
     def line_names(self) -> list[str]:
-        """Its digital lines in their order."""
+        """Return the digital lines in their order."""
         return [line for channel in self.lines for line in channel.lines]
 
     @property
     def wanted(self) -> int | None:
-        """Samples after which a finite task is done; None for one that goes on."""
+        """Return the samples after which a finite task is done; None for a continuous one."""
         return self.clock.samples if self.clock and self.clock.finite else None
 
 
@@ -157,9 +157,9 @@ _RANGE = re.compile(r"^(.*?)(\d+):(\d+)$")
 
 
 def physical_names(text: str, device: str) -> list[str]:
-    """Names within ``device`` of the physical channels in ``text``: ``Dev1/ai0:2, Dev1/ai5``.
+    """Return the names within ``device`` of physical channels such as ``Dev1/ai0:2, Dev1/ai5``.
 
-    Raises ``DaqmxError`` for a device or a syntax that is not known.
+    Raises ``DaqmxError`` for another device or an invalid syntax.
     """
     names: list[str] = []
     for part in text.split(","):

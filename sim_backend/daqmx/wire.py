@@ -1,4 +1,4 @@
-"""Outputs and digital lines of the card over time, and the voltage that reached the film."""
+"""Outputs and digital lines of the card over time, and the resulting voltage at the film."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from dearig.sim_backend.daqmx.wiring import Wiring
 
 __all__ = ["Change", "Wire"]
 
-_AT_ONCE = 1 << 20  # samples that are looked through
+_AT_ONCE = 1 << 20  # samples processed at a time
 
 
 @dataclass(frozen=True)
 class Change:
-    """The output arrived at or left its zero at ``time`` s on the clock, or was set.
+    """Change of the output at ``time`` s on the clock: to zero, from zero, or by a single value.
 
-    ``output`` V stand at the card's terminal and ``wire`` V at the film from then on.
+    From then on ``output`` V are at the card's terminal and ``wire`` V at the film.
     """
 
     time: float
@@ -30,9 +30,9 @@ class Change:
 
 
 class Wire:
-    """The ``outputs`` and digital ``lines`` of a card with ``wiring`` at its terminals.
+    """Outputs and digital lines of a card with ``wiring`` at its terminals.
 
-    Times are in s since ``born`` on the clock. ``client`` is who moved the wired output last.
+    Times are in s since ``born`` on the clock. ``client`` changed the wired output last.
     """
 
     def __init__(
@@ -52,51 +52,51 @@ class Wire:
         self._enabled: list[tuple[float, bool]] = [(-math.inf, self._enable is None)]
         self.history: list[Change] = []
         self._following: tuple[Generation, int] | None = None
-        self._traced = 0  # ticks of it that the history knows
-        self._away = False  # from zero
+        self._traced = 0  # ticks of the generation that are in the history
+        self._away = False  # True while the output is not at zero
         self.client = ""
         self._trace(0.0, 0)
 
     @property
     def switched(self) -> bool:
-        """Whether a line enables the amplifier."""
+        """Return True if a line enables the amplifier."""
         return self._enable is not None
 
     @property
     def track(self) -> Track:
-        """The output that the amplifier is wired to."""
+        """Return the output that is wired to the amplifier."""
         return self._tracks[self._wired]
 
     def film_voltage(self, now: float) -> float:
-        """V at the film."""
+        """Return the voltage in V at the film."""
         if not self._enabled[-1][1]:
             return 0.0
         return self._wiring.film_voltage(self.track.standing(now))
 
     def output_voltage(self, now: float) -> float:
-        """V at the output's terminal."""
+        """Return the voltage in V at the output's terminal."""
         return self._wiring.output_volts(self.track.standing(now))
 
     def row(self, generation: Generation) -> int | None:
-        """Row of ``generation`` that is on the wired output; None: it is not there."""
+        """Return the row of ``generation`` on the wired output, or None."""
         if self._following is None or self._following[0] is not generation:
             return None
         return self._following[1]
 
     def begin(self, generation: Generation, terminals: Sequence[str], client: str) -> None:
-        """Let the outputs ``terminals`` follow the rows of ``generation``."""
+        """Make the outputs ``terminals`` follow the rows of ``generation``."""
         for row, terminal in enumerate(terminals):
             self._tracks[terminal].follow(generation, row)
             if terminal == self._wired:
                 self._following, self._traced, self.client = (generation, row), 0, client
 
     def end(self, generation: Generation) -> None:
-        """``generation`` has ended, and its last sample stands."""
+        """Handle the end of ``generation``; its last sample is held."""
         if self.row(generation) is not None:
             self._following = None
 
     def set_output(self, terminal: str, counts: int, now: float, client: str = "") -> None:
-        """Let an output stand at ``counts``."""
+        """Hold an output at ``counts``."""
         self._tracks[terminal].set(now, counts)
         if terminal == self._wired:
             self.client = client
@@ -111,21 +111,21 @@ class Wire:
             self._trace(now, self.track.standing(now))
 
     def disable(self, now: float) -> None:
-        """Take the line that enables the amplifier low, where there is one."""
+        """Set the line that enables the amplifier low, where there is one."""
         if self._enable is not None:
             self.set_line(self._enable, False, now)
 
     def follow(self, now: float, oldest: Callable[[Generation], int]) -> None:
-        """Take into the history what was put out up to ``now``.
+        """Add the output up to ``now`` to the history.
 
-        ``oldest`` gives the first tick of a generation that a task may still read; what was
-        before is forgotten.
+        ``oldest`` returns the first tick of a generation that a task may still read; earlier
+        samples are discarded.
         """
         if self._following is None:
             return
         generation, row = self._following
         ticks = generation.ticks(now)
-        # the sample that stands is out as well, unless it was counted at the end
+        # the present sample is on the output too, unless the end has counted it
         end = ticks if generation.finished(now) else ticks + 1
         if end <= self._traced:
             return
@@ -140,12 +140,12 @@ class Wire:
         generation.waveform.drop_before(max(0, min(self._traced - 1, oldest(generation))))
 
     def forget_before(self, time: float) -> None:
-        """Nobody will ask for what the outputs were before ``time``."""
+        """Discard the outputs before ``time``."""
         for track in self._tracks.values():
             track.forget_before(time)
 
     def gated(self, counts: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """``counts`` (n,) on the output as the amplifier follows them: not, while not enabled."""
+        """Return ``counts`` (n,) of the output with those of 0 V while the amplifier is off."""
         if self._enable is None:
             return counts
         since = np.array([time for time, _ in self._enabled])

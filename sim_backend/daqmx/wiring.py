@@ -1,4 +1,4 @@
-"""The instruments at the card's terminals, wired as the rig file says."""
+"""Instruments at the card's terminals, wired as in the rig file."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from dearig.sim_backend.streams import Streams
 
 __all__ = ["OUTPUT_MONITOR", "Wiring"]
 
-#: The card's internal way from its output back to its inputs.
+#: The card's internal connection from its output to its inputs.
 OUTPUT_MONITOR = "_{}_vs_aognd"
 
 
 class _TaskSettings(RigSettings):
-    """The rig as a task converts it: each of its inputs ``conversions`` s after the tick."""
+    """Settings of the rig with a task's conversion times: ``conversions`` in s after the tick."""
 
     conversions: tuple[float, ...] = Field(default=())
 
     def skew(self, place: int) -> float:
-        """Time in s from the tick to the conversion of the rig's input in ``place``."""
+        """Return the time in s from the tick to the conversion of the rig's input in ``place``."""
         return self.conversions[place] if self.conversions else super().skew(place)
 
 
 class Wiring:
-    """The instruments of ``settings``, the film ``plant`` at rest, noise of ``noise_seed``."""
+    """Instruments of ``settings`` with the film ``plant`` at rest and noise of ``noise_seed``."""
 
     def __init__(
         self, settings: RigSettings, plant: Plant, noise_seed: tuple[int, ...], faults: FaultPlan
@@ -50,7 +50,7 @@ class Wiring:
         self.zero = int(self._output.counts(np.zeros(1))[0])
 
     def warm_up(self) -> None:
-        """Compute two samples: the kernels are compiled now, not while a client waits for 0 V."""
+        """Compute two samples, so that the kernels are compiled before a client waits for 0 V."""
         rate = self._settings.card.sample_rate_Hz
         wired = [t for n, t in self._settings.terminals().items() if n != "voltage_command"]
         inputs = [AnalogInput(t, t, (-10.0, 10.0), 10.0, 0) for t in wired]
@@ -59,17 +59,17 @@ class Wiring:
         path.advance(0, np.full(2, self.zero, dtype=np.int16), state)
 
     def film_voltage(self, counts: int) -> float:
-        """Voltage in V at the film for ``counts`` on the output, with the amplifier enabled."""
+        """Return the V at the film for ``counts`` on the output, with the amplifier enabled."""
         limit = self._settings.amplifier.range_kV * 1e3
         held = float(self._output.physical(np.array([counts], dtype=np.int16))[0])
         return min(max(held, -limit), limit)
 
     def output_volts(self, counts: int) -> float:
-        """Voltage in V at the output's terminal."""
+        """Return the voltage in V at the output's terminal."""
         return counts * self._settings.card.ao_range_V / (COUNT_MAX + 1)
 
     def coefficients(self, channel: AnalogInput) -> tuple[float, ...]:
-        """V over counts, lowest power first, that scale what ``channel`` delivers."""
+        """Return the scaling of ``channel``: V over counts, lowest power first."""
         name = self._names.get(channel.terminal)
         if name is None:
             return (0.0, channel.range / (COUNT_MAX + 1), 0.0, 0.0)
@@ -79,7 +79,7 @@ class Wiring:
     def run(
         self, number: int, rate: float, inputs: Sequence[AnalogInput], skews: Sequence[float]
     ) -> tuple[SignalPath, PathState]:
-        """The way of the samples of run ``number`` at ``rate`` Hz, and the state before them.
+        """Return the signal path of run ``number`` at ``rate`` Hz, and its initial state.
 
         ``skews`` are the times in s from the tick to the conversion of each of ``inputs``.
         """
@@ -87,7 +87,7 @@ class Wiring:
         wired = self._settings.terminals()
         settings = self._as_converted(
             inputs,
-            # what the task does not read is converted at any time
+            # the conversion time of an input that the task does not read is arbitrary
             tuple(at.get(wired[n], skews[0]) for n in self._settings.channel_names[1:]),
         )
         card = Card(settings, self._streams)
@@ -95,7 +95,7 @@ class Wiring:
         return path, path.start(self._plant)
 
     def laser_reading(self, counts: np.ndarray, inputs: Sequence[AnalogInput]) -> tuple[int, float]:
-        """Last reading of the laser's input in the rig's ``counts`` (channels, n), and range."""
+        """Return the laser's last reading in the rig's ``counts`` (channels, n), and its range."""
         ranges = [c.range for c in inputs if c.terminal == self._settings.card.ai_displacement]
         limit = ranges[0] if ranges else self._settings.card.range_displacement_V
         return int(counts[self._settings.channel_names.index("displacement"), -1]), limit
@@ -103,9 +103,9 @@ class Wiring:
     def as_read(
         self, counts: np.ndarray, output: np.ndarray, inputs: Sequence[AnalogInput]
     ) -> np.ndarray:
-        """Counts (inputs, n) of a task from the rig's ``counts`` (channels, n).
+        """Return counts (inputs, n) of a task from the rig's ``counts`` (channels, n).
 
-        ``output`` (n,) are the counts that stood on the output; an input without a wire reads 0.
+        ``output`` (n,) are the counts on the output; an input without a wire reads 0.
         """
         rows = {name: i for i, name in enumerate(self._settings.channel_names)}
         read = np.zeros((len(inputs), counts.shape[1]), dtype=np.int16)
@@ -126,10 +126,10 @@ class Wiring:
         output: int,
         laser: tuple[int, float] | None,
     ) -> np.ndarray:
-        """Counts (inputs, samples) of reading number ``reading`` of a rig on which nothing moves.
+        """Return counts (inputs, samples) of reading number ``reading`` of a rig at rest.
 
-        ``film`` V stands at the film, ``output`` counts on the output. ``laser`` is what its input
-        read last, in counts, and the range then; None: the film is at rest.
+        ``film`` V are at the film, ``output`` counts on the output. ``laser`` is the last reading
+        of its input in counts with its range; None: the film is at the loaded rest state.
         """
         amplifier = self._settings.amplifier
         noise = self._streams.before_run("card", reading).standard_normal((2, samples))
@@ -177,7 +177,7 @@ class Wiring:
     def _as_converted(
         self, inputs: Sequence[AnalogInput], conversions: tuple[float, ...]
     ) -> _TaskSettings:
-        """The settings with the ranges of ``inputs``, which a task may choose for itself."""
+        """Return the settings with the ranges of ``inputs``, which each task may choose."""
         ranges = {self._names[c.terminal]: c.range for c in inputs if c.terminal in self._names}
         declared = tuple(
             c.model_copy(update={"range_V": ranges.pop(c.name, c.range_V)})
