@@ -81,11 +81,11 @@ class Waveform:
 
 @dataclass(eq=False)
 class Generation:
-    """Generation of an output task: ``waveform`` at ``rate`` Hz from ``start`` s, ``total`` samples.
+    """Generation of an output task: ``waveform`` at ``rate`` Hz from ``start`` s.
 
-    ``total`` is None for a continuous one. ``ended`` is the number of samples that were output when
-    it was stopped or ran out of samples (``starved``). ``breaks`` is a tick at which it fails
-    regardless of what was written.
+    It has ``total`` samples, or None for a continuous one. ``ended`` is the number of samples that
+    were output when it was stopped or ran out of samples (``starved``). ``breaks`` is a tick at
+    which it fails regardless of what was written.
     """
 
     waveform: Waveform

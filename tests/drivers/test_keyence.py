@@ -290,9 +290,9 @@ def test_settings_that_cannot_be_are_refused(changed: dict[str, bytes], said: st
 
 def test_a_reply_that_lost_its_end_is_no_setting() -> None:
     # the OUT would be taken for the kind of filter, and 0 for the number of samples
-    with pytest.raises(LaserError, match="answers SR,OC,01"):
+    with pytest.raises(LaserError, match="reply to SR,OC,01"):
         found_in(OC=b"SR,OC,01,0")
-    with pytest.raises(LaserError, match="answers SR,OH,01"):
+    with pytest.raises(LaserError, match="reply to SR,OH,01"):
         found_in(OH=b"SR,OH,01,-040.000,-10.0000,+040.000")
 
 

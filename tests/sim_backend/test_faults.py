@@ -270,7 +270,7 @@ def test_every_run_has_its_faults_again():
     ("kind", "code", "words"),
     [
         ("ai-overflow", INPUT_OVERWRITTEN, "overwritten before they were read"),
-        ("ao-underflow", OUTPUT_STARVED, "the end of what was written"),
+        ("ao-underflow", OUTPUT_STARVED, "ran out of written samples"),
     ],
 )
 def test_errors_of_the_card_come_at_their_time_with_the_output_at_zero(kind, code, words):
