@@ -1,4 +1,4 @@
-"""A high-voltage amplifier: what its monitors say, and what every amplifier's driver can do."""
+"""High-voltage amplifier: readings of its monitors, and the interface of its drivers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dearig.drivers.settings import AmplifierSettings, RigSettings
 
 __all__ = ["AmplifierDriver", "Monitors", "zero_findings"]
 
-#: Part of the current limit below which the current monitor counts as 0.
+#: Share of the current limit below which the current monitor counts as 0.
 CURRENT_AT_ZERO = 0.02
 
 
@@ -33,23 +33,22 @@ class Monitors:
 
 @runtime_checkable
 class AmplifierDriver(Protocol):
-    """What every amplifier's driver can do; ``amplifier.driver`` is its name in the registry."""
+    """Interface of an amplifier's driver; ``amplifier.driver`` is its name in the registry."""
 
     role: Literal["amplifier"]
 
     def inspect(self, settings: RigSettings, monitors: Monitors | None) -> tuple[Finding, ...]:
-        """Return what the amplifier says, with 0 V commanded; faults are findings.
+        """Return the state of the amplifier with 0 V commanded; faults are findings.
 
-        ``monitors`` is what the card read of the two monitors, None where it could not.
+        ``monitors`` are the card's readings of the two monitors, None where there are none.
         """
         ...
 
 
 def zero_findings(monitors: Monitors, settings: RigSettings) -> tuple[Finding, ...]:
-    """Return whether ``monitors`` agree that there is no voltage on the film, with 0 V commanded.
+    """Return whether ``monitors`` show that there is no voltage on the film, with 0 V commanded.
 
-    The voltage monitor must read within ``limits.zero_tolerance_kV``. A reading that is not a
-    number is not zero.
+    The voltage monitor must read within ``limits.zero_tolerance_kV``. NaN does not count as zero.
     """
     name = settings.amplifier.model
     kilovolts, allowed = monitors.voltage * 1e-3, settings.limits.zero_tolerance_kV

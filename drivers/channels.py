@@ -1,4 +1,4 @@
-"""Channels of a rig: what each count of a converter means."""
+"""Channels of a rig, with the scaling of converter counts to physical values."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ import numpy as np
 
 __all__ = ["CHANNEL_NAMES", "RESERVED_NAMES", "Channel", "Scaling"]
 
-#: The channels that this program knows, in the order in which blocks hold them. Those that a rig
-#: file declares come after them.
+#: Built-in channels in the order of a block's rows. Channels that a rig file declares follow them.
 CHANNEL_NAMES = (
     "voltage_command",
     "voltage_monitor",
@@ -18,7 +17,7 @@ CHANNEL_NAMES = (
     "temperature",
 )
 
-#: Names that a rig file cannot give a channel: recordings use them for something else.
+#: Reserved names: recordings use them otherwise, so a rig file cannot give them to a channel.
 RESERVED_NAMES = (*CHANNEL_NAMES, "time", "displacement_model", "stretch", "nominal_stress")
 
 COUNT_MIN, COUNT_MAX = -32768, 32767
@@ -29,7 +28,7 @@ _INVERSION_TOLERANCE = 1e-3  # counts
 
 @dataclass(frozen=True)
 class Scaling:
-    """From int16 counts to a physical value: offset + gain volts, volts = polynomial(counts).
+    """Scaling of int16 counts to a value: offset + gain * volts, volts = polynomial(counts).
 
     ``coefficients`` are the card's own, lowest power first, in V; ``gain`` is in the channel's unit
     per volt and ``offset`` in its unit.
@@ -45,14 +44,14 @@ class Scaling:
         return self.offset + self.gain * volts
 
     def counts(self, physical: np.ndarray) -> np.ndarray:
-        """Nearest int16 counts of ``physical``, saturating at the converter's ends.
+        """Return the nearest int16 counts of ``physical``, saturated at the converter's ends.
 
-        Raises ``ValueError`` where the higher coefficients bend the scaling by more than 1 % of its
-        first order: then the counts are not found by the iteration used here, and no converter is
-        that crooked.
+        Raises ``ValueError`` where the higher coefficients change the slope by more than 1 % of its
+        first order: the iteration used here does not converge then, and no real converter is so
+        nonlinear.
         """
         constant, first, *higher = self.coefficients
-        # how much the higher terms can bend the slope, of the first order
+        # largest change of the slope by the higher terms, relative to the first order
         bend = sum(p * abs(c / first) * COUNT_MAX ** (p - 1) for p, c in enumerate(higher, start=2))
         if not bend <= _BEND_MAX:
             raise ValueError(
@@ -61,7 +60,7 @@ class Scaling:
         volts = (np.asarray(physical, dtype=np.float64) - self.offset) / self.gain
         raw = (volts - constant) / first
         linear, error = raw, bend * COUNT_MAX
-        while error > _INVERSION_TOLERANCE:  # each round shrinks the error by the bend
+        while error > _INVERSION_TOLERANCE:  # each iteration multiplies the error by this change
             raw = np.clip(raw, COUNT_MIN, COUNT_MAX)
             bent = np.polynomial.polynomial.polyval(raw, higher) * raw * raw
             raw = linear - bent / first
@@ -71,15 +70,15 @@ class Scaling:
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel: its ``name``, SI ``unit``, scaling and timing.
+    """Channel with its ``name``, SI ``unit``, scaling and timing.
 
-    ``name`` is one of ``CHANNEL_NAMES`` or one that the rig file declares; ``label`` is what a
-    person reads, and empty where the name does.
+    ``name`` is one of ``CHANNEL_NAMES`` or one that the rig file declares. ``label`` is the
+    displayed name; where it is empty, ``name`` is displayed.
 
-    ``skew`` is the time in s after the sample clock's tick at which this channel is converted (a
-    multiplexed converter takes one channel after another). ``delay`` is the known lag in s of the
-    instrument itself, such as half a laser's averaging window; ``delay_error`` that by which it may
-    be more or less, in one run as against another.
+    ``skew`` is the time in s from the sample clock's tick to this channel's conversion, since a
+    multiplexed converter takes one channel after another. ``delay`` is the known lag in s of the
+    instrument itself, such as half a laser's averaging window; ``delay_error`` is the amount by
+    which it may differ from run to run.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Findings of an inspection: what an instrument has, against what the rig file wants."""
+"""Findings of an inspection: the state of an instrument compared with the rig file."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Verdict = Literal["ok", "warning", "wrong", "not wired"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One ``item`` of one ``instrument``: what was ``found`` and ``wanted``, and what to do.
+    """Finding on an ``item`` of an ``instrument``: ``found``, ``wanted``, and what to do.
 
-    ``wrong`` keeps a run from starting, ``warning`` does not. ``not wired`` is what the rig file
-    does not have, so that it was not inspected.
+    ``wrong`` prevents a run, ``warning`` does not. ``not wired`` marks an item that the rig file
+    does not have and that was not inspected.
     """
 
     instrument: str
@@ -27,7 +27,7 @@ class Finding:
 
     @property
     def sentence(self) -> str:
-        """The finding in one line."""
+        """Return the finding in one line."""
         wanted = f", {self.wanted} is wanted" if self.wanted and self.verdict != "ok" else ""
         advice = f"; {self.advice}" if self.advice else ""
         return f"{self.instrument}, {self.item}: {self.found}{wanted}{advice}"

@@ -13,7 +13,7 @@ def instruments(
 ) -> tuple[Instrument, ...]:
     """Return card, amplifier, laser and thermometer; ``unnamed`` is a missing serial number.
 
-    The card reports its own model and serial number; those of the others are the rig file's.
+    The card reports its own model and serial number; those of the others come from the rig file.
     """
     amplifier, laser, card = settings.amplifier, settings.laser, settings.card
     found = [

@@ -1,4 +1,4 @@
-"""The instruments' drivers: which there are, and what they find together."""
+"""Registry of the instruments' drivers, and their findings together."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _ROLES = ("laser", "amplifier")
 
 
 def _check(name: str, driver: Any) -> None:
-    # both kinds of drivers have the same members; ``role`` says which one it is
+    # both kinds of drivers have the same members; ``role`` tells them apart
     if not isinstance(driver, LaserDriver) or driver.role not in _ROLES:
         raise TypeError(f"{name} is no driver: it needs a role ({' or '.join(_ROLES)}) and inspect")
 
@@ -41,10 +41,10 @@ def instrument_findings(
     displacement_volts: float | None,
     laser: LaserDriver | None = None,
 ) -> tuple[Finding, ...]:
-    """Return what the amplifier's and the laser's drivers find, with 0 V commanded.
+    """Return the findings of the amplifier's and the laser's drivers, with 0 V commanded.
 
-    ``monitors`` and ``displacement_volts`` are what the card read, None where it could not.
-    ``laser`` takes the place of the driver that the rig file names.
+    ``monitors`` and ``displacement_volts`` are the card's readings, None where there are none.
+    ``laser`` replaces the driver that the rig file names.
     """
     found: list[Finding] = []
     name = settings.amplifier.driver
@@ -67,7 +67,7 @@ def instrument_findings(
 def reading_findings(settings: RigSettings, readings: dict[str, float]) -> tuple[Finding, ...]:
     """Return the readings of the channels that the rig file declares, against their limits.
 
-    ``readings`` are by the channels' names, in their units; a channel that is not among them could
+    ``readings`` maps the channels' names to values in their units; a channel without an entry could
     not be read.
     """
     found = []

@@ -1,4 +1,4 @@
-"""A laser displacement sensor: what an inspection finds, and what every laser's driver can do."""
+"""Laser displacement sensor: results of an inspection, and the interface of its drivers."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from dearig.drivers.settings import LaserSettings
 
 __all__ = ["LaserDriver", "LaserInspection", "analog_findings", "where_to_look"]
 
-_IN_RANGE = 0.999  # of the range: the analog output stays at its end when the film is beyond it
-_AGREEMENT = 0.005  # of the range, between two readings of a film that hangs still
+_IN_RANGE = 0.999  # of the range; beyond it the analog output stays at its end
+_AGREEMENT = 0.005  # of the range, between two readings of a film at rest
 
 
 @dataclass(frozen=True)
 class LaserInspection:
-    """What was found at the laser's interface; None what could not be asked.
+    """Result of an inspection at the laser's interface; None where it could not be queried.
 
     ``reading`` is in m, ``metres_per_volt`` the scale of its analog output.
     """
@@ -28,15 +28,15 @@ class LaserInspection:
 
 @runtime_checkable
 class LaserDriver(Protocol):
-    """What every laser's driver can do; ``laser.driver`` is its name in the registry."""
+    """Interface of a laser's driver; ``laser.driver`` is its name in the registry."""
 
     role: Literal["laser"]
 
     def inspect(self, settings: LaserSettings) -> LaserInspection:
-        """Return what the laser at ``settings.port`` says; faults are findings.
+        """Return the state of the laser at ``settings.port``; faults are findings.
 
-        With an empty port nothing is asked, and one finding says so. The laser measures
-        afterwards as it did before.
+        With an empty port the laser is not queried, and one finding says so. Afterwards the laser
+        measures as before.
         """
         ...
 
@@ -44,11 +44,11 @@ class LaserDriver(Protocol):
 def analog_findings(
     settings: LaserSettings, volts: float | None, inspection: LaserInspection
 ) -> tuple[Finding, ...]:
-    """Return whether ``volts`` at the card's input is a reading, and the same as the laser's own.
+    """Return whether ``volts`` at the card's input are a reading and agree with the laser's own.
 
-    ``volts`` is None where the card could not be read. The second is judged only where the laser
-    has told its reading: it shows that this output is wired to this input, and that the scale it
-    tells is the one it applies.
+    ``volts`` is None where the card could not be read. The agreement is checked only where the
+    laser has reported its reading. It shows that this output is wired to this input, and that the
+    reported scale is the one in use.
     """
     name = settings.model
     if volts is None:
@@ -75,7 +75,7 @@ def analog_findings(
             Finding(
                 name, "analog output against serial port", f"{off:.3f} mm apart",
                 f"{_AGREEMENT * settings.range_mm:g} mm or less", "ok" if same else "wrong",
-                "" if same else "check that the film hangs still, that card.ai_displacement is "
+                "" if same else "check that the film is at rest, that card.ai_displacement is "
                 f"wired to the analog output of OUT{settings.output}, and that the laser's analog "
                 "scaling is the one it reports",
             )
@@ -84,7 +84,7 @@ def analog_findings(
 
 
 def where_to_look(settings: LaserSettings) -> str:
-    """Return what to check of a laser that does not see its target."""
+    """Return what to check on a laser that does not see its target."""
     return (
         f"check that the laser is on, its spot falls on the target, and the target is "
         f"{settings.reference_distance_mm:g} mm away"

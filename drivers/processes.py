@@ -1,7 +1,7 @@
 """Child processes that import nothing from the folder in which the operator works.
 
 Python puts the working folder on the path of ``python -c`` and ``python -m``. A file ``queue.py``
-or ``numbers.py`` there would take the place of the standard library's module in a child process.
+or ``numbers.py`` there would replace the standard library's module in a child process.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["child_environment", "child_path", "isolated_spawn"]
 
 
 def child_path() -> list[str]:
-    """Return ``sys.path`` without the working folder, however that is written there.
+    """Return ``sys.path`` without the working folder, in whatever form it is written there.
 
     A working folder from which this program itself was imported stays: without it a child process
     could not start.
@@ -34,7 +34,7 @@ def child_path() -> list[str]:
 
 
 def child_environment() -> dict[str, str]:
-    """Return the environment for a child process: ``child_path`` and nothing put before it."""
+    """Return the environment for a child process, in which ``child_path`` is the whole path."""
     return {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(child_path()),
@@ -44,12 +44,12 @@ def child_environment() -> dict[str, str]:
 
 @contextmanager
 def isolated_spawn() -> Iterator[None]:
-    """Within the body, a process that ``multiprocessing`` spawns gets ``child_environment``.
+    """Make ``multiprocessing`` spawn processes with ``child_environment`` within the body.
 
-    ``multiprocessing`` has no parameters for these: it hands on ``sys.path`` and the environment
+    ``multiprocessing`` has no parameters for these: it passes on ``sys.path`` and the environment
     as they are when a process starts. It also makes the child import the main module again, which
-    fails for a module of the working folder (``python -m``): the child gets an empty one. All are
-    as before after the body.
+    fails for a module of the working folder (``python -m``): the child gets an empty one. The end
+    of the body restores all of them.
     """
     main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
     path, names = sys.path.copy(), ("PYTHONPATH", "PYTHONSAFEPATH")

@@ -1,4 +1,4 @@
-"""The interface of every rig: simulated, a local card, or a card behind a server."""
+"""Interface of all rigs: simulated, on a local card, or on a card behind a server."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class RigState(Enum):
 
 
 def expect(state: RigState, call: str, *allowed: RigState) -> None:
-    """Raise ``RigStateError`` unless a rig in ``state`` can take ``call``."""
+    """Raise ``RigStateError`` unless a rig in ``state`` allows ``call``."""
     if state not in allowed:
         wanted = " or ".join(one.value for one in allowed)
         raise RigStateError(f"{call}: the rig is {state.value}, it must be {wanted}")
@@ -35,7 +35,7 @@ def expect(state: RigState, call: str, *allowed: RigState) -> None:
 
 @dataclass(frozen=True)
 class Instrument:
-    """One instrument; ``settings`` are pairs of text, name and value with unit."""
+    """Instrument; ``settings`` are pairs of text: name, and value with unit."""
 
     role: str
     model: str
@@ -45,7 +45,7 @@ class Instrument:
 
 @dataclass(frozen=True)
 class RigIdentity:
-    """A rig: its address (``sim``, ``sim:7``, ``daqmx:Dev1``), instruments and channels."""
+    """Identity of a rig: address (``sim``, ``sim:7``, ``daqmx:Dev1``), instruments, channels."""
 
     address: str
     simulated: bool
@@ -56,7 +56,7 @@ class RigIdentity:
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened at ``sample`` of the run: ``level`` is info, warning or fault."""
+    """Event at ``sample`` of the run; ``level`` is info, warning or fault."""
 
     sample: int
     level: str
@@ -65,7 +65,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Block:
-    """Simultaneous samples: ``counts`` (channels, n) int16, the first being sample ``start``."""
+    """Block of samples: ``counts`` (channels, n) int16, the first one being sample ``start``."""
 
     start: int
     counts: np.ndarray
@@ -74,27 +74,27 @@ class Block:
 
 @runtime_checkable
 class Rig(Protocol):
-    """A rig is loaded, armed, started, read until it returns None, and ends safe.
+    """Rig: it is loaded, armed, started, read until ``read`` returns None, and ends safe.
 
-    Calls out of order raise ``RigStateError``; faults of instruments raise ``RigError``. Whatever
-    happened, ``make_safe`` may be called, at any time and more than once.
+    Calls out of order raise ``RigStateError``; faults of instruments raise ``RigError``.
+    ``make_safe`` may be called in any state, at any time and more than once.
     """
 
     @property
     def state(self) -> RigState:
-        """State of the rig."""
+        """Return the state of the rig."""
         ...
 
     def identify(self) -> RigIdentity:
-        """Return what the rig is made of; the output does not move."""
+        """Return the rig's instruments; the output does not change."""
         ...
 
     def load(self, waveform: GatedWaveform) -> float:
-        """Take a waveform that has passed the gate; returns the actual sample rate in Hz."""
+        """Load a waveform that has passed the gate; returns the actual sample rate in Hz."""
         ...
 
     def arm(self) -> None:
-        """Get ready to start without delay; the output stays at 0 V."""
+        """Prepare for a start without delay; the output stays at 0 V."""
         ...
 
     def start(self) -> None:
@@ -102,16 +102,16 @@ class Rig(Protocol):
         ...
 
     def read(self) -> Block | None:
-        """Return the next block, waiting for it; None when the waveform has been played."""
+        """Wait for the next block and return it, or None after the last one."""
         ...
 
     @property
     def waiting(self) -> float:
-        """Delay of the reader in s: samples that were acquired and not read."""
+        """Return the reader's delay in s: samples that were acquired and not read."""
         ...
 
     def stop(self) -> None:
-        """End the run early: ramp to 0 V in the set time; acquired samples stay readable."""
+        """End the run early with a ramp to 0 V; acquired samples stay readable."""
         ...
 
     def make_safe(self) -> None:

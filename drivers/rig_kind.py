@@ -1,4 +1,4 @@
-"""A kind of rig: how its addresses are written, and how it is opened and inspected."""
+"""Interface of a kind of rig: its addresses, and how it is opened and inspected."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ __all__ = ["RigKind", "RigOptions"]
 
 @dataclass(frozen=True)
 class RigOptions:
-    """How a simulated rig is made; a real one has no use for any of it.
+    """Options of a simulated rig; a real one ignores them.
 
-    ``film`` and ``load`` are the rig file's, ``actuator`` what takes their place, each as the model
-    has them, which this layer does not know. ``seed`` is that of the noise, ``paced`` means real
-    time, ``faults`` is the plan of what goes wrong.
+    ``film`` and ``load`` come from the rig file; ``actuator`` replaces them. Their types belong to
+    the model, which this layer does not import. ``seed`` is that of the noise, ``paced`` means real
+    time, ``faults`` is the plan of faults.
     """
 
     film: Any
@@ -31,11 +31,11 @@ class RigOptions:
 
 @runtime_checkable
 class RigKind(Protocol):
-    """A kind of rig.
+    """Kind of rig.
 
-    Its addresses begin with its name in the registry; ``addresses`` are how they are written, for
-    messages. ``simulated``: no instrument is touched; then faults and noise can be
-    asked for, and the film needs no name.
+    Its addresses begin with its name in the registry; ``addresses`` are their forms, for messages.
+    With ``simulated`` no instrument is accessed; faults and noise can then be requested, and the
+    film needs no name.
     """
 
     addresses: tuple[str, ...]
@@ -44,16 +44,16 @@ class RigKind(Protocol):
     def open(self, address: str, settings: RigSettings, options: RigOptions) -> Rig:
         """Return the rig at ``address``, its output at 0 V.
 
-        Raises ``AddressError`` for an address that names none, ``RigError`` where the instruments
-        are not there.
+        Raises ``AddressError`` for an address that names none, ``RigError`` where instruments are
+        missing.
         """
         ...
 
     def inspect(
         self, address: str, settings: RigSettings, options: RigOptions
     ) -> tuple[Finding, ...]:
-        """Return what the instruments say, compared with ``settings``, without raising a volt.
+        """Return the instruments' state compared with ``settings``, without any output voltage.
 
-        What is wrong is a finding. Raises ``AddressError`` for an address that names no rig.
+        Faults are findings. Raises ``AddressError`` for an address that names no rig.
         """
         ...

@@ -1,6 +1,6 @@
-"""The TREK high-voltage amplifier, which has no interface: the card reads its two monitors.
+"""TREK high-voltage amplifier, which has no interface: the card reads its two monitors.
 
-The accuracy assumed for the current monitor is from memory of its maker's description.
+The accuracy assumed for the current monitor is from memory of the maker's description.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ __all__ = ["DRIVER", "TrekDriver"]
 
 
 class TrekDriver:
-    """An amplifier that is known by its two monitors only; see ``AmplifierDriver``."""
+    """Driver of an amplifier that has only two monitors; see ``AmplifierDriver``."""
 
     role: Literal["amplifier"] = "amplifier"
 
     def inspect(self, settings: RigSettings, monitors: Monitors | None) -> tuple[Finding, ...]:
-        """Return the scaling that is applied, and whether the monitors read 0."""
+        """Return the scaling in use, and whether the monitors read 0."""
         amplifier = settings.amplifier
         model = amplifier.model
         serial = f", serial {amplifier.serial}" if amplifier.serial else ""
@@ -44,5 +44,5 @@ class TrekDriver:
         return (*scaling, unread)
 
 
-#: As the registry has it.
+#: Entry of the registry.
 DRIVER = TrekDriver()

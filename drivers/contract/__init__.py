@@ -1,5 +1,5 @@
-"""Tests that a rig, a laser or an amplifier must pass, for whoever brings one.
+"""Tests that every rig, laser driver and amplifier driver must pass, for their authors.
 
-They need pytest, which this program itself does not. Have pytest explain failures in them:
+They need pytest, which the program itself does not need. For pytest's detailed failures call
 ``pytest.register_assert_rewrite("dearig.drivers.contract")`` in ``conftest.py``, before the import.
 """

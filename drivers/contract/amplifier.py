@@ -1,6 +1,6 @@
-"""The tests that every amplifier's driver must pass.
+"""Tests that every amplifier's driver must pass.
 
-Derive a class ``Test...`` from ``AmplifierContract`` and give the driver in ``driver``.
+Derive a class ``Test...`` from ``AmplifierContract`` and return the driver from ``driver``.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ __all__ = ["AmplifierContract"]
 
 
 def wrong(findings: tuple[Finding, ...]) -> list[Finding]:
-    """Return the findings that would keep a run from starting."""
+    """Return the findings that prevent a run."""
     return [finding for finding in findings if finding.verdict == "wrong"]
 
 
 class AmplifierContract:
-    """The tests; ``driver`` is the only method that a derived class must have."""
+    """Tests of an amplifier's driver; a derived class must define ``driver`` only."""
 
     def driver(self) -> AmplifierDriver:
-        """Return the driver, of an amplifier that stands at 0 V and is in order."""
+        """Return the driver of a working amplifier at 0 V."""
         raise NotImplementedError
 
     def settings(self, **amplifier: float | str) -> RigSettings:

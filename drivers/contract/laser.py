@@ -1,7 +1,7 @@
-"""The tests that every laser's driver must pass.
+"""Tests that every laser's driver must pass.
 
-Derive a class ``Test...`` from ``LaserContract`` and say in ``connected`` how a laser, real or
-simulated, is brought into each of the states that are tested.
+Derive a class ``Test...`` from ``LaserContract``. Its ``connected`` brings a laser, real or
+simulated, into each of the tested states.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ __all__ = ["LaserContract"]
 
 
 def wrong(inspection: LaserInspection) -> list[Finding]:
-    """Return the findings that would keep a run from starting."""
+    """Return the findings that prevent a run."""
     return [finding for finding in inspection.findings if finding.verdict == "wrong"]
 
 
 class LaserContract:
-    """The tests; ``connected`` is the only method that a derived class must have."""
+    """Tests of a laser's driver; a derived class must define ``connected`` only."""
 
-    TOLERANCE = 1e-6  # m, between the reading and the target's place
-    PLACE = 6.4e-3  # m, of a target within the range
+    TOLERANCE = 1e-6  # m, between the reading and the target's position
+    PLACE = 6.4e-3  # m, position of a target within the range
 
     def connected(
         self, *, reading: float | None = PLACE, answers: bool = True, agrees: bool = True
     ) -> AbstractContextManager[tuple[LaserDriver, LaserSettings]]:
         """Return a driver, and the settings under which it finds its laser, for one test.
 
-        The target is at ``reading`` m, None: out of sight. ``answers`` False: nothing is at the
-        other end of the line. ``agrees`` False: the scale of the laser's analog output is another
-        one than the settings say.
+        The target is at ``reading`` m, or out of range with None. With ``answers`` False nothing is
+        connected to the line. With ``agrees`` False the scale of the laser's analog output differs
+        from the settings.
         """
         raise NotImplementedError
 

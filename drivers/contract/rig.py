@@ -1,6 +1,6 @@
-"""The tests that every rig must pass.
+"""Tests that every rig must pass.
 
-Derive a class ``Test...`` from ``RigContract`` and say in ``open_rig`` how the rig is opened.
+Derive a class ``Test...`` from ``RigContract`` and return the opened rig from ``open_rig``.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def lobes(
     rate: float = RATE,
     limits: Limits = LIMITS,
 ) -> GatedWaveform:
-    """Return half-sine lobes of ``peaks`` V between quiet ends, as the gate admits them."""
+    """Return an admitted waveform of half-sine lobes of ``peaks`` V with quiet ends."""
     time = np.arange(round(seconds * rate)) / rate
     lobe = np.sin(np.pi * time / seconds)
     still = np.zeros(round(quiet * rate))
@@ -59,7 +59,7 @@ def lobes(
 
 @dataclass(frozen=True)
 class Record:
-    """All that one run delivered: ``counts`` (channels, N) int16, and its blocks and events."""
+    """Record of one run: ``counts`` (channels, N) int16, with its blocks and events."""
 
     counts: np.ndarray
     blocks: tuple[Block, ...]
@@ -73,7 +73,7 @@ class Record:
 
 
 def begin(rig: Rig, waveform: GatedWaveform) -> None:
-    """Load, arm and start."""
+    """Load, arm and start ``rig``."""
     rig.load(waveform)
     rig.arm()
     rig.start()
@@ -89,7 +89,7 @@ def drain(rig: Rig) -> Record:
 
 
 def play(rig: Rig, waveform: GatedWaveform) -> Record:
-    """Play ``waveform`` to its end and return what was read."""
+    """Play ``waveform`` to its end and return the record."""
     begin(rig, waveform)
     return drain(rig)
 
@@ -103,7 +103,7 @@ CALLS: dict[str, Callable[[Rig], object]] = {
     "identify": lambda rig: rig.identify(),
 }
 
-#: The calls that a rig takes in each state.
+#: Calls that a rig allows in each state.
 ALLOWED: dict[RigState, Set[str]] = {
     RigState.SAFE: {"identify", "load"},
     RigState.LOADED: {"identify", "arm"},
@@ -115,7 +115,7 @@ ALLOWED: dict[RigState, Set[str]] = {
 
 
 def bring_to(rig: Rig, state: RigState) -> None:
-    """Take a new rig to ``state`` by the ordinary way."""
+    """Bring a new rig to ``state`` by the ordinary calls."""
     if state is RigState.CLOSED:
         rig.close()
     if state in (RigState.SAFE, RigState.CLOSED):
@@ -132,9 +132,9 @@ def bring_to(rig: Rig, state: RigState) -> None:
 
 
 class RigContract:
-    """The tests; ``open_rig`` is the only method that a derived class must have.
+    """Tests of a rig; a derived class must define ``open_rig`` only.
 
-    A real rig has no seed and never does the same thing twice: its class skips
+    A real rig has no seed and does not repeat its noise: its class skips
     ``test_same_seed_gives_the_same_bytes``, ``test_another_seed_or_run_gives_other_noise`` and
     ``test_block_length_changes_nothing``.
     """
@@ -142,7 +142,7 @@ class RigContract:
     MONITOR_TOLERANCE = 20.0  # V at the film between command and monitor
 
     def open_rig(self, *, block_samples: int | None = None, seed: int = 0) -> Rig:
-        """A new rig with the settings' defaults, as fast as it can."""
+        """Return a new rig with default settings that runs as fast as possible."""
         raise NotImplementedError
 
     @contextmanager
@@ -156,7 +156,7 @@ class RigContract:
 
     @pytest.fixture
     def rig(self) -> Iterator[Rig]:
-        """A rig for one test."""
+        """Yield a rig for one test."""
         with self.opened() as rig:
             yield rig
 
@@ -276,7 +276,7 @@ class RigContract:
             command = rig.identify().channels[0].scaling.physical(counts[0])
         assert command.size < waveform.voltage.size
         assert command[-1] == pytest.approx(0.0, abs=1.0)
-        # the same as without the stop, and from there on a straight line to 0 within the limits
+        # the same as without the stop, then a straight line to 0 within the limits
         played = np.flatnonzero(np.abs(command - waveform.voltage[: command.size]) > 1.0)
         at = played[0] if played.size else command.size
         assert np.all(np.diff(command[at - 1 :]) <= 1.0)

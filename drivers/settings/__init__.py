@@ -1,8 +1,8 @@
-"""Settings of the instruments as a rig file holds them, each with its unit in its name.
+"""Settings of the instruments in a rig file, each with its unit in its name.
 
-Defaults are the rig of the thesis (section 4.1) with its makers' figures, which are from memory:
-check them against the manuals of the instruments at hand. Values marked "simulated rig only" say
-how an instrument misbehaves; a real one needs no telling.
+Defaults are the rig of the thesis (section 4.1) with the makers' figures, which are from memory:
+check them against the manuals of the actual instruments. Values marked "simulated rig only"
+describe an instrument's imperfections; they have no effect on a real one.
 """
 
 from dearig.drivers.settings.amplifier import AmplifierSettings

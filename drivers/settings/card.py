@@ -19,7 +19,7 @@ __all__ = ["CardSettings"]
 
 
 class CardSettings(Section):
-    """The multifunction card: one output clock, on whose ticks the inputs are converted too."""
+    """The multifunction card; the output's sample clock also times the inputs."""
 
     model: str = Field(default="NI PCIe-6361", description="type of card")
     device: str = Field(default="Dev1", min_length=1, description="name in NI MAX")

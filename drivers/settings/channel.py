@@ -63,24 +63,24 @@ class ChannelSettings(Section):
 
     @property
     def shown(self) -> str:
-        """The name that a person reads."""
+        """Return the displayed name."""
         return self.label or self.name.replace("_", " ")
 
     @property
     def limited(self) -> bool:
-        """Whether an interlock watches it."""
+        """Return True if the channel has an interlock."""
         return self.limit_min is not None or self.limit_max is not None
 
     @property
     def limits_shown(self) -> str:
-        """The values that are allowed, in words; empty where all are."""
+        """Return the allowed values as text; empty where all are allowed."""
         low, high, unit = self.limit_min, self.limit_max, self.unit
         if low is None:
             return "" if high is None else f"{high:.4g} {unit} or less"
         return f"{low:.4g} {unit} or more" if high is None else f"{low:.4g} to {high:.4g} {unit}"
 
     def allows(self, value: float) -> bool:
-        """Return whether ``value`` is within the limits; what is not a number is not."""
+        """Return True if ``value`` is within the limits; False for NaN."""
         low = -math.inf if self.limit_min is None else self.limit_min
         high = math.inf if self.limit_max is None else self.limit_max
         return low <= value <= high

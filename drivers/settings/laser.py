@@ -92,19 +92,19 @@ class LaserSettings(Section):
 
     @property
     def window(self) -> float:
-        """Length of the moving average in s."""
+        """Return the length of the moving average in s."""
         return self.averaging * self.sampling_us * 1e-6
 
     @property
     def delay(self) -> float:
-        """Mean age of a reading in s.
+        """Return the mean age of a reading in s.
 
-        The average lags by (averaging - 1)/2 sampling periods, and the output stands for one
-        period, half of which has passed on average.
+        The average lags by (averaging - 1)/2 sampling periods. The output is held for one period,
+        of which half has passed on average.
         """
         return 0.5 * self.window
 
     @property
     def delay_error(self) -> float:
-        """Time in s by which a reading may be older, or younger: its clock is not the card's."""
+        """Return the s by which a reading may be older or younger, since the clocks differ."""
         return 0.5 * self.sampling_us * 1e-6

@@ -1,4 +1,4 @@
-"""Limits of a run, the interlocks that end it, and the guardian beside it."""
+"""Settings of a run's limits, interlocks and guardian."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["GuardianSettings", "InterlockSettings", "LimitsSettings"]
 
 
 class LimitsSettings(Section):
-    """What the film and the amplifier may see; the gate holds every sample against these."""
+    """Limits of the film and the amplifier; the gate checks every sample against them."""
 
     voltage_max_kV: float = Field(
         default=8.5, gt=0.0, le=100.0, description="highest voltage at the film"
@@ -51,7 +51,7 @@ class LimitsSettings(Section):
     )
 
     def gate_limits(self, film: str = "") -> Limits:
-        """The limits as the gate takes them, in SI units, for the film of that name."""
+        """Return the limits for the gate, in SI units, for the film of that name."""
         return Limits(
             voltage_min=self.voltage_min_kV * 1e3,
             voltage_max=self.voltage_max_kV * 1e3,
@@ -65,7 +65,7 @@ class LimitsSettings(Section):
 
 
 class InterlockSettings(Section):
-    """What ends a run while it goes on: thresholds, how long each must be broken, what is done."""
+    """Interlocks that end a run: thresholds, debounce times and actions."""
 
     monitor_tolerance_kV: float = Field(
         default=1.5,
@@ -145,7 +145,7 @@ class InterlockSettings(Section):
 
 
 class GuardianSettings(Section):
-    """The process beside a run on real instruments that takes over when the run dies or freezes."""
+    """The guardian process, which takes over when a run on real instruments dies or freezes."""
 
     timeout_s: float = Field(
         default=1.0,

@@ -1,4 +1,4 @@
-"""All instruments of a rig together: its channels, and what must agree."""
+"""Settings of all instruments of a rig, with its channels and consistency checks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _ZERO_CELSIUS = 273.15  # K
 
 
 class RigSettings(Section):
-    """All instruments of a rig with its limits, which agree with each other."""
+    """Settings of a rig's instruments and limits, checked for consistency."""
 
     amplifier: AmplifierSettings = AmplifierSettings()
     laser: LaserSettings = LaserSettings()
@@ -30,7 +30,7 @@ class RigSettings(Section):
     )
     channel: tuple[ChannelSettings, ...] = Field(
         default=(),
-        strict=False,  # TOML has lists, not tuples; what is in them is as strict as elsewhere
+        strict=False,  # TOML has lists, not tuples; their items are validated strictly
         description="one [[channel]] table for each",
     )
     limits: LimitsSettings = LimitsSettings()
@@ -39,7 +39,7 @@ class RigSettings(Section):
 
     @property
     def channel_names(self) -> tuple[str, ...]:
-        """Names of the channels this rig delivers, in the order in which blocks hold them."""
+        """Return the names of this rig's channels in the order of a block's rows."""
         return (
             *(n for n in CHANNEL_NAMES if n != "temperature" or self.thermometer is not None),
             *(channel.name for channel in self.channel),
@@ -50,11 +50,11 @@ class RigSettings(Section):
         coefficients: Mapping[str, tuple[float, ...]],
         skews: Sequence[float] | None = None,
     ) -> tuple[Channel, ...]:
-        """The rig's channels in the order of blocks.
+        """Return the rig's channels in the order of a block's rows.
 
         ``coefficients`` maps each of ``channel_names`` to the scaling polynomial of its converter,
-        V over counts, lowest power first. ``skews`` in s are those that a card really has, input by
-        input, where it did not take exactly the ones asked for.
+        V over counts, lowest power first. ``skews`` in s are the card's actual ones by input,
+        where they differ from the requested ones.
         """
         if skews is None:
             skews = [self.skew(place) for place in range(len(self.channel_names) - 1)]
@@ -81,7 +81,7 @@ class RigSettings(Section):
                     name=name,
                     unit=unit,
                     scaling=Scaling(tuple(coefficients[name]), gain, offset),
-                    # the command is put out on the tick itself; the inputs follow one by one
+                    # the command is output on the tick itself; the inputs follow one by one
                     skew=skews[place - 1] if place else 0.0,
                     delay=delays.get(name, 0.0),
                     delay_error=laser.delay_error if name == "displacement" else 0.0,
@@ -91,11 +91,11 @@ class RigSettings(Section):
         return tuple(channels)
 
     def skew(self, place: int) -> float:
-        """Time in s from the tick to the conversion of the input in ``place`` 0, 1, ..."""
+        """Return the time in s from the tick to the conversion of input number ``place``."""
         return (self.card.first_convert_us + place * self.card.convert_interval_us) * 1e-6
 
     def terminals(self) -> dict[str, str]:
-        """Card terminal of each channel: ``{"voltage_command": "ao0", ...}``."""
+        """Return the card terminal of each channel: ``{"voltage_command": "ao0", ...}``."""
         card = self.card
         wired = {
             "voltage_command": card.ao_command,
@@ -108,7 +108,7 @@ class RigSettings(Section):
         return {name: wired[name] for name in self.channel_names}
 
     def ranges(self) -> dict[str, float]:
-        """Converter range of each channel in V, plus and minus."""
+        """Return the converter range of each channel in V, plus and minus."""
         card = self.card
         ranges = {
             "voltage_command": card.ao_range_V,
@@ -121,7 +121,7 @@ class RigSettings(Section):
         return {name: ranges[name] for name in self.channel_names}
 
     def wiring(self) -> dict[str, str]:
-        """Terminal configuration of each input channel: ``{"voltage_monitor": "DIFF", ...}``."""
+        """Return the terminal configuration of each input: ``{"voltage_monitor": "DIFF", ...}``."""
         card = self.card
         wiring = {
             "voltage_monitor": card.terminals_voltage_monitor,
@@ -146,7 +146,7 @@ class RigSettings(Section):
         amplifier, laser, card, limits = self.amplifier, self.laser, self.card, self.limits
 
         def most(key: str, value: float, allowed: float, why: str) -> None:
-            # a hair of tolerance: products of decimal fractions are not exact
+            # with a small tolerance: products of decimal fractions are not exact
             if value > allowed * (1.0 + 1e-9):
                 raise ValueError(f"{key} = {value:g} is more than {allowed:g}: {why}")
 

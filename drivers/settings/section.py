@@ -1,4 +1,4 @@
-"""What every table of a rig file has in common."""
+"""Common base of all tables of a rig file."""
 
 from __future__ import annotations
 
@@ -25,6 +25,6 @@ Action = Literal["ramp", "at once"]
 
 
 class Section(BaseModel):
-    """One table of a rig file: immutable, no unknown keys, no text for numbers, no NaN or inf."""
+    """Table of a rig file: immutable, no unknown keys, no text for numbers, no NaN or inf."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
