@@ -15,9 +15,9 @@ class AmplifierSettings(Section):
     driver: str = Field(
         default="trek",
         min_length=1,
-        description="which driver inspects it: dearig doctor lists them",
+        description="driver for its inspection; dearig doctor lists them",
     )
-    model: str = Field(default="TREK 10/40A-HS", description="as it stands on the front panel")
+    model: str = Field(default="TREK 10/40A-HS", description="type, as on the front panel")
     serial: str = Field(default="", description="serial number, kept with every recording")
     gain_V_per_V: float = Field(
         default=1000.0, ge=1.0, le=1e5, description="volts at the film per volt at the input"

@@ -57,21 +57,21 @@ class CardSettings(Section):
     terminals_temperature: Wiring = Field(default="DIFF", description="as above")
     do_hv_enable: DigitalLine | None = Field(
         default=None,
-        description="line that enables the amplifier's high voltage, such as port0/line0; left "
+        description="line that enables the amplifier's high voltage, such as port0/line0; if left "
         "out, it is not wired",
     )
     hv_enable_watchdog_s: float = Field(
         default=0.0,
         ge=0.0,
         le=60.0,
-        description="the card's own watchdog takes do_hv_enable low when the program is silent for "
-        "so long; 0 means none",
+        description="the card's own watchdog sets do_hv_enable low when the program is silent for "
+        "this time; 0 means none",
     )
     first_convert_us: float = Field(
         default=50.0,
         ge=0.0,
         le=1e5,
-        description="from the tick to the first conversion: lets the amplifier follow first",
+        description="from the tick to the first conversion, so that the amplifier follows first",
     )
     convert_interval_us: float = Field(
         default=10.0, ge=0.5, le=1e5, description="from one input's conversion to the next one's"

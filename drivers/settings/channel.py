@@ -22,7 +22,7 @@ class ChannelSettings(Section):
         description="name in recordings and exports, in lower case with underscores",
     )
     label: str = Field(
-        default="", max_length=60, description="name on the screen; left empty, the name is shown"
+        default="", max_length=60, description="displayed name; if empty, the name is displayed"
     )
     terminal: AnalogInput = Field(examples=["ai4"], description="input of the card")
     wiring: Wiring = Field(default="DIFF", description="as [card] terminals_displacement")
@@ -51,11 +51,11 @@ class ChannelSettings(Section):
         default=None, description="interlock: highest value allowed during a run; left out, none"
     )
     limit_debounce_ms: float = Field(
-        default=5.0, ge=0.0, le=1e4, description="interlock: out of its limits for so long"
+        default=5.0, ge=0.0, le=1e4, description="interlock: debounce time"
     )
-    limit_action: Action = Field(default="ramp", description="interlock: what is done")
+    limit_action: Action = Field(default="ramp", description="interlock: action")
     simulated_value: float = Field(
-        default=0.0, ge=-1e12, le=1e12, description="simulated rig only: what it reads"
+        default=0.0, ge=-1e12, le=1e12, description="simulated rig only: its reading"
     )
     simulated_noise: float = Field(
         default=0.0, ge=0.0, le=1e12, description="simulated rig only: RMS noise of a reading"

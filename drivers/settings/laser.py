@@ -17,7 +17,7 @@ class LaserSettings(Section):
     driver: str = Field(
         default="keyence",
         min_length=1,
-        description="which driver inspects it: dearig doctor lists them",
+        description="driver for its inspection; dearig doctor lists them",
     )
     model: str = Field(
         default="Keyence LK-H152 / LK-G5000", description="sensor head and controller"
@@ -77,7 +77,7 @@ class LaserSettings(Section):
         default=20.0,
         ge=-1000.0,
         le=1000.0,
-        description="simulated rig only: how slow its sampling clock is against the card's",
+        description="simulated rig only: by how much its sampling clock is slower than the card's",
     )
 
     @field_validator("averaging")

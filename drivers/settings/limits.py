@@ -35,7 +35,7 @@ class LimitsSettings(Section):
         description="most energy that a run may charge into the film, over all its rises",
     )
     at_voltage_kV: float = Field(
-        default=1.0, gt=0.0, le=100.0, description="what counts as standing at voltage"
+        default=1.0, gt=0.0, le=100.0, description="voltage from which time_at_voltage_max_s counts"
     )
     time_at_voltage_max_s: float = Field(
         default=600.0, gt=0.0, le=1e7, description="longest time at voltage without a pause"
@@ -47,7 +47,7 @@ class LimitsSettings(Section):
         default=0.1,
         gt=0.0,
         le=1.0,
-        description="the voltage monitor must read less than this once the rig is safe",
+        description="the voltage monitor must read less than this when the rig is safe",
     )
 
     def gate_limits(self, film: str = "") -> Limits:
@@ -73,8 +73,8 @@ class InterlockSettings(Section):
         le=100.0,
         description="voltage monitor against command; an amplifier that loses 15 % at 8 kV passes",
     )
-    monitor_debounce_ms: float = Field(default=50.0, ge=0.0, le=1e4, description="for so long")
-    monitor_action: Action = Field(default="ramp", description="what is done")
+    monitor_debounce_ms: float = Field(default=50.0, ge=0.0, le=1e4, description="debounce time")
+    monitor_action: Action = Field(default="ramp", description="action")
     breakdown_fraction: float = Field(
         default=0.4,
         ge=0.0,
@@ -83,25 +83,28 @@ class InterlockSettings(Section):
         "breakdown, or an amplifier that tripped; 0 switches it off",
     )
     breakdown_above_kV: float = Field(default=0.5, gt=0.0, le=100.0, description="see above")
-    breakdown_debounce_ms: float = Field(default=2.0, ge=0.0, le=1e4, description="for so long")
-    breakdown_action: Action = Field(default="at once", description="what is done")
+    breakdown_debounce_ms: float = Field(default=2.0, ge=0.0, le=1e4, description="debounce time")
+    breakdown_action: Action = Field(default="at once", description="action")
     current_max_mA: float = Field(
         default=20.0, gt=0.0, le=1000.0, description="current monitor, either sign"
     )
-    current_debounce_ms: float = Field(default=2.0, ge=0.0, le=1e4, description="for so long")
-    current_action: Action = Field(default="at once", description="what is done")
+    current_debounce_ms: float = Field(default=2.0, ge=0.0, le=1e4, description="debounce time")
+    current_action: Action = Field(default="at once", description="action")
     laser_debounce_ms: float = Field(
-        default=50.0, ge=0.0, le=1e4, description="reading out of the laser's range for so long"
+        default=50.0,
+        ge=0.0,
+        le=1e4,
+        description="debounce time of a reading out of the laser's range",
     )
     laser_stuck_s: float = Field(
         default=0.5,
         ge=0.0,
         le=1e4,
-        description="reading that does not change by one count for so long while the command "
+        description="time for which the reading stays at one count while the command "
         "moves by laser_stuck_swing_kV; 0 switches it off",
     )
     laser_stuck_swing_kV: float = Field(default=1.0, gt=0.0, le=100.0, description="see above")
-    laser_action: Action = Field(default="ramp", description="what is done")
+    laser_action: Action = Field(default="ramp", description="action")
     displacement_min_mm: float = Field(
         default=-20.0, ge=-1e4, le=0.0, description="from the loaded rest state"
     )
@@ -116,9 +119,9 @@ class InterlockSettings(Section):
         "and two samples); grows with the square of a sample interval above 4 ms",
     )
     displacement_debounce_ms: float = Field(
-        default=5.0, ge=0.0, le=1e4, description="out of bounds for so long; a jump counts at once"
+        default=5.0, ge=0.0, le=1e4, description="debounce time; a jump trips at once"
     )
-    displacement_action: Action = Field(default="ramp", description="what is done")
+    displacement_action: Action = Field(default="ramp", description="action")
     following_fraction: float = Field(
         default=0.2,
         ge=0.0,
@@ -131,17 +134,17 @@ class InterlockSettings(Section):
         default=200.0,
         ge=0.0,
         le=1e4,
-        description="for so long, not counting the time between such displacements",
+        description="debounce time, not counting the time between such displacements",
     )
-    following_action: Action = Field(default="ramp", description="what is done")
+    following_action: Action = Field(default="ramp", description="action")
     late_s: float = Field(
-        default=1.0, gt=0.0, le=60.0, description="samples that wait for so long for the program"
+        default=1.0, gt=0.0, le=60.0, description="time for which samples wait for the program"
     )
-    late_action: Action = Field(default="ramp", description="what is done")
+    late_action: Action = Field(default="ramp", description="action")
     disk_free_min_MB: float = Field(
-        default=100.0, ge=0.0, le=1e6, description="room on the disk that must stay free"
+        default=100.0, ge=0.0, le=1e6, description="disk space that must stay free"
     )
-    disk_action: Action = Field(default="ramp", description="what is done")
+    disk_action: Action = Field(default="ramp", description="action")
 
 
 class GuardianSettings(Section):
@@ -151,11 +154,11 @@ class GuardianSettings(Section):
         default=1.0,
         ge=0.3,
         le=10.0,
-        description="a run that is silent for so long is taken for frozen",
+        description="a run that is silent for this time counts as frozen",
     )
     link_timeout_s: float = Field(
         default=2.0,
         ge=0.2,
         le=60.0,
-        description="a server that does not answer for so long is taken for gone",
+        description="a server that does not answer for this time counts as lost",
     )

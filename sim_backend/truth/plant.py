@@ -104,7 +104,7 @@ class TruthPlant:
                 rows,
             )
             if lost:
-                fault, fault_at = "the stretch ran away or a spring locked", int(reached)
+                fault, fault_at = "the stretch diverged or a spring locked", int(reached)
                 y = np.concatenate((rows[0, -1:], np.zeros(y.size - 1)))
         stretch, rate, warming = rows
         current = np.zeros(time.size)

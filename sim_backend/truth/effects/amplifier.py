@@ -48,7 +48,7 @@ def saturation(generator: np.random.Generator, load: Load) -> TruthEffect:  # no
     def stage(time: np.ndarray, v: np.ndarray, carry: object) -> tuple[np.ndarray, object]:  # noqa: ARG001
         return v / (1.0 + np.abs(v / at) ** exponent) ** (1.0 / exponent), carry
 
-    return _stage(stage, f"the output falls {lost:.2%} behind at 8 kV (exponent {exponent:.2g})")
+    return _stage(stage, f"the output is {lost:.2%} too low at 8 kV (exponent {exponent:.2g})")
 
 
 def slew(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001

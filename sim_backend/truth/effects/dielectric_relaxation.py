@@ -34,7 +34,7 @@ def _relaxing(shares: np.ndarray, times: np.ndarray, words: str) -> TruthEffect:
     return TruthEffect(
         family="dielectric_relaxation",
         acts_on="dielectric",
-        description=f"{shares.sum():.2%} of the permittivity comes late, {words}",
+        description=f"{shares.sum():.2%} of the permittivity relaxes, {words}",
         on_voltage=on_voltage,
     )
 

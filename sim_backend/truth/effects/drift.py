@@ -38,7 +38,7 @@ def root(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: AR
         family="drift",
         acts_on="sensor",
         description=(
-            f"the reading drifts by {size * 1e6:.3g} um in 25 s, with the root of time after "
+            f"the reading drifts by {size * 1e6:.3g} um in 25 s, by the root of time after "
             f"{time:.2g} s"
         ),
         on_motion=on_motion,

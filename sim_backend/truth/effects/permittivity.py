@@ -56,6 +56,6 @@ def with_field(generator: np.random.Generator, load: Load) -> TruthEffect:  # no
     return TruthEffect(
         family="permittivity",
         acts_on="dielectric",
-        description=f"the permittivity is 1/(1 + {size:.3g}) of itself at 8 kV, by the field",
+        description=f"the permittivity falls with the field, by 1/(1 + {size:.3g}) at 8 kV",
         on_film=on_film,
     )
