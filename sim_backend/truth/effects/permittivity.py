@@ -56,6 +56,6 @@ def with_field(generator: np.random.Generator, load: Load) -> TruthEffect:  # no
     return TruthEffect(
         family="permittivity",
         acts_on="dielectric",
-        description=f"the permittivity falls with the field, by 1/(1 + {size:.3g}) at 8 kV",
+        description=f"the field multiplies the permittivity by 1/(1 + {size:.3g}) at 8 kV",
         on_film=on_film,
     )
