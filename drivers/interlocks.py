@@ -23,8 +23,8 @@ _JUMP_WITHIN = 2e-3  # s
 _JUMP_INTERVAL = 4e-3
 
 _NOMINAL = (0.0, 10.0 / 32768)  # V over counts of a converter of +-10 V
-_AT_END = 0.999  # of the laser's range; an alarm holds the analog output beyond it
-_FOLLOWS = 2  # counts; a command that is nearer to the plan than this follows it
+_RANGE_END = 0.999  # of the laser's range; an alarm holds the analog output beyond it
+_PLAN_TOLERANCE = 2  # counts; a command that is nearer to the plan than this follows it
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Interlocks:
         # thresholds in counts, so that samples within bounds need no scaling
         limit = locks.current_max_mA * 1e-3
         self._current_ends = _sorted(self._current.counts(np.array([-limit, limit])))
-        reach = settings.laser.range_mm * 1e-3 * _AT_END
+        reach = settings.laser.range_mm * 1e-3 * _RANGE_END
         self._laser_ends = _sorted(self._laser.counts(np.array([-reach, reach])))
         self._zero = int(self._command.counts(np.zeros(1))[0])
         self._swing = round(locks.laser_stuck_swing_kV * 1e3 / _step(self._command))
@@ -91,11 +91,11 @@ class Interlocks:
         self._watched = 0  # samples
         self._last_command = self._zero
         self._last_readings = np.empty(0, dtype=np.int32)
-        self._quiet_sum = self._quiet_samples = 0  # readings of the lead-in
+        self._lead_in_sum = self._lead_in_samples = 0  # readings of the lead-in
         self._rest: float | None = None  # m, the laser's reading at the loaded rest state
         self._rest_from = 0  # sample
-        self._departed = False  # True once the command has left the plan
-        self._still = _Still()
+        self._left_plan = False  # True once the command has left the plan
+        self._still = _StuckDetector()
         self._broken = {
             name: _Debounce(self._samples(seconds))
             for name, seconds in (
@@ -173,12 +173,12 @@ class Interlocks:
         driven = command != self._zero
         quiet = int(np.argmax(driven)) if driven.any() else command.size
         # integers, so that their sum does not depend on the block length
-        self._quiet_sum += int(reading[:quiet].sum(dtype=np.int64))
-        self._quiet_samples += quiet
+        self._lead_in_sum += int(reading[:quiet].sum(dtype=np.int64))
+        self._lead_in_samples += quiet
         if quiet < command.size:
             # with a command from the first sample on, the film is still at rest at that sample
-            samples = self._quiet_samples
-            mean = self._quiet_sum / samples if samples else float(reading[0])
+            samples = self._lead_in_samples
+            mean = self._lead_in_sum / samples if samples else float(reading[0])
             self._rest = _physical(self._laser, mean)
             self._rest_from = self._watched + quiet
 
@@ -328,7 +328,7 @@ class Interlocks:
         if (
             self._predicted is None
             or self._rest is None
-            or self._departed
+            or self._left_plan
             or locks.following_fraction == 0.0
             or not self._live("following")
         ):
@@ -337,9 +337,9 @@ class Interlocks:
         planned = predicted.size
         if self._planned is not None:
             plan = self._planned[self._watched : self._watched + planned]
-            other = np.abs(np.subtract(command[:planned], plan, dtype=np.int32)) > _FOLLOWS
+            other = np.abs(np.subtract(command[:planned], plan, dtype=np.int32)) > _PLAN_TOLERANCE
             planned = int(np.argmax(other)) if other.any() else planned
-        self._departed = planned < command.size
+        self._left_plan = planned < command.size
         predicted = predicted[:planned]
         moved = self._laser.physical(reading[:planned]) - self._rest
         far = np.abs(predicted)
@@ -446,7 +446,7 @@ class _Debounce:
         return int(starts[long[0]]) + self._needed - 1 if long.size else None
 
 
-class _Still:
+class _StuckDetector:
     """Detector of a reading that does not change while the command does."""
 
     def __init__(self) -> None:

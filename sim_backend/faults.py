@@ -38,7 +38,7 @@ class FaultKind(StrEnum):
 
 
 #: Default duration of a fault in s. Kinds that are not listed last until the run ends.
-_LASTS = {
+_DURATION = {
     FaultKind.ARC: 0.01,
     FaultKind.SENSOR_NOISE_BURST: 0.2,
     FaultKind.SHORT_READ: 0.0,
@@ -47,7 +47,7 @@ _LASTS = {
 
 
 #: Faults that are permanent and take no duration.
-_FOR_GOOD = {FaultKind.FILM_RUPTURE, FaultKind.AMPLIFIER_TRIP}
+_PERMANENT = {FaultKind.FILM_RUPTURE, FaultKind.AMPLIFIER_TRIP}
 
 _NEVER = 2**62  # samples
 
@@ -68,7 +68,7 @@ class Fault:
             raise ValueError(
                 f"fault {self.kind} at {self.at!r} s for {self.duration!r} s: write times from 0 up"
             )
-        if self.kind in _FOR_GOOD and math.isfinite(self.duration):
+        if self.kind in _PERMANENT and math.isfinite(self.duration):
             raise ValueError(f"fault {self.kind} is permanent: leave its duration out")
 
     @property
@@ -107,7 +107,7 @@ class FaultPlan:
                     f"KIND@SECONDS+DURATION, KIND one of {', '.join(FaultKind)}"
                 )
             kind = FaultKind(found[1])
-            lasts = float(found[3]) if found[3] else _LASTS.get(kind, math.inf)
+            lasts = float(found[3]) if found[3] else _DURATION.get(kind, math.inf)
             faults.append(Fault(kind, float(found[2]), lasts))
         return FaultPlan(tuple(sorted(faults, key=lambda fault: fault.at)))
 

@@ -27,7 +27,7 @@ OUTPUT_STARVED = -200290  #: DAQmx: the output ran out of written samples
 _TICK_TOLERANCE = 1e-6
 
 # faults that only a card behind a server, or a laser at a serial port, can have
-_ELSEWHERE = (FaultKind.SERVER_FROZEN, FaultKind.SERVER_GONE, FaultKind.SERIAL_GARBAGE)
+_NOT_IN_PROCESS = (FaultKind.SERVER_FROZEN, FaultKind.SERVER_GONE, FaultKind.SERIAL_GARBAGE)
 
 _CARD_ERRORS = {
     FaultKind.AI_OVERFLOW: (
@@ -125,7 +125,7 @@ class SimulatedRig:
         if block_samples is not None and block_samples < 1:
             raise ValueError(f"block_samples = {block_samples} must be 1 or more, or None")
         self._faults = faults or FaultPlan()
-        for fault in self._faults.of(*_ELSEWHERE):
+        for fault in self._faults.of(*_NOT_IN_PROCESS):
             raise ValueError(
                 f"fault {fault.kind} needs a server or a serial port: an in-process rig cannot "
                 f"have it"

@@ -140,14 +140,14 @@ class _Line(_Served):
         """Serve the program that opens the other end."""
         while (ready := self._wait(self._line)) is not None:
             if ready:
-                self._responder.receive(self._heard(os.read(self._line, 4096)), self._clock.now())
-            data = self._heard(self._responder.due(self._clock.now()))
+                self._responder.receive(self._carried(os.read(self._line, 4096)), self._clock.now())
+            data = self._carried(self._responder.due(self._clock.now()))
             # bytes that nobody reads from a serial line are lost
             with suppress(BlockingIOError):
                 while data:
                     data = data[os.write(self._line, data) :]
 
-    def _heard(self, data: bytes) -> bytes:
+    def _carried(self, data: bytes) -> bytes:
         """Return ``data`` as received: another baud rate corrupts its bits."""
         return data if self._same_speed() else bytes(byte ^ 0x55 | 0x80 for byte in data)
 

@@ -31,7 +31,7 @@ _STARTS_WITHIN = 60.0  # s: an interpreter, the driver's library, a connection
 _TAKES_OVER_WITHIN = 5.0  # s; it keeps trying after that, but the operator must be told
 _ENDS_WITHIN = 5.0  # s
 # s; a process that has ended has written its error by then, and the message must not wait longer
-_EXPLAINS_WITHIN = 0.5
+_ERROR_WITHIN = 0.5
 _LINES_KEPT = 20  # of its error stream; the last line of a traceback names the error
 _LINE_MAX = 2000  # characters of a line
 
@@ -120,7 +120,7 @@ class GuardianProcess:
 
     def arm(self) -> None:
         """Start to watch: silence means a frozen run. Raises ``RigError`` if it has ended."""
-        if not self._tell("arm"):
+        if not self._send("arm"):
             raise RigError(
                 f"the guardian process has ended ({self.last_error()}): nothing would take the "
                 f"output to 0 V if this program died; start the run again"
@@ -129,13 +129,13 @@ class GuardianProcess:
 
     def beat(self) -> bool:
         """Report that the run is alive; returns False if the guardian is not."""
-        return self._tell("beat")
+        return self._send("beat")
 
     def last_error(self) -> str:
         """Return why the guardian has ended, as far as that is known."""
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(_EXPLAINS_WITHIN)
-        self._listener.join(_EXPLAINS_WITHIN)
+            self._process.wait(_ERROR_WITHIN)
+        self._listener.join(_ERROR_WITHIN)
         lines = [line for line in self._errors if line]
         return f"exit code {self._process.returncode}" + (f", {lines[-1]}" if lines else "")
 
@@ -143,13 +143,13 @@ class GuardianProcess:
         """Stop watching: the output is at 0 V."""
         if self._guards:
             self._guards = False
-            self._tell("disarm")
+            self._send("disarm")
 
     def take_over(self) -> None:
         """Request 0 V now. Raises ``RigError`` where the guardian does not set it."""
         if self._trying:
             raise RigError("the guardian process is still trying to reach the card")
-        if not self._tell("take over"):
+        if not self._send("take over"):
             raise RigError(f"the guardian process has ended too ({self.last_error()})")
         self._trying = True
         self._expect_word("safe", _TAKES_OVER_WITHIN)
@@ -157,7 +157,7 @@ class GuardianProcess:
 
     def close(self) -> None:
         """End the guardian; one that still tries to reach the card goes on and reports the end."""
-        self._tell("bye")
+        self._send("bye")
         if self._process.stdin is not None:
             with contextlib.suppress(OSError):  # it has ended and closed its end of the pipe
                 self._process.stdin.close()
@@ -172,7 +172,7 @@ class GuardianProcess:
         if self._process.stderr is not None and not self._listener.is_alive():
             self._process.stderr.close()
 
-    def _tell(self, word: str) -> bool:
+    def _send(self, word: str) -> bool:
         if self._process.poll() is not None or self._process.stdin is None:
             return False
         try:

@@ -14,7 +14,7 @@ from dearig.drivers.settings import RigSettings
 
 __all__ = ["Outputs"]
 
-_LOOKS = 20  # readings of the monitor; the amplifier's output falls in less than a millisecond
+_MONITOR_READINGS = 20  # the amplifier's output falls in less than a millisecond
 
 
 class Outputs:
@@ -68,7 +68,7 @@ class Outputs:
         tolerance = self._settings.limits.zero_tolerance_kV
         per_volt = 1.0 / self._settings.amplifier.monitor_V_per_kV
         reading = 0.0
-        for _ in range(_LOOKS):
+        for _ in range(_MONITOR_READINGS):
             reading = self.read("voltage_monitor") * per_volt
             if abs(reading) <= tolerance:
                 return

@@ -362,11 +362,11 @@ class Device(TimingEngine):
                 self._verify(task)
                 self._reserve(task)
                 task.state = max(task.state, State.COMMITTED, key=lambda state: state.value)
-                self._write_ahead(task, counts)
+                self._write_before_start(task, counts)
                 if auto_start:
                     self.start(task)
                 return int(counts.shape[1])
-        return self._write_behind(task, counts, timeout)
+        return self._write_while_running(task, counts, timeout)
 
     def written(self, task: Task) -> int:
         """Return the samples per channel written since the task was set up or stopped."""

@@ -144,7 +144,7 @@ class TimingEngine(Setup):
                 oldest = min(oldest, math.floor((time - generation.start) * generation.rate) - 1)
         return oldest
 
-    def _looks_back(self, now: float) -> float:
+    def _earliest_needed(self, now: float) -> float:
         """Return the earliest time in s whose output a task may still read."""
         earliest = now
         for task in self._tasks.values():
@@ -155,7 +155,7 @@ class TimingEngine(Setup):
 
     def _set_output(self, terminal: str, counts: int, now: float, client: str = "") -> None:
         self._wire.set_output(terminal, counts, now, client)
-        self._wire.forget_before(self._looks_back(now))
+        self._wire.forget_before(self._earliest_needed(now))
 
     # reservations
 
@@ -291,7 +291,7 @@ class TimingEngine(Setup):
             self._wire.follow(now, self._oldest)
             self._wire.end(task.generation)
             task.generation = None
-            self._wire.forget_before(self._looks_back(now))
+            self._wire.forget_before(self._earliest_needed(now))
         if task.ticks is not None:
             task.ticks, task.run = None, None
         if task.watchdog is not None:
@@ -367,7 +367,7 @@ class TimingEngine(Setup):
         self._notify()
         return int(counts.shape[1])
 
-    def _write_ahead(self, task: Task, counts: np.ndarray) -> None:
+    def _write_before_start(self, task: Task, counts: np.ndarray) -> None:
         """Write before the start, up to the room in the buffer."""
         samples = counts.shape[1]
         if task.waveform is None:
@@ -385,7 +385,7 @@ class TimingEngine(Setup):
             raise DaqmxError(Code.BUFFER_SIZE_FIXED, f"Task Name: {task.name}", written=0)
         waveform.append(counts)
 
-    def _write_behind(self, task: Task, counts: np.ndarray, timeout: float) -> int:
+    def _write_while_running(self, task: Task, counts: np.ndarray, timeout: float) -> int:
         """Write to a task that generates; waits for room in its buffer."""
         total = counts.shape[1]
         done = 0

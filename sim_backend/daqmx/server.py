@@ -25,7 +25,7 @@ __all__ = ["DaqmxServer"]
 log = logging.getLogger(__name__)
 
 _THREADS = 32  # concurrent calls; an event that a client listens to is one
-_LOOK_S = 0.05  # period of the search for silent clients
+_POLL_S = 0.05  # period of the search for silent clients
 _OPTIONS = (
     ("grpc.max_send_message_length", -1),
     ("grpc.max_receive_message_length", -1),
@@ -67,11 +67,11 @@ class DaqmxServer:
         self._pool = ThreadPoolExecutor(_THREADS, thread_name_prefix="daqmx")
         self._server = grpc.server(
             self._pool,
-            interceptors=(_Way(self, self._link, self._closing),),
+            interceptors=(_Interceptor(self, self._link, self._closing),),
             options=_OPTIONS if client_timeout is None else _OPTIONS + _pings(link_timeout),
         )
         pb_grpc.add_NiDAQmxServicer_to_server(Servicer(device, self._closing), self._server)
-        self._watch = threading.Thread(target=self._look, name="daqmx clients", daemon=True)
+        self._watch = threading.Thread(target=self._poll, name="daqmx clients", daemon=True)
         self.port = 0
 
     def start(self) -> int:
@@ -104,9 +104,9 @@ class DaqmxServer:
         """Close."""
         self.close()
 
-    def _look(self) -> None:
+    def _poll(self) -> None:
         """Check for silent clients and for the planned end of the server, until it is closed."""
-        while not self._closing.wait(_LOOK_S):
+        while not self._closing.wait(_POLL_S):
             if self.clients is not None:
                 self.clients.check()
             if self.device.fires(FaultKind.SERVER_GONE) is not None:
@@ -128,7 +128,7 @@ def _pings(timeout: float) -> tuple[tuple[str, int], ...]:
     )
 
 
-class _Way(grpc.ServerInterceptor):
+class _Interceptor(grpc.ServerInterceptor):
     """Interceptor of every call: faults of the link, the caller's identity, and error replies."""
 
     def __init__(self, server: DaqmxServer, link: Clock, closing: threading.Event) -> None:

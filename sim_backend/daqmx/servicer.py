@@ -27,7 +27,7 @@ __all__ = ["Servicer", "refuse"]
 _BY_CHANNEL = 0  # DAQmx: group by channel
 _FINITE, _CONTINUOUS = 10178, 10123
 _RISING = 10280
-_LOOK_S = 0.02  # period at which an event's stream checks whether it is due
+_POLL_S = 0.02  # period at which an event's stream checks whether it is due
 _GROUPS = (
     "Buffer", "Chan", "Device", "PhysicalChan", "Read", "SystemInfo", "Task", "Timing", "Trig",
     "Watchdog", "Write",
@@ -347,7 +347,7 @@ class Servicer(pb_grpc.NiDAQmxServicer):
 
     def _listening(self, key: str, context: grpc.ServicerContext) -> bool:
         """Wait one period; return True while an event's stream continues."""
-        over = self._closing.wait(_LOOK_S)
+        over = self._closing.wait(_POLL_S)
         return not over and context.is_active() and key in self._streams
 
     # shared by the calls

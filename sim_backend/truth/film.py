@@ -423,7 +423,7 @@ def _fastest(body: _Body, h: Hidden, rate: float) -> float:
 
 
 @jit
-def _sound(springs: np.ndarray, y: np.ndarray) -> bool:
+def _intact(springs: np.ndarray, y: np.ndarray) -> bool:
     """Return True while the film is intact: finite, not diverging, no spring locked."""
     if not (0.0 < y[0] < _STRETCH_MAX and math.isfinite(y[1])):
         return False
@@ -519,7 +519,7 @@ def follow(
             memory[_START] = y[0]
             memory[_LARGEST] = max(memory[_LARGEST], y[0])
             elapsed += h_step
-        if not _sound(springs, y):
+        if not _intact(springs, y):
             for late in range(k + 1, nodes):
                 rows[0, late], rows[1, late], rows[2, late] = rows[0, k], 0.0, rows[2, k]
             return LOST, k + 1
