@@ -171,33 +171,7 @@ def admit(
     # a copy: the checked samples are those that go out, even if the caller changes its array
     voltage = np.array(voltage, dtype=np.float64)
     field_per_volt = np.asarray(prediction.field_per_volt, dtype=np.float64)
-    for name, limit in vars(limits).items():
-        if isinstance(limit, float) and math.isnan(limit):
-            raise RefusedWaveform((f"the limit {name} is nan, which admits no waveform",))
-    if not (math.isfinite(rate) and rate > 0.0):
-        raise RefusedWaveform((f"the sample rate {rate!r} Hz is not a finite number above 0",))
-    predicted = (-(-voltage.size // prediction.stride),) if prediction.stride >= 1 else (0,)
-    if voltage.ndim != 1 or voltage.size < 2 or field_per_volt.shape != predicted:
-        raise RefusedWaveform(
-            (
-                f"a waveform is one row of at least 2 samples with a prediction for each "
-                f"{prediction.stride}, not {voltage.shape} and {field_per_volt.shape}",
-            )
-        )
-    for values, step in ((voltage, 1), (field_per_volt, prediction.stride)):
-        if not np.isfinite(values.sum()):  # fast; a sum may overflow, so check each value then
-            at = int(np.argmin(np.isfinite(values))) * step
-            if not np.isfinite(values[at // step]):
-                raise RefusedWaveform(
-                    (f"sample {at} (at {at / rate:.4g} s) is not a finite number",)
-                )
-    thickest = float(field_per_volt.min())
-    for quantity, value, unit in (
-        ("one over the thickness", thickest, "1/m"),
-        ("the film's permittivity times its volume", prediction.electric_volume, "F m"),
-    ):
-        if not (math.isfinite(value) and value > 0.0):
-            raise RefusedWaveform((f"{quantity} is predicted as {value:.4g} {unit}, not above 0",))
+    _require_comparable(voltage, field_per_volt, rate, limits, prediction)
 
     reached = _Reached()
     with np.errstate(over="ignore", invalid="ignore"):  # an overflow exceeds every limit
@@ -256,6 +230,43 @@ def admit(
     if reasons:
         raise RefusedWaveform(tuple(reasons))
     return GatedWaveform(voltage, rate, limits, margins, _KEY)
+
+
+def _require_comparable(
+    voltage: np.ndarray,
+    field_per_volt: np.ndarray,
+    rate: float,
+    limits: Limits,
+    prediction: Prediction,
+) -> None:
+    """Raise ``RefusedWaveform`` for values that cannot be compared with the limits."""
+    for name, limit in vars(limits).items():
+        if isinstance(limit, float) and math.isnan(limit):
+            raise RefusedWaveform((f"the limit {name} is nan, which admits no waveform",))
+    if not (math.isfinite(rate) and rate > 0.0):
+        raise RefusedWaveform((f"the sample rate {rate!r} Hz is not a finite number above 0",))
+    predicted = (-(-voltage.size // prediction.stride),) if prediction.stride >= 1 else (0,)
+    if voltage.ndim != 1 or voltage.size < 2 or field_per_volt.shape != predicted:
+        raise RefusedWaveform(
+            (
+                f"a waveform is one row of at least 2 samples with a prediction for each "
+                f"{prediction.stride}, not {voltage.shape} and {field_per_volt.shape}",
+            )
+        )
+    for values, step in ((voltage, 1), (field_per_volt, prediction.stride)):
+        if not np.isfinite(values.sum()):  # fast; a sum may overflow, so check each value then
+            at = int(np.argmin(np.isfinite(values))) * step
+            if not np.isfinite(values[at // step]):
+                raise RefusedWaveform(
+                    (f"sample {at} (at {at / rate:.4g} s) is not a finite number",)
+                )
+    thickest = float(field_per_volt.min())
+    for quantity, value, unit in (
+        ("one over the thickness", thickest, "1/m"),
+        ("the film's permittivity times its volume", prediction.electric_volume, "F m"),
+    ):
+        if not (math.isfinite(value) and value > 0.0):
+            raise RefusedWaveform((f"{quantity} is predicted as {value:.4g} {unit}, not above 0",))
 
 
 class _Reached:

@@ -19,6 +19,12 @@ __all__ = ["RigSettings"]
 _ZERO_CELSIUS = 273.15  # K
 
 
+def _require_at_most(key: str, value: float, allowed: float, why: str) -> None:
+    # with a small tolerance: products of decimal fractions are not exact
+    if value > allowed * (1.0 + 1e-9):
+        raise ValueError(f"{key} = {value:g} is more than {allowed:g}: {why}")
+
+
 class RigSettings(Section):
     """Settings of a rig's instruments and limits, checked for consistency."""
 
@@ -145,59 +151,60 @@ class RigSettings(Section):
     def _instruments_agree(self) -> RigSettings:
         amplifier, laser, card, limits = self.amplifier, self.laser, self.card, self.limits
 
-        def most(key: str, value: float, allowed: float, why: str) -> None:
-            # with a small tolerance: products of decimal fractions are not exact
-            if value > allowed * (1.0 + 1e-9):
-                raise ValueError(f"{key} = {value:g} is more than {allowed:g}: {why}")
-
-        most(
+        _require_at_most(
             "limits.voltage_max_kV",
             limits.voltage_max_kV,
             amplifier.range_kV,
             "the amplifier's range",
         )
-        most(
+        _require_at_most(
             "limits.voltage_min_kV, without its sign,",
             -limits.voltage_min_kV,
             amplifier.range_kV,
             "the amplifier's range",
         )
-        most(
+        _require_at_most(
             "limits.slew_max_kV_per_s",
             limits.slew_max_kV_per_s,
             amplifier.slew_V_per_us * 1e3,
             "the amplifier's own slew rate",
         )
         highest = max(limits.voltage_max_kV, -limits.voltage_min_kV)
-        most(
+        _require_at_most(
             "limits.voltage_max_kV",
             highest,
             (card.ao_range_V * amplifier.gain_V_per_V - abs(amplifier.offset_V)) * 1e-3,
             "what card.ao_range_V times amplifier.gain_V_per_V reaches",
         )
-        most(
+        _require_at_most(
             "limits.voltage_max_kV",
             highest,
             card.range_voltage_monitor_V / amplifier.monitor_V_per_kV,
             "what card.range_voltage_monitor_V can read of the voltage monitor",
         )
-        most(
+        _require_at_most(
             "laser.range_mm",
             laser.range_mm,
             laser.mm_per_V * min(laser.analog_range_V, card.range_displacement_V),
             "what laser.mm_per_V leaves within laser.analog_range_V and card.range_displacement_V",
         )
-        most(
+        _require_at_most(
             "laser.rest_position_mm, without its sign,",
             abs(laser.rest_position_mm),
             laser.range_mm,
             "the laser's range",
         )
+        self._check_wiring()
+        self._check_sampling()
+        return self
+
+    def _check_wiring(self) -> None:
+        card, amplifier = self.card, self.amplifier
         names = self.channel_names
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"channel {name}: the name is given to two channels")
-        inputs = [t for name, t in self.terminals().items() if name != "voltage_command"]
+        inputs = self._input_terminals()
         for terminal in inputs:
             if inputs.count(terminal) > 1:
                 raise ValueError(f"card: input {terminal} is wired to two channels, one is allowed")
@@ -219,22 +226,28 @@ class RigSettings(Section):
             raise ValueError(
                 "card.hv_enable_watchdog_s is set, but no card.do_hv_enable that it could take low"
             )
-        most(
+
+    def _check_sampling(self) -> None:
+        card = self.card
+        inputs = self._input_terminals()
+        _require_at_most(
             "card.first_convert_us and card.convert_interval_us: the scan, in us,",
             self.skew(len(inputs) - 1) * 1e6 + card.convert_interval_us,
             1e6 / card.sample_rate_Hz,
             "one sample interval at card.sample_rate_Hz",
         )
-        most(
+        _require_at_most(
             "card.sample_rate_Hz",
             card.sample_rate_Hz,
             min(card.ao_rate_max_kHz, card.ai_rate_max_kHz / len(inputs)) * 1e3,
             "what the card can do on this many channels",
         )
-        most(
+        _require_at_most(
             "1 / card.convert_interval_us, in kHz,",
             1e3 / card.convert_interval_us,
             card.ai_rate_max_kHz,
             "card.ai_rate_max_kHz",
         )
-        return self
+
+    def _input_terminals(self) -> list[str]:
+        return [t for name, t in self.terminals().items() if name != "voltage_command"]

@@ -101,7 +101,9 @@ def _broyden(
     sure: bool,
     coarse: bool,
 ) -> LocalFit:
-    """Descend from ``here``, whose Jacobian is known nearby, or not finite where unknown.
+    """Descend from ``here``: one loop, whose branches share one state.
+
+    Its Jacobian is one known nearby, or not finite where unknown.
 
     Further Jacobians are ``coarse`` while they lower the cost: in a narrow valley columns nearly
     cancel, and the coarse drives do not resolve the difference.

@@ -47,7 +47,7 @@ def descend(
     patience: int = _PATIENCE,
     quick: bool = False,
 ) -> LocalFit:
-    """Minimise least squares from ``start`` (d,), coordinates of the layout, inside its bounds.
+    """Minimise least squares from ``start`` (d,), inside the layout's bounds: one loop, one state.
 
     ``fixed`` (d,) bool holds parameters. Marquardt's scaling (each coordinate by the length of its
     Jacobian column) keeps parameters with little influence, such as J at small stretch, from
