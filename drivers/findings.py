@@ -28,6 +28,6 @@ class Finding:
     @property
     def sentence(self) -> str:
         """Return the finding in one line."""
-        wanted = f", {self.wanted} is wanted" if self.wanted and self.verdict != "ok" else ""
+        wanted = f", expected {self.wanted}" if self.wanted and self.verdict != "ok" else ""
         advice = f"; {self.advice}" if self.advice else ""
         return f"{self.instrument}, {self.item}: {self.found}{wanted}{advice}"

@@ -35,8 +35,8 @@ class ActuatorRecord:
     bool is False where a reading must not be used (a dropout, a clipped sensor), None where all are
     good. Over the first ``lead_in`` samples, at 0 V, the displacement is 0 on average, because it
     is counted from there. Each reading is the mean of ``means_of`` that were taken, evenly about
-    its time. By ``sketch``, where there is one, it is told what a number of a model does: the drive
-    in fewer and longer steps (``dearig.model.fitting.coarse_drive``).
+    its time. ``coarse_drive``, where there is one, is the drive in fewer and longer steps
+    (``dearig.model.fitting.coarse_drive``); the effect of a parameter is estimated with it.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Inspection of a rig before it is used: what is there, what is wrong, which limits apply."""
+"""Inspection of a rig before a run: instruments, errors, and the limits that apply."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ class CheckOutcome:
 
     @property
     def wrong(self) -> tuple[Finding, ...]:
-        """What keeps a run from starting."""
+        """The findings that prevent a run from starting."""
         return tuple(f for f in self.findings if f.verdict == "wrong")
 
     def refuse(self) -> None:
-        """Raise ``InstrumentFault`` with the first thing that keeps a run from starting, if any."""
+        """Raise ``InstrumentFault`` with the first finding that prevents a run, if any."""
         if self.wrong:
             more = f" (and {len(self.wrong) - 1} more)" if len(self.wrong) > 1 else ""
             raise InstrumentFault(f"{self.wrong[0].sentence}{more}")
 
     @property
     def summary(self) -> str:
-        """All of it in one sentence."""
+        """Number of checks, and of those that are not OK, in one sentence."""
         counts = {
             "wrong": len(self.wrong),
             "to check": sum(f.verdict == "warning" for f in self.findings),
@@ -57,9 +57,9 @@ class CheckOutcome:
 def check_rig(rig: str, rig_file: RigFile, faults: FaultPlan | None = None) -> CheckOutcome:
     """Inspect the instruments of the rig at address ``rig`` against ``rig_file``.
 
-    A simulated rig plays 0 V and is read, and where ``laser.port`` is not empty a simulated
-    controller is asked through the driver; ``faults`` go wrong in it. What is wrong with
-    instruments is in the outcome. Raises ``InputError`` for an address that names no rig.
+    A simulated rig plays 0 V and is read. Where ``laser.port`` is not empty, the driver asks a
+    simulated controller; ``faults`` occur in it. Errors of instruments are findings. Raises
+    ``InputError`` for an address that names no rig.
     """
     kind = kind_of(rig)
     options = replace(options_of(rig_file), faults=faults)
@@ -67,13 +67,13 @@ def check_rig(rig: str, rig_file: RigFile, faults: FaultPlan | None = None) -> C
         instruments = kind.inspect(rig, rig_file, options)
     except AddressError as error:
         raise InputError(str(error)) from error
-    except ValueError as error:  # a film that cannot hang at rest
+    except ValueError as error:  # a film without a rest state
         raise InputError(f"rig {rig!r} with this rig file: {error}") from error
     findings = (*_programs(), *instruments, *_limits(rig_file, kind.simulated))
     return CheckOutcome(rig, kind.simulated, findings)
 
 
-# ---------------------------------------------------------------- what holds for both
+# ---------------------------------------------------------------- findings on every rig
 
 
 def _programs() -> Iterator[Finding]:
@@ -102,18 +102,18 @@ def _limits(rig_file: RigFile, simulated: bool) -> Iterator[Finding]:
         yield Finding(name, "film", "any")
     else:
         yield Finding(
-            name, "film", "none is named", "the film that hangs there", "wrong",
+            name, "film", "none is named", "the name of the film on the rig", "wrong",
             "name it in [film] of the rig file: a run on real instruments needs it",
         )  # fmt: skip
 
 
-# ---------------------------------------------------------------- to be shown
+# ---------------------------------------------------------------- output
 
 _LOOKS = {"ok": "green", "warning": "yellow", "wrong": "bold red", "not wired": "dim"}
 
 
 def check_table(outcome: CheckOutcome) -> RenderableType:
-    """The findings, instrument by instrument, and what to do about those that are not OK."""
+    """Return the findings by instrument, with advice for those that are not OK."""
     pieces: list[RenderableType] = []
     for instrument, group in groupby(outcome.findings, key=lambda finding: finding.instrument):
         table = Table(
@@ -125,7 +125,7 @@ def check_table(outcome: CheckOutcome) -> RenderableType:
         for finding in group:
             words = f"{finding.item}: {finding.found}"
             if finding.verdict != "ok":
-                wanted = f", {finding.wanted} is wanted" if finding.wanted else ""
+                wanted = f", expected {finding.wanted}" if finding.wanted else ""
                 words += wanted + (f"; {finding.advice}" if finding.advice else "")
             table.add_row(Text(finding.verdict, style=_LOOKS[finding.verdict]), Text(words))
         pieces.append(table)
@@ -133,7 +133,7 @@ def check_table(outcome: CheckOutcome) -> RenderableType:
 
 
 def check_json(outcome: CheckOutcome) -> dict[str, Any]:
-    """The outcome as it goes into a file."""
+    """Return the outcome for a JSON file."""
     return {
         "format": "dearig-check/1",
         "rig": outcome.rig,

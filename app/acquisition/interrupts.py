@@ -9,7 +9,7 @@ from types import FrameType, TracebackType
 
 __all__ = ["Interrupts"]
 
-# a closed terminal or a stopped service must not leave the voltage on either
+# the voltage must not stay on when a terminal is closed or a service stopped
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 _Handler = Callable[[int, FrameType | None], object] | int | None
@@ -18,10 +18,10 @@ _Handler = Callable[[int, FrameType | None], object] | int | None
 class Interrupts:
     """A context in which the first ctrl-C sets ``asked`` and the second raises.
 
-    An exception at the first could come after a block is read and before it is written, and the
-    samples around the ramp to 0 V would be lost; the second ends a run on a rig that hangs.
-    Handlers that a host program has set stay, and so does a signal that is ignored. Outside the
-    main thread nothing is installed, because signals are not delivered there.
+    An exception at the first ctrl-C could come between the reading and the writing of a block, and
+    the samples around the ramp to 0 V would be lost. The second ends a run on a rig that does not
+    answer. Handlers that a host program has set stay, and ignored signals stay ignored. Outside
+    the main thread nothing is installed, because signals are not delivered there.
     """
 
     def __init__(self) -> None:

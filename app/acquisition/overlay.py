@@ -1,4 +1,4 @@
-"""An overlay model, stepped with a run: block of samples in, displacement out."""
+"""An overlay model that runs in step with a run, block by block."""
 
 from __future__ import annotations
 
@@ -40,10 +40,9 @@ class Overlay:
     """``actuator`` driven by the ``command`` or the ``monitor`` voltage of a run's blocks.
 
     ``channels`` are those of the blocks, in their order, on a clock of ``rate`` Hz. The film starts
-    at rest; its state and the sensor's are carried from block to block, so that the same record in
-    blocks of any length gives what it gives at once, but for the last digits of the integration
-    (hundredths of a micrometre). A thermometer counts as the mean of the last second above that of
-    the first.
+    at rest; its state and the sensor's are carried from block to block, so that the result does not
+    depend on the length of the blocks, except for integration errors (hundredths of a micrometre).
+    The temperature rise is the mean of the last second less the mean of the first.
 
     Raises ``ModelError`` for a film without a rest state, and ``ValueError`` where the channels
     hold no such voltage.
@@ -75,7 +74,7 @@ class Overlay:
         self._memory = np.zeros(SENSOR_MEMORY)
         self._next = 0
         self._voltage = 0.0
-        # what a late sensor still has to show: time, displacement, velocity
+        # time, displacement and velocity that a sensor with a delay has not read yet
         self._past = np.zeros((3, 0))
         self._keep = max(2, math.ceil(max(self._lag, 0.0) * rate) + 2)
         self._read = (0.0, 0.0)  # displacement and velocity before the sensor's effects
@@ -84,14 +83,14 @@ class Overlay:
 
     @property
     def failure(self) -> str:
-        """The reason why the model failed; empty while it follows."""
+        """Reason why the model failed; empty while it works."""
         return self._failure
 
     def advance(self, block: Block) -> np.ndarray:
-        """Displacement (n,) m that the sensor would read at the samples of ``block``.
+        """Return the displacement (n,) m that the sensor would read at the samples of ``block``.
 
-        NaN from where the model could not follow. Raises ``ValueError`` for a block that does not
-        begin where the one before ended.
+        NaN from the sample at which the model failed. Raises ``ValueError`` for a
+        block that does not begin where the one before ended.
         """
         samples = block.counts.shape[1]
         if block.start != self._next:
@@ -138,7 +137,7 @@ class Overlay:
 
 
 class _TemperatureRise:
-    """Temperature above that of the first second, as the mean of the last second."""
+    """Temperature rise: mean of the last second less the mean of the first."""
 
     def __init__(self, rate: float) -> None:
         self._count = max(1, round(_TEMPERATURE_MEAN * rate))
@@ -147,7 +146,7 @@ class _TemperatureRise:
         self._start = 0.0
 
     def after(self, temperature: np.ndarray) -> float:
-        """K, once ``temperature`` (n,) K has been read too."""
+        """Return the rise in K after the next readings ``temperature`` (n,) K."""
         seen = sum(part.size for part in self._first)
         if seen < self._count:
             self._first.append(temperature[: self._count - seen])

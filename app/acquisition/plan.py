@@ -1,4 +1,4 @@
-"""Plan of a run: the voltage, the predicted response, and what the gate says."""
+"""Plan of a run: the voltage, the predicted response, and the verdict of the gate."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from dearig.model.material import TABLE_3
 
 __all__ = ["Plan", "plan"]
 
-# Hz: this rate is enough to predict a film that rings for milliseconds, however fast the clock;
-# the field is still checked with every sample of the voltage
+# Hz; enough to predict a film with a period of milliseconds, at any rate of the clock; the field is
+# still checked with every sample of the voltage
 _PREDICTION_RATE = 5000.0
 
 
@@ -30,8 +30,8 @@ class Plan:
 
     ``voltage`` (N,) V. The prediction has one value for each ``stride`` samples, M in all:
     ``displacement`` (M,) m, the true ``field`` (M,) V/m at the highest voltage among them, both NaN
-    from where the model fails. ``waveform`` has passed the gate, or is None with the ``reasons``,
-    one sentence each.
+    from the sample at which the model fails. ``waveform`` has passed the gate,
+    or is None with the ``reasons``, one sentence each.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Plan:
 
     @property
     def displacement_of_samples(self) -> np.ndarray:
-        """Displacement (N,) m of every sample, in single precision: a run may have many."""
+        """Displacement (N,) m of every sample, in single precision to save memory."""
         predicted = self.displacement.astype(np.float32)
         return np.repeat(predicted, self.stride)[: self.voltage.size]
 

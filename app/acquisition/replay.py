@@ -20,7 +20,7 @@ __all__ = ["Original", "original_of"]
 
 @dataclass(frozen=True)
 class Original:
-    """What ``dearig.acquisition.run.record`` needs to repeat the run of the recording ``path``.
+    """Input of ``dearig.acquisition.run.record`` to repeat the run of the recording ``path``.
 
     ``configuration`` is the text of the rig file. ``rig`` is the address of the run, "" for data
     from elsewhere; ``seed`` is that of its simulated noise.
@@ -46,13 +46,13 @@ class Original:
         """
         if (self.film, self.load) != (rig_file.as_film(), rig_file.as_load()):
             raise InputError(
-                f"{self.path} was made with another film or load than its rig file says, of a "
-                f"model file: give that one with --model"
+                f"{self.path} was made with the film and load of a model file, which differ from "
+                f"those of its rig file: give the model file with --model"
             )
 
 
 def original_of(path: str | Path) -> Original:
-    """Return what the recording at ``path`` says of its run.
+    """Return the run of the recording at ``path``, to repeat it.
 
     The CSV file of a waveform is read from the recording's folder. Raises ``InputError`` for a file
     that is no recording of a run, or whose sequence or rig file this version does not accept.
@@ -72,7 +72,7 @@ def original_of(path: str | Path) -> Original:
         raise InputError(f"{name} is not of this version: {key}: {first['msg']}") from error
     seed = noted.get("seed", 0)
     if not isinstance(seed, int) or seed < 0:
-        raise InputError(f"{path}: its seed {seed!r} is no whole number from 0 on")
+        raise InputError(f"{path}: its seed {seed!r} is not a whole number of 0 or more")
     return Original(
         path=path,
         sequence=parse_sequence(recording.sequence_toml, f"the sequence in {path}", path.parent),

@@ -14,10 +14,12 @@ __all__ = ["RIGS", "is_simulated", "kind_of", "options_of"]
 
 def _check(name: str, kind: Any) -> None:
     if not isinstance(kind, RigKind):
-        raise TypeError(f"{name} is no kind of rig: it needs addresses, simulated, open, inspect")
+        raise TypeError(
+            f"{name} is not a kind of rig: it needs addresses, simulated, open, inspect"
+        )
 
 
-#: One line for each kind of rig, by what its addresses have before the first colon; other
+#: Kinds of rigs by the scheme of their addresses, the part before the first colon; other
 #: distributions add theirs by the entry point.
 RIGS: Registry[RigKind] = Registry(
     "dearig.rigs",

@@ -1,4 +1,4 @@
-"""A run: sequence -> gate -> rig -> recording, with interlocks on every sample, 0 V at its end."""
+"""A run: sequence, gate, rig and recording, with interlocks on every sample and 0 V at its end."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _DISK_INTERVAL = 1.0  # s between two checks of the free space on the disk
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How a run is made, and what its recording says of it.
+    """Options of a run, and metadata for its recording.
 
     ``configuration`` is the text of the rig file, kept with the recording. ``operator``,
     ``film_id`` (by default the rig file's film) and ``notes`` are kept too. With ``overwrite`` an
@@ -78,7 +78,7 @@ _DEFAULT = RunOptions()
 class RunResult:
     """A recorded run: its file, size, outcome and events.
 
-    ``margins`` say how near the plan came to each limit of the gate.
+    ``margins`` are the distances of the plan from each limit of the gate.
     """
 
     path: Path
@@ -90,10 +90,10 @@ class RunResult:
 
 
 class RunObserver:
-    """Receives a run's samples and events while it goes on; the methods here do nothing.
+    """Receives samples and events of a run while it goes on; the methods here do nothing.
 
-    They are called from the thread that runs the rig, which waits for them: an observer that draws
-    or computes must copy the samples and return at once.
+    The thread that runs the rig calls them and waits for them: an observer that draws or computes
+    must copy the samples and return at once.
     """
 
     def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:
@@ -107,9 +107,9 @@ class RunObserver:
 
 
 def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) -> Rig:
-    """Return the rig at ``address``, opened.
+    """Open the rig at ``address`` and return it.
 
-    Of ``options`` those for a simulated rig are used. Raises ``InputError`` for an address that
+    Only the ``options`` for a simulated rig are used. Raises ``InputError`` for an address that
     names no rig and for options that it does not take, ``InstrumentFault`` where the instruments
     are not there.
     """
@@ -122,7 +122,7 @@ def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) ->
         if not rig_file.film.name:
             raise InputError(
                 f"rig {address!r}: no film is declared; give a --rig-file whose [film] has a name, "
-                f"so that its limits are those of the film that hangs there"
+                f"so that its limits are those of the film on the rig"
             )
         check_rig(address, rig_file).refuse()
     wanted = replace(
@@ -136,7 +136,7 @@ def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) ->
         rig = kind.open(address, rig_file, wanted)
     except AddressError as error:
         raise InputError(str(error)) from error
-    except ValueError as error:  # a film that cannot hang at rest
+    except ValueError as error:  # a film without a rest state
         raise InputError(f"rig {address!r} with this rig file: {error}") from error
     except RigError as error:
         raise InstrumentFault(str(error)) from error
@@ -166,10 +166,11 @@ def record(
     ``overlay`` is a model that runs in step with the data and is recorded with them; ``observer``
     receives them. ``interrupts`` lets another thread end the run; by default ctrl-C does.
 
-    Raises ``InputError`` before anything is touched; after the rig was made safe and the recording
-    was closed, ``SafetyStop`` where an interlock ended it, ``InstrumentFault`` or ``DiskFault`` for
-    what failed, and ``Interrupted`` where the operator ended it: the first ctrl-C ramps down in the
-    set time, the second is 0 V at once.
+    Raises ``InputError`` before anything is changed. After the rig was made safe and the recording
+    was closed, it raises ``SafetyStop`` where an interlock ended the run, ``InstrumentFault`` or
+    ``DiskFault`` where an instrument or the disk failed, and ``Interrupted`` where the operator
+    ended it: the first ctrl-C ramps down in the set time, the second takes the output to 0 V at
+    once.
     """
     out = check_output(out, options.overwrite)
     planned = plan(loaded, rig_file, options.actuator, options.film_id)
@@ -246,7 +247,7 @@ class _Run:
         self._trip: Trip | None = None  # the first one; later ones follow from it
 
     def follow(self, samples: int, progress: Progress) -> tuple[str, ...]:
-        """Play and record; on every exit 0 V comes first, then the file is closed."""
+        """Play and record; every exit takes the rig to 0 V first and then closes the file."""
         writer = self._writer
         try:
             try:
@@ -316,7 +317,7 @@ class _Run:
         except (RigError, KeyboardInterrupt):
             raise
         except BaseException:
-            # the instruments work: a disk fault or a program error is no reason for a step to 0 V
+            # the instruments work: after a disk fault or a program error the voltage is ramped down
             _ramp_down(rig)
             raise
 
@@ -350,7 +351,7 @@ class _Run:
             free = shutil.disk_usage(folder).free
         except OSError as error:
             raise DiskFault(
-                f"{folder} is gone: {error.strerror}; see that the drive is there"
+                f"{folder} is gone: {error.strerror}; check that the drive is connected"
             ) from error
         return self._interlocks.disk(free)
 
@@ -384,7 +385,7 @@ class _Run:
         return f"{where}; {trouble}" if trouble else where
 
     def _close_file(self, outcome: str) -> None:
-        """Finish the recording, with what the overlay model gave."""
+        """Finish the recording, with the displacement of the overlay model."""
         modelled = None
         if self._overlay is not None and self._modelled:
             modelled = np.concatenate(self._modelled)[: self._writer.samples]
@@ -424,7 +425,7 @@ def _close(rig: Rig) -> None:
         rig.close()
     except RigError as error:
         raise NotSafe(
-            f"THE RIG COULD NOT BE CLOSED ({error}): see that the amplifier is at 0 V"
+            f"THE RIG COULD NOT BE CLOSED ({error}): check that the amplifier is at 0 V"
         ) from error
 
 

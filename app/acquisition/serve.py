@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Serving", "serve"]
 
-_LOOK_S = 0.1  # how often ctrl-C is looked at
+_POLL_S = 0.1  # s between two checks for ctrl-C
 
 
 @dataclass(frozen=True)
@@ -54,12 +54,13 @@ def serve(
     seed: int = 0,
     laser: bool = False,
 ) -> None:
-    """Serve the card of the simulated rig at ``address`` until ctrl-C; ``told`` hears where.
+    """Serve the card of the simulated rig at ``address`` until ctrl-C.
 
-    ``anywhere`` allows a ``host`` that other computers can reach. ``client_timeout`` in s is how
-    long a client may be silent with a voltage at the film; None: for ever. ``link_timeout``
-    in s is how long its link may be dead. Raises ``InputError``
-    for an address, host or port that cannot be had, ``InstrumentFault`` without the libraries.
+    ``told`` is called with a ``Serving`` once it listens. ``anywhere`` allows a ``host`` that
+    other computers can reach. A client may be silent with a voltage at the film for
+    ``client_timeout`` s, without limit if None, and its link may be dead for ``link_timeout`` s.
+    Raises ``InputError`` for an address, host or port that cannot be used, and ``InstrumentFault``
+    where the libraries are missing.
     """
     if not (anywhere or _is_loopback(host)):
         raise InputError(
@@ -82,7 +83,7 @@ def serve(
         )  # fmt: skip
     except AddressError as error:
         raise InputError(str(error)) from error
-    except ValueError as error:  # a fault that is none, or a film that cannot hang at rest
+    except ValueError as error:  # an unknown fault, or a film without a rest state
         raise InputError(f"rig {address!r}: {error}") from error
     server = DaqmxServer(
         device, host=host, port=port, client_timeout=client_timeout, link_timeout=link_timeout
@@ -101,7 +102,7 @@ def serve(
                 told(Serving(host, found, rig, serial_port))
                 waiting = threading.Event()
                 while not interrupts.asked():
-                    waiting.wait(_LOOK_S)
+                    waiting.wait(_POLL_S)
             interrupts.close()
         finally:
             server.close()
@@ -110,7 +111,7 @@ def serve(
 def _controller(
     rig_file: RigFile, device: Device, faults: FaultPlan
 ) -> AbstractContextManager[str]:
-    """A laser controller at a serial port, set as the rig file says, that sees the card's film."""
+    """Return a laser controller at a serial port, set as in the rig file, that reads the film."""
     controller = SimulatedController(rig_file.laser, lambda _: device.displacement(), faults=faults)
     if sys.platform == "win32":
         return serve_on_socket(controller)

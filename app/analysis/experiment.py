@@ -29,11 +29,11 @@ __all__ = ["SEPARATES", "candidates", "separating_experiment"]
 #: RMS difference of two predictions, in noise floors, from which an experiment separates them.
 SEPARATES = 0.5
 
-# amplitudes are lowered in these steps until a sequence can be played and read
+# factors of the amplitudes, tried in turn until a sequence can be played and measured
 _SCALES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
-_INTERLOCK_MARGIN = 0.7  # of what trips an interlock: no rival predicts the film exactly
-_DELAY_BLUR = 1.0  # of the noise: displacement within the unknown part of the laser's delay
-_NEAR_BEST = 0.9  # of the best separation: of these the one with the most per second is taken
+_INTERLOCK_MARGIN = 0.7  # part of an interlock's threshold: no rival predicts the film exactly
+_DELAY_BLUR = 1.0  # noise floors; largest displacement within the uncertainty of the laser's delay
+_NEAR_BEST = 0.9  # part of the best separation; above it the highest separation per second wins
 
 
 def candidates(top_kV: float) -> Mapping[str, str]:
@@ -98,7 +98,7 @@ def separating_experiment(
 ) -> tuple[SeparatingExperiment | None, str]:
     """Return the sequence that separates the two closest of ``rivals`` best, and a sentence on it.
 
-    Two rivals that no sequence separates do not count: others may be separated from both.
+    Pairs of rivals that no sequence separates are left out: both may differ from a third rival.
 
     ``rivals`` are (label, family, fitted model), the final model among them; ``noise`` is the floor
     of one reading in m. Every sequence passes the gate of ``rig_file`` and trips no interlock if
@@ -121,8 +121,8 @@ def separating_experiment(
         made.append((name, apart, waveform.duration, loaded.toml))
     if not made:
         return None, (
-            "None of the excitations that were considered could be played: the limits or the "
-            "interlocks of the rig file would end them"
+            "None of the candidate excitations can be played: each would break a limit or trip an "
+            "interlock of the rig file"
         )
     pairs = list(made[0][1])
     separable = [p for p in pairs if max(apart[p] for _, apart, _, _ in made) >= SEPARATES]
@@ -134,13 +134,13 @@ def separating_experiment(
     best = tried[0][1]
     if best < SEPARATES:
         return None, (
-            f"None of {len(tried)} excitations within the rig's limits would separate "
-            f"{_and(labels)}: at best their predictions differ by {best:.2g} times the noise"
+            f"None of {len(tried)} excitations within the rig's limits separates {_and(labels)}: "
+            f"at best their predictions differ by {best:.2g} times the noise"
         )
     good = [t for t in tried if t[1] >= _NEAR_BEST * best]
     name, separation, seconds, closest, toml = max(good, key=lambda t: t[1] / t[2])
     alike = [_and(p) for p in pairs if p not in separable]
-    but = f", but for {'; '.join(alike)}, which none would separate" if alike else ""
+    but = f". No excitation separates {'; '.join(alike)}" if alike else ""
     found = SeparatingExperiment(
         name=name,
         sequence=toml,
@@ -152,8 +152,8 @@ def separating_experiment(
         tried=tuple((t[0], t[1], t[2]) for t in tried),
     )
     return found, (
-        f"Of {len(tried)} excitations within the rig's limits, {name!r} ({seconds:.0f} s) "
-        f"separates {_and(labels)} best: the predictions of any two differ by at least "
+        f"{name!r} ({seconds:.0f} s) separates {_and(labels)} best among {len(tried)} "
+        f"excitations within the rig's limits: the predictions of any two differ by at least "
         f"{separation:.2g} times the noise{but}"
     )
 
@@ -187,7 +187,7 @@ def _playable(
 def _would_end(
     planned: Plan, waveform: GatedWaveform, moved: np.ndarray, rig_file: RigFile, noise: float
 ) -> bool:
-    """Return whether a film at ``moved`` (N,) m would trip an interlock, or be too fast to measure.
+    """Return whether a film at ``moved`` (N,) m would trip an interlock or be too fast to measure.
 
     The laser has its own clock, so the age of a reading is uncertain by its period.
     """
@@ -195,7 +195,7 @@ def _would_end(
     if speed * rig_file.laser.delay_error > _DELAY_BLUR * noise:
         return True
     predicted = planned.displacement_of_samples
-    # more than predicted, and less
+    # a film that moves more than predicted, and one that moves less
     return any(
         would_trip(rig_file, waveform.rate, waveform.voltage, part * moved, predicted)
         for part in (1.0 / _INTERLOCK_MARGIN, _INTERLOCK_MARGIN)

@@ -101,8 +101,8 @@ class Recording(stored.Recording):
             rows.append(("film", f"{self.film_id + ', ' if self.film_id else ''}{size} mm"))
         if self.load is not None:
             rows.append(("load", f"{self.load.mass * 1e3:.4g} g"))
-        ended = self.outcome if self.complete else f"INCOMPLETE: {self.outcome}"
-        rows.append(("ended", ended))
+        outcome = self.outcome if self.complete else f"INCOMPLETE: {self.outcome}"
+        rows.append(("outcome", outcome))
         rows += [(f"{e.level} at {e.time:.4g} s", e.message) for e in self.events[:_EVENTS_MAX]]
         if len(self.events) > _EVENTS_MAX:
             rows.append(("events", f"{len(self.events) - _EVENTS_MAX} more"))

@@ -37,23 +37,33 @@ class FilmSection(Section):
     name: str = Field(
         default="",
         max_length=200,
-        description="which film the limits are for; a run on real instruments needs it, and one "
-        "that names another film is refused",
+        description="name of the film that the limits are for; a run on real instruments needs it, "
+        "and a run that names another film is refused",
     )
-    length_mm: float = Field(default=75.0, gt=0.0, le=1e4, description="L1, along the motion")
-    width_mm: float = Field(default=72.0, gt=0.0, le=1e4, description="L2, across the motion")
-    thickness_mm: float = Field(default=1.0, ge=1e-4, le=100.0, description="Z")
-    relative_permittivity: float = Field(default=4.7, ge=1.0, le=1000.0, description="of the film")
-    density_kg_m3: float = Field(default=1000.0, ge=1.0, le=3e4, description="of the film")
+    length_mm: float = Field(
+        default=75.0, gt=0.0, le=1e4, description="free length L1 of the film, along the motion"
+    )
+    width_mm: float = Field(
+        default=72.0, gt=0.0, le=1e4, description="width L2 of the film, across the motion"
+    )
+    thickness_mm: float = Field(
+        default=1.0, ge=1e-4, le=100.0, description="thickness Z of the film"
+    )
+    relative_permittivity: float = Field(
+        default=4.7, ge=1.0, le=1000.0, description="relative permittivity of the film"
+    )
+    density_kg_m3: float = Field(default=1000.0, ge=1.0, le=3e4, description="density of the film")
     kinematics: Literal["constrained-width", "uniaxial", "equibiaxial"] = Field(
-        default="constrained-width", description="how the film is held across the motion"
+        default="constrained-width", description="boundary condition of the film across the motion"
     )
 
 
 class LoadSection(Section):
     """The load that hangs from the film."""
 
-    mass_g: float = Field(default=200.0, ge=0.0, le=1e5, description="hung mass")
+    mass_g: float = Field(
+        default=200.0, ge=0.0, le=1e5, description="mass that hangs from the film"
+    )
     rest_length_mm: float | None = Field(
         default=None,
         gt=0.0,

@@ -1,4 +1,4 @@
-"""Editing a rig file: faults by key, and the text with one value changed."""
+"""Editing of a rig file: errors by key, and its text with one value changed."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def _table(name: str) -> type[BaseModel]:
     )
 
 
-#: The tables of a rig file that a form can show, the operator's own first. Tables that may be
-#: repeated have no form: they are written in the file.
+#: The tables of a rig file that a form shows, those of the specimen first. Repeated tables have no
+#: form: they are edited in the file.
 SECTIONS: dict[str, type[BaseModel]] = {
     name: _table(name)
     for name in (
@@ -45,9 +45,10 @@ def parse_rig_file(text: str) -> RigFile:
 
 
 def faults_of(text: str) -> dict[tuple[str, str], str]:
-    """What is wrong, a sentence for each (table, key); ("", "") where it is no one key's fault.
+    """Return the errors in ``text``: a sentence for each (table, key).
 
-    Raises ``InputError`` where the text is not TOML.
+    The key is ("", "") where no single key is at fault. Raises ``InputError`` where the text is not
+    TOML.
     """
     data = parse_toml(text, "the rig file")
     try:
@@ -62,7 +63,7 @@ def faults_of(text: str) -> dict[tuple[str, str], str]:
             table, key = [*place, "", ""][:2]
             words = str(fault["ctx"]["error"]) if fault["type"] == "value_error" else ""
             if not key and words:
-                # what two keys do not agree on is said beside the one that the sentence names first
+                # an error of two keys is shown beside the key that its sentence names first
                 named = re.match(r"(\w+)(?:\.(\w+))?", words)
                 if named and named[1] in SECTIONS and named[2]:
                     table, key = named[1], named[2]
@@ -78,9 +79,9 @@ def section_values(text: str, table: str) -> dict[str, Any]:
 
 
 def with_value(text: str, table: str, key: str, value: Any) -> str:
-    """``text`` with another value of a key; None takes the key out. Everything else stays.
+    """Return ``text`` with the value of a key changed; None removes the key.
 
-    Comments, order and blank lines are the operator's: only the line of that key is touched.
+    Comments, order and blank lines stay: only the line of that key changes.
     """
     line = "" if value is None else f"{key} = {_toml(value)}\n"
     header = re.search(rf"^[ \t]*\[{table}\][ \t]*(?:#.*)?$\n?", text, re.MULTILINE)
@@ -102,7 +103,7 @@ def with_value(text: str, table: str, key: str, value: Any) -> str:
             line = f"{line.rstrip()}  {remark}\n"
         body = body[: old.start()] + line + body[after:]
     else:
-        # below the comment that explains it, where the file has one; else at the table's end
+        # below the commented-out key where the file has one, else at the end of the table
         hint = re.search(rf"^[ \t]*#[ \t]*{key}[ \t]*=.*$\n?", body, re.MULTILINE)
         place = hint.end() if hint else len(body.rstrip("\n")) + (1 if body.rstrip("\n") else 0)
         if not hint and body and not body.endswith("\n"):
@@ -112,7 +113,7 @@ def with_value(text: str, table: str, key: str, value: Any) -> str:
 
 
 def _value_end(body: str, start: int) -> int:
-    """Return the end of the value that begins at ``start``; values stand on one line."""
+    """Return the end of the value that begins at ``start``; a value takes one line."""
     quoted = re.match(r"\"(?:[^\"\\]|\\.)*\"|'[^']*'", body[start:])
     if quoted:
         return start + quoted.end()

@@ -1,4 +1,4 @@
-"""Recordings: written during a run, read back, brought in from elsewhere and handed on."""
+"""Recordings: written during a run, read, imported and exported."""
 
 from __future__ import annotations
 

@@ -36,8 +36,9 @@ class Overview:
 class Arrays:
     """Values in the recording at ``path``: ``stored`` there, or ``derived`` from its counts.
 
-    Arrays are float64, read-only, and checked when they are read: numbers, and time that goes
-    forward. Every method raises ``InputError`` for what cannot be read or fails that.
+    Arrays are float64 and read-only. They are checked when they are read: values are finite and
+    time increases. Every method raises ``InputError`` for values that cannot be read or fail a
+    check.
     """
 
     def __init__(
@@ -69,7 +70,7 @@ class Arrays:
         return self._read[name]
 
     def window(self, name: str, start: int, stop: int) -> np.ndarray:
-        """``name`` from sample ``start`` to before ``stop``, (n,); reads no more than that."""
+        """Return ``name`` from sample ``start`` to before ``stop``, (n,); only these are read."""
         start, stop = max(start, 0), min(stop, self.samples)
         if name in self._read:
             return self._read[name][start:stop]
@@ -83,7 +84,7 @@ class Arrays:
         return self._of_entry(cut)
 
     def overview(self, name: str, points: int, start: int, stop: int) -> Overview:
-        """``name`` between two samples in at most about ``points`` bins."""
+        """Return ``name`` between two samples in at most about ``points`` bins."""
         start, stop = max(start, 0), min(stop, self.samples)
         if name != "time" and name in self._derived:
             return self._of_entry(
@@ -124,7 +125,7 @@ class Arrays:
         return counts
 
     def _check(self, name: str, values: np.ndarray) -> None:
-        # the overlay model may have no value at times
+        # the overlay model has no value where it failed
         finite = np.isfinite(values)
         if not finite.all() and name != "displacement_model":
             at = int(np.argmin(finite))

@@ -1,8 +1,8 @@
 """Checksums of the counts of a run: CRC-32 of every block of every channel.
 
-Of HDF5's own filters none is used on counts: a chunk that is written again by the next flush would,
-killed in the middle of it, fail as a whole, with what an earlier flush had made safe. What is
-written once, at the end, carries HDF5's fletcher32.
+Counts use none of HDF5's own checksum filters: a flush writes the last chunk again, and a kill in
+the middle of it would make the whole chunk unreadable, with samples of earlier flushes. Values that
+are written once, at the end, have HDF5's fletcher32.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class ChecksumWriter:
 def complete_checksums(
     entry: h5py.Group, samples: int, read: Callable[[int, int], np.ndarray]
 ) -> None:
-    """Add what ``samples`` samples have more than is there; ``read(a, b)`` gives counts.
+    """Add the missing checksums of ``samples`` samples; ``read(a, b)`` returns counts.
 
     The last block may be shorter than the others.
     """

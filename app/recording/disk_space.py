@@ -19,34 +19,34 @@ LEFT_FREE = 2**26
 
 #: Metadata, texts and the first chunks of everything.
 FIXED = 200_000
-#: Beside two bytes for each count: least and greatest counts over bins, checksums, indexes.
+#: Bytes for each count: the count itself, minima and maxima over bins, checksums, indexes.
 PER_COUNT = 2.0 * (1.0 + 2.0 / 64.0 + 2.0 / 4096.0 + 0.001)
 
-#: What the operating system calls it, and what to do.
+#: Error number of the operating system: what happened, and what to do.
 _ADVICE = MappingProxyType(
     {
-        errno.ENOSPC: "the disk is full: make room, or record to another one",
-        errno.EROFS: "the disk may only be read: record to another one",
-        errno.EACCES: "nothing may be written there: choose another folder",
-        errno.EPERM: "nothing may be written there: choose another folder",
-        errno.EFBIG: "the disk, or a limit, takes no file as large: record to another disk",
-        errno.EIO: "the disk fails, or was removed: record to another one",
-        errno.ENOENT: "the disk, or the folder, was removed: record to another one",
-        errno.ENODEV: "the disk was removed: record to another one",
-        errno.ENXIO: "the disk was removed: record to another one",
+        errno.ENOSPC: "the disk is full: free some space, or record to another disk",
+        errno.EROFS: "the disk is read-only: record to another disk",
+        errno.EACCES: "the folder may not be written to: choose another folder",
+        errno.EPERM: "the folder may not be written to: choose another folder",
+        errno.EFBIG: "the disk, or a limit, allows no file of this size: record to another disk",
+        errno.EIO: "the disk fails, or was removed: record to another disk",
+        errno.ENOENT: "the disk, or the folder, was removed: record to another disk",
+        errno.ENODEV: "the disk was removed: record to another disk",
+        errno.ENXIO: "the disk was removed: record to another disk",
         errno.ENAMETOOLONG: "the path is too long: choose a shorter one",
         # these codes are missing on some systems
-        getattr(errno, "EDQUOT", -1): "your share of the disk is used up: make room, or record to "
-        "another one",
+        getattr(errno, "EDQUOT", -1): "your disk quota is used up: free some space, or record to "
+        "another disk",
         getattr(errno, "ESTALE", -2): "the network disk is gone: record to a local one",
     }
 )
 
 
 def estimate_bytes(channels: int, rate: float, samples: int) -> int:
-    """Bytes that a run of ``samples`` samples of ``channels`` channels at ``rate`` Hz will take.
+    """Return the bytes that a run of ``samples`` samples of ``channels`` channels needs.
 
-    From the first block to the finished file, which is at no time larger.
+    The clock has ``rate`` Hz. At no time from the first block to the finished file it is larger.
     """
     size = FIXED + PER_COUNT * channels * samples
     # computer's clock and events
@@ -59,9 +59,9 @@ def estimate_bytes(channels: int, rate: float, samples: int) -> int:
 
 
 def free_bytes(path: str | Path) -> int:
-    """Bytes that may still be written to the disk of ``path``; quick enough to ask in a run.
+    """Return the free bytes of the disk of ``path``; fast enough to call during a run.
 
-    Raises ``InputError`` if the folder is not there (any more).
+    Raises ``InputError`` if the folder does not exist (any more).
     """
     folder = Path(path).absolute().parent
     try:
@@ -76,7 +76,8 @@ def check_room(path: str | Path, channels: int, rate: float, samples: int) -> No
     if needed + LEFT_FREE > free:
         raise InputError(
             f"the run needs {_size(needed)} and the disk of {path} has {_size(free)} free, of "
-            f"which {_size(LEFT_FREE)} stay so: make room, record to another disk, or shorten it"
+            f"which {_size(LEFT_FREE)} must stay free: free some space, record to another disk, or "
+            f"shorten the run"
         )
 
 
@@ -87,7 +88,7 @@ def _size(amount: float) -> str:
 
 
 def advice(error: Exception) -> str:
-    """Return what to do about an ``error`` of the disk or of HDF5, in words."""
+    """Return advice on an ``error`` of the disk or of HDF5."""
     number = errno_of(error)
-    otherwise = "see that the disk has room and that no other program holds the file"
+    otherwise = "check that the disk has space and that no other program has the file open"
     return otherwise if number is None else _ADVICE.get(number, otherwise)

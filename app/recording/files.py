@@ -1,4 +1,4 @@
-"""Output files: refused before anything is touched, or replaced as a whole."""
+"""Output files: checked before anything is changed, and replaced as a whole."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ NAME_MAX = 255 - len(".partial")
 
 
 def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Path:
-    """``path`` as one that may be written to; otherwise ``InputError`` with nothing touched.
+    """Return ``path`` if it may be written to; otherwise raise ``InputError``.
 
-    ``sources`` are the files that are read meanwhile, and never overwritten.
+    ``sources`` are input files, which are never overwritten. Nothing is changed.
     """
     path = Path(path)
     try:
@@ -38,12 +38,10 @@ def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Pat
             raise InputError(f"{path} is a folder; give the name of a file in it")
         if path.exists():
             if any(Path(s).exists() and path.samefile(s) for s in sources):
-                raise InputError(
-                    f"{path} is the file that is read; choose another name for the output"
-                )
+                raise InputError(f"{path} is the input file; choose another name for the output")
             if not path.is_file():
                 # replacing a device (/dev/null) would take it from the whole machine
-                raise InputError(f"{path} is no ordinary file; give the name of one")
+                raise InputError(f"{path} is not a regular file; give the name of one")
             if not overwrite:
                 raise InputError(
                     f"{path} exists already; choose another name, or replace it with --force"
@@ -59,8 +57,8 @@ def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Pat
         raise InputError(f"{path} cannot be written: {in_words(error)}") from error
     if not os.access(path.parent, os.W_OK):
         raise InputError(
-            f"{path} cannot be written: nothing may be written to the folder {path.parent}; "
-            f"choose another one"
+            f"{path} cannot be written: the folder {path.parent} may not be written to; "
+            f"choose another folder"
         )
     return path
 
@@ -87,10 +85,10 @@ def one_line(error: Exception, most: int = 300) -> str:
 
 @contextmanager
 def replaced_when_done(path: Path) -> Iterator[Path]:
-    """A path beside ``path`` to write to, which takes its place only if the body ends well.
+    """Yield a path beside ``path`` to write to; the file replaces ``path`` if the body succeeds.
 
-    The body should hold only what writes: an ``OSError`` in it becomes ``InputError``, and so does
-    a ``RuntimeError``, as which HDF5 reports some full disks.
+    The body should only write: an ``OSError`` in it becomes an ``InputError``, and so does a
+    ``RuntimeError``, by which HDF5 reports some full disks.
     """
     partial = path.with_name(f"{path.name}.partial")
     try:
@@ -108,7 +106,7 @@ def old_of(path: Path) -> Path:
 
 
 def set_aside(path: Path) -> Path | None:
-    """Give the file at ``path`` the name ``FILE.old`` until another is in its place; None if none.
+    """Rename the file at ``path`` to ``FILE.old`` until it is replaced; None if there is none.
 
     Raises ``InputError`` if there is a ``FILE.old`` already, ``OSError``.
     """
@@ -117,8 +115,8 @@ def set_aside(path: Path) -> Path | None:
     old = old_of(path)
     if old.exists():
         raise InputError(
-            f"{old} is there already, left by a run that ended before its first samples: give it "
-            f"back its name or another, or delete it"
+            f"{old} exists already, left by a run that ended before its first samples: rename it "
+            f"or delete it"
         )
     return path.rename(old)
 

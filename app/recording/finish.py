@@ -29,8 +29,8 @@ from dearig.recording.text import clip_text, fixed, put_text
 
 __all__ = ["OVERVIEW", "PHYSICAL_MAX", "finish"]
 
-#: Runs of more samples hold counts and an overview in physical units: their physical values would
-#: take four times the room, and no viewer can plot as many.
+#: Longer runs hold counts and an overview in physical units: their physical values would take four
+#: times the space, and no viewer can plot as many.
 PHYSICAL_MAX = 2**24
 #: Bins of that overview; each is two points.
 OVERVIEW = 2**13
@@ -49,8 +49,8 @@ def finish(
 ) -> int:
     """Write physical values and closing metadata to the closed recording ``path``.
 
-    As a whole or not at all: outside SWMR a kill can make a file unreadable, and a full disk can
-    strike here, but the counts stay safe. ``mend`` is called with the file before HDF5 opens it.
+    All is written or nothing: outside SWMR mode a kill can make a file unreadable, and the disk can
+    be full, but the counts stay safe. ``mend`` is called with the file before HDF5 opens it.
     ``ended`` is a Unix time in s, None if unknown. Returns the number of samples. Raises
     ``InputError`` if it cannot be written; then the file is as it was.
     """
@@ -111,7 +111,7 @@ def _write_physical(entry: h5py.Group) -> int:
 
 
 def _trim(entry: h5py.Group, samples: int) -> None:
-    """Remove empty events and notes of flushes whose samples are missing, as a kill leaves them."""
+    """Remove empty events, and notes of flushes whose samples are missing; a kill leaves both."""
     notes = flush_notes(entry)
     if notes is not None:
         entry["wall_clock"].resize((int(np.sum(notes["sample"] <= samples)),))

@@ -12,10 +12,10 @@ __all__ = ["flush_notes"]
 
 
 def flush_notes(entry: h5py.Group) -> np.ndarray | None:
-    """``sample`` and ``unix_time`` (n,) of the flushes whose note lies in the file.
+    """Return ``sample`` and ``unix_time`` (n,) of the flushes whose note is in the file.
 
-    A kill or a full disk leaves room for a note that was never written: it ends there. None where
-    the file has no such notes.
+    A kill or a full disk can leave space for notes that were never written; they are left out. None
+    where the file has no such notes.
     """
     rows = item(entry, "wall_clock", stored=False)
     if not isinstance(rows, h5py.Dataset) or rows.dtype != WALL_CLOCK_TYPE or rows.ndim != 1:

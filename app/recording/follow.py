@@ -22,7 +22,8 @@ __all__ = ["Follower", "News"]
 class News:
     """New samples since the last look: ``values`` by name, (n,) each, from sample ``start`` on.
 
-    ``time`` is among them; SI units. ``ended``: the run was closed, and there will be no more.
+    Values are in SI units, with ``time`` among them. ``ended``: the run was closed, and no samples
+    follow.
     """
 
     start: int
@@ -34,8 +35,8 @@ class News:
 class Follower:
     """Follows the recording at ``path`` of a run in another process.
 
-    Between looks it holds nothing open. Displacement is counted from the mean of the lead-in, or,
-    until that is over, of what of it there is.
+    Between looks no file is open. Displacement is counted from the mean of the lead-in, or of the
+    part of it that has been recorded so far.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -47,8 +48,8 @@ class Follower:
     def look(self, most: int | None = None) -> News:
         """Return what is new since the last look, at most ``most`` samples.
 
-        A flush makes new samples visible, four times a second. Raises ``InputError`` for what is
-        no recording of a run.
+        A flush makes new samples visible, four times a second. Raises ``InputError`` for a
+        file that is not a recording of a run.
         """
         return read_from(self.path, lambda file: self._look(file, most))
 
@@ -59,7 +60,7 @@ class Follower:
         ended = "samples" in entry.attrs
         counts = Counts(entry, rest=self._rest)
         if not counts.channels:
-            raise InputError(f"{self.path} is not of a run: it has no counts")
+            raise InputError(f"{self.path} is not the recording of a run: it has no counts")
         start, stop = self._samples, counts.samples
         if most is not None:
             stop = min(stop, start + most)

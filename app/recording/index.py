@@ -29,7 +29,7 @@ KEPT = "dearig-index/1"
 
 @dataclass(frozen=True)
 class Entry:
-    """Summary of one file. ``trouble`` says why it is no recording, or is ""."""
+    """Summary of one file. ``trouble`` is the reason why it is not a recording, or ""."""
 
     path: str
     bytes: int
@@ -49,15 +49,15 @@ class Entry:
 def index_folder(
     folder: str | Path, progress: Callable[[float], None] | None = None, cache: Path | None = None
 ) -> list[Entry]:
-    """The recordings in ``folder`` and the folders in it, by their paths from there.
+    """Return the recordings in ``folder`` and its subfolders, sorted by relative path.
 
-    A file that has the size and the time of the last look is not opened again; what was seen is
-    kept in ``cache``, by default in the user's own folder for such things. ``progress`` is called
-    with the part that is done. Raises ``InputError`` if there is no such folder.
+    A file whose size and time of change are those in ``cache`` is not opened again. The cache is by
+    default in the user's cache folder. ``progress`` is called with the part of the files that is
+    done. Raises ``InputError`` if there is no such folder.
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise InputError(f"{folder} is {'no folder' if folder.exists() else 'not there'}")
+        raise InputError(f"{folder} is {'not a folder' if folder.exists() else 'not there'}")
     cache = _cache_of(folder) if cache is None else cache
     kept = _load(cache)
     found = sorted(_files(folder))
@@ -78,8 +78,8 @@ def index_folder(
 
 
 def _files(folder: Path) -> Iterator[tuple[str, int, int]]:
-    """Path from ``folder``, size and time of change in ns of every file that may be a recording."""
-    # texts, not paths: there may be ten thousand
+    """Yield relative path, size and time of change in ns of every file that may be a recording."""
+    # text is faster than Path: there may be ten thousand files
     waiting = [""]
     while waiting:
         here = waiting.pop()
@@ -173,12 +173,12 @@ def _save(cache: Path, entries: dict[str, Entry], stamps: dict[str, tuple[int, i
         with replaced_when_done(cache) as partial:
             partial.write_text(json.dumps({"format": KEPT, "files": files}), encoding="utf-8")
     except (OSError, InputError):
-        # without the cache the next index is slower; that is no reason to fail
+        # without the cache the next index is only slower
         return
 
 
 def lines(entries: Sequence[Entry]) -> list[str]:
-    """Return a line for each entry: start, length, content and path."""
+    """Return a line for each entry: start, length, path and content."""
     if not entries:
         return ["no recordings"]
     shown = []

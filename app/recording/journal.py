@@ -1,9 +1,9 @@
-"""Changes to a file made in place, as a whole or not at all, whenever the program is killed.
+"""Changes of a file in place, made completely or not at all even if the program is killed.
 
-What is appended goes into the file at once: nothing in it points there yet. What would take the
-place of something is held back, written with what it replaces to ``FILE.journal`` beside the file,
-and only then into the file. A journal that is not whole has changed nothing; a whole one is carried
-out by whoever finds it, and readers look through it.
+Appended bytes go into the file at once, because nothing in the file refers to them yet. Bytes that
+replace others are held back; they are written with the old bytes to ``FILE.journal`` beside the
+file, and only then into the file. An incomplete journal has changed nothing. A complete one is
+applied by the next recovery, and readers show the file as if it had been applied.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 __all__ = ["Patched", "carry_out", "changed_in_place", "journal_of", "whole_journal"]
 
 MAGIC = b"dearig-journal/1"
-#: Held back in pieces of this many bytes.
+#: Bytes of a page; changes are held back in pages.
 PAGE = 4096
 HEAD = struct.Struct("<16sQQQ")  # magic, size before, size after, pages
 PIECE = struct.Struct("<QI")  # offset, length; then the old bytes, then the new ones
@@ -35,11 +35,11 @@ def journal_of(path: Path) -> Path:
 
 
 class Patched(io.RawIOBase):
-    """A binary file with ``pages`` laid over its first ``edge`` bytes; as h5py takes one.
+    """A binary file for h5py, with ``pages`` in place of parts of its first ``edge`` bytes.
 
-    Writes below ``edge`` are held back in ``pages``, those above go through to the file. What
-    fails there is kept in ``failure``, and nothing is written after it: HDF5 cannot let go of a
-    file that it cannot write, and brings the program down at its end.
+    Writes below ``edge`` are held back in ``pages``; those above go to the file. The first error
+    there is kept in ``failure`` and not raised, and nothing is written after it: HDF5 cannot close
+    a file that it cannot write, and crashes the program when it exits.
     """
 
     def __init__(self, file: io.FileIO, edge: int, pages: dict[int, bytearray]) -> None:
@@ -90,7 +90,7 @@ class Patched(io.RawIOBase):
             if not more:
                 if at + len(view) > self.edge:
                     raise OSError(f"the file ends before byte {at + len(view)}")
-                # bytes that were cut off and added again read as zeros
+                # bytes that were cut off and added again are read as zeros
                 view[got:] = bytes(len(view) - got)
                 return
             got += more
@@ -144,10 +144,10 @@ class Patched(io.RawIOBase):
 
 @contextmanager
 def changed_in_place(path: Path, fsync: bool = False) -> Iterator[Patched]:
-    """The file at ``path`` to read and write; if the body ends well all of it counts, else nothing.
+    """Yield the file at ``path`` to change; all changes are kept if the body succeeds, else none.
 
-    ``fsync``: nothing is lost with the power either. Raises ``OSError``, with the file as it was
-    before, unless it is raised while the journal is carried out; then that stays to be done.
+    With ``fsync`` this holds for a power cut too. Raises ``OSError``; the file is then as it was
+    before, or, if the journal was being applied, the journal is left to be applied later.
     """
     journal = journal_of(path)
     with path.open("r+b", buffering=0) as file:
@@ -194,10 +194,10 @@ def _apply(file: io.FileIO, end: int, pages: dict[int, bytes]) -> None:
 
 
 def whole_journal(path: Path) -> tuple[int, int, dict[int, bytes]] | None:
-    """Size before, size after, and new pages that the journal of ``path`` holds; else None.
+    """Return size before, size after and new pages from the journal of ``path``; None without one.
 
-    None too for one that is cut short, or of another file: every byte in the file must be the
-    old or the new one. Raises ``OSError``.
+    None too for a journal that is cut short or belongs to another file: every byte in the file must
+    be the old or the new one. Raises ``OSError``.
     """
     try:
         with journal_of(path).open("rb") as stream:
@@ -234,7 +234,7 @@ def _either(here: bytes, old: bytes, new: bytes) -> bool:
 
 
 def carry_out(path: Path) -> bool:
-    """Carry out the journal beside ``path``; True if there was one. Raises ``OSError``."""
+    """Apply the journal beside ``path``; return True if there was one. Raises ``OSError``."""
     found = whole_journal(path)
     if found is not None:
         _, after, pages = found

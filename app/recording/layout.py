@@ -11,9 +11,9 @@
 /entry/model            TOML of the live overlay (when there was one)
 /entry/events           sample, time, level, message
 /entry/wall_clock       sample, unix_time: the computer's clock at every flush (runs only)
-/entry/pyramid/*        least and greatest counts over bins (runs only)
+/entry/pyramid/*        minima and maxima of the counts over bins (runs only)
 /entry/checksums        CRC-32 of the counts (runs only)
-/entry/overview         NXdata: least and greatest physical values of a run too long for its own
+/entry/overview         NXdata: minima and maxima of the physical values of a long run
 /entry/provenance       versions, configuration and its hash, seed, host, operator
 """
 
@@ -55,7 +55,7 @@ __all__ = [
 FORMAT_NAME = "dearig-recording"
 FORMAT = f"{FORMAT_NAME}/1"
 
-#: The only library version under which a file survived a kill at every write boundary.
+#: The only library version with which a file survived a kill at every write boundary in tests.
 LIBVER = ("v110", "v110")
 
 #: Samples in a chunk of physical values, at most.
@@ -64,7 +64,7 @@ CHUNK = 2**17
 #: The two kinds: a film driven by voltage, and a film specimen driven by stretch.
 KINDS = ("actuator", "film")
 
-#: The measured quantity: the default plot, and what a model has to reproduce.
+#: Measured quantity of each kind: the default plot, and the target of a model.
 SIGNALS = MappingProxyType({"actuator": "displacement", "film": "nominal_stress"})
 
 #: Values that a recording of each kind must have.
@@ -101,7 +101,7 @@ LONG_NAMES = MappingProxyType(
     }
 )
 
-#: The voltage between samples: a converter holds it, imported data are linear.
+#: Interpolation of the voltage between samples: a converter holds it, imported data are linear.
 ZERO_ORDER, LINEAR = "zero-order", "linear"
 
 EVENT_LEVELS = ("info", "warning", "fault")
@@ -115,7 +115,7 @@ EVENT_TYPE = np.dtype(
     ]
 )
 
-#: The computer's clock beside the sample clock: so many samples had come at that Unix time in s.
+#: The computer's clock and the sample clock: number of samples at a Unix time in s.
 WALL_CLOCK_TYPE = np.dtype([("sample", "<i8"), ("unix_time", "<f8")])
 
 
@@ -132,7 +132,7 @@ def iso_time(moment: float) -> str:
 def declared_names(data: h5py.Group) -> tuple[str, ...]:
     """Return the names of the channels in /entry/data that the rig file declared, in their order.
 
-    They have counts like the others, and a number ``declared`` that says which comes first.
+    They have counts like the others, and an attribute ``declared`` with their place in the order.
     """
     suffix = counts_name("")
     found = []
@@ -145,7 +145,7 @@ def declared_names(data: h5py.Group) -> tuple[str, ...]:
 
 
 def variable_attributes(name: str, unit: str = "", label: str = "") -> dict[str, str]:
-    """Return ``units`` of the physical values ``name`` and, where it says more, ``long_name``.
+    """Return ``units`` of the physical values ``name`` and, where there is one, ``long_name``.
 
     ``unit`` and ``label`` are those of a channel that the rig file declared.
     """
@@ -156,10 +156,10 @@ def variable_attributes(name: str, unit: str = "", label: str = "") -> dict[str,
 
 
 def describe_field(dataset: h5py.Dataset, name: str, unit: str = "", label: str = "") -> None:
-    """Give a physical dataset its ``units`` and, where it says more, a name for plots."""
+    """Write ``units`` of a physical dataset and, where the channel has one, a ``long_name``."""
     found = variable_attributes(name, unit, label)
     for key, text in found.items():
-        # viewers show a long name instead of name and unit
+        # viewers show the long name in place of name and unit
         with_unit = f"{text} ({found['units']})" if key == "long_name" else text
         dataset.attrs[key] = fixed(with_unit)
 
@@ -187,7 +187,7 @@ def attach_time(data: h5py.Group) -> None:
     """Make ``time`` the dimension scale of every row in ``data`` that has its length.
 
     With it xarray finds the time coordinate. SWMR mode forbids the attributes that this writes, so
-    a run gets its scale when it is finished, which is also when it gets its ``time``.
+    it is done when a run is finished, which is also when ``time`` is written.
     """
     time = data["time"]
     time.make_scale("time")
@@ -197,10 +197,10 @@ def attach_time(data: h5py.Group) -> None:
 
 
 def make_own_scale(rows: h5py.Dataset) -> None:
-    """Make a table under /entry a dimension scale, so that it has no dimension without a name.
+    """Make a table under /entry a dimension scale, so that its dimension has a name.
 
-    xarray warns of such dimensions in every group above the one that it opens. A table that grows
-    in SWMR mode has to get this when it is created.
+    xarray warns of nameless dimensions in every group above the one that it opens. For a table that
+    grows in SWMR mode this must be done when it is created.
     """
     rows.make_scale(rows.name.rpartition("/")[2])
 

@@ -1,4 +1,4 @@
-"""Opening an HDF5 file for reading, also one that is being written or was left by a kill."""
+"""Open an HDF5 file for reading, also one that is being written or whose run was killed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dearig.recording.superblock import SIZE, flags_of, mend_superblock
 
 #: Consistency flag of a file in SWMR mode.
 WRITTEN_IN_ORDER = 4
-#: A size beyond the end of every file.
+#: A size in bytes beyond the end of every file.
 FAR = 2**60
 BEING_WRITTEN = "is being written by another program, or was killed before its first sample"
 
@@ -52,7 +52,7 @@ def damage(path: Path, error: Exception) -> InputError:
 def read_from(path: Path, look: Callable[[h5py.File], T]) -> T:
     """Return what ``look`` returns for the file at ``path``; ``InputError`` if it is unreadable.
 
-    A file that is being written is looked at again: a look may fall between two of its writes.
+    A file that is being written is read again after an error: a write may have been half done.
     """
     for left in reversed(range(LOOKS)):
         with opened(path) as file:
@@ -87,8 +87,8 @@ def opened(path: Path) -> Iterator[h5py.File]:
             raise InputError(f"{path} is damaged: {error}") from error
         if flags is None:
             raise InputError(
-                f"{path} is not an HDF5 file, as recordings are; bring data made elsewhere in with "
-                f"dearig import"
+                f"{path} is not an HDF5 file, as recordings are; import data of other programs "
+                f"with dearig import"
             )
         if flags and not flags & WRITTEN_IN_ORDER:
             raise InputError(f"{path} {BEING_WRITTEN}")
@@ -96,7 +96,7 @@ def opened(path: Path) -> Iterator[h5py.File]:
             file = h5py.File(_as_closed(patched) if flags else patched if journal else path, "r")
         except UNREADABLE as error:
             if "truncated" in str(error):
-                reason = "is truncated: it was not copied or downloaded to its end"
+                reason = "is truncated: it was not copied or downloaded completely"
             elif flags:
                 reason = BEING_WRITTEN
             else:
@@ -107,12 +107,12 @@ def opened(path: Path) -> Iterator[h5py.File]:
 
 
 def _as_closed(patched: Patched) -> Patched:
-    """A file that is being written, or was when its run was killed, as if it had been closed.
+    """Return a file that was not closed, by a kill or during a run, as if it had been closed.
 
-    HDF5 has a mode for this (SWMR). In it what is damaged is read again and again, with pauses that
-    grow without end; here it is an error at once, and ``UNREADABLE`` may be worth another look.
+    HDF5's SWMR mode could read it too, but it reads damaged parts again and again, with pauses that
+    grow without limit. Here damage raises an ``UNREADABLE`` error at once; the caller may retry.
     """
-    # while it is looked at it may grow, and its end with it
+    # the file may grow while it is read
     patched.end = FAR
     mend_superblock(patched)
     return patched

@@ -31,9 +31,9 @@ TEMPERATURE_UNITS = ("degC", "°C", "C", "K")
 KELVIN = 273.15
 #: Samples processed at a time, so that memory does not grow with the length of the run.
 SLICE = 2**20
-#: Chunks from the end that are checked one by one: more than any flush writes.
+#: Chunks at the end that are checked one by one: more than any flush writes.
 BACK = 8
-#: Samples of the lead-in that are averaged, at most: more would not be more accurate.
+#: Samples of the lead-in that are averaged, at most: more add no accuracy.
 REST_MAX = 2**22
 
 
@@ -46,9 +46,9 @@ class Rest:
 
 
 def write_channel(counts: h5py.Dataset, channel: Channel, place: int) -> None:
-    """Give a dataset of counts what is needed to read it without this program.
+    """Write the attributes that are needed to read a dataset of counts without this program.
 
-    ``place`` is the channel's in a block.
+    ``place`` is the index of the channel in a block.
     """
     attrs = counts.attrs
     attrs["units"] = fixed("counts")
@@ -66,7 +66,7 @@ def write_channel(counts: h5py.Dataset, channel: Channel, place: int) -> None:
 
 
 def read_channels(data: h5py.Group) -> tuple[Channel, ...]:
-    """Channels whose counts stand in /entry/data, in the order in which blocks held them."""
+    """Return the channels whose counts are in /entry/data, in the order of the blocks."""
     found = []
     for name in (*CHANNEL_NAMES, *declared_names(data)):
         if counts_name(name) not in data:
@@ -88,10 +88,10 @@ def read_channels(data: h5py.Group) -> tuple[Channel, ...]:
 
 
 def sample_count(data: h5py.Group, channels: Sequence[Channel]) -> int:
-    """Samples of a run; of one that was not closed, those of its last flush that is whole.
+    """Return the number of samples of a run; if it was not closed, up to its last complete flush.
 
-    A kill may have left some channels one block ahead of others, and a full disk room for samples
-    that never reached it, which HDF5 reads as zeros.
+    After a kill some channels can be one block ahead of others. After a full disk there can be
+    space for samples that were never written, which HDF5 reads as zeros.
     """
     there = min((_backed(data[counts_name(c.name)]) for c in channels), default=0)
     notes = None if _closed(data) else flush_notes(data.parent)
@@ -105,9 +105,9 @@ def _closed(data: h5py.Group) -> bool:
 
 
 def _backed(counts: h5py.Dataset) -> int:
-    """Samples of ``counts`` whose chunks lie in the file.
+    """Return the number of samples of ``counts`` whose chunks are in the file.
 
-    HDF5 goes on writing when a disk refuses a chunk, and a row may claim more than is there.
+    HDF5 goes on writing when the disk refuses a chunk, so a dataset can claim more than is stored.
     """
     claimed = int(counts.shape[0])
     claimed = min(claimed, int(counts.id.get_storage_size() // counts.dtype.itemsize))
@@ -170,7 +170,7 @@ class Counts:
 
     @property
     def rest(self) -> Rest:
-        """Rest from which displacement is measured: as stored, else from the lead-in."""
+        """Rest from which displacement is measured: the stored one, else from the lead-in."""
         if self._rest is None:
             self._rest = self._stored_rest() or self.measured_rest()
         return self._rest
@@ -184,7 +184,7 @@ class Counts:
         return Rest(float(attrs["rest_reading"]), int(attrs["rest_samples"]))
 
     def measured_rest(self) -> Rest:
-        """Return the mean over the lead-in, whatever is stored."""
+        """Return the mean over the lead-in, also where another rest is stored."""
         if not self.samples or not {"voltage_command", "displacement"} <= self._by_name.keys():
             return Rest(0.0, 0)
         quiet = self.lead_in()
@@ -192,13 +192,13 @@ class Counts:
         return Rest(float(readings.mean()), quiet)
 
     def lead_in(self) -> int:
-        """Samples at 0 V before the first that is not: ``quiet.lead_in`` of the whole voltage."""
+        """Count the samples at 0 V at the start, as ``rest_noise.lead_in`` of the whole voltage."""
         channel = self._by_name["voltage_command"]
         low, high = self.extremes("voltage_command", 0, self.samples, 2000)[1:]
         largest = float(np.maximum(np.abs(low), np.abs(high)).max(initial=0.0))
         threshold = max(resolution(channel), NEGLIGIBLE * largest)
         for start, stop in self.slices():
-            # the extremes decide for most slices of a lead-in
+            # for most slices of a lead-in the extremes are enough
             _, low, high = self.extremes("voltage_command", start, stop, 1)
             if float(np.maximum(np.abs(low), np.abs(high)).max()) > threshold:
                 loud = np.abs(self._reading("voltage_command", start, stop)) > threshold
@@ -206,7 +206,7 @@ class Counts:
         return self.samples
 
     def slices(self) -> Iterator[tuple[int, int]]:
-        """Start and stop of one slice of the run after another."""
+        """Yield start and stop of each slice of the run."""
         for start in range(0, self.samples, SLICE):
             yield start, min(start + SLICE, self.samples)
 
@@ -232,10 +232,10 @@ class Counts:
     def extremes(
         self, name: str, start: int, stop: int, points: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """First sample, least and greatest reading (n,) of at most about ``points`` bins.
+        """Return first sample, minimum and maximum (n,) of at most about ``points`` bins.
 
-        Of the displacement they are not counted from its rest. From the stored levels, so that it
-        takes as long for hours as for seconds.
+        Displacements are readings, not counted from the rest. The stored levels make this as fast
+        for hours as for seconds.
         """
         counts = self.data[counts_name(name)]
         span = max(stop - start, 0)
@@ -249,7 +249,7 @@ class Counts:
             place = self.channels.index(self._by_name[name])
             rows = found[size][first:last, place, :]
             parts = [(np.arange(first, last) * size, rows[:, 0], rows[:, 1])]
-            # what lies before the first whole bin, and after the last
+            # the samples before the first full bin, and after the last
             for a, b, where in ((start, first * size, 0), (last * size, stop, 2)):
                 if b > a:
                     raw = counts[a:b]
@@ -265,7 +265,7 @@ class Counts:
     def overview(
         self, name: str, start: int, stop: int, points: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Time s, least and greatest value (n,) of at most about ``points`` bins."""
+        """Return time in s, minimum and maximum (n,) of at most about ``points`` bins."""
         at, low, high = self.extremes(name, start, stop, points)
         rest = self.rest.reading if name == "displacement" else 0.0
         return at / self.rate, low - rest, high - rest

@@ -21,14 +21,14 @@ __all__ = ["gather", "git_revision", "read_provenance", "write_provenance"]
 
 ROOT = Path(__file__).resolve().parents[2]
 
-#: Texts longer than this are datasets: HDF5 takes 64 KB in an attribute.
+#: Characters; longer texts are datasets, because an HDF5 attribute holds 64 KB at most.
 LONGEST_ATTRIBUTE = 1000
 
 
 def git_revision(root: Path = ROOT) -> str:
     """Return the git revision at ``root``, with ``-dirty`` if files changed; "" if none."""
     git = shutil.which("git")
-    # not a parent's repository: an installed copy may lie inside somebody else's
+    # git would also find the repository of a parent folder, which is not that of this program
     if git is None or not (root / ".git").exists():
         return ""
     command = [git, "-C", str(root), "describe", "--always", "--dirty", "--abbrev=40"]

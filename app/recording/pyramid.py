@@ -1,4 +1,4 @@
-"""Least and greatest counts over bins of growing width, for quick plots of long runs."""
+"""Minima and maxima of the counts over bins of growing width, for fast plots of long runs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["BINS", "PyramidWriter", "complete_pyramid", "levels", "reduced"]
 
 #: Samples in a bin of each level; each a multiple of the one before.
 BINS = (64, 4096, 262144)
-#: s of a run in one chunk of a level, as far as this makes sense.
+#: s of a run in one chunk of a level, within 64 to 16384 bins.
 CHUNK = 4.0
 
 
@@ -22,7 +22,7 @@ def _name(bin_samples: int) -> str:
 class PyramidWriter:
     """The levels under ``entry/pyramid`` of a run of ``channels`` channels at ``rate`` Hz.
 
-    Each is (bins, channels, 2) int16: least and greatest count of every full bin.
+    Each is (bins, channels, 2) int16: minimum and maximum of the counts of every full bin.
     """
 
     def __init__(self, entry: h5py.Group, channels: int, rate: float) -> None:
@@ -40,7 +40,7 @@ class PyramidWriter:
                 )
             )
             self._datasets[-1].attrs["bin_samples"] = size
-        # of each level what does not fill a bin yet: counts, then rows of the level below
+        # for each level, the counts or the bins of the level below that do not fill a bin yet
         self._low = [np.empty((channels, 0), dtype=np.int16) for _ in BINS]
         self._high = [np.empty((channels, 0), dtype=np.int16) for _ in BINS]
         self._pending: list[list[np.ndarray]] = [[] for _ in BINS]
@@ -50,7 +50,7 @@ class PyramidWriter:
         low = high = counts
         size_below = 1
         for i, size in enumerate(BINS):
-            # one array where low and high are the same: those of the counts themselves
+            # at the first level low and high are the same array: the counts
             lows = np.concatenate((self._low[i], low), axis=1) if self._low[i].size else low
             highs = lows
             if i:
@@ -78,7 +78,7 @@ class PyramidWriter:
 
 
 def levels(entry: h5py.Group, samples: int) -> dict[int, h5py.Dataset]:
-    """The levels of a run of ``samples`` samples that can be relied on, by samples in a bin."""
+    """Return the complete levels of a run of ``samples`` samples, by samples in a bin."""
     group = entry.get("pyramid")
     if not isinstance(group, h5py.Group):
         return {}
@@ -86,7 +86,7 @@ def levels(entry: h5py.Group, samples: int) -> dict[int, h5py.Dataset]:
     for size in BINS:
         level = group.get(_name(size))
         usable = isinstance(level, h5py.Dataset) and level.ndim == 3 and level.dtype == np.int16
-        # a kill may have left one a block behind the counts
+        # after a kill a level can be a block behind the counts
         if usable and level.shape[0] >= samples // size:
             found[size] = level
     return found

@@ -33,15 +33,15 @@ from dearig.recording.text import text_of
 
 __all__ = ["is_finished", "open_recording", "opened", "read_events"]
 
-#: Up to so many samples, stored values are read and checked at once; of longer recordings when they
-#: are first asked for, so that they open at once too.
+#: Up to this number of samples, stored values are read and checked when a recording is opened;
+#: those of longer recordings on first use, so that they open without delay.
 EAGER = 2**20
 
 
 def open_recording(path: str | Path) -> Recording:
     """Read the recording at ``path``, also one that was killed or is being written.
 
-    Raises ``InputError`` with one sentence, what and where, for everything it does not understand.
+    Raises ``InputError`` for every file that is not a valid recording; it says what and where.
     """
     path = Path(path)
     recording = read_from(path, lambda file: _Reader(path, file).read())
@@ -59,7 +59,7 @@ def is_finished(path: Path) -> bool:
 
 def read_events(path: Path, entry: h5py.Group) -> tuple[RecordedEvent, ...]:
     """Return the events in ``entry``; ``path`` is for messages."""
-    # events that a full disk refused are missing; the rest can still be read
+    # after a full disk there may be no events; the rest can still be read
     rows = item(entry, "events", stored=False)
     if not isinstance(rows, h5py.Dataset) or rows.id.get_storage_size() == 0:
         return ()
@@ -98,7 +98,7 @@ class _Reader:
             )
         finished = "samples" in entry.attrs
         for name in data:
-            # of what a kill or a full disk cut short the channels say how much there is
+            # counts may be cut short by a kill or a full disk; ``Counts`` finds how many there are
             item(data, name, stored=finished or not name.endswith(counts_name("")))
         channels = read_channels(data)
         stored = self._stored(data)
@@ -119,7 +119,7 @@ class _Reader:
             raise InputError(
                 f"{self.path} holds no samples"
                 + ("" if stored else ": the run ended before its first block")
-                + (f"; the recording that it was to replace is {old}" if old.exists() else "")
+                + (f"; the recording that it would have replaced is {old}" if old.exists() else "")
             )
         self._check_rows(data, stored, samples)
         if stored:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["RecordedEvent", "Recording"]
 
-#: Samples of the lead-in that the noise is computed from, at most: more add no accuracy.
+#: Samples of the lead-in for the noise floor, at most: more add no accuracy.
 NOISE_MAX = 2**22
 
 
@@ -42,18 +42,17 @@ class RecordedEvent:
 class Recording:
     """A recording as read. Arrays are (N,) float64 and read-only; None means "not recorded".
 
-    They are read from the file when they are first asked for, so that a recording of hours opens
-    at once; ``overview`` and ``window`` read no more than what they show.
+    They are read from the file on first use, so that a recording of hours opens without delay;
+    ``overview`` and ``window`` read only what they return.
 
-    ``kind`` is ``actuator`` (``voltage_command`` V drives, ``displacement`` m from the loaded rest
-    state answers) or ``film`` (``stretch`` drives, ``nominal_stress`` Pa answers). ``time`` in s
-    increases and need not be even. ``hold``: the voltage stands between samples (a converter);
-    otherwise it is linear. ``displacement_skew`` and ``displacement_delay`` in s are the known time
-    at which the sensor is converted after the tick, and the sensor's own lag; neither has been
-    taken off ``time``; by ``displacement_delay_error`` the lag may be more or less.
-    ``temperature`` is in degrees Celsius. ``complete`` is False for a run that
-    was killed; ``outcome`` says how it ended. ``rate`` in Hz is the sample clock's, None for data
-    that had none.
+    ``kind`` is ``actuator`` (input ``voltage_command`` in V, output ``displacement`` in m from the
+    loaded rest state) or ``film`` (input ``stretch``, output ``nominal_stress`` in Pa). ``time`` in
+    s increases and need not be even. ``hold``: the voltage is held between samples (a converter);
+    otherwise it is linear. ``displacement_skew`` in s is the known time from the tick to the
+    conversion of the sensor, ``displacement_delay`` in s the sensor's own lag, known within
+    ``displacement_delay_error``; neither has been subtracted from ``time``. ``temperature`` is in
+    degrees Celsius. ``complete`` is False for a run that was killed; ``outcome`` says how it ended.
+    ``rate`` in Hz is that of the sample clock, None for data without one.
     """
 
     path: Path
@@ -130,14 +129,14 @@ class Recording:
 
     @property
     def declared(self) -> dict[str, str]:
-        """Names of the channels that the rig file declared, and what a person calls them."""
+        """Names of the channels that the rig file declared, and their labels."""
         labels = {c.name: c.label or c.name.replace("_", " ") for c in self.channels}
         return {n: labels.get(n, n) for n in self.arrays.names if n not in UNITS}
 
     def unit(self, name: str) -> str:
-        """Return the unit in which the values of ``name`` are.
+        """Return the unit of the values of ``name``.
 
-        Raises ``ValueError`` for a channel that is not there.
+        Raises ``ValueError`` for a channel that the recording does not have.
         """
         self._check_channel(name)
         if name in UNITS:
@@ -176,11 +175,11 @@ class Recording:
     def overview(
         self, channel: str, points: int, start: int = 0, stop: int | None = None
     ) -> Overview:
-        """Least and greatest values of ``channel`` in at most about ``points`` bins.
+        """Return minima and maxima of ``channel`` in at most about ``points`` bins.
 
-        From sample ``start`` to before ``stop``, by default the end. From levels stored with the
-        run: as quick for hours as for seconds. Raises ``ValueError`` for a channel that is not
-        there.
+        The samples are ``start`` to before ``stop``, by default the end. Levels stored with the run
+        make this as fast for hours as for seconds. Raises ``ValueError`` for a channel that the
+        recording does not have.
         """
         self._check_channel(channel)
         if points < 1:
@@ -188,9 +187,9 @@ class Recording:
         return self.arrays.overview(channel, points, start, self.samples if stop is None else stop)
 
     def window(self, channel: str, start: int, stop: int) -> np.ndarray:
-        """Values (n,) of ``channel`` from sample ``start`` to before ``stop``, and only these.
+        """Return the values (n,) of ``channel`` from sample ``start`` to before ``stop``.
 
-        Raises ``ValueError`` for a channel that is not there.
+        Only these are read. Raises ``ValueError`` for a channel that the recording does not have.
         """
         self._check_channel(channel)
         return self.arrays.window(channel, start, stop)
@@ -203,7 +202,7 @@ class Recording:
 
     @cached_property
     def quiet_samples(self) -> int:
-        """Samples of the lead-in: at 0 V, before the first voltage. 0 for a film."""
+        """Number of samples of the lead-in, at 0 V before the first voltage; 0 for a film."""
         if "voltage_command" not in self.arrays.names:
             return 0
         return self.arrays.lead_in(self.voltage_step)
@@ -231,8 +230,8 @@ class Recording:
     def to_xarray(self) -> xarray.Dataset:
         """Return the values as an xarray ``Dataset`` over ``time``, in SI units.
 
-        Every variable has ``units`` (degC for a temperature) and where it needs one a
-        ``long_name``; the attributes of the data set say what was recorded. Raises ``InputError``
+        Every variable has ``units`` (degC for a temperature) and, where there is one, a
+        ``long_name``; the attributes of the data set are the metadata. Raises ``InputError``
         where xarray is not installed.
         """
         lib = import_extra("xarray", "notebook", "to_xarray")
@@ -263,5 +262,5 @@ class Recording:
 
     @cached_property
     def sha256(self) -> str:
-        """SHA-256 of the file, read when it is first asked for."""
+        """SHA-256 of the file, computed on first use."""
         return file_sha256(self.path)

@@ -23,10 +23,10 @@ STILL_RUNNING = 10.0
 def recover(path: str | Path, now: Callable[[], float] = time.time) -> bool:
     """Make the recording at ``path`` readable by any program, with physical values.
 
-    True if there was anything to do. It stays marked as incomplete. What is changed in the file is
-    copied first, so that a kill during the rescue takes nothing. Raises ``InputError``: not a
-    recording, no samples in it, or it changed within the last ten seconds (``now`` is Unix time in
-    s) and so may still be written to.
+    Returns True if the file was changed. It stays marked as incomplete. Bytes that are replaced are
+    copied first, so that a kill during the recovery loses nothing. Raises ``InputError`` for a file
+    that is not a recording, has no samples, or changed within the last ten seconds (``now`` is Unix
+    time in s) and so may still be written to.
     """
     path = Path(path)
     samples = open_recording(path).samples
@@ -52,5 +52,5 @@ def recover(path: str | Path, now: Callable[[], float] = time.time) -> bool:
             fsync=True,
         )
     except UNREADABLE as error:
-        raise InputError(f"{path} cannot be mended: {in_words(error)}") from error
+        raise InputError(f"{path} cannot be repaired: {in_words(error)}") from error
     return True

@@ -10,18 +10,18 @@ from dearig.model.noise import noise_at_rest
 
 __all__ = ["MIN_QUIET", "NEGLIGIBLE", "lead_in", "mean_beyond_noise", "noise_floor"]
 
-#: Samples that an estimate of the noise needs, at least.
+#: Least number of samples for an estimate of the noise.
 MIN_QUIET = 20
 
-#: Of the largest voltage: the film's force goes with the square, so this moves it a millionth.
+#: Part of the largest voltage that counts as 0: the force goes with the square, a millionth.
 NEGLIGIBLE = 1e-3
 
 
 def lead_in(voltage: np.ndarray, step: float = 0.0) -> int:
-    """How many samples of ``voltage`` (N,) V stand at 0 V before the first that does not.
+    """Count the samples of ``voltage`` (N,) V at 0 V before the first one that is not.
 
-    ``step`` V is what the converter cannot resolve; a measured voltage may lie a thousandth of its
-    largest value off 0.
+    ``step`` V is the resolution of the converter; a measured voltage may differ from 0 by a
+    thousandth of its largest value.
     """
     size = np.abs(voltage)
     if size.size == 0:
@@ -31,12 +31,12 @@ def lead_in(voltage: np.ndarray, step: float = 0.0) -> int:
 
 
 def noise_floor(time: np.ndarray, values: np.ndarray) -> float | None:
-    """Noise of ``values`` (n,) as ``model.records`` reads it at rest; None below 20 samples."""
+    """Return the noise of ``values`` (n,) by ``noise_at_rest``; None below 20 samples."""
     return noise_at_rest(time, values) if values.size >= MIN_QUIET else None
 
 
 def mean_beyond_noise(values: np.ndarray) -> float:
-    """Mean of the lead-in ``values`` (n,), or 0 where its noise alone may have made it."""
+    """Return the mean of the lead-in ``values`` (n,), or 0 if noise alone could explain it."""
     n = values.size
     if n < MIN_QUIET:
         return 0.0

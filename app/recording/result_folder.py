@@ -18,5 +18,5 @@ def result_folder(out: Path, overwrite: bool) -> Path:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{out} cannot be made: {error.strerror or error}") from error
+        raise InputError(f"{out} cannot be created: {error.strerror or error}") from error
     return out

@@ -1,7 +1,7 @@
 """Safe access to items of a file from an unknown source.
 
-Links that lead out of the file, virtual datasets and values that lie in other files are not
-followed. A dataset that claims more values than are stored is refused before room is made for it.
+Links out of the file, virtual datasets and values in other files are not followed. A dataset that
+claims more values than are stored is refused before memory is allocated for it.
 """
 
 from __future__ import annotations
@@ -10,18 +10,19 @@ import h5py
 
 __all__ = ["Refused", "dataset", "group", "item"]
 
-#: A dataset may claim at most so many times its size in the file.
+#: Largest size that a dataset may claim, in multiples of its size in the file.
 PACKED_MAX = 100
 
 
 class Refused(Exception):  # noqa: N818  (what happened to the file, said by the reader)
-    """An item is not read; the text says why."""
+    """An item that is not read; the text is the reason."""
 
 
 def item(parent: h5py.Group, name: str, stored: bool = True) -> h5py.Group | h5py.Dataset | None:
-    """``name`` in ``parent``, None if it is not there. Raises ``Refused`` for a link elsewhere.
+    """Return ``name`` in ``parent``, None if there is none.
 
-    ``stored``: and for a dataset that claims more than it holds.
+    Raises ``Refused`` for a link out of the file, and with ``stored`` also for a
+    dataset that claims more values than are stored.
     """
     link = parent.get(name, getlink=True)
     if link is None:

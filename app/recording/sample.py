@@ -28,7 +28,7 @@ UNITS = MappingProxyType(
 
 
 def write_sample(entry: h5py.Group, metadata: RunMetadata) -> None:
-    """Write what is known of the film and its load; what is not known is absent."""
+    """Write the known values of the film and its load; unknown ones are left out."""
     sample = entry.create_group("sample")
     sample.attrs["NX_class"] = fixed("NXsample")
     put_text(sample, "name", metadata.film_id)

@@ -1,4 +1,4 @@
-"""Writing a recording from arrays: imported data, or the prediction of a model."""
+"""Write a recording from arrays: imported data, or the prediction of a model."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def save_recording(
 
     ``values`` are (N,) each, by their names in ``layout.UNITS`` and in those units. ``kind`` is
     actuator or film, ``hold`` and ``kinematics`` are as in ``Recording``, ``rest_reading`` in m has
-    been subtracted from the displacement. The file appears as a whole or not at all. Raises
+    been subtracted from the displacement. The file appears complete or not at all. Raises
     ``InputError`` if it may not be written, and ``ValueError`` for values that no recording of
     that kind has.
     """

@@ -13,14 +13,14 @@ from dearig.recording.recording import Recording
 
 __all__ = ["describe", "describe_rows"]
 
-#: Steps of time that differ by less than this of their mean are even (rounding to a file's digits).
+#: Time steps are even if they differ by less than this part of their mean: a file rounds them.
 EVEN = 1e-6
 
 
 def describe(recording: Recording, checksum: bool = True) -> dict[str, Any]:
     """Return the metadata of a recording for JSON, in SI units with units in the names.
 
-    ``checksum``: of the whole file too, which takes some time for a file of gigabytes.
+    With ``checksum`` the SHA-256 of the whole file is in it, which takes time for gigabytes.
     """
     timing: dict[str, Any] = {"even": False, "rate_Hz": None}
     if recording.rate is not None:
@@ -87,7 +87,7 @@ def describe(recording: Recording, checksum: bool = True) -> dict[str, Any]:
 
 def _channel(recording: Recording, name: str) -> dict[str, Any]:
     whole = recording.overview(name, 2000)
-    # the overlay model may have no value at times
+    # the overlay model has no value where it failed
     known = np.isfinite(whole.low)
     low = high = None
     if known.any():
@@ -114,11 +114,11 @@ _READABLE = MappingProxyType(
 
 
 def describe_rows(recording: Recording) -> list[tuple[str, str]]:
-    """Return the metadata as (what, value) pairs of text, the most important first."""
+    """Return the metadata as (label, value) pairs of text, the most important first."""
     d = describe(recording, checksum=False)
     rows = [("recording", f"{d['name']} ({d['kind']}, {d['title']})")]
-    ended = d["outcome"] if d["complete"] else f"INCOMPLETE: {d['outcome']}"
-    rows.append(("ended", ended))
+    outcome = d["outcome"] if d["complete"] else f"INCOMPLETE: {d['outcome']}"
+    rows.append(("outcome", outcome))
     samples = f"{d['samples']} over {d['duration_s']:.6g} s"
     if d["samples_expected"] is not None and d["samples_expected"] != d["samples"]:
         samples += f", {d['samples_expected']} were planned"
@@ -142,8 +142,8 @@ def describe_rows(recording: Recording) -> list[tuple[str, str]]:
     elif d["kind"] == "actuator":
         rows.append(("noise floor", f"unknown: {d['quiet_samples']} samples at 0 V at the start"))
     if d["kind"] == "actuator":
-        between = "held" if recording.hold else "linear"
-        rows.append(("voltage between samples", between))
+        between = "zero-order hold" if recording.hold else "linear"
+        rows.append(("voltage interpolation", between))
     rows.append(("kinematics", d["kinematics"]))
     film, load = recording.film, recording.load
     if film is not None:

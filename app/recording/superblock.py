@@ -1,4 +1,4 @@
-"""The superblock of an HDF5 file, as far as a recovery needs it.
+"""The superblock of an HDF5 file: the parts that a recovery needs.
 
 Version 3 (HDF5 File Format Specification, section II.A): 8 bytes of signature, version, sizes of
 offsets and lengths, consistency flags (byte 11), base address, extension address, end of file
@@ -20,18 +20,18 @@ MASK = 0xFFFFFFFF
 
 
 def consistency_flags(path: Path) -> int | None:
-    """Flags of a file that was not closed (0: it was); None if it is not an HDF5 file.
+    """Return the flags of a file that was not closed, 0 if it was; None if it is not HDF5.
 
-    Files with an older superblock have none, and count as closed. Raises ``ValueError`` if the
-    superblock is damaged: opened in SWMR mode such a file is read again and again, and pauses grow
-    without end.
+    Files with an older superblock have no flags and count as closed. Raises ``ValueError`` if the
+    superblock is damaged: in SWMR mode HDF5 reads such a file again and again, with pauses that
+    grow without limit.
     """
     with path.open("rb") as stream:
         return flags_of(stream.read(SIZE))
 
 
 def flags_of(head: bytes) -> int | None:
-    """The same, of the first ``SIZE`` bytes of a file."""
+    """Return ``consistency_flags`` from the first ``SIZE`` bytes of a file."""
     if head[: len(SIGNATURE)] != SIGNATURE or len(head) < SIZE:
         return None
     if head[VERSION_AT] != VERSION:
@@ -42,14 +42,14 @@ def flags_of(head: bytes) -> int | None:
 
 
 def mend_superblock(stream: io.RawIOBase) -> None:
-    """Mark the file open in ``stream`` as closed, and its end as where it is.
+    """Mark the file open in ``stream`` as closed, and write its size as the end of file.
 
-    Raises ``ValueError`` for a superblock of another version than recordings are written with.
+    Raises ``ValueError`` for a superblock of another version than that of recordings.
     """
     stream.seek(0)
     head = bytearray(stream.read(SIZE) or b"")
     if head[: len(SIGNATURE)] != SIGNATURE or len(head) < SIZE or head[VERSION_AT] != VERSION:
-        raise ValueError("it does not begin as a recording does")
+        raise ValueError("it does not begin with the superblock of a recording")
     end = stream.seek(0, 2)
     head[FLAGS_AT] = 0
     head[END_AT : END_AT + 8] = struct.pack("<Q", end)
@@ -67,7 +67,7 @@ def lookup3(data: bytes, seed: int = 0) -> int:
     a = b = c = (0xDEADBEEF + len(data) + seed) & MASK
     if not data:
         return c
-    # all but the last 1 to 12 bytes are mixed in threes of words; the rest, padded, ends it
+    # all but the last 1 to 12 bytes are mixed three words at a time; the rest is padded
     last = (len(data) - 1) // 12 * 12
     for at in range(0, last, 12):
         x, y, z = struct.unpack_from("<3I", data, at)

@@ -1,7 +1,7 @@
-"""Text in a recording file: UTF-8 of fixed length, there and back.
+"""Text in a recording file: UTF-8 of fixed length, written and read.
 
-Not of variable length: HDF5 keeps that on a heap without a checksum, which a run that is read while
-it grows cannot append to, and on which one damaged byte can keep the library busy for ever.
+Variable length is not used: HDF5 keeps such text on a heap without a checksum. A run in SWMR mode
+cannot append to the heap, and one damaged byte in it can put the library into an endless loop.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ __all__ = ["not_forward"]
 def not_forward(time: np.ndarray) -> tuple[int, str] | None:
     """Return the first sample of ``time`` (N,) that does not increase, and how; else None.
 
-    The words are ``goes back`` or ``stands still``, for a sentence that begins with time.
+    The second value is ``goes back`` or ``stands still``, for a sentence that begins with time.
     """
     back = np.flatnonzero(np.diff(time) <= 0.0)
     if not back.size:

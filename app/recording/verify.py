@@ -1,4 +1,4 @@
-"""Verification of a recording: whether its data agree with everything that it states."""
+"""Verification of a recording: its data against its checksums, scaling and metadata."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from dearig.recording.text import text_of
 
 __all__ = ["Verification", "verify"]
 
-#: Relative difference that rounding may cause where another library computes the same.
+#: Relative difference that rounding may cause between two libraries.
 ROUNDING = 1e-12
-#: Of the sample clock against the computer's, over runs of at least so many s: more is a fault.
+#: Largest relative difference of sample clock and computer's clock, in runs of this many s or more.
 CLOCKS_APART, CLOCKS_OVER = 0.01, 10.0
-#: Faults of one sort that are listed one by one, at most.
+#: Faults of one kind that are listed one by one, at most.
 LISTED = 5
 
 
@@ -75,11 +75,13 @@ def verify(path: str | Path) -> Verification:
 
 def _state(found: Verification, recording: Recording) -> None:
     if whole_journal(found.path) is not None:
-        found.notes.append("its end lies in a journal beside it; dearig recover puts it in")
+        found.notes.append(
+            "its last changes are in a journal beside it; dearig recover applies them"
+        )
     elif consistency_flags(found.path):
-        found.notes.append("it was killed, or is being written; dearig recover mends it")
+        found.notes.append("it was killed, or is being written; dearig recover repairs it")
     if not recording.complete:
-        found.notes.append(f"the run did not come to its end: {recording.outcome}")
+        found.notes.append(f"the run is incomplete: {recording.outcome}")
     faults = [e for e in recording.events if e.level == "fault"]
     found.notes += [f"fault at sample {e.sample} ({e.time:.6g} s): {e.message}" for e in faults]
 
@@ -136,17 +138,17 @@ class _Check:
                     break
                 if name == "time":
                     if values[0] <= before or (np.diff(values) <= 0.0).any():
-                        self.fault(f"time does not go forward in {self.span(start, stop)}")
+                        self.fault(f"time does not increase in {self.span(start, stop)}")
                         break
                     before = values[-1]
                 elif name != "displacement_model" and not np.isfinite(values).all():
                     self.fault(
-                        f"/entry/data/{name} has values that are no numbers in "
+                        f"/entry/data/{name} has values that are not finite in "
                         f"{self.span(start, stop)}"
                     )
                     break
         if arrays.stored:
-            self.done(f"{len(arrays.stored)} rows of stored values, {self.samples} samples each")
+            self.done(f"{len(arrays.stored)} arrays of stored values, {self.samples} samples each")
 
     def counts_shapes(self) -> None:
         claimed = int(self.entry.attrs.get("samples", self.samples))
@@ -157,21 +159,23 @@ class _Check:
                     self.fault(f"{name} has {many} counts, not {self.samples}")
         elif max(there.values()) > self.samples:
             self.found.notes.append(
-                f"what came after sample {self.samples - 1} is left out: the run ended while it "
-                f"was being written, and not all of it has reached the disk"
+                f"samples after {self.samples - 1} are left out: the run ended while they were "
+                f"being written, and not all of them have reached the disk"
             )
         if claimed != self.samples:
             self.fault(f"/entry claims {claimed} samples and holds {self.samples}")
         expected, outcome = self.recording.samples_expected, self.recording.outcome
         if outcome == "finished" and expected is not None and expected != self.samples:
             self.fault(
-                f"the run is said to have finished, with {self.samples} of {expected} samples"
+                f"the outcome is finished, but there are only {self.samples} of {expected} samples"
             )
-        self.done(f"{self.samples} samples of {len(self.recording.channels)} channels are there")
+        self.done(
+            f"number of samples: {self.samples} in each of {len(self.recording.channels)} channels"
+        )
 
     def checksums(self, counts: Counts) -> None:
         if dataset(self.entry, "checksums") is None:
-            self.found.notes.append("its counts have no checksums: it is of an earlier version")
+            self.found.notes.append("its counts have no checksums: an earlier version wrote it")
             return
         compared, wrong = wrong_blocks(self.entry, self.samples, counts.raw)
         for channel, start, stop in wrong[:LISTED]:
@@ -187,7 +191,7 @@ class _Check:
             if self.finished:
                 self.fault(rest)
             else:
-                self.found.notes.append(f"{rest} yet: the run was killed before")
+                self.found.notes.append(f"{rest} yet: the run was killed before it was written")
         self.done(f"checksums of the counts of {compared} samples")
 
     def pyramid(self, counts: Counts) -> None:
@@ -202,7 +206,7 @@ class _Check:
                     f"/entry/pyramid has {level.shape[0]} bins of {size} samples, not "
                     f"{self.samples // size}"
                 )
-            # bins are few samples wide or many: about a slice of them at a time
+            # about one slice of samples at a time, whatever the width of the bins
             step = max(SLICE // size, 1)
             for first in range(0, rows, step):
                 last = min(first + step, rows)
@@ -211,11 +215,11 @@ class _Check:
                 ends = np.stack((binned.min(axis=2).T, binned.max(axis=2).T), axis=2)
                 if not np.array_equal(ends, level[first:last]):
                     self.fault(
-                        f"/entry/pyramid is not of these counts in "
+                        f"/entry/pyramid does not agree with the counts in "
                         f"{self.span(first * size, last * size)} (bins of {size})"
                     )
                     break
-        self.done("least and greatest counts over bins")
+        self.done("minima and maxima of the counts over bins")
 
     def physical(self, counts: Counts) -> None:
         stored = [n for n in counts.names if n in self.recording.arrays.stored]
@@ -224,14 +228,14 @@ class _Check:
                 try:
                     there = self.data[name][start:stop]
                 except (OSError, RuntimeError):
-                    break  # said by stored()
+                    break  # stored() reports it
                 expected = counts.window(name, start, stop)
                 off = np.abs(there - expected)
                 scale = np.abs(expected).max(initial=0.0) + abs(counts.rest.reading)
                 if not (off <= ROUNDING * scale).all():
                     at = start + int(np.argmax(~(off <= ROUNDING * scale)))
                     self.fault(
-                        f"/entry/data/{name} is not what its counts give: "
+                        f"/entry/data/{name} does not agree with its counts: "
                         f"{there[at - start]:.9g} at sample {at}, not {expected[at - start]:.9g}"
                     )
                     break
@@ -256,7 +260,7 @@ class _Check:
             there = shown[name][()]
             both = np.stack((low, high), axis=1).reshape(-1)
             if there.shape != both.shape or not np.allclose(there, both, rtol=1e-9, atol=1e-15):
-                self.fault(f"/entry/overview/{name} does not show these counts")
+                self.fault(f"/entry/overview/{name} does not agree with the counts")
         self.done("the overview for viewers")
 
     def wall_clock(self) -> None:
@@ -264,15 +268,15 @@ class _Check:
         if notes is None:
             return
         if not self.finished:
-            notes = notes[notes["sample"] <= self.samples]  # the others are left out too
+            notes = notes[notes["sample"] <= self.samples]  # their samples are left out too
         at, moments = notes["sample"], notes["unix_time"]
         if (np.diff(at) < 0).any() or (at.size and int(at[-1]) > self.samples):
-            self.fault("/entry/wall_clock notes samples that go back, or that are not there")
+            self.fault("/entry/wall_clock has sample numbers that go back, or that do not exist")
             return
         if (np.diff(moments) < 0.0).any():
             self.found.notes.append("the computer's clock was set back during the run")
         elif at.size > 1 and not self.recording.provenance.get("simulated", False):
-            # the first row is from before the run was started
+            # the first row was written before the run started
             took, counted = float(moments[-1] - moments[1]), float(at[-1] - at[1])
             rate = self.recording.rate or 0.0
             if took >= CLOCKS_OVER and abs(counted / rate - took) > CLOCKS_APART * took:
@@ -280,16 +284,16 @@ class _Check:
                     f"the sample clock counted {counted / rate:.6g} s and the computer's clock "
                     f"{took:.6g} s: rate_Hz is wrong, or samples are missing"
                 )
-        self.done("the computer's clock beside the sample clock")
+        self.done("the sample clock against the computer's clock")
 
     def events(self) -> None:
         rate = self.recording.rate
         for event in self.recording.events:
             where = f"the event {event.message[:60]!r}"
             if not 0 <= event.sample <= self.samples:
-                # a kill may have taken the block and left what happened in it
+                # a kill can lose the samples of a block and leave its events
                 say = self.fault if self.recording.complete else self.found.notes.append
-                say(f"{where} is at sample {event.sample}, which is not there")
+                say(f"{where} is at sample {event.sample}, which does not exist")
             elif rate is not None and abs(event.time - event.sample / rate) > 1e-6 / rate:
                 self.fault(
                     f"{where} is at {event.time:.9g} s, and its sample {event.sample} at "
@@ -302,7 +306,9 @@ class _Check:
         if "configuration" in noted and "configuration_sha256" in noted:
             digest = hashlib.sha256(str(noted["configuration"]).encode()).hexdigest()
             if digest != noted["configuration_sha256"]:
-                self.fault("/entry/provenance: the configuration is not the one of its SHA-256")
+                self.fault(
+                    "/entry/provenance: the configuration does not have the SHA-256 stored with it"
+                )
             self.done("the configuration's SHA-256")
         moments = [
             text_of(self.entry[n][()]) for n in ("start_time", "end_time") if n in self.entry
@@ -310,7 +316,7 @@ class _Check:
         try:
             times = [datetime.fromisoformat(moment) for moment in moments]
         except ValueError:
-            self.fault(f"/entry: one of {', '.join(moments)} is no time")
+            self.fault(f"/entry: one of {', '.join(moments)} is not a time")
             return
         if any(later < earlier for earlier, later in pairwise(times)):
             self.found.notes.append(f"it ended at {moments[1]}, before its start at {moments[0]}")
@@ -320,10 +326,10 @@ class _Check:
         shown = text_of(self.entry.attrs.get("default", ""))
         plot = group(self.entry, shown) if shown else None
         if plot is None:
-            self.fault(f"/entry names {shown!r} as its default plot, which is not there")
+            self.fault(f"/entry names {shown!r} as its default plot, which does not exist")
             return
         if not self.finished and self.recording.channels:
-            return  # what was killed has no plot before it is recovered
+            return  # a killed run has no plot until it is recovered
         signal = text_of(plot.attrs.get("signal", ""))
         if signal != SIGNALS[self.recording.kind] or signal not in plot or "time" not in plot:
             self.fault(f"{plot.name} has no plot of {SIGNALS[self.recording.kind]} over time")
@@ -334,7 +340,7 @@ class _Check:
         self.done("the default plot")
 
     def dimension_scales(self) -> None:
-        """Check that ``time`` is the scale of every row; files of earlier versions have none."""
+        """Check that ``time`` is the scale of every array; files of earlier versions have none."""
         for plot in (self.data, group(self.entry, "overview")):
             if plot is None or "time" not in plot or not plot["time"].is_scale:
                 continue
@@ -343,4 +349,4 @@ class _Check:
                     continue
                 scales = row.dims[0].values()
                 if [scale.name for scale in scales] != [plot["time"].name]:
-                    self.fault(f"{row.name} has not time as its dimension scale")
+                    self.fault(f"the dimension scale of {row.name} is not time")

@@ -1,8 +1,8 @@
-"""Writing a recording during a run: counts are appended, and a kill loses nothing flushed.
+"""Write a recording during a run: counts are appended, and a kill loses nothing flushed.
 
-Tried with kills at random moments and with every write boundary replayed: what survives all of
-them is the library version of ``layout.LIBVER``, the whole layout made first, then SWMR mode, and
-one flush of the whole file (of single datasets, channels could differ by an interval).
+The file survives kills at any moment and at every write boundary with the library version of
+``layout.LIBVER``, the whole layout created first, then SWMR mode, and flushes of the whole file.
+After flushes of single datasets, channels could differ by one flush interval.
 """
 
 from __future__ import annotations
@@ -54,23 +54,23 @@ __all__ = ["FLUSH_INTERVAL", "RecordingWriter"]
 
 log = logging.getLogger(__name__)
 
-#: s between flushes, at least: at most this much of a run is lost in a kill.
+#: Least time between two flushes in s; a kill loses at most this much of a run.
 FLUSH_INTERVAL = 0.25
-#: Bytes free at which a run ends: what HDF5 still has to write needs them. A second is added.
+#: Free bytes below which a run ends: HDF5 needs them for its last writes. One second is added.
 ROOM_LEFT = 2**21
 
 
 class RecordingWriter:
-    """One run, being recorded to ``path``; a context manager.
+    """Writer of one run to ``path``; a context manager.
 
-    ``identity`` names the channels, in the order in which blocks hold them; ``rate_Hz`` is the
-    sample clock's, ``samples_expected`` sizes nothing and is kept so that a reader sees what is
-    missing. Without a title in ``metadata`` the run takes the name of its sequence, without a seed
-    that of the identity. ``now`` gives Unix time in s.
-    ``fsync``: what is flushed is on the disk, so that not even a power cut takes it. A recording
-    that is overwritten stays until the first flush of samples, as ``FILE.h5.old``.
+    ``identity`` names the channels in the order of the blocks. ``rate_Hz`` is that of the sample
+    clock. ``samples_expected`` is only stored, so that a reader sees how many samples are missing.
+    Without a title in ``metadata`` the run takes the name of its sequence, without a seed that of
+    the identity. ``now`` returns Unix time in s. With ``fsync`` every flush reaches the disk, so
+    that flushed samples survive a power cut. A recording that is overwritten stays until the first
+    flush of samples, as ``FILE.h5.old``.
 
-    Raises ``InputError`` before anything is touched: the file exists (unless ``overwrite``), its
+    Raises ``InputError`` before anything is changed if the file exists (unless ``overwrite``), its
     folder does not, or the sequence is not TOML. ``ValueError`` is a programming error.
     """
 
@@ -111,7 +111,7 @@ class RecordingWriter:
             self._old = set_aside(self._path) if overwrite else None
         try:
             with _disk_errors(self._path, InputError):
-                # "x" refuses a file that another process made since it was looked for
+                # "x" fails if another process has created the file since the check
                 self._file = h5py.File(self._path, "x", libver=LIBVER)
             try:
                 with _disk_errors(self._path, InputError):
@@ -137,7 +137,7 @@ class RecordingWriter:
         data = entry["data"]
         data.attrs["rate_Hz"] = self._rate
         data.attrs["samples_expected"] = int(samples_expected)
-        # about a second: a chunk is written again by every flush that finds it changed
+        # about one second: every flush writes a changed chunk again
         chunk = int(min(max(self._rate, 1024), 65536))
         self._counts = []
         for place, channel in enumerate(self._channels):
@@ -157,8 +157,8 @@ class RecordingWriter:
         )
         self._pyramid = PyramidWriter(entry, len(self._channels), self._rate)
         self._checksums = ChecksumWriter(entry, len(self._channels), self._rate)
-        # made last: a flush writes datasets in this order and stops where the disk refuses one, so
-        # that its note is in the file only with all that it speaks of
+        # created last: a flush writes datasets in this order and stops where the disk refuses one,
+        # so that its note is in the file only if all samples up to it are
         self._wall_clock = entry.create_dataset(
             "wall_clock", shape=(0,), maxshape=(None,), chunks=(256,), dtype=WALL_CLOCK_TYPE
         )
@@ -202,10 +202,10 @@ class RecordingWriter:
         return self._closed
 
     def append(self, block: Block) -> None:
-        """Write the next block, its events with it.
+        """Write the next block and its events.
 
-        Raises ``InstrumentFault`` if samples are missing before it, or come a second time, with an
-        event that says so; ``DiskFault`` if the disk takes no more.
+        Raises ``InstrumentFault`` if samples before it are missing or come a second time, and
+        records an event; ``DiskFault`` if the disk cannot be written.
         """
         counts = block.counts
         if counts.ndim != 2 or counts.shape[0] != len(self._channels) or counts.dtype != np.int16:
@@ -233,8 +233,8 @@ class RecordingWriter:
         what = f"{lost} samples are missing" if lost > 0 else f"{-lost} samples came twice"
         self.event(self._written, "fault", f"{what} from here on; the run was ended")
         return InstrumentFault(
-            f"{self._path}: a block starts at sample {start} where sample {self._written} was due: "
-            f"{what}; the rig has lost step, record again at a lower rate"
+            f"{self._path}: a block starts at sample {start}, expected sample {self._written}: "
+            f"{what}; the rig cannot keep up, record again at a lower rate"
         )
 
     def event(self, sample: int, level: str, message: str) -> None:
@@ -255,25 +255,25 @@ class RecordingWriter:
             self._let_go()
             self._written = self._flushed
             self._failure = DiskFault(
-                f"{error}; the {self._flushed} samples until then are safe there, in counts: "
-                f"dearig recover {self._path} finishes them when there is room"
+                f"{error}; the {self._flushed} samples until then are in the file, as counts: "
+                f"free some space, then finish it with dearig recover {self._path}"
             )
             raise self._failure from error
 
     def _check_room(self) -> None:
-        # checked before each write: after a full disk HDF5 writes in no useful order
+        # checked before each write: on a full disk the order of HDF5's writes is not defined
         if shutil.disk_usage(self._path.parent).free < self._margin:
             raise OSError(errno.ENOSPC, "no room for the next second")
 
     def _let_go(self) -> None:
         """Close the file as a kill would: not another byte is written to it.
 
-        HDF5 cannot close a file that it cannot write, and brings the program down at its end; so
-        what it still wants to write goes elsewhere.
+        HDF5 cannot close a file that it cannot write, and crashes the program when it exits. So its
+        last writes go to the null device.
         """
-        # nowhere: another file could be refused as well, by the same disk or the same limit
-        with Path(os.devnull).open("r+b") as nowhere:
-            os.dup2(nowhere.fileno(), self._file.id.get_vfd_handle())
+        # not to another file: the same disk or the same limit could refuse that too
+        with Path(os.devnull).open("r+b") as null:
+            os.dup2(null.fileno(), self._file.id.get_vfd_handle())
             try:
                 self._file.close()
             except (OSError, RuntimeError):
@@ -301,7 +301,7 @@ class RecordingWriter:
         self._dirty = True
 
     def _flush_when_due(self) -> None:
-        # outside the interval on either side: a clock set back must not end the flushing
+        # a negative time is due too: flushing must go on if the clock is set back
         moment = self._now()
         if self._dirty and not 0.0 <= moment - self._last_flush < FLUSH_INTERVAL:
             self._flush_all(moment)
@@ -321,7 +321,7 @@ class RecordingWriter:
         self._flushed = self._written
         self._dirty = False
         if self._old is not None and self._flushed:
-            # from here on there is something in its place
+            # from here on the new file has samples in its place
             self._old.unlink(missing_ok=True)
             self._old = None
 
@@ -344,9 +344,9 @@ class RecordingWriter:
     ) -> None:
         """Finish the recording: physical values, end time, sample count; calling it again is fine.
 
-        ``outcome`` says in words how the run ended. ``displacement_model`` (samples,) m is the live
-        overlay, ``model_toml`` its parameters. Raises ``DiskFault`` if the physical values cannot
-        be written; the counts are safe then.
+        ``outcome`` is a sentence on how the run ended. ``displacement_model`` (samples,) m is that
+        of the live overlay, ``model_toml`` its parameters. Raises ``DiskFault`` if the physical
+        values cannot be written; the counts are in the file then.
         """
         if self._closed:
             return
@@ -374,11 +374,11 @@ class RecordingWriter:
             )
         except InputError as error:
             raise DiskFault(
-                f"{error}; the run itself is safe there, in counts: make room and recover it"
+                f"{error}; the whole run is in the file, as counts: free some space and recover it"
             ) from error
 
     def discard(self) -> None:
-        """Leave no file, or the one from before: for a run that ended before its first sample."""
+        """Delete the file of a run without samples, and restore the one that it would replace."""
         if not self._closed:
             self._closed = True
             if self._failure is None:
@@ -387,7 +387,7 @@ class RecordingWriter:
             put_back(self._old, self._path)
 
     def __enter__(self) -> RecordingWriter:
-        """Itself."""
+        """Return the writer."""
         return self
 
     def __exit__(
@@ -409,7 +409,7 @@ class RecordingWriter:
 
 @contextmanager
 def _disk_errors(path: Path, kind: type[DearigError] = DiskFault) -> Iterator[None]:
-    """Say in a sentence what HDF5 reports as an ``OSError`` or ``RuntimeError``."""
+    """Turn an ``OSError`` or ``RuntimeError`` of HDF5 into a ``kind`` with a sentence."""
     try:
         yield
     except FileExistsError as error:
@@ -424,7 +424,7 @@ def _check_channels(channels: tuple[Channel, ...]) -> None:
         if needed not in names:
             raise ValueError(f"a run is recorded with a channel {needed}; there are {names}")
     if len(set(names)) != len(names):
-        raise ValueError(f"two channels have one name: {names}")
+        raise ValueError(f"two channels have the same name: {names}")
     known = [name for name in names if name in CHANNEL_NAMES]
     if known != [n for n in CHANNEL_NAMES if n in names] or names[: len(known)] != known:
         raise ValueError(f"channels come as {', '.join(CHANNEL_NAMES)}, then others, not {names}")

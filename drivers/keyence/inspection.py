@@ -27,8 +27,8 @@ def inspect(
     if not settings.port:
         nobody = Finding(
             name, "serial port", "none in the rig file", verdict="not wired",
-            advice="set laser.port to have the controller's settings compared; until then "
-            "laser.mm_per_V, sampling_us and averaging are taken on trust",
+            advice="set laser.port to compare the controller's settings; until then "
+            "laser.mm_per_V, sampling_us and averaging are not checked",
         )  # fmt: skip
         return LaserInspection((nobody,))
     findings: list[Finding] = []

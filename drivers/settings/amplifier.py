@@ -15,39 +15,50 @@ class AmplifierSettings(Section):
     driver: str = Field(
         default="trek",
         min_length=1,
-        description="driver for its inspection; dearig doctor lists them",
+        description="name of the driver that inspects the amplifier; dearig doctor lists them",
     )
-    model: str = Field(default="TREK 10/40A-HS", description="type, as on the front panel")
+    model: str = Field(
+        default="TREK 10/40A-HS", description="type of the amplifier, as on its front panel"
+    )
     serial: str = Field(default="", description="serial number, kept with every recording")
     gain_V_per_V: float = Field(
-        default=1000.0, ge=1.0, le=1e5, description="volts at the film per volt at the input"
+        default=1000.0,
+        ge=1.0,
+        le=1e5,
+        description="gain: volts at the film per volt at the amplifier's input",
     )
     offset_V: float = Field(
         default=0.0,
         ge=-100.0,
         le=100.0,
-        description="measured output at 0 V input; commands are corrected for it",
+        description="measured output of the amplifier at 0 V input; commands are corrected for it",
     )
     range_kV: float = Field(
-        default=10.0, gt=0.0, le=100.0, description="output range, plus and minus"
+        default=10.0, gt=0.0, le=100.0, description="output range of the amplifier, plus and minus"
     )
     current_limit_mA: float = Field(
-        default=40.0, gt=0.0, le=1000.0, description="output current limit"
+        default=40.0, gt=0.0, le=1000.0, description="output current limit of the amplifier"
     )
     monitor_V_per_kV: float = Field(
-        default=1.0, gt=0.0, le=100.0, description="voltage monitor: volts per kilovolt at the film"
+        default=1.0,
+        gt=0.0,
+        le=100.0,
+        description="scaling of the voltage monitor: volts per kilovolt at the film",
     )
     current_monitor_V_per_mA: float = Field(
-        default=0.25, gt=0.0, le=100.0, description="current monitor: volts per milliampere"
+        default=0.25,
+        gt=0.0,
+        le=100.0,
+        description="scaling of the current monitor: volts per milliampere",
     )
     slew_V_per_us: float = Field(
-        default=900.0, gt=0.0, le=1e5, description="slew rate without load"
+        default=900.0, gt=0.0, le=1e5, description="slew rate of the amplifier without load"
     )
     bandwidth_kHz: float = Field(
         default=25.0,
         ge=0.1,
         le=1e4,
-        description="small-signal bandwidth (-3 dB), taken as first order",
+        description="small-signal bandwidth of the amplifier (-3 dB), modelled as first order",
     )
     monitor_noise_mV: float = Field(
         default=1.0, ge=0.0, le=100.0, description="simulated rig only: RMS noise of either monitor"

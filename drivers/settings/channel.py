@@ -24,9 +24,12 @@ class ChannelSettings(Section):
     label: str = Field(
         default="", max_length=60, description="displayed name; if empty, the name is displayed"
     )
-    terminal: AnalogInput = Field(examples=["ai4"], description="input of the card")
-    wiring: Wiring = Field(default="DIFF", description="as [card] terminals_displacement")
-    range_V: InputRange = Field(default=10.0, description="input range, plus and minus")
+    terminal: AnalogInput = Field(examples=["ai4"], description="terminal of the card's input")
+    wiring: Wiring = Field(
+        default="DIFF",
+        description="wiring of the input: differential, referenced or non-referenced single-ended",
+    )
+    range_V: InputRange = Field(default=10.0, description="range of the input, plus and minus")
     unit: str = Field(
         pattern=r"^[A-Za-z0-9%µ][A-Za-z0-9%µ*/^.-]{0,15}$",
         examples=["N"],
@@ -36,7 +39,7 @@ class ChannelSettings(Section):
         ge=-1e12,
         le=1e12,
         examples=[50.0],
-        description="scaling: change of the value per volt at the input, not 0",
+        description="scaling: change of the value per volt at the input; 0 is not allowed",
     )
     value_at_0_V: float = Field(
         default=0.0, ge=-1e12, le=1e12, description="scaling: the value at 0 V"
@@ -45,17 +48,24 @@ class ChannelSettings(Section):
         default=0.0, ge=0.0, le=1e5, description="known lag of the instrument, kept with recordings"
     )
     limit_min: float | None = Field(
-        default=None, description="interlock: lowest value allowed during a run; left out, none"
+        default=None,
+        description="interlock: lowest value allowed during a run; if left out, there is none",
     )
     limit_max: float | None = Field(
-        default=None, description="interlock: highest value allowed during a run; left out, none"
+        default=None,
+        description="interlock: highest value allowed during a run; if left out, there is none",
     )
     limit_debounce_ms: float = Field(
-        default=5.0, ge=0.0, le=1e4, description="interlock: debounce time"
+        default=5.0,
+        ge=0.0,
+        le=1e4,
+        description="interlock: time out of the limits after which it trips",
     )
-    limit_action: Action = Field(default="ramp", description="interlock: action")
+    limit_action: Action = Field(
+        default="ramp", description="interlock: how the voltage goes to 0 V"
+    )
     simulated_value: float = Field(
-        default=0.0, ge=-1e12, le=1e12, description="simulated rig only: its reading"
+        default=0.0, ge=-1e12, le=1e12, description="simulated rig only: value that it reads"
     )
     simulated_noise: float = Field(
         default=0.0, ge=0.0, le=1e12, description="simulated rig only: RMS noise of a reading"
@@ -129,15 +139,17 @@ class ChannelSettings(Section):
 class ThermometerSettings(Section):
     """An optional thermometer with a voltage output, near the film."""
 
-    model: str = Field(default="Pt100 transmitter", description="type of thermometer")
+    model: str = Field(default="Pt100 transmitter", description="type of the thermometer")
     serial: str = Field(default="", description="serial number, kept with every recording")
-    celsius_per_V: float = Field(default=10.0, gt=0.0, le=1000.0, description="scaling")
+    celsius_per_V: float = Field(
+        default=10.0, gt=0.0, le=1000.0, description="scaling: degrees Celsius per volt"
+    )
     celsius_at_0_V: float = Field(
-        default=0.0, ge=-273.15, le=1000.0, description="temperature at 0 V"
+        default=0.0, ge=-273.15, le=1000.0, description="scaling: temperature at 0 V"
     )
     room_celsius: float = Field(
         default=22.0, ge=-50.0, le=200.0, description="simulated rig only: temperature of the room"
     )
     noise_mK: float = Field(
-        default=10.0, ge=0.0, le=1e5, description="simulated rig only: RMS noise"
+        default=10.0, ge=0.0, le=1e5, description="simulated rig only: RMS noise of a reading"
     )

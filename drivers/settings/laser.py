@@ -17,10 +17,11 @@ class LaserSettings(Section):
     driver: str = Field(
         default="keyence",
         min_length=1,
-        description="driver for its inspection; dearig doctor lists them",
+        description="name of the driver that inspects the laser; dearig doctor lists them",
     )
     model: str = Field(
-        default="Keyence LK-H152 / LK-G5000", description="sensor head and controller"
+        default="Keyence LK-H152 / LK-G5000",
+        description="types of the sensor head and the controller",
     )
     serial: str = Field(default="", description="serial number, kept with every recording")
     reference_distance_mm: float = Field(
@@ -33,21 +34,27 @@ class LaserSettings(Section):
         description="measuring range, plus and minus, about the reference",
     )
     analog_range_V: float = Field(
-        default=10.0, gt=0.0, le=10.0, description="analog output, plus and minus"
+        default=10.0, gt=0.0, le=10.0, description="range of the analog output, plus and minus"
     )
     mm_per_V: float = Field(
-        default=4.0, gt=0.0, le=1000.0, description="analog scaling set in controller"
+        default=4.0,
+        gt=0.0,
+        le=1000.0,
+        description="scaling of the analog output, as set in the controller",
     )
     direction: Literal[1, -1] = Field(
         default=1,
-        description="1 when the analog output rises as the film gets longer, -1 when it falls",
+        description="sign of the analog output: 1 when it rises as the film gets longer, -1 when "
+        "it falls",
     )
-    sampling_us: float = Field(default=20.0, ge=2.55, le=1000.0, description="sampling period")
+    sampling_us: float = Field(
+        default=20.0, ge=2.55, le=1000.0, description="sampling period of the sensor"
+    )
     averaging: int = Field(
         default=16,
         ge=1,
         le=262144,
-        description="samples in the moving average: a power of 4 for the driver keyence",
+        description="number of samples in the moving average; a power of 4 for the driver keyence",
     )
     port: str = Field(
         default="",
@@ -55,9 +62,11 @@ class LaserSettings(Section):
         "settings are not compared with the ones here",
     )
     baud_rate: Literal[9600, 19200, 38400, 57600, 115200] = Field(
-        default=115200, description="of the serial port"
+        default=115200, description="baud rate of the serial port"
     )
-    output: Literal[1, 2] = Field(default=1, description="OUT of the controller: which head")
+    output: Literal[1, 2] = Field(
+        default=1, description="number of the controller's output (OUT), which selects the head"
+    )
     resolution_um: float = Field(
         default=0.01, ge=0.0, le=100.0, description="simulated rig only: smallest step of a reading"
     )

@@ -211,8 +211,8 @@ class RigSettings(Section):
         if self.interlocks.current_max_mA >= amplifier.current_limit_mA:
             raise ValueError(
                 f"interlocks.current_max_mA = {self.interlocks.current_max_mA:g} is not below "
-                f"amplifier.current_limit_mA = {amplifier.current_limit_mA:g}: the amplifier would "
-                f"never deliver what trips it"
+                f"amplifier.current_limit_mA = {amplifier.current_limit_mA:g}: the amplifier "
+                f"limits the current before the interlock can trip"
             )
         for name, how in self.wiring().items():
             number = int(self.terminals()[name].removeprefix("ai"))
@@ -220,11 +220,12 @@ class RigSettings(Section):
                 terminal, _, wiring = self.keys(name)
                 raise ValueError(
                     f'{terminal} = "ai{number}" with {wiring} = "DIFF": differential inputs are '
-                    f"ai0 to ai7, whose other wire is 8 higher"
+                    f"ai0 to ai7; the second wire is the input 8 higher"
                 )
         if card.hv_enable_watchdog_s > 0.0 and card.do_hv_enable is None:
             raise ValueError(
-                "card.hv_enable_watchdog_s is set, but no card.do_hv_enable that it could take low"
+                "card.hv_enable_watchdog_s is set, but not card.do_hv_enable, the line that it "
+                "takes low"
             )
 
     def _check_sampling(self) -> None:

@@ -53,7 +53,7 @@ def test_a_run_of_a_model_file_needs_it_again(tmp_path: Path) -> None:
     assert dearig(*record).code == 0
     refused = dearig("record", "--like", first, "--out", again)
     assert refused.code == 2
-    assert "give that one with --model" in refused.err
+    assert "give the model file with --model" in refused.err
     done("record", "--like", first, "--model", model, "--out", again)
     assert same(first, again)
 
@@ -81,6 +81,4 @@ def test_what_cannot_be_repeated(tmp_path: Path) -> None:
         assert answer.code == 2, answer.err
         assert words in answer.err
         assert not out.exists()
-    assert (
-        "is the file that is read" in dearig("record", "--like", run, "--out", run, "--force").err
-    )
+    assert "is the input file" in dearig("record", "--like", run, "--out", run, "--force").err

@@ -70,20 +70,20 @@ def test_of_three_the_nearest_two_count():
     assert found.closest == min(apart, key=lambda pair: apart[pair])
 
 
-def test_where_nothing_separates_it_says_so():
+def test_identical_rivals_have_no_separating_experiment():
     twins = [("one", "drag", DRAG), ("other", "creep", DRAG)]
     found, words = separating_experiment(twins, SLOW, NOISE)
     assert found is None
-    assert "would separate one and other" in words
+    assert "separates one and other: at best" in words
     assert "0 times the noise" in words
 
 
-def test_twins_do_not_stand_in_the_way_of_a_third():
+def test_identical_rivals_are_left_out_of_the_score():
     twin = ("twin", "amplifier", LAG)
     found, words = separating_experiment([*RIVALS, twin], SLOW, NOISE)
     alone, _ = separating_experiment(RIVALS, SLOW, NOISE)
     assert (found.name, found.separation) == (alone.name, alone.separation)
-    assert "but for sensor lag and twin, which none would separate" in words
+    assert "No excitation separates sensor lag and twin" in words
 
 
 def test_limits_lower_every_candidate():
@@ -101,7 +101,7 @@ def test_every_candidate_passes_the_gate_of_the_thesis_rig():
 
 
 def played(found, settings: RigFile) -> tuple[np.ndarray, float, list[np.ndarray]]:
-    """Voltage, its rate, and what each of the two foresees of the film."""
+    """Voltage, its rate, and what each of the two predicts of the film."""
     waveform = plan(parse_sequence(found.sequence, "x", Path()), settings).admitted()
     time = np.arange(waveform.voltage.size) / waveform.rate
     drive = Drive(time, waveform.voltage, hold=True)
@@ -120,7 +120,7 @@ def test_it_trips_no_interlock_of_its_own(most):
     found, _ = separating_experiment(RIVALS, settings, NOISE)
     voltage, rate, moved = played(found, settings)
     for each in moved:
-        # with room for a film that goes further than any of them foresees
+        # with a margin for a film that moves further than any of them predicts
         assert would_trip(settings, rate, voltage, each / 0.75) == ()
     assert max(each.max() for each in moved) < 0.75e-3 * most
 
@@ -128,7 +128,7 @@ def test_it_trips_no_interlock_of_its_own(most):
 def test_where_interlocks_would_end_everything_it_says_so():
     found, words = separating_experiment(RIVALS, with_interlocks(displacement_max_mm=1e-3), NOISE)
     assert found is None
-    assert "could be played: the limits or the interlocks" in words
+    assert "can be played: each would break a limit or trip" in words
 
 
 def test_it_is_no_faster_than_the_laser_can_tell():

@@ -2,7 +2,7 @@
 
 ``python -m tests.crash replay [--blocks N]`` notes every write, truncation, renaming and removal
 of a run that replaces an older recording, makes them again one by one, and after each one checks
-that nothing flushed is lost and that ``recover`` mends the file. Each write is made in two halves
+that nothing flushed is lost and that ``recover`` repairs the file. Each write is made in two halves
 as well with --torn. ``python -m tests.crash kills [--kills N]`` kills that many runs which write as
 fast as they can.
 """

@@ -171,10 +171,10 @@ def test_every_sampling_and_average_is_read_back() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"mm_per_V": 5.0}, "analog scaling: 5 mm/V, 4 mm/V is wanted"),
-        ({"mm_per_V": 4.002}, "analog scaling: 4.002 mm/V, 4 mm/V"),
-        ({"averaging": 64}, "averaging: 64 samples, 16 samples is wanted"),
-        ({"sampling_us": 200.0}, "sampling: 200 us, 20 us is wanted"),
+        ({"mm_per_V": 5.0}, "analog scaling: 5 mm/V, expected 4 mm/V"),
+        ({"mm_per_V": 4.002}, "analog scaling: 4.002 mm/V, expected 4 mm/V"),
+        ({"averaging": 64}, "averaging: 64 samples, expected 16 samples"),
+        ({"sampling_us": 200.0}, "sampling: 200 us, expected 20 us"),
     ],
 )
 def test_each_mismatch_is_one_sentence(change: dict[str, object], said: str) -> None:
@@ -258,15 +258,15 @@ def test_points_without_a_decimal_point_count_smallest_steps() -> None:
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"OC": b"SR,OC,01,1,2"}, "filter: low-pass filter, moving average is wanted"),
-        ({"OD": b"SR,OD,01,1"}, "calculation: peak hold, normal is wanted"),
+        ({"OC": b"SR,OC,01,1,2"}, "filter: low-pass filter, expected moving average"),
+        ({"OD": b"SR,OD,01,1"}, "calculation: peak hold, expected normal"),
         (
             {"OH": b"SR,OH,01,-040.000,+00.0000,+040.000,+10.0000"},
-            "analog scaling: 8 mm/V, 4 mm/V is wanted",
+            "analog scaling: 8 mm/V, expected 4 mm/V",
         ),
         (
             {"OH": b"SR,OH,01,-038.000,-10.0000,+042.000,+10.0000"},
-            "analog output at 0 V: reads 2 mm, 0 mm is wanted",
+            "analog output at 0 V: reads 2 mm, expected 0 mm",
         ),
     ],
 )

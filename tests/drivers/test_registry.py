@@ -130,7 +130,7 @@ def test_what_cannot_be_used_is_left_out_with_a_sentence(installed):
     assert set(found) == {"broken", "absent", "shapeless", "wrong", "daqmx", "camera"}
     assert "division by zero" in found["broken"]
     assert "No module named 'acme_absent'" in found["absent"]
-    assert "is no kind of rig: it needs addresses" in found["wrong"]
+    assert "is not a kind of rig: it needs addresses" in found["wrong"]
     assert "already taken" in found["daqmx"]
     assert "is no driver: it needs a role" in found["camera"]
 

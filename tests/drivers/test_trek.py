@@ -43,9 +43,7 @@ def test_a_voltage_that_should_not_be_there_is_told(monitors: Monitors, wrong: l
 
 def test_the_sentence_names_both_values() -> None:
     sentence = zero_findings(Monitors(500.0, 0.0), RIG)[0].sentence
-    assert (
-        "TREK 10/40A-HS, voltage monitor at 0 V: 0.500 kV, less than 0.1 kV is wanted" in sentence
-    )
+    assert "TREK 10/40A-HS, voltage monitor at 0 V: 0.500 kV, expected less than 0.1 kV" in sentence
 
 
 class TestTrek(AmplifierContract):

@@ -312,7 +312,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     ),
     "the output is the sequence": (
         "record {s}/lobe.toml --out {s}/lobe.toml --force",
-        ["lobe.toml is the file that is read"],
+        ["lobe.toml is the input file"],
     ),
     "a table for a recording": (
         "record thesis --out o.csv",
@@ -324,7 +324,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     ),
     "json over a recording": (
         "info {s}/run.h5 --json {s}/run.h5 --force",
-        ["the file that is read"],
+        ["the input file"],
     ),
     "json nowhere": ("validate {s}/actuator.toml {s}/run.h5 --json no/x.json", ["no folder no"]),
     "no rig file there": ("record thesis --out o.h5 --rig-file no.toml", ["rig file no.toml"]),
@@ -338,14 +338,14 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     "export of none": ("export no.h5 --to csv", ["no.h5 is not there"]),
     "export onto itself": (
         "export {s}/run.h5 --to csv --out {s}/run.h5 --force",
-        ["the file that is read"],
+        ["the input file"],
     ),
     "export onto another": ("export {s}/film.h5 --to csv", ["film.csv exists already"]),
     "recover of none": ("recover {s}/text.h5", ["is not an HDF5 file"]),
     # import
     "nothing to import": ("import no.csv --out o.h5", ["no.csv is not there"]),
     "an unknown format": ("import {s}/rig.toml --out o.h5", [".csv, .mat, .parquet and .tdms"]),
-    "import onto itself": ("import {s}/film.csv --out {s}/film.csv --force", ["that is read"]),
+    "import onto itself": ("import {s}/film.csv --out {s}/film.csv --force", ["the input file"]),
     "column nonsense": (
         "import {s}/film.csv --out o.h5 --column nonsense",
         ["--column nonsense is not of the form NAME=SOURCE", "voltage_kV=Voltage"],
@@ -370,7 +370,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     "the model exists": ("identify {s}/run.h5 --out {s}/film.toml", ["film.toml exists already"]),
     "the model is the recording": (
         "identify {s}/run.h5 --out {s}/run.h5 --force",
-        ["the file that is read"],
+        ["the input file"],
     ),
     "the same file twice": (
         "identify {s}/run.h5 {s}/run.h5 --out m.toml",
@@ -458,7 +458,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     "validated twice": ("validate {s}/actuator.toml {s}/run.h5 {s}/run.h5", ["is named twice"]),
     "a report over the model": (
         "validate {s}/actuator.toml {s}/run.h5 --report {s}/actuator.toml --force",
-        ["the file that is read"],
+        ["the input file"],
     ),
     # diagnose
     "nothing to diagnose": (
@@ -505,7 +505,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     ),
     "a model over a recording": (
         "diagnose {s}/run.h5 --model-out {s}/run.h5 --force",
-        ["the file that is read"],
+        ["the input file"],
     ),
     "one name for report and model": (
         "diagnose {s}/run.h5 --report o.x --model-out o.x",
@@ -515,7 +515,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     "an unknown ending": ("simulate {s}/actuator.toml --drive thesis --out o.txt", [".h5", ".csv"]),
     "simulated over its drive": (
         "simulate {s}/actuator.toml --drive {s}/run.h5 --out {s}/run.h5 --force",
-        ["the file that is read"],
+        ["the input file"],
     ),
     "a film under a voltage": (
         "simulate {s}/film.toml --drive thesis --out o.csv",
@@ -680,5 +680,5 @@ def test_a_folder_that_may_not_be_written_is_told_before_any_work(
 @pytest.mark.skipif(not Path("/dev/null").exists(), reason="there is no such device here")
 def test_a_device_is_not_replaced_by_a_file(shelf: Path, bench: Path) -> None:
     answer = dearig("identify", shelf / "run.h5", "--out", "/dev/null", "--force")
-    refused(answer, "/dev/null is no ordinary file")
+    refused(answer, "/dev/null is not a regular file")
     assert not Path("/dev/null").is_file()

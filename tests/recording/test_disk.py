@@ -70,9 +70,11 @@ def test_a_disk_that_fills_up_ends_the_run_with_all_that_came(
         recorder.append(Block(1000 * i, counts[:, 1000 * i : 1000 * i + 1000]))
     room(monkeypatch, 1e6)
     clock.moment += 1.0
-    with pytest.raises(DiskFault, match=r"No space left .* make room.* the 3000 samples until"):
+    with pytest.raises(
+        DiskFault, match=r"No space left .* free some space.* the 3000 samples until"
+    ):
         recorder.append(Block(3000, counts[:, 3000:]))
-    with pytest.raises(DiskFault, match="the 3000 samples until then are safe there"):
+    with pytest.raises(DiskFault, match="the 3000 samples until then are in the file"):
         recorder.close("ended early")
     assert recorder.closed
     run = open_recording(path)
@@ -181,7 +183,7 @@ def test_a_full_disk_at_the_end_changes_nothing(
             yield patched
 
     monkeypatch.setattr("dearig.recording.finish.changed_in_place", changed)
-    with pytest.raises(DiskFault, match="No space left on device; the run itself is safe there"):
+    with pytest.raises(DiskFault, match="No space left on device; the whole run is in the file"):
         recorder.close()
     assert path.read_bytes() == before[0]
     assert not journal_of(path).exists()
@@ -256,7 +258,9 @@ def test_the_old_recording_stays_until_the_new_one_has_samples(tmp_path: Path) -
     clock = Clock()
     recorder = writer(path, overwrite=True, now=clock)
     assert old.read_bytes() == before
-    with pytest.raises(InputError, match=r"no samples: .* it was to replace is .*run\.h5\.old"):
+    with pytest.raises(
+        InputError, match=r"no samples: .* it would have replaced is .*run\.h5\.old"
+    ):
         open_recording(path)
     recorder.append(Block(0, run_counts(100)))
     assert old.exists()
@@ -271,7 +275,7 @@ def test_the_old_recording_stays_until_the_new_one_has_samples(tmp_path: Path) -
     assert path.read_bytes() == before
     assert not old.exists()
     old.write_bytes(b"precious")
-    with pytest.raises(InputError, match=r"run\.h5\.old is there already, left by a run"):
+    with pytest.raises(InputError, match=r"run\.h5\.old exists already, left by a run"):
         writer(path, overwrite=True)
     assert (path.read_bytes(), old.read_bytes()) == (before, b"precious")
 
@@ -304,10 +308,13 @@ def test_a_name_that_is_too_long(tmp_path: Path, length: int) -> None:
     ("error", "match"),
     [
         (OSError(28, ""), "the disk is full"),
-        (OSError(30, ""), "may only be read"),
-        (RuntimeError("unable to extend file properly, errno = 27, error m"), "no file as large"),
+        (OSError(30, ""), "is read-only"),
+        (
+            RuntimeError("unable to extend file properly, errno = 27, error m"),
+            "no file of this size",
+        ),
         (OSError(5, ""), "fails, or was removed"),
-        (RuntimeError("cannot flush"), "see that the disk has room"),
+        (RuntimeError("cannot flush"), "check that the disk has space"),
     ],
 )
 def test_what_to_do(error: Exception, match: str) -> None:

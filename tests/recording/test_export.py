@@ -200,7 +200,7 @@ def test_a_description_of_uneven_film_data(tmp_path: Path) -> None:
 def test_a_description_for_people(tmp_path: Path, run: Path) -> None:
     rows = dict(describe_rows(open_recording(run)))
     assert rows["recording"] == "run (actuator, two lobes)"
-    assert rows["ended"] == "finished"
+    assert rows["outcome"] == "finished"
     assert rows["samples"] == "3000 over 2.999 s"
     assert rows["rate"] == "1000 Hz"
     assert rows["noise floor"].endswith("um, over 1000 samples at 0 V")

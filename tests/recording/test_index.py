@@ -92,7 +92,7 @@ def test_folders_that_cannot_be_looked_at(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"nowhere is not there"):
         index_folder(tmp_path / "nowhere", cache=tmp_path / "c.json")
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match=r"file is no folder"):
+    with pytest.raises(InputError, match=r"file is not a folder"):
         index_folder(tmp_path / "file", cache=tmp_path / "c.json")
     assert lines(index_folder(tmp_path, cache=tmp_path / "c.json")) == ["no recordings"]
 

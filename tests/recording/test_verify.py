@@ -62,28 +62,37 @@ def row(where: str, at: int, column: str, number: float) -> Callable[[h5py.File]
             value("displacement_counts", 66_000, 7),
             r"counts of displacement are not those .*: samples 65536 to 69999 \(65\.536 to 70 s\)",
         ),
-        (value("displacement_counts", 3, 7), "displacement is not what its counts give"),
-        (value("voltage_monitor", 9, 4.5), "voltage_monitor is not what its counts give: 4.5 at s"),
-        (value("time", 10, 0.0101), "time is not what its counts give"),
+        (value("displacement_counts", 3, 7), "displacement does not agree with its counts"),
+        (
+            value("voltage_monitor", 9, 4.5),
+            "voltage_monitor does not agree with its counts: 4.5 at",
+        ),
+        (value("time", 10, 0.0101), "time does not agree with its counts"),
         (
             lambda f: f["entry/pyramid/bins_of_64"].__setitem__((5, 0, 0), -9),
-            "pyramid is not of these counts",
+            "pyramid does not agree with the counts",
         ),
         (lambda f: f["entry/pyramid/bins_of_64"].resize(3, axis=0), "pyramid has 3 bins of 64"),
         (lambda f: f["entry/checksums"].resize(1, axis=0), "the last 4464 samples have no checksu"),
         (attribute("entry", "samples", 69_000), "claims 69000 samples and holds 70000"),
-        (attribute("entry/data", "samples_expected", 80_000), "finished, with 70000 of 80000"),
+        (
+            attribute("entry/data", "samples_expected", 80_000),
+            "finished, but there are only 70000 of 80000",
+        ),
         (cut("voltage_monitor", 69_999), "voltage_monitor has 69999 counts, not 70000"),
         (
             attribute("entry/data/displacement_counts", "rest_reading", 0.1),
             "displacement is counted from 0.1 m",
         ),
-        (row("entry/events", 0, "sample", 70_001), "is at sample 70001, which is not there"),
+        (row("entry/events", 0, "sample", 70_001), "is at sample 70001, which does not exist"),
         (row("entry/events", 0, "time", 2.0), "is at 2 s, and its sample 510 at 0.51 s"),
-        (row("entry/wall_clock", 0, "sample", 70_001), "wall_clock notes samples that go back"),
+        (
+            row("entry/wall_clock", 0, "sample", 70_001),
+            "wall_clock has sample numbers that go back",
+        ),
         (
             attribute("entry/provenance", "configuration_sha256", fixed("0" * 64)),
-            "not the one of its SHA-256",
+            "does not have the SHA-256",
         ),
         (attribute("entry", "default", fixed("plot")), "names 'plot' as its default plot"),
         (attribute("entry/data", "signal", fixed("force")), "no plot of displacement over time"),
@@ -129,9 +138,9 @@ def test_what_a_killed_run_cannot_claim_is_noted(tmp_path: Path) -> None:
     found = verify(copy)
     assert found.faults == []
     assert found.notes == [
-        "the last 4464 samples have no checksum yet: the run was killed before",
-        "it was killed, or is being written; dearig recover mends it",
-        "the run did not come to its end: killed, or still running",
+        "the last 4464 samples have no checksum yet: the run was killed before it was written",
+        "it was killed, or is being written; dearig recover repairs it",
+        "the run is incomplete: killed, or still running",
         "fault at sample 70000 (70 s): amplifier tripped",
     ]
 

@@ -220,7 +220,7 @@ def test_what_is_refused_touches_nothing(tmp_path: Path) -> None:
     [
         (CHANNELS[:3], "a channel displacement"),
         (CHANNELS[1:], "a channel voltage_command"),
-        ((*CHANNELS, CHANNELS[0]), "one name"),
+        ((*CHANNELS, CHANNELS[0]), "the same name"),
         ((*CHANNELS, Channel("stretch", "1", Scaling((0.0, 1.0), 1.0))), "'stretch'"),
         ((Channel("humidity", "%", Scaling((0.0, 1.0), 1.0)), *CHANNELS), "then others"),
         ((CHANNELS[1], CHANNELS[0], *CHANNELS[2:]), "channels come as voltage_command"),
@@ -242,7 +242,7 @@ def test_channels_it_cannot_record(
 def test_lost_samples_are_a_fault(tmp_path: Path) -> None:
     recorder = make(tmp_path / "run.h5")
     recorder.append(Block(0, run_counts(100)))
-    with pytest.raises(InstrumentFault, match="sample 150 where sample 100 was due: 50 samples ar"):
+    with pytest.raises(InstrumentFault, match="sample 150, expected sample 100: 50 samples are"):
         recorder.append(Block(150, run_counts(100)))
     with pytest.raises(InstrumentFault, match="60 samples came twice"):
         recorder.append(Block(40, run_counts(100)))
@@ -290,7 +290,7 @@ def test_a_full_disk_at_the_end_leaves_the_counts(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("dearig.recording.finish._write_physical", full)
-    with pytest.raises(DearigError, match=r"No space left.*safe there, in counts"):
+    with pytest.raises(DearigError, match=r"No space left.*in the file, as counts"):
         recorder.close()
     assert [p.name for p in tmp_path.iterdir()] == ["run.h5"]
     run = open_recording(path)

@@ -110,9 +110,7 @@ def test_a_row_with_another_scale_is_a_fault(tmp_path: Path) -> None:
     with h5py.File(path, "r+") as file:
         data = file["entry/data"]
         data["voltage_monitor"].dims[0].detach_scale(data["time"])
-    assert verify(path).faults == [
-        "/entry/data/voltage_monitor has not time as its dimension scale"
-    ]
+    assert verify(path).faults == ["the dimension scale of /entry/data/voltage_monitor is not time"]
 
 
 def test_to_xarray_has_units_and_what_was_recorded(tmp_path: Path) -> None:

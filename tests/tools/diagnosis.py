@@ -176,7 +176,7 @@ def diagnose_outcome(**changes) -> DiagnoseOutcome:
         stands=_stands((train,), others),
         noise=NOISE,
         experiment=EXPERIMENT,
-        experiment_words="Of 14 excitations within the rig's limits, 'fast lobes' separates best",
+        experiment_words="'fast lobes' separates best among 14 excitations within the rig's limits",
         quality=("train.h5: the sensor is clipped at 0.7 mm from sample 400 (4 s) on",),
         model_path="out/model.toml",
         seconds=12.3,

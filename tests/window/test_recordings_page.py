@@ -91,7 +91,7 @@ def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
         assert float(number) == pytest.approx(1.0, abs=0.2)  # the simulated noise
     assert set(cells(page, "State").values()) == {"✓ finished"}
     qtbot.waitUntil(lambda: len(page.plot.shown) == 1, timeout=_PATIENCE)
-    assert rows(page.details)["ended"] == ["finished"]
+    assert rows(page.details)["outcome"] == ["finished"]
 
     # words find a recording
     qtbot.keyClicks(page.filter, "grace film")

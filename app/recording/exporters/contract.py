@@ -16,7 +16,7 @@ from dearig.recording.reader import open_recording
 
 __all__ = ["check_exporter"]
 
-#: What an import does not bring back: it is not measured.
+#: Columns that an import does not read, because they are not measured.
 _NOT_IMPORTED = ("displacement_model",)
 
 
@@ -32,7 +32,7 @@ def check_exporter(
     before = recording.read_bytes()
     out = export_recording(recording, name, folder / f"exported.{name}")
     if [path.name for path in folder.iterdir()] != [out.name]:
-        raise ContractError(f"{name}: it writes other files than the one that it is asked for")
+        raise ContractError(f"{name}: it writes other files than the one asked for")
     if not out.stat().st_size:
         raise ContractError(f"{name}: it writes nothing")
     if recording.read_bytes() != before:
@@ -50,7 +50,7 @@ def check_exporter(
             continue
         if column not in imported:
             raise ContractError(f"{name}: the column {column} does not come back")
-        # an import counts the displacement from its rest again, which is 0 but for rounding
+        # an import subtracts the rest from the displacement again, which is 0 within rounding
         atol = 1e-15 if column.startswith("displacement") else 0.0
         if not np.allclose(values[column], imported[column], rtol=0.0, atol=atol):
             raise ContractError(f"{name}: the column {column} comes back with other values")

@@ -1,4 +1,4 @@
-"""What every export holds: columns by name with unit, and what the recording says of itself."""
+"""Content of every export: columns by name with unit, and metadata of the recording."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dearig.recording.recording import Recording
 
 __all__ = ["Exporter", "columns_of", "description_of", "units_of"]
 
-#: Names of the exported columns, in the recording's own units so that not a bit is lost.
+#: Names of the exported columns; units are those of the recording, so that no bit is lost.
 COLUMNS = MappingProxyType(
     {
         "time": "time_s",
@@ -59,12 +59,12 @@ def units_of(recording: Recording) -> dict[str, str]:
 
 
 def _column(recording: Recording, name: str) -> str:
-    """Return the name of the exported column; a declared channel's is made like the others."""
+    """Return the name of the exported column; for a declared channel, name and unit."""
     return COLUMNS.get(name) or f"{name}_{re.sub(r'[^A-Za-z0-9]+', '_', recording.unit(name))}"
 
 
 def description_of(recording: Recording) -> dict[str, str]:
-    """Return what an import reads back of the recording beside its values, as texts by name."""
+    """Return the metadata that an import reads back, as texts by name."""
     return {
         "format": FORMAT,
         "name": recording.name,

@@ -1,4 +1,4 @@
-"""The columns of a file that hold each quantity, and the values that a recording gets from them."""
+"""Choice of the column for each quantity, and the values of a recording from them."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Chosen:
                 self.picked[quantity] = (name, column, names[name])
 
     def kind(self, warnings: list[str]) -> str:
-        """Whether these are data of an actuator or of a film."""
+        """Return the kind of the data: ``actuator`` or ``film``."""
         there = self.picked.keys()
         film = [q for q in ("stretch", "nominal_stress") if q in there]
         if "voltage" in there and film:
@@ -93,7 +93,7 @@ class Chosen:
         )
 
     def actuator(self) -> dict[str, np.ndarray]:
-        """Values of a recording of kind actuator."""
+        """Return the values of a recording of kind actuator."""
         for quantity in ("time", "displacement"):
             self._need(quantity)
         found = self._read(["time", "voltage", "displacement", *OPTIONAL])
@@ -106,7 +106,7 @@ class Chosen:
     def film(
         self, gauge_length_mm: float | None, area_mm2: float | None, warnings: list[str]
     ) -> dict[str, np.ndarray]:
-        """Values of a recording of kind film."""
+        """Return the values of a recording of kind film."""
         self._need("time")
         path = self.source.path
         there = self.picked.keys()
@@ -151,7 +151,7 @@ class Chosen:
         return found
 
     def left_out(self) -> list[str]:
-        """A sentence for each optional column whose unit is not known, and which was not read."""
+        """Return a sentence for each optional column that was not read for its unknown unit."""
         hints = [misnamed(q, self.source.names) for q in OPTIONAL if q not in self.picked]
         return [f"{hint}; it was not imported" for hint in hints if hint]
 
@@ -169,7 +169,7 @@ class Chosen:
         )
 
     def _read(self, quantities: list[str]) -> dict[str, np.ndarray]:
-        """Checked values of those ``quantities`` that are there, in the recording's units."""
+        """Return the checked values of ``quantities`` that exist, in the recording's units."""
         path, row = self.source.path, self.source.row
         picked = {q: self.picked[q] for q in quantities if q in self.picked}
         raw = self.source.read([column for _, column, _ in picked.values()])
@@ -185,7 +185,7 @@ class Chosen:
                 at = int(np.argmin(finite))
                 raise InputError(
                     f"{path}, {row(at)}, column {column!r}: {values[at]} is not a finite number; "
-                    f"leave the row out or mend it"
+                    f"leave the row out or correct it"
                 )
             found[quantity] = values * times / over
         seconds, name = found["time"], picked["time"][1]
@@ -195,6 +195,6 @@ class Chosen:
             at, how = back
             raise InputError(
                 f"{path}, {row(at)}, column {name!r}: time {how}, from {seconds[at - 1]:.9g} s to "
-                f"{seconds[at]:.9g} s; leave out or mend the rows that do not follow"
+                f"{seconds[at]:.9g} s; leave the rows out or correct them"
             )
         return found

@@ -1,4 +1,4 @@
-"""Columns by name with unit: ``voltage_kV`` is a voltage, and a thousand volts to the one."""
+"""Column names with units: ``voltage_kV`` is a voltage in kV."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from types import MappingProxyType
 
 __all__ = ["QUANTITIES", "TARGETS", "Scale", "misnamed", "names_of", "suggestion"]
 
-#: Multiplied by the first, divided by the second: 5 mm is 0.005 m to the last bit that way.
+#: Factor and divisor; dividing makes 5 mm exactly 0.005 m, to the last bit.
 Scale = tuple[float, float]
 
-#: Names that a column may have, by what it holds, with the scale to the unit of the recording.
+#: Names that a column may have, by quantity, with the scale to the unit of the recording.
 QUANTITIES: MappingProxyType[str, dict[str, Scale]] = MappingProxyType(
     {
         "time": {"time_s": (1.0, 1.0)},
@@ -40,28 +40,28 @@ TARGETS = MappingProxyType({name: q for q, names in QUANTITIES.items() for name 
 
 
 def names_of(quantity: str) -> str:
-    """The names a column of ``quantity`` may have, in words."""
+    """Return the names that a column of ``quantity`` may have, for a message."""
     return " or ".join(QUANTITIES[quantity])
 
 
 def misnamed(quantity: str, names: Iterable[str]) -> str:
-    """A hint about one of ``names`` that seems to be ``quantity`` in another unit; "" if none is.
+    """Return a hint about one of ``names`` that seems to be ``quantity`` in another unit, or "".
 
-    ``voltage_mV`` gives "'voltage_mV' is no name for it: voltage may be in V or kV".
+    For ``voltage_mV`` it is "'voltage_mV' is not a known name: voltage may be in V or kV".
     """
     known = QUANTITIES[quantity]
     units = " or ".join(name.removeprefix(f"{quantity}_") for name in known)
     what = "has no unit" if quantity in known else f"may be in {units}"
     for name in names:
-        # a unit is short: voltage_monitor is not a voltage in monitors
+        # units are short: the rest of voltage_monitor is not one
         match = re.fullmatch(rf"{quantity}\s*[_(\[/ ]\s*[^\W\d_]{{1,4}}[)\]]?", name, re.IGNORECASE)
         if match and name.lower() not in {k.lower() for k in known}:
-            return f"{name!r} is no name for it: {quantity} {what}"
+            return f"{name!r} is not a known name: {quantity} {what}"
     return ""
 
 
 def suggestion(wanted: Iterable[str], there: Iterable[str]) -> str:
-    """``; did you mean 'x'?`` for the name ``there`` that is nearest to one ``wanted``, or ""."""
+    """Return ``; did you mean 'x'?`` for the name ``there`` nearest to one ``wanted``, or ""."""
     listed = list(there)
     lowered = {name.lower(): name for name in reversed(listed)}
     for name in wanted:

@@ -24,7 +24,7 @@ from dearig.recording.importers.source import no_such_column
 __all__ = ["IMPORTER", "CsvFile"]
 
 DELIMITERS = (";", "\t", ",")
-#: A line without data: blank, or a comment. It begins with a plain character, so that it is fast.
+#: A line without data: blank, or a comment. A plain first character makes the search fast.
 NO_DATA = re.compile(r"\n[^\S\n]*[#\n]")
 #: A cell is quoted in messages up to this length.
 SHOWN = 30
@@ -69,11 +69,11 @@ class CsvFile:
             raise InputError(f"{self.path}, line {number}: it cannot be split: {error}") from error
 
     def named(self, name: str) -> list[str]:
-        """The columns called ``name``."""
+        """Return the columns called ``name``."""
         return [n for n in self.names if n == name]
 
     def row(self, index: int) -> str:
-        """The line of sample ``index``."""
+        """Return the line of sample ``index``."""
         return f"line {self._numbers[index + 1]}"
 
     def check(self, name: str) -> None:
@@ -85,24 +85,24 @@ class CsvFile:
             raise InputError(f"{self.path}: {count} columns are called {name!r}; rename one")
 
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
-        """Columns by name; see ``Source``."""
+        """Return columns by name; see ``Source``."""
         wanted = list(dict.fromkeys(names))
         columns = self._read_fast(wanted)
         return columns if columns is not None else self._read_slowly(wanted)
 
     def _read_fast(self, names: list[str]) -> dict[str, np.ndarray] | None:
-        """Return the columns as NumPy parses them; None if they need a closer look."""
+        """Return the columns as NumPy parses them; None if the slow reader is needed."""
         lines, places = self._lines, [self.names.index(name) for name in names]
         if set(places) == set(range(len(self.names))):
             wanted = None
         else:
             wanted = places
-            # NumPy skips what it is not asked for, so a row of another length would go unnoticed
+            # NumPy skips the other columns, so it would not notice a row of another length
             separators = {len(self.names) - 1}
             if set(map(str.count, lines, repeat(self._delimiter))) != separators:
                 return None
         if self._delimiter != "," and any("," in line for line in lines):
-            # decimal commas; where there are points too, both need a closer look
+            # decimal commas; where there are points too, the slow reader decides
             if any("." in line for line in lines):
                 return None
             lines = [line.replace(",", ".") for line in lines]
@@ -172,7 +172,7 @@ def _complaint(cell: str, decimal_comma: bool) -> str:
         return "there is no value; fill it in or leave the line out"
     shown = text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
     if _number(cell, decimal_comma) is not None:
-        return f"{shown!r} is not a finite number; leave the line out or mend it"
+        return f"{shown!r} is not a finite number; leave the line out or correct it"
     if decimal_comma and "," in text and "." in text:
         return f"{shown!r} has both a comma and a point; write numbers without thousands separators"
     return f"{shown!r} is not a number"
@@ -182,7 +182,7 @@ def _decoded(path: Path) -> str:
     try:
         if path.exists() and not (path.is_file() or path.is_dir()):
             # a device may have no end
-            raise InputError(f"{path} cannot be read: it is no ordinary file")
+            raise InputError(f"{path} cannot be read: it is not a regular file")
         raw = path.read_bytes()
     except (OSError, ValueError) as error:  # a name with a zero byte is a ValueError
         raise InputError(f"{path} cannot be read: {in_words(error)}") from error
@@ -190,13 +190,15 @@ def _decoded(path: Path) -> str:
         try:
             return raw.decode("utf-16")
         except UnicodeDecodeError as error:
-            raise InputError(f"{path} begins as UTF-16 text and is not: {error}") from error
+            raise InputError(
+                f"{path} begins as UTF-16 text but is not valid UTF-16: {error}"
+            ) from error
     if b"\0" in raw:
         raise InputError(f"{path} is not a text file; CSV, MAT and TDMS files can be imported")
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError:
-        # numbers are ASCII in any case; only a column name may look odd
+        # numbers are ASCII in any case; only a column name may be decoded wrongly
         return raw.decode("latin-1")
 
 

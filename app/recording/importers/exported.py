@@ -18,7 +18,7 @@ T = TypeVar("T", Film, Load)
 
 @dataclass(frozen=True)
 class Exported:
-    """As in a ``Recording``; what was not said, or makes no sense any more, is absent."""
+    """Fields as in a ``Recording``; missing or invalid ones have their defaults."""
 
     hold: bool = False
     kinematics: str | None = None

@@ -1,4 +1,4 @@
-"""An importer: what a file format of measured data has to bring."""
+"""An importer: the interface of a file format of measured data."""
 
 from __future__ import annotations
 

@@ -39,16 +39,17 @@ def import_file(
     """Import the CSV, MAT, Parquet or TDMS file ``source`` as the recording ``out``.
 
     ``columns`` maps names such as ``voltage_kV`` to what the file calls them: a CSV column, a MAT
-    path (``data.xdata[0]``), a TDMS ``group/channel``; columns that have such a name already need
-    no mention. Film data with a displacement take ``gauge_length_mm``, with a force ``area_mm2``,
-    and are uniaxial unless ``kinematics`` says otherwise. Time is kept as it is, even or not.
+    path (``data.xdata[0]``), a TDMS ``group/channel``; columns that already have such a name
+    may be left out. Film data with a displacement take ``gauge_length_mm``, those with a force
+    ``area_mm2``; they are uniaxial unless ``kinematics`` says otherwise. Time is kept as it is,
+    even or not.
     Displacement of an actuator is counted from the mean of its lead-in at 0 V, if it has one. A
-    recording that was exported to MAT or Parquet comes back with what it said of itself there:
-    film, load, kinematics, sequence, and how its voltage was held. What ``metadata`` gives comes
-    before that; its title is the file's name by default.
+    recording that was exported to MAT or Parquet keeps the metadata of that file: film, load,
+    kinematics, sequence, and how its voltage was held. ``metadata`` has precedence; its title is
+    the file's name by default.
 
-    Returns sentences about values that are possible and look wrong. Raises ``InputError``, with
-    nothing written, for everything that cannot be a recording.
+    Returns warnings about values that are possible but look wrong. Raises ``InputError``, with
+    nothing written, for data that cannot be a recording.
     """
     path = Path(source)
     out = check_output(out, overwrite, path)

@@ -1,8 +1,9 @@
-"""The variables of a MAT file of version 5, read so that no damage can do more than be told.
+"""Reader of the variables of a MAT file of version 5, safe on damaged files.
 
 Written from "MAT-File Format" (The MathWorks): a header of 128 bytes, then elements of kind, size
-and body; each variable is an element that may be packed (zlib). Every size is held against what
-there is before it is used. Numbers, structs and cells are read; what else there is, is passed over.
+and body; each variable is an element that may be packed (zlib). Every size is checked against
+the bytes that exist before it is used. Numbers, text, structs and cells are read; other values are
+skipped.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 
 __all__ = ["Damaged", "Value", "columns", "variables"]
 
-#: A number, a table of them, text, a struct by its fields, or None for anything else.
+#: An array of numbers, text, the fields of a struct, or None for anything else.
 Value = np.ndarray | str | dict[str, "Value"] | None
 
 HEADER = 128
@@ -30,20 +31,20 @@ CELL, STRUCT, OBJECT, CHAR = 1, 2, 3, 4
 #: Classes of arrays of numbers.
 NUMERIC = range(6, 16)
 COMPLEX = 0x08
-#: Structs in structs are followed to this depth.
+#: Depth to which structs in structs are read.
 DEEPEST = 8
-#: Bytes that are unpacked at most, beside so many times the file's own size.
+#: Bytes that are unpacked at most: the first plus the second times the size of the file.
 UNPACKED_MAX, PACKED_MAX = 2**28, 100
-#: More fields, cells or columns than this no table of measurements has, nor more items in all.
+#: Largest number of fields, cells or columns, and of items in all; measurements have fewer.
 FIELDS_MAX, ITEMS_MAX = 4096, 200_000
 
 
 class Damaged(Exception):  # noqa: N818  (what happened to the file, said by the importer)
-    """Why the file cannot be read: a sentence's end."""
+    """A file that cannot be read; the text is the end of a sentence that begins with its path."""
 
 
 class _Bytes:
-    """Elements one after another in ``raw``, in the byte order ``order``."""
+    """Reader of consecutive elements in ``raw``, in the byte order ``order``."""
 
     def __init__(self, raw: memoryview, order: str, where: str, count: Iterator[int]) -> None:
         self.raw = raw
@@ -53,18 +54,18 @@ class _Bytes:
         self.at = 0
 
     def inside(self, body: memoryview) -> _Bytes:
-        """The elements in the ``body`` of one of these."""
+        """Return a reader of the elements in the ``body`` of an element."""
         return _Bytes(body, self.order, self.where, self.count)
 
     def element(self) -> tuple[int, memoryview]:
-        """Kind and body of the next element."""
+        """Return kind and body of the next element."""
         if next(self.count) > ITEMS_MAX:
             raise Damaged(f"is not read: it has more than {ITEMS_MAX} items")
         if len(self.raw) < self.at + 8:
             raise Damaged(f"is truncated in the variable {self.where}")
         first, size = struct.unpack_from(f"{self.order}2I", self.raw, self.at)
         if first >> 16:
-            # up to four bytes stand in the tag itself
+            # up to four bytes are in the tag itself
             kind, size, start, step = first & 0xFFFF, first >> 16, self.at + 4, 8
             if size > 4:
                 raise Damaged(f"is damaged in the variable {self.where}: a short item of {size}")
@@ -73,12 +74,12 @@ class _Bytes:
             step = 8 + size if kind == COMPRESSED else 8 + -(-size // 8) * 8
         body = self.raw[start : start + size]
         if len(body) < size:
-            raise Damaged(f"is truncated: the variable {self.where} has no end")
+            raise Damaged(f"is truncated: the variable {self.where} is incomplete")
         self.at += step
         return kind, body
 
     def numbers(self, kind: int, body: memoryview) -> np.ndarray:
-        """The numbers in an element's ``body``."""
+        """Return the numbers in an element's ``body``."""
         if kind not in NUMBERS:
             raise Damaged(f"is damaged in the variable {self.where}: numbers of kind {kind}")
         dtype = np.dtype(self.order + NUMBERS[kind])
@@ -91,13 +92,13 @@ class _Bytes:
 
 
 def variables(raw: bytes) -> dict[str, Value]:
-    """The variables in the file of which ``raw`` is all; of equal names the last one counts.
+    """Return the variables of the file with the content ``raw``; the last of equal names counts.
 
-    Raises ``Damaged`` for a file that is of another version, cut short, or not in order.
+    Raises ``Damaged`` for a file of another version, and for one that is cut short or damaged.
     """
     order = {b"IM": "<", b"MI": ">"}.get(raw[126:HEADER])
     if order is None:
-        raise Damaged("cannot be read as a MAT file: it does not begin as one")
+        raise Damaged("cannot be read as a MAT file: it does not begin with the header of one")
     version = struct.unpack_from(f"{order}H", raw, 124)[0]
     if version == VERSION_7_3:
         raise Damaged(
@@ -116,7 +117,7 @@ def variables(raw: bytes) -> dict[str, Value]:
             room -= len(unpacked)
             kind, body = top.inside(memoryview(unpacked)).element()
         if kind != MATRIX:
-            raise Damaged(f"is damaged: at byte {HEADER + top.at} there is no variable")
+            raise Damaged(f"is damaged: there is no variable at byte {HEADER + top.at}")
         name, value = _matrix(top.inside(body), 0)
         if not name.startswith("__"):
             found[name] = value
@@ -127,19 +128,19 @@ def _unpacked(body: memoryview, room: int, where: str) -> bytes:
     unpacking = zlib.decompressobj()
     try:
         unpacked = unpacking.decompress(body, max(room, 1))
-        # the checksum stands at the end
+        # only the end of the stream checks its checksum
         whole = unpacking.eof or not unpacking.decompress(unpacking.unconsumed_tail, 1)
     except zlib.error as error:
         raise Damaged(f"is damaged: the variable {where}: {error}") from error
     if not whole:
         raise Damaged(f"is not read: the variable {where} unpacks to more than {room} bytes")
     if not unpacking.eof:
-        raise Damaged(f"is truncated: the variable {where} has no end")
+        raise Damaged(f"is truncated: the variable {where} is incomplete")
     return unpacked
 
 
 def _matrix(items: _Bytes, depth: int) -> tuple[str, Value]:
-    """Name and value of an array, whose items are in ``items``."""
+    """Return name and value of the array whose items are in ``items``."""
     kind, body = items.element()
     flags = items.numbers(kind, body)
     if flags.dtype.kind != "u" or flags.dtype.itemsize != 4 or flags.size < 1:
@@ -180,8 +181,8 @@ def _few(size: int, items: _Bytes) -> range:
 def _next(items: _Bytes, depth: int) -> Value:
     kind, body = items.element()
     if kind != MATRIX:
-        raise Damaged(f"is damaged in the variable {items.where}: an item is no array")
-    # an item without anything in it is an empty array
+        raise Damaged(f"is damaged in the variable {items.where}: an item is not an array")
+    # an item without a body is an empty array
     return _matrix(items.inside(body), depth + 1)[1] if len(body) else None
 
 
@@ -199,7 +200,7 @@ def _table(items: _Bytes, shape: list[int], size: int, complex_: bool) -> np.nda
     values = items.numbers(*items.element())
     if values.size != size:
         raise Damaged(
-            f"is damaged in the variable {items.where}: {values.size} numbers in place of {size}"
+            f"is damaged in the variable {items.where}: {values.size} numbers, expected {size}"
         )
     return None if complex_ else values.reshape(shape, order="F")
 
@@ -218,7 +219,7 @@ def _text(items: _Bytes, shape: list[int], size: int) -> str | None:
 
 
 def columns(name: str, value: Value) -> Iterator[tuple[str, np.ndarray]]:
-    """Path and numbers (n,) float64 of every column in ``value``, which is called ``name``."""
+    """Yield path and numbers (n,) float64 of every column in ``value``, called ``name``."""
     if isinstance(value, dict):
         for field, inner in value.items():
             yield from columns(f"{name}.{field}", inner)

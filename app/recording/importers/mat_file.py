@@ -47,11 +47,11 @@ class MatFile:
         return list(self._columns)
 
     def named(self, name: str) -> list[str]:
-        """The columns whose path is ``name`` or ends with ``.name``."""
+        """Return the columns whose path is ``name`` or ends with ``.name``."""
         return [n for n in self._columns if n == name or n.endswith(f".{name}")]
 
     def row(self, index: int) -> str:
-        """The row of sample ``index``, counted from 1 as MATLAB does."""
+        """Return the row of sample ``index``, counted from 1 as in MATLAB."""
         return f"row {index + 1}"
 
     def check(self, name: str) -> None:
@@ -61,12 +61,13 @@ class MatFile:
         inside = [n for n in self._columns if re.match(re.escape(name) + r"[.\[]", n)]
         if inside:
             raise InputError(
-                f"{self.path}: {name!r} holds several columns; say which: {', '.join(inside[:6])}"
+                f"{self.path}: {name!r} holds several columns; give one of them: "
+                f"{', '.join(inside[:6])}"
             )
         raise no_such_column(self, name)
 
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
-        """Columns by name; see ``Source``."""
+        """Return columns by name; see ``Source``."""
         return {name: self._columns[name] for name in names}
 
 

@@ -1,4 +1,4 @@
-"""Columns of a Parquet file: of numbers, without gaps."""
+"""Columns of numbers in a Parquet file, without gaps."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from dearig.recording.importers.source import PARSER_FAILURES, no_such_column
 
 __all__ = ["IMPORTER", "ParquetFile"]
 
-#: Bytes that are unpacked at most, beside so many times the file's own size.
+#: Bytes that are unpacked at most: the first plus the second times the size of the file.
 UNPACKED_MAX, PACKED_MAX = 2**28, 100
 
 
 class ParquetFile:
-    """The Parquet file at ``path``. Raises ``InputError`` if it is none or has no numbers."""
+    """The Parquet file at ``path``. Raises ``InputError`` if it is not one or has no numbers."""
 
     def __init__(self, path: Path) -> None:
         pyarrow, parquet = _library()
@@ -51,11 +51,11 @@ class ParquetFile:
         return InputError(f"{self.path} cannot be read as a Parquet file: {one_line(error)}")
 
     def named(self, name: str) -> list[str]:
-        """The columns called ``name``."""
+        """Return the columns called ``name``."""
         return [n for n in self.names if n == name]
 
     def row(self, index: int) -> str:
-        """The row, counted from 1."""
+        """Return the row of sample ``index``, counted from 1."""
         return f"row {index + 1}"
 
     def check(self, name: str) -> None:
@@ -67,7 +67,7 @@ class ParquetFile:
             raise InputError(f"{self.path}: {count} columns are called {name!r}; rename one")
 
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
-        """Columns by name; see ``Source``."""
+        """Return columns by name; see ``Source``."""
         pyarrow, parquet = _library()
 
         wanted = list(dict.fromkeys(names))

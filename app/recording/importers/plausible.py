@@ -10,7 +10,7 @@ from dearig.model.specimen import Film
 
 __all__ = ["doubts"]
 
-#: A free length that no actuator film on a bench exceeds, m; used where the film is not known.
+#: Largest free length of an actuator film on a bench, m; used where the film is not known.
 LONGEST_FILM = 0.5
 
 

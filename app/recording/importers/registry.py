@@ -57,7 +57,7 @@ def source_at(path: Path) -> Source:
     candidates = named or list(IMPORTERS.values())
     chosen = next((importer for importer in candidates if importer.sniff(head)), None)
     if chosen is None and named:
-        chosen = named[0]  # it says in its own words what is wrong
+        chosen = named[0]  # its error says what is wrong with the file
     if chosen is None:
         *most, last = (importer.suffixes[0] for importer in IMPORTERS.values())
         raise InputError(

@@ -64,14 +64,14 @@ class Source(Protocol):
         ...
 
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
-        """Columns (n,) float64, by names that have been checked.
+        """Return columns (n,) float64 by names that have been checked.
 
         Raises ``InputError`` for text or gaps among the numbers.
         """
         ...
 
     def row(self, index: int) -> str:
-        """Return the place of sample ``index`` (from 0) in the file, in words."""
+        """Return the place of sample ``index`` (from 0) in the file, for a message."""
         ...
 
 

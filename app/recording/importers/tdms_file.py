@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 __all__ = ["IMPORTER", "TdmsChannels"]
 
 
-#: Every segment begins with this, its contents, a version, and the sizes of all and of the head.
+#: Start of every segment: tag, contents, version, size of the segment, size of its metadata.
 LEAD_IN = struct.Struct("<4sIIQQ")
-#: The size of a segment whose writing was never ended.
+#: Size that marks a segment whose writing was not completed.
 NOT_ENDED = 2**64 - 1
 
 
@@ -32,7 +32,7 @@ class TdmsChannels:
     """The TDMS file at ``path``. Raises ``InputError`` if it cannot be read or holds no numbers.
 
     Where no channel is called ``time_s``, one is made from the waveform timing of the channels, if
-    they have it and it is the same for all.
+    it exists and is the same for all.
     """
 
     def __init__(self, path: Path) -> None:
@@ -51,11 +51,11 @@ class TdmsChannels:
         return list(self._columns)
 
     def named(self, name: str) -> list[str]:
-        """The channels called ``name``, in whichever group."""
+        """Return the channels called ``name``, in any group."""
         return [n for n in self._columns if n == name or n.endswith(f"/{name}")]
 
     def row(self, index: int) -> str:
-        """The sample, counted from 1."""
+        """Return the row of sample ``index``, counted from 1."""
         return f"row {index + 1}"
 
     def check(self, name: str) -> None:
@@ -64,23 +64,23 @@ class TdmsChannels:
             raise no_such_column(self, name)
 
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
-        """Columns by name; see ``Source``."""
+        """Return columns by name; see ``Source``."""
         return {name: self._columns[name] for name in names}
 
 
 def _check_whole(path: Path, stream: BinaryIO) -> None:
-    """Raise ``InputError`` unless every segment has its end: the library reads what there is."""
+    """Raise ``InputError`` unless every segment is complete: the library accepts a cut file."""
     end, at = path.stat().st_size, 0
     while at < end:
         stream.seek(at)
         lead_in = stream.read(LEAD_IN.size)
         if len(lead_in) < LEAD_IN.size or lead_in[:4] != b"TDSm":
-            break  # the library has words for this
+            break  # the library reports this
         size = LEAD_IN.unpack(lead_in)[3]
         if size == NOT_ENDED or at + LEAD_IN.size + size > end:
             raise InputError(
-                f"{path} is truncated: its segment at byte {at} has no end; copy it again, or "
-                f"save it anew with the program that made it"
+                f"{path} is truncated: its segment at byte {at} is incomplete; copy it again, or "
+                f"save it again with the program that made it"
             )
         at += LEAD_IN.size + size
 
@@ -99,7 +99,7 @@ def _load(path: Path) -> tuple[dict[str, np.ndarray], set[tuple[float, float, in
     from nptdms import TdmsFile
     from nptdms.log import log_manager
 
-    # its complaints are part of the error, not of the terminal
+    # its messages go into the error, not to the terminal
     log_manager.set_level(logging.ERROR)
     columns: dict[str, np.ndarray] = {}
     timing: set[tuple[float, float, int]] = set()
