@@ -46,7 +46,7 @@ def kind_of(address: str) -> RigKind:
 
 
 def is_simulated(address: str) -> bool:
-    """Return whether no instrument is touched at ``address``; False where there is no such rig."""
+    """Return True if the rig at ``address`` is simulated; False where there is no such rig."""
     kind = RIGS.get(address.partition(":")[0])
     return kind is not None and kind.simulated
 

@@ -111,7 +111,7 @@ def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) ->
 
     Only the ``options`` for a simulated rig are used. Raises ``InputError`` for an address that
     names no rig and for options that it does not take, ``InstrumentFault`` where the instruments
-    are not there.
+    are missing.
     """
     kind = kind_of(address)
     if options.actuator is not None and address != "sim":

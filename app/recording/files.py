@@ -23,7 +23,7 @@ __all__ = [
     "set_aside",
 ]
 
-#: Bytes of a file's name, so that one with .partial or .journal behind it can stand beside it.
+#: Largest length of a file's name in bytes; it leaves space for the endings .partial and .journal.
 NAME_MAX = 255 - len(".partial")
 
 
@@ -64,7 +64,7 @@ def check_output(path: str | Path, overwrite: bool, *sources: str | Path) -> Pat
 
 
 def errno_of(error: Exception) -> int | None:
-    """Return the system's error number, also where HDF5 gives it only in its text."""
+    """Return the system's error number, also where HDF5 has it only in its text."""
     if isinstance(error, OSError) and error.errno:
         return error.errno
     found = re.search(r"errno = (\d+)", str(error))

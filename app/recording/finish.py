@@ -44,20 +44,20 @@ def finish(
     ended: float | None,
     displacement_model: np.ndarray | None = None,
     model_toml: str = "",
-    mend: Callable[[Patched], None] | None = None,
+    repair: Callable[[Patched], None] | None = None,
     fsync: bool = False,
 ) -> int:
     """Write physical values and closing metadata to the closed recording ``path``.
 
     All is written or nothing: outside SWMR mode a kill can make a file unreadable, and the disk can
-    be full, but the counts stay safe. ``mend`` is called with the file before HDF5 opens it.
+    be full, but the counts stay safe. ``repair`` is called with the file before HDF5 opens it.
     ``ended`` is a Unix time in s, None if unknown. Returns the number of samples. Raises
     ``InputError`` if it cannot be written; then the file is as it was.
     """
     try:
         with changed_in_place(path, fsync) as changes:
-            if mend is not None:
-                mend(changes)
+            if repair is not None:
+                repair(changes)
             with h5py.File(changes, "r+", libver=LIBVER) as file:
                 entry = file["entry"]
                 samples = _write_physical(entry)

@@ -13,7 +13,7 @@ from dearig.errors import InputError
 from dearig.recording.files import in_words, one_line
 from dearig.recording.journal import Patched, whole_journal
 from dearig.recording.safe import Refused
-from dearig.recording.superblock import SIZE, flags_of, mend_superblock
+from dearig.recording.superblock import SIZE, flags_of, repair_superblock
 
 #: Consistency flag of a file in SWMR mode.
 WRITTEN_IN_ORDER = 4
@@ -114,5 +114,5 @@ def _as_closed(patched: Patched) -> Patched:
     """
     # the file may grow while it is read
     patched.end = FAR
-    mend_superblock(patched)
+    repair_superblock(patched)
     return patched

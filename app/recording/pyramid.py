@@ -95,7 +95,7 @@ def levels(entry: h5py.Group, samples: int) -> dict[int, h5py.Dataset]:
 def complete_pyramid(
     entry: h5py.Group, samples: int, read: Callable[[int, int], np.ndarray]
 ) -> None:
-    """Bring every level to the full bins of ``samples``; ``read(a, b)`` gives counts (channels, n).
+    """Extend every level to the full bins of ``samples``; ``read(a, b)`` returns (channels, n).
 
     A run that was killed has left them some bins behind the counts, or ahead.
     """

@@ -12,7 +12,7 @@ from dearig.recording.finish import finish
 from dearig.recording.journal import carry_out, whole_journal
 from dearig.recording.opening import UNREADABLE
 from dearig.recording.reader import is_finished, open_recording
-from dearig.recording.superblock import mend_superblock
+from dearig.recording.superblock import repair_superblock
 
 __all__ = ["recover"]
 
@@ -48,7 +48,7 @@ def recover(path: str | Path, now: Callable[[], float] = time.time) -> bool:
             complete=False,
             outcome=f"killed; {samples} samples recovered",
             ended=None,
-            mend=mend_superblock,
+            repair=repair_superblock,
             fsync=True,
         )
     except UNREADABLE as error:

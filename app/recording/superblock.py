@@ -11,7 +11,7 @@ import io
 import struct
 from pathlib import Path
 
-__all__ = ["SIZE", "consistency_flags", "flags_of", "lookup3", "mend_superblock"]
+__all__ = ["SIZE", "consistency_flags", "flags_of", "lookup3", "repair_superblock"]
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 VERSION = 3
@@ -41,7 +41,7 @@ def flags_of(head: bytes) -> int | None:
     return head[FLAGS_AT]
 
 
-def mend_superblock(stream: io.RawIOBase) -> None:
+def repair_superblock(stream: io.RawIOBase) -> None:
     """Mark the file open in ``stream`` as closed, and write its size as the end of file.
 
     Raises ``ValueError`` for a superblock of another version than that of recordings.

@@ -263,7 +263,7 @@ class RecordingWriter:
     def _check_room(self) -> None:
         # checked before each write: on a full disk the order of HDF5's writes is not defined
         if shutil.disk_usage(self._path.parent).free < self._margin:
-            raise OSError(errno.ENOSPC, "no room for the next second")
+            raise OSError(errno.ENOSPC, "no space for the next second")
 
     def _let_go(self) -> None:
         """Close the file as a kill would: not another byte is written to it.

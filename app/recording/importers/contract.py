@@ -61,9 +61,9 @@ def _check_source(name: str, source: Source, path: Path) -> None:
                 f"{name}: column {column!r} is {values.dtype} {values.shape}, not float64 (n,)"
             )
         if not set(source.named(column)) <= set(names):
-            raise ContractError(f"{name}: named({column!r}) gives columns that are not there")
+            raise ContractError(f"{name}: named({column!r}) returns columns that do not exist")
         if not source.row(0):
-            raise ContractError(f"{name}: row(0) does not say where the first sample stands")
+            raise ContractError(f"{name}: row(0) does not say where the first sample is")
     absent = "no such column"
     if source.named(absent):
         raise ContractError(f"{name}: named({absent!r}) finds a column")

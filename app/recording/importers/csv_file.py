@@ -1,7 +1,7 @@
 """Columns of a CSV file: comma, semicolon or tab, with a line of names.
 
-NumPy parses the numbers. Where that does not give a finite number in every place, the text is read
-again line by line, more slowly, to say in which line and column and why.
+NumPy parses the numbers. If a value is not a finite number, the text is read
+again line by line, more slowly, to find the line, the column and the reason.
 """
 
 from __future__ import annotations

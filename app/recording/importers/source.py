@@ -87,7 +87,7 @@ def listing(names: Sequence[str]) -> str:
 
 
 def no_such_column(source: Source, name: str) -> InputError:
-    """Return the error for a column ``name`` that is not there."""
+    """Return the error for a column ``name`` that does not exist."""
     return InputError(
         f"{source.path}: there is no column {name!r}; there are: {listing(source.names)}"
         f"{suggestion([name], source.names)}"
