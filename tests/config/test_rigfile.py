@@ -87,7 +87,7 @@ MISTAKES = [
     ("[load]\nlength_mm = 75", r"load\.length_mm is not a key here: it belongs in \[film\]"),
     (
         "[film]\nlength_mm = -75",
-        r"film\.length_mm = -75 is not allowed, but a number above 0, at most 10000 \(L1",
+        r"film\.length_mm = -75 is not allowed, but a number above 0, at most 10000 \(free length",
     ),
     ("[film]\nlength_mm = '75'", r'film\.length_mm = "75" is not allowed, but a number'),
     ("[film]\nlength_mm = nan", r"film\.length_mm = NaN is not allowed"),
