@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -78,11 +78,12 @@ def diagnose_recordings(
     """
     started = clock()
     check_named_once(train, validation)
+    settings = _Settings(branches, drive, rig_file, thorough)
     recordings = open_all(train)
     others = open_all(validation)
-    base, quality = _prepared(recordings, others, branches, drive, rig_file)
-    finding = _search(recordings, base, drive, thorough, progress)
-    return _outcome(recordings, others, finding, quality, drive, rig_file, "", started, clock)
+    base, quality = _prepared(recordings, others, settings)
+    finding = _search(recordings, base, settings, progress)
+    return _outcome(recordings, others, finding, quality, settings, "", started, clock)
 
 
 def diagnose_rig(
@@ -114,111 +115,176 @@ def diagnose_rig(
     """
     started = clock()
     check_named_once(train, validation)
-    settings = rig_file or RigFile()
-    names = [*([] if train else ["thesis"]), *(f"experiment-{n + 1}" for n in range(experiments))]
+    settings = _Settings(branches, drive, rig_file, thorough)
+    names = [*([] if train else ["thesis"]), *(_experiment_name(n) for n in range(experiments))]
     planned = [*names, *([] if validation else VALIDATION)]
     for name in planned:
         check_output(out / f"{name}.h5", overwrite)
-    runs = len(planned)
-    parts = (
-        2.0 * (1 + experiments) + 1.0
-    )  # of the progress: a diagnosis counts two, all recordings together one
-    done = 0.0
-
-    def part(size: float) -> Progress:
-        first = done
-        return lambda stage, fraction: progress(stage, (first + size * fraction) / parts)
-
+    # a diagnosis counts two parts of the progress, all recordings together one
+    parts = _Parts(progress, total=2.0 * (1 + experiments) + 1.0)
+    recorder = _Recorder(
+        address, out, settings.rig, RunOptions(configuration, seed=seed, overwrite=overwrite),
+        parts, runs=len(planned),
+    )  # fmt: skip
     files: list[Source] = [*train]
-    made: list[Path] = []
+    if not files:
+        recorder.run("thesis")
+        files += recorder.made
+    recordings, finding, performed, ended = _search_and_separate(
+        files, experiments, settings, recorder
+    )
+    others: list[Recording] = []
+    if validation:
+        others = open_all(validation)
+    elif not (ended or finding.interrupted):
+        recorded = len(recorder.made)
+        ended = recorder.run_until_ended(*VALIDATION)
+        others = open_all(recorder.made[recorded:])
+    if ended is not None:
+        stopped = finding.interrupted or isinstance(ended, Interrupted)
+        notes = (*finding.notes, f"No more was recorded: {ended}")
+        finding = replace(finding, interrupted=stopped, notes=notes)
+    _, quality = _prepared(recordings, others, settings)
+    outcome = _outcome(
+        recordings, others, finding, quality, settings, address, started, clock, performed
+    )
+    return replace(outcome, ended=ended)
 
-    def run(sequence: str, name: str) -> None:
-        nonlocal done
-        path = out / f"{name}.h5"
-        loaded = load_sequence(name) if not sequence else parse_sequence(sequence, name, Path())
-        report = part(1.0 / runs)
+
+@dataclass(frozen=True)
+class _Settings:
+    """Settings of a diagnosis, as of ``diagnose_recordings``."""
+
+    branches: int
+    drive: str
+    rig_file: RigFile | None
+    thorough: bool
+
+    @property
+    def rig(self) -> RigFile:
+        """The rig file, or the thesis's rig."""
+        return self.rig_file or RigFile()
+
+
+# ---------------------------------------------------------------- on a rig
+
+
+class _Parts:
+    """Progress of work in consecutive parts, whose sizes add up to ``total``."""
+
+    def __init__(self, progress: Progress, total: float) -> None:
+        self.progress = progress
+        self.total = total
+        self.done = 0.0
+
+    def part(self, size: float) -> Progress:
+        """Return the progress of the next part."""
+        first = self.done
+        self.done += size
+        return lambda stage, fraction: self.progress(stage, (first + size * fraction) / self.total)
+
+
+class _Recorder:
+    """Runs on the rig at ``address``, each recorded to a file in the folder ``out``.
+
+    ``runs`` is the number of runs that count one part of the progress together. ``made`` lists the
+    files of complete runs.
+    """
+
+    def __init__(
+        self,
+        address: str,
+        out: Path,
+        rig_file: RigFile,
+        options: RunOptions,
+        parts: _Parts,
+        runs: int,
+    ) -> None:
+        self.address = address
+        self.out = out
+        self.rig_file = rig_file
+        self.options = options
+        self.parts = parts
+        self.runs = runs
+        self.made: list[Path] = []
+
+    def run(self, name: str, sequence: str = "") -> None:
+        """Record the preset ``name``, or the text of a ``sequence`` under that name."""
+        path = self.out / f"{name}.h5"
+        loaded = parse_sequence(sequence, name, Path()) if sequence else load_sequence(name)
+        report = self.parts.part(1.0 / self.runs)
         # each run has its own seed, so that its noise is independent of the others'
-        options = RunOptions(configuration, seed=seed * 1000 + len(made), overwrite=overwrite)
+        options = replace(self.options, seed=self.options.seed * 1000 + len(self.made))
         record(
-            loaded, address, settings, path, options,
+            loaded, self.address, self.rig_file, path, options,
             progress=lambda _, fraction: report(f"recording {name}", fraction),
         )  # fmt: skip
-        made.append(path)
-        done += 1.0 / runs
+        self.made.append(path)
 
-    def run_until_ended(sequence: str, *names: str) -> DearigError | None:
+    def run_until_ended(self, *names: str, sequence: str = "") -> DearigError | None:
+        """Record each of ``names`` as ``run`` does; return the error that ended one early."""
         try:
             for name in names:
-                run(sequence, name)
+                self.run(name, sequence)
         except NotSafe:
             raise
         except _EARLY_ENDS as error:
             return error  # the rig is safe, and the results until here hold
         return None
 
-    if not files:
-        run("", "thesis")
-        files += made
+
+def _experiment_name(index: int) -> str:
+    return f"experiment-{index + 1}"
+
+
+def _search_and_separate(
+    files: list[Source], experiments: int, settings: _Settings, recorder: _Recorder
+) -> tuple[list[Recording], Diagnosis, list[str], DearigError | None]:
+    """Search, and while rivals are left, record a separating experiment and search again.
+
+    Returns the recordings of the last search, its result, a sentence on each experiment, and the
+    error that ended an experiment early.
+    """
+    files = [*files]
     performed: list[str] = []
-    ended: DearigError | None = None
     while True:
         recordings = open_all(files)
-        base, _ = _prepared(recordings, [], branches, drive, rig_file)
-        finding = _search(recordings, base, drive, thorough, part(2.0))
-        done += 2.0
+        base, _ = _prepared(recordings, [], settings)
+        finding = _search(recordings, base, settings, recorder.parts.part(2.0))
         if finding.interrupted or len(performed) >= experiments:
-            break
-        experiment, words = _experiment(finding, _noise(recordings, drive), settings)
+            return recordings, finding, performed, None
+        noise = _noise(recordings, settings.drive)
+        experiment, words = _experiment(finding, noise, settings.rig)
         if experiment is None:
-            break
-        name = f"experiment-{len(performed) + 1}"
-        ended = run_until_ended(experiment.sequence, name)
+            return recordings, finding, performed, None
+        name = _experiment_name(len(performed))
+        ended = recorder.run_until_ended(name, sequence=experiment.sequence)
         if ended is not None:
-            break
-        files.append(made[-1])
+            return recordings, finding, performed, ended
+        files.append(recorder.made[-1])
         performed.append(f"{words}. It was run, and its recording, {name}.h5, was added.")
-    others: list[Recording] = []
-    if validation:
-        others = open_all(validation)
-    elif not (ended or finding.interrupted):
-        recorded = len(made)
-        ended = run_until_ended("", *VALIDATION)
-        others = open_all(made[recorded:])
-    if ended is not None:
-        stopped = finding.interrupted or isinstance(ended, Interrupted)
-        notes = (*finding.notes, f"No more was recorded: {ended}")
-        finding = replace(finding, interrupted=stopped, notes=notes)
-    _, quality = _prepared(recordings, others, branches, drive, rig_file)
-    outcome = _outcome(
-        recordings, others, finding, quality, drive, rig_file, address, started, clock, performed
-    )
-    return replace(outcome, ended=ended)
 
 
 # ---------------------------------------------------------------- before
 
 
 def _prepared(
-    recordings: Sequence[Recording],
-    others: Sequence[Recording],
-    branches: int,
-    drive: str,
-    rig_file: RigFile | None,
+    recordings: Sequence[Recording], others: Sequence[Recording], settings: _Settings
 ) -> tuple[Any, tuple[str, ...]]:
     """Return the baseline to fit, and sentences on the recordings. Raises ``InputError``."""
-    check_branches(branches)
+    check_branches(settings.branches)
     check_apart(recordings, others)
-    base = base_model(recordings, branches, "gent", None, rig_file)
+    base = base_model(recordings, settings.branches, "gent", None, settings.rig_file)
     said = [
         f"{r.name}: {sentence}"
         for r in (*recordings, *others)
-        for sentence in inspect(r, drive, to_fit=r in recordings).findings
+        for sentence in inspect(r, settings.drive, to_fit=r in recordings).findings
     ]
-    said += extrapolated(recordings, others, drive)
+    said += extrapolated(recordings, others, settings.drive)
     films = sorted({r.film_id for r in (*recordings, *others) if r.film_id})
     if len(films) > 1:
         said.append(f"the recordings name different films: {', '.join(films)}")
-    check_enough(recordings, drive)
+    check_enough(recordings, settings.drive)
     return base, tuple(said)
 
 
@@ -227,13 +293,13 @@ def _prepared(
 
 @for_simulations()
 def _search(
-    recordings: Sequence[Recording], base: Any, drive: str, thorough: bool, progress: Progress
+    recordings: Sequence[Recording], base: Any, settings: _Settings, progress: Progress
 ) -> Diagnosis:
-    records = [as_record(r, drive) for r in recordings]
+    records = [as_record(r, settings.drive) for r in recordings]
     try:
         with Interrupts() as interrupts:
             return diagnose(
-                records, base, progress=progress, stop=interrupts.asked, thorough=thorough
+                records, base, progress=progress, stop=interrupts.asked, thorough=settings.thorough
             )
     except ModelError as error:
         raise InputError(f"these recordings cannot be diagnosed: {error}") from error
@@ -244,8 +310,7 @@ def _outcome(
     others: Sequence[Recording],
     finding: Diagnosis,
     quality: tuple[str, ...],
-    drive: str,
-    rig_file: RigFile | None,
+    settings: _Settings,
     rig: str,
     started: float,
     clock: Callable[[], float],
@@ -254,6 +319,7 @@ def _outcome(
     if finding.held:
         recordings = [replace(r, hold=True) for r in recordings]
         others = [replace(r, hold=True) for r in others]
+    drive = settings.drive
     failed: list[str] = []
     models = [finding.baseline, *(s.stage for s in finding.steps[:-1]), finding.final]
     if not finding.steps:
@@ -269,7 +335,7 @@ def _outcome(
     noise = _noise(recordings, drive)
     experiment, words = None, "The recordings are of films: sequences of voltage do not apply."
     if recordings[0].kind == "actuator":
-        experiment, words = _experiment(finding, noise, rig_file or RigFile())
+        experiment, words = _experiment(finding, noise, settings.rig)
     seconds = clock() - started
     said = (*quality, *dict.fromkeys(failed))
     title = _title(recordings)

@@ -63,31 +63,15 @@ def identify_recordings(
     others = open_all(validation)
     check_apart(recordings, others)
     records = [as_record(r, drive) for r in recordings]
-    kind = recordings[0].kind
     for count in branches:
         check_branches(count)
     counts = sorted(set(branches))
     alone = len(counts) == 1
-    fits: list[Identification] = []
-    smaller: Network | None = None
-    for i, count in enumerate(counts):
-        base = base_model(recordings, count, spring, rest_length_mm, rig_file)
 
-        def report(stage: str, fraction: float, done: int = i) -> None:
-            if alone:
-                progress(stage, fraction)
-            else:
-                progress(f"{counts[done]} branches", (done + fraction) / len(counts))
+    def base_of(count: int) -> Any:
+        return base_model(recordings, count, spring, rest_length_mm, rig_file)
 
-        try:
-            fit = identify(
-                records, base, method, seed, intervals and alone, smaller,
-                progress=report,
-            )  # fmt: skip
-        except ModelError as error:
-            raise InputError(f"these recordings cannot be fitted: {error}") from error
-        smaller = fit.model.network
-        fits.append(fit)
+    fits = _fits(records, base_of, counts, method, seed, intervals and alone, progress)
     # one number of independent samples for all, from the fit with the least structured residual
     correlation = max(1.0, min(fit.correlation for fit in fits))
     scores = [_bic(fit, records, correlation) for fit in fits]
@@ -107,6 +91,7 @@ def identify_recordings(
     title = recordings[0].title or recordings[0].name
     name = f"{title}, {count} branches" if count != 1 else f"{title}, 1 branch"
     history = _history(fit, recordings, compared, validated, spring, drive, seconds)
+    kind = recordings[0].kind
     is_thesis_run = kind == "actuator" and any(c.row == "identification" for c in compared)
     return IdentifyOutcome(
         title=name,
@@ -120,6 +105,39 @@ def identify_recordings(
         seconds=seconds,
         published_fit=PUBLISHED_FIT if is_thesis_run else None,
     )
+
+
+def _fits(
+    records: Sequence[Record],
+    base_of: Callable[[int], Any],
+    counts: Sequence[int],
+    method: str,
+    seed: int,
+    intervals: bool,
+    progress: Progress,
+) -> list[Identification]:
+    """Return the fit for each number of branches in ``counts``, which rise.
+
+    Each fit starts from the network of the one before. ``base_of`` gives the model to fit.
+    """
+    fits: list[Identification] = []
+    smaller: Network | None = None
+    for i, count in enumerate(counts):
+        base = base_of(count)
+
+        def report(stage: str, fraction: float, done: int = i) -> None:
+            if len(counts) == 1:
+                progress(stage, fraction)
+            else:
+                progress(f"{counts[done]} branches", (done + fraction) / len(counts))
+
+        try:
+            fit = identify(records, base, method, seed, intervals, smaller, progress=report)
+        except ModelError as error:
+            raise InputError(f"these recordings cannot be fitted: {error}") from error
+        smaller = fit.model.network
+        fits.append(fit)
+    return fits
 
 
 def _bic(fit: Identification, records: Sequence[Record], correlation: float) -> float:

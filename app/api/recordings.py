@@ -183,17 +183,10 @@ def record(
     if model is not None:
         actuator = _actuator(model)[1]
         settings = of_rig(settings, actuator.film, actuator.load)
-    in_step = None
-    if overlay is not None:
-        file, moved = _actuator(overlay)
-        in_step = OverlayModel(file.name, moved, toml=model_toml(file.name, moved, file.history))
-    try:
-        plan = FaultPlan.parse(list(faults))
-    except ValueError as error:
-        raise InputError(str(error)) from error
+    in_step = None if overlay is None else _overlay_model(overlay)
     options = RunOptions(
         text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced,
-        actuator=actuator, faults=plan,
+        actuator=actuator, faults=_fault_plan(faults),
     )  # fmt: skip
     folder = None if path is not None else Path(tempfile.mkdtemp(prefix="dearig-"))
     out = Path(path) if path is not None else _unnamed(folder, sequence, loaded)
@@ -207,6 +200,20 @@ def record(
     if folder is not None:
         weakref.finalize(found, shutil.rmtree, folder, ignore_errors=True)
     return found
+
+
+def _overlay_model(source: ModelSource) -> OverlayModel:
+    """Return the model of ``source``, to run in step with a measurement."""
+    file, actuator = _actuator(source)
+    return OverlayModel(file.name, actuator, toml=model_toml(file.name, actuator, file.history))
+
+
+def _fault_plan(faults: Iterable[str]) -> FaultPlan:
+    """Return the plan of ``faults`` such as ``arc@3.2``. Raises ``InputError``."""
+    try:
+        return FaultPlan.parse(list(faults))
+    except ValueError as error:
+        raise InputError(str(error)) from error
 
 
 def _unnamed(folder: Path | None, source: SequenceSource, loaded: LoadedSequence) -> Path:

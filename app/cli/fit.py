@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,6 +26,9 @@ from dearig.cli.options import (
 from dearig.cli.output import check_files, optional, print_line, working, write_result
 from dearig.errors import InputError, Interrupted
 
+if TYPE_CHECKING:
+    from dearig.analysis.outcomes import DiagnoseOutcome
+
 __all__ = ["commands"]
 
 commands = typer.Typer()
@@ -35,6 +38,44 @@ Train = Annotated[
     list[Path], typer.Argument(metavar="TRAIN.h5...", help="Recordings to fit.", show_default=False)
 ]
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL.toml", help="A model file.")]
+
+# ---------------------------------------------------------------- options of diagnose
+
+OptionalTrain = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="TRAIN.h5...", help="Recordings to fit.", show_default=False),
+]
+ModelOut = Annotated[
+    Path | None,
+    typer.Option(metavar="MODEL.toml", help="Write the model with the effects found to this file."),
+]
+BaselineBranches = Annotated[
+    int, typer.Option(help="Number of Maxwell branches of the baseline model.")
+]
+RigToRecordOn = Annotated[
+    str | None,
+    typer.Option(
+        help="Record on this rig, such as sim:7, and run experiments that separate the "
+        "remaining candidates."
+    ),
+]
+Experiments = Annotated[
+    int, typer.Option(min=0, max=20, help="Largest number of such experiments; needs --rig.")
+]
+ResultFolder = Annotated[
+    Path,
+    typer.Option("--out", metavar="DIR", help="Folder for recordings and results of --rig."),
+]
+Thorough = Annotated[
+    bool,
+    typer.Option(
+        "--thorough",
+        help="Search without a time budget (the default is about a minute). Use it when the "
+        "report says that the search was ended early.",
+    ),
+]
+
+# ---------------------------------------------------------------- commands
 
 
 @commands.command(rich_help_panel=_PANEL)
@@ -198,46 +239,17 @@ def validate(
 
 @commands.command(cls=ManyToValidate, rich_help_panel=_PANEL)
 def diagnose(
-    train: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="TRAIN.h5...", help="Recordings to fit.", show_default=False),
-    ] = None,
+    train: OptionalTrain = None,
     validate_: Validation = None,
     report: Report = None,
-    model_out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="MODEL.toml", help="Write the model with the effects found to this file."
-        ),
-    ] = None,
-    branches: Annotated[
-        int, typer.Option(help="Number of Maxwell branches of the baseline model.")
-    ] = 3,
+    model_out: ModelOut = None,
+    branches: BaselineBranches = 3,
     drive: Drive = DriveChannel.command,
     rig_file: RigFileOption = None,
-    rig: Annotated[
-        str | None,
-        typer.Option(
-            help="Record on this rig, such as sim:7, and run experiments that separate the "
-            "remaining candidates."
-        ),
-    ] = None,
-    experiments: Annotated[
-        int,
-        typer.Option(min=0, max=20, help="Largest number of such experiments; needs --rig."),
-    ] = 1,
-    out: Annotated[
-        Path,
-        typer.Option("--out", metavar="DIR", help="Folder for recordings and results of --rig."),
-    ] = Path("diagnosis"),
-    thorough: Annotated[
-        bool,
-        typer.Option(
-            "--thorough",
-            help="Search without a time budget (the default is about a minute). Use it when the "
-            "report says that the search was ended early.",
-        ),
-    ] = False,
+    rig: RigToRecordOn = None,
+    experiments: Experiments = 1,
+    out: ResultFolder = Path("diagnosis"),
+    thorough: Thorough = False,
     seed: Seed = 0,
     json: Json = None,
     force: Force = False,
@@ -291,6 +303,11 @@ def diagnose(
         if path is not None:
             print_line(console, f"{label}: {path}")
     write_result(diagnosis_json(outcome), json)
+    _raise_early_end(outcome)
+
+
+def _raise_early_end(outcome: DiagnoseOutcome) -> None:
+    """Raise the error that ended the runs or the search early, if one did."""
     if outcome.ended is not None and not isinstance(outcome.ended, Interrupted):
         raise type(outcome.ended)(f"{outcome.ended}; the results found before that were kept")
     if outcome.finding.interrupted:

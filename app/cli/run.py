@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,62 +18,74 @@ if TYPE_CHECKING:
 
     from dearig.acquisition.replay import Original
     from dearig.acquisition.run import RunResult
+    from dearig.acquisition.serve import Serving
 
 __all__ = ["commands"]
 
 commands = typer.Typer()
 _PANEL = "Rig"
 
+# ---------------------------------------------------------------- options of record
+
+RecordingOut = Annotated[
+    Path, typer.Option("--out", metavar="FILE.h5", help="Write the recording to this file.")
+]
+SequenceToPlay = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="SEQUENCE",
+        help="A sequence file (TOML) or the name of a preset.",
+        show_default=False,
+    ),
+]
+Like = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.h5",
+        help="Repeat the run of this recording: its sequence, rig file and simulated rig, and "
+        "its seed unless --seed is given.",
+    ),
+]
+SimulatedModel = Annotated[
+    Path | None,
+    typer.Option(metavar="MODEL.toml", help="Simulate this model in place of the thesis's."),
+]
+ModelInStep = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="MODEL.toml",
+        help="Compute this model's prediction during the run, and record it.",
+    ),
+]
+Fsync = Annotated[
+    bool,
+    typer.Option(
+        "--fsync", help="Write every block through to the disk, so it survives a power cut."
+    ),
+]
+Paced = Annotated[
+    bool,
+    typer.Option("--paced", help="Simulate in real time.", show_default="as fast as possible"),
+]
+Operator = Annotated[str, typer.Option(help="Name of the operator, kept in the recording.")]
+
+# ---------------------------------------------------------------- commands
+
 
 @commands.command(rich_help_panel=_PANEL)
 def record(
-    out: Annotated[
-        Path, typer.Option("--out", metavar="FILE.h5", help="Write the recording to this file.")
-    ],
-    sequence: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="SEQUENCE",
-            help="A sequence file (TOML) or the name of a preset.",
-            show_default=False,
-        ),
-    ] = None,
-    like: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.h5",
-            help="Repeat the run of this recording: its sequence, rig file and simulated rig, and "
-            "its seed unless --seed is given.",
-        ),
-    ] = None,
+    out: RecordingOut,
+    sequence: SequenceToPlay = None,
+    like: Like = None,
     rig: Rig = "sim",
     rig_file: RigFileOption = None,
-    model: Annotated[
-        Path | None,
-        typer.Option(metavar="MODEL.toml", help="Simulate this model in place of the thesis's."),
-    ] = None,
-    overlay: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="MODEL.toml",
-            help="Compute this model's prediction during the run, and record it.",
-        ),
-    ] = None,
-    fsync: Annotated[
-        bool,
-        typer.Option(
-            "--fsync", help="Write every block through to the disk, so it survives a power cut."
-        ),
-    ] = False,
-    paced: Annotated[
-        bool,
-        typer.Option("--paced", help="Simulate in real time.", show_default="as fast as possible"),
-    ] = False,
+    model: SimulatedModel = None,
+    overlay: ModelInStep = None,
+    fsync: Fsync = False,
+    paced: Paced = False,
     fault: Faults = None,
     seed: Seed = 0,
-    operator: Annotated[
-        str, typer.Option(help="Name of the operator, kept in the recording.")
-    ] = "",
+    operator: Operator = "",
     film: FilmName = "",
     notes: Notes = "",
     json: Json = None,
@@ -276,26 +289,23 @@ def serve_daqmx(
     NI's Python library (nidaqmx) reaches it as it reaches a real card behind NI's gRPC device
     server.
     """
-    import sys
-
-    from dearig.acquisition.serve import Serving, serve
+    from dearig.acquisition.serve import serve
     from dearig.config.rigfile import load_rig_file
 
-    settings = load_rig_file(rig_file)
-
-    def announce(serving: Serving) -> None:
-        # flushed: a program that started the server reads the port from a pipe
-        sys.stdout.write(
-            f"simulated card at {serving.host}:{serving.port}; use it with --rig {serving.rig}; "
-            f"ctrl-C ends it\n"
-        )
-        if serving.laser:
-            sys.stdout.write(f'laser controller: port = "{serving.laser}" in [laser]\n')
-        sys.stdout.flush()
-
     serve(
-        rig, settings, told=announce, host=host, port=port, anywhere=anywhere, paced=paced,
-        faults=fault or (), client_timeout=client_timeout if client_tracking else None,
-        link_timeout=link_timeout, seed=seed,
-        laser=laser,
+        rig, load_rig_file(rig_file), told=_announce, host=host, port=port, anywhere=anywhere,
+        paced=paced, faults=fault or (),
+        client_timeout=client_timeout if client_tracking else None, link_timeout=link_timeout,
+        seed=seed, laser=laser,
     )  # fmt: skip
+
+
+def _announce(serving: Serving) -> None:
+    """Print the addresses of the simulated instruments."""
+    sys.stdout.write(
+        f"simulated card at {serving.host}:{serving.port}; use it with --rig {serving.rig}; "
+        f"ctrl-C ends it\n"
+    )
+    if serving.laser:
+        sys.stdout.write(f'laser controller: port = "{serving.laser}" in [laser]\n')
+    sys.stdout.flush()  # a program that started the server reads the port from a pipe

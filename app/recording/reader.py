@@ -10,7 +10,7 @@ import numpy as np
 from dearig.drivers.rig import Instrument
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
-from dearig.model.specimen import KINEMATICS
+from dearig.model.specimen import KINEMATICS, Film, Load
 from dearig.recording.arrays import Arrays
 from dearig.recording.files import old_of
 from dearig.recording.layout import (
@@ -91,11 +91,7 @@ class _Reader:
         self._check_format()
         entry = self._group(self.file, "entry")
         data = self._group(entry, "data")
-        kind = text_of(entry.attrs.get("kind", ""))
-        if kind not in KINDS:
-            raise InputError(
-                f"{self.path}: kind {kind!r} of /entry is not one of {', '.join(KINDS)}"
-            )
+        kind = self._kind(entry)
         finished = "samples" in entry.attrs
         for name in data:
             # counts may be cut short by a kill or a full disk; ``Counts`` finds how many there are
@@ -114,13 +110,6 @@ class _Reader:
             raise InputError(f"{self.path}: /entry/data/time is missing")
         else:
             samples = int(data["time"].shape[0])
-        if samples == 0:
-            old = old_of(self.path)
-            raise InputError(
-                f"{self.path} holds no samples"
-                + ("" if stored else ": the run ended before its first block")
-                + (f"; the recording that it would have replaced is {old}" if old.exists() else "")
-            )
         self._check_rows(data, stored, samples)
         if stored:
             derived = tuple(n for n in derived if n in stored or n == "time")
@@ -129,18 +118,8 @@ class _Reader:
                 raise InputError(f"{self.path}: /entry/data/{name} is missing")
 
         sample = self._group(entry, "sample")
-        try:
-            film, load = read_film(sample), read_load(sample)
-        except (ModelError, TypeError, ValueError) as error:
-            raise InputError(f"{self.path}: /entry/sample cannot be used: {error}") from error
-        kinematics = text_of(
-            data.attrs.get("kinematics", film.kinematics if film else KINEMATICS[0])
-        )
-        if kinematics not in KINEMATICS:
-            raise InputError(
-                f"{self.path}: kinematics {kinematics!r} of /entry/data is not one of "
-                f"{', '.join(KINEMATICS)}"
-            )
+        film, load = self._film_and_load(sample)
+        kinematics = self._kinematics(data, film)
         skew, delay, delay_error = self._timing(data)
         expected = data.attrs.get("samples_expected")
         step = {c.name: resolution(c) for c in channels}.get("voltage_command", 0.0)
@@ -192,6 +171,31 @@ class _Reader:
             )
         raise InputError(f"{self.path} has format {form!r}, not {FORMAT}")
 
+    def _kind(self, entry: h5py.Group) -> str:
+        kind = text_of(entry.attrs.get("kind", ""))
+        if kind not in KINDS:
+            raise InputError(
+                f"{self.path}: kind {kind!r} of /entry is not one of {', '.join(KINDS)}"
+            )
+        return kind
+
+    def _film_and_load(self, sample: h5py.Group) -> tuple[Film | None, Load | None]:
+        try:
+            return read_film(sample), read_load(sample)
+        except (ModelError, TypeError, ValueError) as error:
+            raise InputError(f"{self.path}: /entry/sample cannot be used: {error}") from error
+
+    def _kinematics(self, data: h5py.Group, film: Film | None) -> str:
+        kinematics = text_of(
+            data.attrs.get("kinematics", film.kinematics if film else KINEMATICS[0])
+        )
+        if kinematics not in KINEMATICS:
+            raise InputError(
+                f"{self.path}: kinematics {kinematics!r} of /entry/data is not one of "
+                f"{', '.join(KINEMATICS)}"
+            )
+        return kinematics
+
     def _group(self, parent: h5py.Group, name: str) -> h5py.Group:
         found = group(parent, name)
         if found is None:
@@ -241,6 +245,14 @@ class _Reader:
         return int(data["time"].shape[0]) if "time" in stored else None
 
     def _check_rows(self, data: h5py.Group, stored: tuple[str, ...], samples: int) -> None:
+        """Refuse a recording without samples, and rows of different lengths."""
+        if samples == 0:
+            old = old_of(self.path)
+            raise InputError(
+                f"{self.path} holds no samples"
+                + ("" if stored else ": the run ended before its first block")
+                + (f"; the recording that it would have replaced is {old}" if old.exists() else "")
+            )
         for name in stored:
             size = data[name].shape[0]
             if size != samples:

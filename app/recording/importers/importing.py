@@ -53,11 +53,7 @@ def import_file(
     """
     path = Path(source)
     out = check_output(out, overwrite, path)
-    if kinematics is not None and kinematics not in KINEMATICS:
-        raise InputError(f"kinematics {kinematics!r} is not one of {', '.join(KINEMATICS)}")
-    for name, given in (("gauge length", gauge_length_mm), ("area", area_mm2)):
-        if given is not None and not 0.0 < given < float("inf"):
-            raise InputError(f"the {name} is {given!r}; it must be a finite number above 0")
+    _check_film_settings(gauge_length_mm, area_mm2, kinematics)
     opened = source_at(path)
     was = exported(opened.about)
     chosen = Chosen(opened, columns or {})
@@ -90,11 +86,7 @@ def import_file(
             load=metadata.load or was.load,
             sequence_toml=metadata.sequence_toml or was.sequence,
             provenance={
-                "source": path.name,
-                "source_sha256": file_sha256(path),
-                "columns": ", ".join(f"{n}={where}" for n, where, _ in chosen.picked.values()),
-                **({} if gauge_length_mm is None else {"gauge_length_mm": float(gauge_length_mm)}),
-                **({} if area_mm2 is None else {"area_mm2": float(area_mm2)}),
+                **_provenance(path, chosen, gauge_length_mm, area_mm2),
                 **metadata.provenance,
             },
         ),
@@ -106,6 +98,33 @@ def import_file(
         now=now,
     )
     return warnings
+
+
+def _check_film_settings(
+    gauge_length_mm: float | None, area_mm2: float | None, kinematics: str | None
+) -> None:
+    """Raise ``InputError`` for settings that no film can have."""
+    if kinematics is not None and kinematics not in KINEMATICS:
+        raise InputError(f"kinematics {kinematics!r} is not one of {', '.join(KINEMATICS)}")
+    for name, given in (("gauge length", gauge_length_mm), ("area", area_mm2)):
+        if given is not None and not 0.0 < given < float("inf"):
+            raise InputError(f"the {name} is {given!r}; it must be a finite number above 0")
+
+
+def _provenance(
+    path: Path, chosen: Chosen, gauge_length_mm: float | None, area_mm2: float | None
+) -> dict[str, object]:
+    """Return the file, the columns and the settings that the values come from."""
+    found: dict[str, object] = {
+        "source": path.name,
+        "source_sha256": file_sha256(path),
+        "columns": ", ".join(f"{n}={where}" for n, where, _ in chosen.picked.values()),
+    }
+    if gauge_length_mm is not None:
+        found["gauge_length_mm"] = float(gauge_length_mm)
+    if area_mm2 is not None:
+        found["area_mm2"] = float(area_mm2)
+    return found
 
 
 def _from_rest(values: dict[str, np.ndarray]) -> tuple[float, tuple[Event, ...]]:
