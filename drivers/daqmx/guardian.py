@@ -169,8 +169,6 @@ class GuardianProcess:
             self._process.kill()
             self._process.wait()
         self._listener.join(_ENDS_WITHIN)
-        if self._process.stderr is not None and not self._listener.is_alive():
-            self._process.stderr.close()
 
     def _send(self, word: str) -> bool:
         if self._process.poll() is not None or self._process.stdin is None:
@@ -193,13 +191,19 @@ class GuardianProcess:
             raise RigError(f"the guardian process does not work: {said}")
 
     def _listen(self) -> None:
-        """Read the guardian's lines at once, so that it never waits for this process."""
+        """Read the guardian's lines at once, so that it never waits for this process.
+
+        The stream stays open as long as the guardian lives, even after ``close``: one that still
+        tries to reach the card must be able to write.
+        """
         stream = self._process.stderr
-        while stream is not None and (line := stream.readline(_LINE_MAX)):
-            if line.startswith(WORD):
-                self._said.put(line.removeprefix(WORD).strip())
-            else:
-                self._errors.append(line.strip())
+        if stream is not None:
+            with stream:
+                while line := stream.readline(_LINE_MAX):
+                    if line.startswith(WORD):
+                        self._said.put(line.removeprefix(WORD).strip())
+                    else:
+                        self._errors.append(line.strip())
         self._said.put(None)
 
 

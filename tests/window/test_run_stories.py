@@ -305,7 +305,7 @@ def answer(button: str) -> None:
     QTimer.singleShot(0, look)
 
 
-@pytest.mark.parametrize(("button", "closes"), [("Close", True), ("Stay", False)])
+@pytest.mark.parametrize(("button", "closes"), [("Close", True), ("Keep open", False)])
 def test_closing_in_mid_run_makes_safe_whatever_the_answer(
     qtbot: QtBot, quick_ramp: Session, window: MainWindow, button: str, closes: bool
 ) -> None:
