@@ -1,4 +1,4 @@
-"""Every effect: at its neutral values nothing, elsewhere what its physics says, and found again."""
+"""Every effect: at its neutral values nothing, elsewhere what its physics says."""
 
 import functools
 import math
@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from dearig.config.sequencefile import load_sequence
 from dearig.model import kernel
-from dearig.model.actuator import Actuator, Drive, at_rest, initial_state
+from dearig.model.actuator import Drive, at_rest, initial_state
 from dearig.model.effects import (
     EFFECTS,
     MEMORY,
@@ -26,44 +25,24 @@ from dearig.model.effects import (
     assembly,
 )
 from dearig.model.errors import ModelError
-from dearig.model.excitation import Sequence
 from dearig.model.film import Strip
-from dearig.model.fitting.intervals import correlation_time, covariance
-from dearig.model.fitting.levenberg import descend
-from dearig.model.fitting.parameters import Layout
-from dearig.model.fitting.problem import Problem
-from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
-from dearig.model.records import ActuatorRecord, FilmRecord
+from dearig.model.material import THESIS_FILM
 from dearig.sim_backend.model_plant import ModelPlant
+from tests.tools.effect_cases import (
+    BOTH,
+    BY_STRETCH,
+    BY_VOLTAGE,
+    STRIP,
+    THESIS,
+    numbers,
+    pulled,
+    with_effect,
+)
 from tests.tools.effect_oracle import Film, bouc_wen, extra, follow, limited, spectrum
 
-THESIS = Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3)
 LENGTH = THESIS_FILM.length
-STRIP = Strip(Network(Spring(40e3, 60.0), (Branch(Spring(30e3, 80.0), 2.0),)))
-BY_VOLTAGE = [n for n, e in EFFECTS.items() if "voltage" in e.drives]
-BY_STRETCH = [n for n, e in EFFECTS.items() if "stretch" in e.drives]
 OF_SENSOR = [n for n in BY_VOLTAGE if EFFECTS[n].acts_on == "sensor"]
 OF_FILM = [n for n in BY_VOLTAGE if n not in OF_SENSOR]
-
-
-MOMENT = 1.5  # s, in the course below
-
-
-def numbers(name, size=1.0, **given):
-    """Values of an effect: ``size`` times the typical sizes, shapes at their first start."""
-    values = {}
-    for p in EFFECTS[name].parameters:
-        value = p.typical if p.neutral is None else p.neutral + size * p.typical
-        if p.starts and p.neutral is None and p.relative_to in ("", "spectrum"):
-            value = p.starts[0]
-        elif p.name == "moment":
-            value = MOMENT
-        values[p.name] = given.get(p.name, limited(value, *p.bounds))
-    return values
-
-
-def with_effect(base, name, values):
-    return replace(base, effects=((name, tuple(values.items())),))
 
 
 class Course:
@@ -91,13 +70,6 @@ class Course:
 COURSE = Course()
 
 
-def pulled(samples=400):
-    """Time, stretch of a strip: up, down, up further, held, and down fast."""
-    time = np.linspace(0.0, 40.0, samples + 1)
-    corners = [0.0, 5.0, 10.0, 12.0, 20.0, 38.0, 40.0]
-    return time, np.interp(time, corners, [1.0, 1.5, 1.1, 1.1, 1.9, 1.9, 1.05])
-
-
 def measured(model):
     """What ``model`` shows on the test's course: displacement in m, or stress in Pa."""
     answer = model.simulate(*pulled()) if isinstance(model, Strip) else None
@@ -109,17 +81,6 @@ def measured(model):
 @functools.cache
 def baseline(driven):
     return measured(STRIP if driven == "stretch" else THESIS)
-
-
-def cases(*driven):
-    return [
-        pytest.param(name, d, id=f"{name}, {d}")
-        for d in driven
-        for name in (BY_STRETCH if d == "stretch" else BY_VOLTAGE)
-    ]
-
-
-BOTH = cases("voltage", "stretch")
 
 
 def base_of(driven):
@@ -542,210 +503,6 @@ def test_a_simulated_rigs_film_goes_on_where_it_was(name):
         assert motion.fault is None
         joined[part] = motion.displacement
     np.testing.assert_allclose(joined, at_once.displacement, rtol=0.0, atol=0.05e-6)
-
-
-# --- found again
-
-NOISE = 1e-6
-ONE = Network.gent((45e3, 60e3), (1e4, 1e4), (0.4,))
-RATE = 125.0  # at 200 Hz the third harmonic of the mains would look like the first
-# larger than typical, where typical hardly shows in a record of a minute
-LARGER = {
-    "elastoplastic friction": 0.3,  # a film that squeals more has a valley for every phase
-    "distributed hysteresis": 5.0,
-    "sheet electrode": 5.0,
-    "ageing": 3.0,
-    "temperature": 3.0,
-    "warm-up": 3.0,
-    "warm-up in stages": 5.0,
-    "slowing warm-up": 10.0,
-    "self-heating": 3.0,
-    "self-heating in stages": 10.0,
-    "linear drift": 3.0,
-    "settling drift": 3.0,
-    "slowing drift": 30.0,
-    "wandering drift": 3.0,
-    "restless drift": 3.0,
-    "fitful drift": 3.0,
-    "mains interference": 2.0,
-    "sensor curvature": 3.0,
-    "sensor bend": 3.0,
-    "slow branch": 3.0,
-    "broad creep": 8.0,
-    "power-law creep": 3.0,
-    "Mullins softening": 3.0,
-    "first-loading damage": 5.0,
-    "saturating permittivity": 5.0,
-    "dielectric relaxation": 3.0,
-    "broad dielectric relaxation": 6.0,
-    "dielectric relaxation in stages": 6.0,
-}
-# a film's load cell is worse than a laser: what is typical of an actuator does not show there
-LARGER_IN_FILMS = 20.0
-# and it is stretched much further
-IN_FILMS = {
-    "first-loading damage": {"softening": 0.1, "reach": 0.3},
-    "distributed hysteresis": {"reach": 0.1},
-}
-# a start that is 1.5 times off is in another valley for these, or where nothing is seen of them
-NEARER = {"mains interference": 1.00005, "sensor ripple": 1.05}
-NEARER |= dict.fromkeys(("amplifier limit", "sensor saturation"), 0.8)
-NEARER |= dict.fromkeys(
-    (
-        "stress beyond a displacement",
-        "self-heating in stages",
-        "warm-up in stages",
-        "slowing warm-up",
-        "broad dielectric relaxation",
-        "dielectric relaxation in stages",
-    ),
-    1.2,
-)
-NEARER |= dict.fromkeys(("easing friction", "elastoplastic friction"), 1.1)
-# of these, what quick steps get wrong is as large as what a number does
-CLOSELY = {"distributed hysteresis", "self-heating in stages"}
-# who squeals in another phase is far off: a search sets out from the same friction without easing
-SIZED = dict.fromkeys(("easing friction", "elastoplastic friction"), 0.8)
-NEARER |= dict.fromkeys(
-    ("sudden change of reading", "sudden change of force", "sudden loss of field"), 1.003
-)
-
-
-@functools.cache
-def courses():
-    """The thesis's excitation and the rich one, with a temperature that comes and goes."""
-    drives = []
-    for sequence in (Sequence.thesis(periods=1), load_sequence("rich")):
-        time, voltage = sequence.sample(RATE)
-        warmth = 0.8 * np.sin(2.0 * math.pi * time / 31.0)
-        drives.append(Drive(time, voltage, warmth=warmth))
-    return drives
-
-
-def strip_courses():
-    time, stretch = pulled(800)
-    fast = np.linspace(0.0, 12.0, 601)
-    return [(time, stretch), (fast, 1.0 + 0.35 * (1.0 - np.cos(1.1 * fast)))]
-
-
-def records(model, seed=0):
-    rng = np.random.default_rng(seed)
-    made = []
-    if isinstance(model, Strip):
-        for i, (time, stretch) in enumerate(strip_courses()):
-            stress = model.simulate(time, stretch).stress
-            noisy = stress + 20.0 * rng.standard_normal(time.size)
-            made.append(FilmRecord(f"film {i}", time, stretch, noisy, 20.0))
-        return made
-    for i, drive in enumerate(courses()):
-        answer = model.simulate(drive)
-        assert answer.ok, answer.in_words
-        noisy = answer.displacement + NOISE * rng.standard_normal(drive.time.size)
-        made.append(ActuatorRecord(f"record {i}", drive, noisy, NOISE))
-    return made
-
-
-def refitted(truth, start):
-    """Fit from ``start`` to records of ``truth``: (layout, found, standard deviations, misfit).
-
-    The misfit is that of the prediction without the noise, over the noise (RMS).
-    """
-    closely = any(name in CLOSELY for name, _ in truth.effects)
-    fidelity = kernel.CAREFUL if closely else kernel.QUICK
-    problem = Problem(records(truth), Layout(start), workers=1, fidelity=fidelity)
-    layout = problem.layout
-    held = np.zeros(layout.size, dtype=bool)
-    held[layout.column("J")] = True
-    start = layout.coordinates(layout.initial())
-    fit = descend(problem, start, held, iterations=60)
-    drift = problem.fit_drift(fit.x)
-    if drift is not None:
-        # each record has a walk of its own; here they are alike, and told by both together
-        x = fit.x.copy()
-        x[problem.own] = drift.in_common
-        fit = replace(fit, x=x)
-    jac = problem.without_drift().jacobian(fit.x, ~held)
-    inflation = max(1.0, fit.cost) * max(1.0, correlation_time(fit.residuals))
-    sigma = np.zeros(layout.size)
-    sigma[~held] = np.sqrt(np.diag(covariance(jac.T @ jac, inflation)))
-    clean, _ = problem.predict(Layout(truth).initial())
-    misfit = (problem.residuals(fit.x) * problem.sigma + problem.measured - clean[0]) / NOISE
-    if isinstance(truth, Strip):
-        misfit *= NOISE / 20.0
-    assert drift is None or np.mean(drift.residuals_in_common**2) < 1.05
-    return layout, fit, sigma, float(np.sqrt(np.mean(misfit**2)))
-
-
-def nearby(truth):
-    """A start: springs 5 % off, sizes at a third, shapes one and a half times what they are.
-
-    Nearer where ``NEARER`` and ``SIZED`` say so.
-    """
-    network, effects = truth.network, []
-    equilibrium = network.equilibrium
-    branches = tuple(
-        Branch(replace(b.spring, modulus=0.95 * b.spring.modulus), 1.05 * b.relaxation_time)
-        for b in network.branches
-    )
-    for name, values in truth.effects:
-        start = dict(values)
-        for p in EFFECTS[name].parameters:
-            if p.neutral is None:
-                value = start[p.name] * NEARER.get(name, 1.5)
-            else:
-                value = p.neutral + SIZED.get(name, 0.3) * (start[p.name] - p.neutral)
-            start[p.name] = limited(value, *p.bounds)
-        effects.append((name, tuple(start.items())))
-    springs = Network(replace(equilibrium, modulus=1.05 * equilibrium.modulus), branches)
-    return replace(truth, network=springs, effects=tuple(effects))
-
-
-def require_found(truth, but=()):
-    layout, fit, sigma, misfit = refitted(truth, nearby(truth))
-    # what is left is the noise, and the prediction is that of the truth
-    assert 0.93 < fit.cost < 1.05
-    assert misfit < 0.15
-    expected = Layout(truth)
-    wanted = expected.coordinates(expected.initial())
-    for q, found, true, width in zip(layout.quantities, fit.x, wanted, sigma, strict=True):
-        if q.kind == "effect":
-            scale = 1.0 if q.logarithmic else abs(true)
-            if q.name not in but:
-                assert width < 0.05 * scale, q.name
-                assert abs(found - true) < 4.0 * width + 2e-3 * scale, q.name
-
-
-def truth_of(base, names):
-    effects = []
-    for name in names:
-        size = LARGER_IN_FILMS if isinstance(base, Strip) else LARGER.get(name, 1.0)
-        values = numbers(name, size, **(IN_FILMS.get(name, {}) if isinstance(base, Strip) else {}))
-        if "moment" in values:
-            values["moment"] = 4.3  # in the first lobe of the one, in the second of the other
-        effects.append((name, tuple(values.items())))
-    return replace(base, effects=tuple(effects))
-
-
-@pytest.mark.parametrize(("name", "driven"), BOTH)
-def test_found_again(name, driven):
-    base = STRIP if driven == "stretch" else replace(THESIS, network=ONE)
-    # what the permittivity on a data sheet means shows at large strengths only; by what law the
-    # last of a film's stress is lost, only when it is; and how a friction eases, not to a twentieth
-    hardly = ["settled", "easing_exponent"] if driven == "voltage" else ["breadth"]
-    require_found(truth_of(base, [name]), but=tuple(f"{name}: {number}" for number in hardly))
-
-
-@pytest.mark.parametrize(
-    "names",
-    [
-        ("linear drag", "sensor lag"),
-        ("load inertia", "slow branch"),
-        ("electrode resistance", "elastoplastic hysteresis"),
-    ],
-    ids=" and ".join,
-)
-def test_two_at_once_are_found_again(names):
-    require_found(truth_of(replace(THESIS, network=ONE), names))
 
 
 # --- one more

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import logging
+import re
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -35,6 +36,12 @@ frequency_Hz = 1.0
 SLOW_RIG = "[card]\nsample_rate_Hz = 200.0\n"
 #: The presets, of the thesis's excitation one period of each lobe: half as long to fit.
 SHORT_PRESETS = {**PRESETS, "thesis": PRESETS["thesis"].replace("periods = 2", "periods = 1")}
+
+#: Words that belong to the program and not to its operator.
+FOREIGN = re.compile(
+    r"Traceback|Error\b|Errno|pydantic|Input should|after validation|NoneType|\bdict\b"
+    r"|list should|valid list|object at 0x|<class"
+)
 
 FILM_NETWORK = Network(Spring(3e4, 200.0), (Branch(Spring(2e4, 150.0), 4.0),))
 
@@ -95,6 +102,20 @@ def done(*arguments: str | Path) -> Answer:
     assert answer.code == 0, answer.err
     assert "Traceback" not in answer.err
     return answer
+
+
+def refused(answer: Answer, *words: str) -> str:
+    """Return the sentence of ``answer``, a refusal that says all of ``words``."""
+    assert answer.code == 2, (answer.code, answer.out, answer.err)
+    assert answer.out == ""
+    assert answer.err.startswith("dearig: ")
+    assert answer.err.count("\n") == 1
+    sentence = answer.err.removeprefix("dearig: ").strip()
+    # the names of files are the operator's own words
+    assert not FOREIGN.search(re.sub(r"\S*/\S*", "", sentence)), sentence
+    for word in words:
+        assert word in sentence, sentence
+    return sentence
 
 
 def strict_json(text: str) -> dict[str, Any]:
