@@ -70,6 +70,13 @@ class LogFile(RotatingFileHandler):
         error = sys.exc_info()[1]
         self.problem = _reason(error) if isinstance(error, OSError) else repr(error)
 
+    def close(self) -> None:
+        """Close the file. What a full disk does not take of the last lines is lost."""
+        try:
+            super().close()
+        except OSError as error:
+            self.problem = _reason(error)
+
     def doRollover(self) -> None:  # noqa: N802
         """Start a new file, unless another program on Windows keeps the present one open."""
         if self.stream is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import logging
 import subprocess
 import sys
@@ -121,3 +123,20 @@ def test_a_file_that_cannot_be_opened_is_told_and_raises_nothing(
         log.info("lost")
         assert handler.problem
     assert capsys.readouterr().err == ""
+
+
+class FullDisk(io.StringIO):
+    """A stream whose disk takes nothing more."""
+
+    def flush(self) -> None:
+        raise OSError(errno.EFBIG, "File too large")
+
+    def close(self) -> None:
+        raise OSError(errno.EFBIG, "File too large")
+
+
+def test_a_full_disk_at_the_end_is_told_and_raises_nothing(folder: Path) -> None:
+    handler = log_file.LogFile(log_file.log_path())
+    handler.stream = FullDisk()
+    handler.close()
+    assert handler.problem == "File too large"

@@ -49,7 +49,7 @@ def sources_digest() -> str:
     paths = [
         *(p for folder in ("model", "sim_backend") for p in (ROOT / folder).rglob("*.py")),
         *HERE.glob("*.toml"),
-        ROOT / "app" / "presets.py",
+        ROOT / "app" / "config" / "presets.py",
     ]
     for path in sorted(paths):
         digest.update(path.relative_to(ROOT).as_posix().encode())

@@ -426,7 +426,7 @@ def test_a_parameter_at_the_end_of_its_range_is_reported():
     trial = fitted(bench, DRAGGED)
     notes = {e.name: e.note for e in bench.estimates(trial, trial.jacobian())}
     assert trial.x[-1] == pytest.approx(trial.problem.layout.lower[-1], abs=1e-9)
-    assert "end of the range" in notes["linear drag: drag"]
+    assert "end of its search range" in notes["linear drag: drag"]
     assert "end of the range" not in notes["mu_0"]
 
 

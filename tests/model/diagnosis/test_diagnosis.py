@@ -584,5 +584,5 @@ def test_records_of_two_kinds_are_refused():
     with pytest.raises(ModelError, match="one kind"):
         diagnose([record_of(PLAIN)], STRIP, workers=1)
     both: list[ActuatorRecord] = [record_of(PLAIN), film_record_of(STRIP)]
-    with pytest.raises(ModelError, match="parallel_map"):
+    with pytest.raises(ModelError, match="together"):
         diagnose(both, PLAIN, workers=1)
