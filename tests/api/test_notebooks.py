@@ -67,6 +67,10 @@ def test_a_notebook_runs_and_shows_its_values(executed) -> None:
         (compared,) = [d["text/plain"] for d in shown if "target_mm" in d["text/plain"]]
         told = ast.literal_eval(compared)
         assert told["reached_mm"] == pytest.approx(told["target_mm"], abs=0.02)
+        (diagnosed,) = [d["text/plain"] for d in shown if "verdict" in d["text/plain"]]
+        told = ast.literal_eval(diagnosed)
+        assert told["verdict"] == "explained"
+        assert told["after"] < 0.8 * told["before"]
     else:
         assert sum("image/png" in data for data in shown) == 2
 
