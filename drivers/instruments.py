@@ -7,8 +7,8 @@ from typing import Any
 from dearig.drivers.amplifier import AmplifierDriver, Monitors
 from dearig.drivers.findings import Finding
 from dearig.drivers.laser import LaserDriver, LaserInspection, analog_findings
+from dearig.drivers.registry import Registry
 from dearig.drivers.settings import RigSettings
-from dearig.plugins import Registry
 
 __all__ = ["INSTRUMENTS", "InstrumentDriver", "instrument_findings", "reading_findings"]
 

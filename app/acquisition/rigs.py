@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from dearig.config.rigfile import RigFile
+from dearig.drivers.registry import Registry
 from dearig.drivers.rig_kind import RigKind, RigOptions
 from dearig.errors import InputError
-from dearig.plugins import Registry
 
 __all__ = ["RIGS", "is_simulated", "kind_of", "options_of"]
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from nptdms import ChannelObject, TdmsWriter
 
+from dearig.drivers.registry import ContractError
 from dearig.errors import InputError
-from dearig.plugins import ContractError
 from dearig.recording import EXPORTS, export_recording, open_recording
 from dearig.recording.exporters import Exporter
 from dearig.recording.exporters import contract as exporters_contract

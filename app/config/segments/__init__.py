@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Any, Literal, get_args, get_origin
 
 from dearig.config.segments.base import Positive, SegmentTable, Voltage
-from dearig.plugins import Registry
+from dearig.drivers.registry import Registry
 
 __all__ = ["SEGMENT_KINDS", "Positive", "SegmentTable", "Voltage"]
 

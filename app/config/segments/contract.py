@@ -11,9 +11,9 @@ from pydantic import ValidationError
 from dearig.config.segments.base import SegmentTable
 from dearig.config.sequencefile import parse_sequence
 from dearig.config.toml_input import parse_toml
+from dearig.drivers.registry import ContractError
 from dearig.errors import InputError
 from dearig.model.excitation import Segment
-from dearig.plugins import ContractError
 
 __all__ = ["check_segment"]
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from dearig.drivers.registry import Registry
 from dearig.errors import InputError
-from dearig.plugins import Registry
 from dearig.recording.exporters.table import Exporter
 from dearig.recording.files import check_output, replaced_when_done
 from dearig.recording.reader import open_recording

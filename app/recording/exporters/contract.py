@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dearig.plugins import ContractError
+from dearig.drivers.registry import ContractError
 from dearig.recording.exporters import export_recording
 from dearig.recording.exporters.table import columns_of
 from dearig.recording.importers import IMPORTERS, import_file

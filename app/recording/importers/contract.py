@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from dearig.drivers.registry import ContractError
 from dearig.errors import InputError
-from dearig.plugins import ContractError
 from dearig.recording.importers.importer import HEAD_BYTES, Importer
 from dearig.recording.importers.source import Source
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from dearig.drivers.registry import Registry
 from dearig.errors import InputError
-from dearig.plugins import Registry
 from dearig.recording.files import in_words
 from dearig.recording.importers.importer import HEAD_BYTES, Importer
 from dearig.recording.importers.source import Source
