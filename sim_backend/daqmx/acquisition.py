@@ -35,7 +35,14 @@ class OwnTicks:
         """Return the times (n,) s of the samples from ``first`` to before ``last``."""
         return (self.start or 0.0) + np.arange(first, last) / self.rate
 
-    def commands(self, first: int, last: int, track: Track) -> np.ndarray:
+    def commands(
+        self,
+        first: int,
+        last: int,
+        track: Track,
+        *,
+        wired: bool = True,  # noqa: ARG002
+    ) -> np.ndarray:
         """Return the counts (n,) on the output of ``track`` at these samples."""
         return track.at(self.times(first, last))
 
@@ -89,11 +96,14 @@ class SharedTicks:
         parts = [p.generation.start + t / p.generation.rate for p, t in self._split(first, last)]
         return np.concatenate(parts)
 
-    def commands(self, first: int, last: int, track: Track) -> np.ndarray:
-        """Return the counts (n,) on the output of ``track`` at these samples."""
+    def commands(self, first: int, last: int, track: Track, *, wired: bool = True) -> np.ndarray:
+        """Return the counts (n,) on the output of ``track`` at these samples.
+
+        ``wired`` is True for the output to the amplifier.
+        """
         parts = []
         for piece, ticks in self._split(first, last):
-            if piece.row is None:
+            if piece.row is None or not wired:
                 start, rate = piece.generation.start, piece.generation.rate
                 parts.append(track.at(start + ticks / rate))
             else:

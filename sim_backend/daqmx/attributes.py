@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 from dearig.sim_backend.daqmx.device import Device
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.setup import INPUT_RANGES, INPUTS, LINES, OUTPUTS
-from dearig.sim_backend.daqmx.tasks import AnalogInput, AnalogOutput, Kind, Lines, Task
+from dearig.sim_backend.daqmx.tasks import AnalogInput, AnalogOutput, Kind, Lines, Task, expanded
 
 __all__ = ["SERIAL", "Asked", "get", "reset", "set_"]
 
@@ -51,12 +50,14 @@ class Asked:
         task = self.own
         if not task.channels:
             raise DaqmxError(Code.NOT_WITHOUT_CHANNELS, f"Task Name: {task.name}")
-        # the first name of a list or range such as Dev1/ai0:2
-        wanted = re.sub(r"(?<=\d):\d+$", "", self.channel.split(",")[0].strip())
+        # the first name of a list or range such as Dev1/ai0:2; names are not case-sensitive
+        wanted = expanded(self.channel.split(",")[0].strip())[0].lower()
         for channel in task.channels:
-            if not wanted or channel.name == wanted:
+            if not wanted or channel.name.lower() == wanted:
                 return channel
-        raise DaqmxError(Code.INVALID_CHANNEL_NAME, f"Channel Name: {self.channel}")
+        raise DaqmxError(
+            Code.CHANNEL_NOT_IN_TASK, f"Channel Name: {self.channel}; Task Name: {task.name}"
+        )
 
     def analog(self) -> AnalogInput | AnalogOutput:
         """Return the same channel; raises an error unless it is analog."""
@@ -141,6 +142,10 @@ def _clock_source(asked: Asked) -> str:
 def _trigger_terminal(asked: Asked) -> str:
     side = "ai" if asked.own.kind is Kind.AI else "ao"
     return f"/{asked.device.name}/{side}/StartTrigger"
+
+
+def _set_read_available(asked: Asked, value: bool) -> None:
+    asked.own.read_available = value
 
 
 def _acquired(asked: Asked) -> int:
@@ -249,7 +254,11 @@ TABLE: dict[tuple[str, int], tuple[Getter | None, Setter | None]] = {
     ("Trig", 0x1393): (lambda a: _DIGITAL_EDGE if a.own.trigger else _NO_TRIGGER, None),
     ("Trig", 0x1407): (
         lambda a: f"/{a.device.name}/{a.own.trigger}" if a.own.trigger else "",
-        lambda a, v: a.device.set_trigger(a.own, v),
+        lambda a, v: a.device.set_trigger(a.own, v, a.own.trigger_edge),
+    ),
+    ("Trig", 0x1404): (
+        lambda a: a.own.trigger_edge,
+        lambda a, v: a.device.set_trigger(a.own, a.own.trigger, v),
     ),
     ("Trig", 0x2F1E): (_trigger_terminal, None),
     # buffers, reading and writing
@@ -270,7 +279,8 @@ TABLE: dict[tuple[str, int], tuple[Getter | None, Setter | None]] = {
     ("Read", 0x1221): (lambda a: a.own.delivered, None),
     ("Read", 0x192A): (_acquired, None),
     ("Read", 0x1826): (_always(True), _only(True)),
-    ("Read", 0x1215): (_always(False), _only(False)),
+    ("Read", 0x1215): (lambda a: a.own.read_available, _set_read_available),
+    ("Read", 0x31E8): (lambda a: a.device.default_samples(a.own), None),
     ("Read", 0x1211): (_always(_DO_NOT_OVERWRITE), _only(_DO_NOT_OVERWRITE)),
     ("Read", 0x2174): (_always(False), None),
     ("Write", 0x217E): (lambda a: len(a.own.channel_names), None),

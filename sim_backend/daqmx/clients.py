@@ -87,7 +87,7 @@ class Clients:
         there = self._device.task(task)
 
         def ended() -> None:
-            if there.listened and there in self._device.tasks_of(name):
+            if there.listens(context) and there in self._device.tasks_of(name):
                 self.gone(name)
 
         context.add_callback(ended)
@@ -126,5 +126,5 @@ class Clients:
                 self._make_safe(name, f"it is silent for more than {self._timeout:g} s")
 
     def _make_safe(self, name: str, why: str) -> None:
-        self._device.make_safe(name)
+        self._device.make_safe(name, f"The client was lost: {why}.")
         log.warning("client %s: %s; its tasks were aborted, the output is at 0 V", name, why)

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from dearig.drivers.channels import COUNT_MAX, COUNT_MIN
+from dearig.sim_backend.daqmx import events
 from dearig.sim_backend.daqmx.engine import Reading, TimingEngine
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.setup import LINES, OUTPUTS
-from dearig.sim_backend.daqmx.tasks import Kind, State, Task, Watchdog
+from dearig.sim_backend.daqmx.tasks import Kind, Listener, State, Task, Watchdog
 from dearig.sim_backend.daqmx.wire import Change
 from dearig.sim_backend.faults import Fault, FaultKind
 
@@ -138,7 +139,7 @@ class Device(TimingEngine):
             self.check_device(device)
             now = self._settle()
             for task in self._tasks.values():
-                self._abort(task, now)
+                self._abort(task, now, "The device was reset.")
                 if task.watchdog is not None:
                     task.watchdog.expired = False
             for terminal in OUTPUTS:
@@ -147,13 +148,16 @@ class Device(TimingEngine):
                 self._wire.set_line(line, False, now)
             self._notify()
 
-    def make_safe(self, client: str | None = None) -> None:
-        """Abort the tasks of ``client`` (None: all tasks), set 0 V and the enable line low."""
+    def make_safe(self, client: str | None = None, why: str = "The card was made safe.") -> None:
+        """Abort the tasks of ``client`` (None: all tasks), set 0 V and the enable line low.
+
+        ``why`` is a sentence for the client.
+        """
         with self._lock:
             now = self._settle()
             for task in self._tasks.values():
                 if client in (None, task.client):
-                    self._abort(task, now)
+                    self._abort(task, now, why)
             self._set_output(self._card.ao_command, 0, now)
             self._wire.disable(now)
             self._notify()
@@ -166,7 +170,7 @@ class Device(TimingEngine):
         for output in task.outputs:
             if output.name == name:
                 return (0.0, (COUNT_MAX + 1) / output.range)
-        raise DaqmxError(Code.INVALID_CHANNEL_NAME, f"Channel Name: {name}")
+        raise DaqmxError(Code.CHANNEL_NOT_IN_TASK, f"Channel Name: {name}")
 
     # states
 
@@ -192,7 +196,7 @@ class Device(TimingEngine):
             elif action == 6:
                 now = self._settle()
                 self._end(task, now)
-                task.failed = None
+                task.failed, task.failed_why = None, ""
                 self._release(task)
                 self._notify()
             else:
@@ -207,8 +211,10 @@ class Device(TimingEngine):
             self._verify(task)
             if task.kind is Kind.AO and task.clock is not None:
                 self._may_generate(task)
+            events.check_intervals(task, self.buffer_size(task))
             self._reserve(task)
-            task.failed = None
+            task.failed, task.failed_why = None, ""
+            events.restart(task)
             task.state = State.RUNNING
             if task.watchdog is not None:
                 self._start_watchdog(task.watchdog, now)
@@ -226,16 +232,16 @@ class Device(TimingEngine):
         """Stop ``task``; the output keeps its value. Raises the error that stopped it earlier."""
         with self._lock:
             now = self._settle()
-            failed = task.failed
+            failed, why = task.failed, task.failed_why
             self._end(task, now)
-            task.failed = None
+            task.failed, task.failed_why = None, ""
             if task.kept is State.VERIFIED:
                 self._release(task)
             elif not task.regenerates:
                 task.waveform = None  # a new start needs a new waveform
             self._notify()
             if failed is not None:
-                raise DaqmxError(failed, f"Task Name: {task.name}")
+                raise DaqmxError(failed, f"{why} Task Name: {task.name}".strip())
 
     def is_done(self, task: Task) -> bool:
         """Return True once ``task`` is complete; raises the error that stopped it."""
@@ -263,6 +269,33 @@ class Device(TimingEngine):
 
         self._wait(timeout, attempt)
 
+    # events
+
+    def listen(self, task: Task, every: int | None, owner: object, direction: int = 0) -> Listener:
+        """Return a new listener to ``task``: every ``every`` samples, or None for its end.
+
+        ``owner`` is the call that listens, ``direction`` DAQmx's type of an event by samples.
+        """
+        with self._lock:
+            events.check_registration(task, every, direction)
+            listener = Listener(every, owner)
+            task.listeners.append(listener)
+            return listener
+
+    def forget(self, task: Task, listener: Listener) -> None:
+        """End ``listener``."""
+        with self._lock:
+            if listener in task.listeners:
+                task.listeners.remove(listener)
+
+    def due_events(self, task: Task, listener: Listener) -> Sequence[int]:
+        """Return the status of each event that happened since the last call."""
+        with self._lock:
+            now = self._settle()
+            if task.running:
+                self._observe(task, now)
+            return events.collect(listener)
+
     # reading
 
     def available(self, task: Task) -> int:
@@ -275,6 +308,14 @@ class Device(TimingEngine):
         """Return the samples per channel since the start."""
         with self._lock:
             return self._acquired(task, self._settle())
+
+    def default_samples(self, task: Task) -> int:
+        """Return the samples per channel of a read of all that is there."""
+        if task.clock is None:
+            return 1
+        if task.clock.finite and not task.read_available:
+            return task.clock.samples
+        return self.available(task)
 
     def read(self, task: Task, samples: int, timeout: float, most: int | None = None) -> Reading:
         """Return the next ``samples`` of every channel; -1: all present, or all of a finite task.
@@ -305,13 +346,16 @@ class Device(TimingEngine):
             wanted = samples
             if task.wanted is not None:
                 left = task.wanted - task.delivered
-                if samples > left:
+                if samples > 0 and left == 0:
                     raise DaqmxError(
                         Code.SAMPLES_NEVER_AVAILABLE,
-                        f"Task Name: {task.name}; Samples Left: {left}",
+                        f"Task Name: {task.name}; Samples Left: 0",
                         read=0,
                     )
-                wanted = left if samples == -1 else samples
+                # the driver gives what is left of a finite acquisition without an error
+                wanted = left if samples == -1 else min(samples, left)
+                if samples == -1 and task.read_available:
+                    wanted = waiting
             elif samples == -1:
                 wanted = waiting
             if most is not None:
@@ -335,13 +379,14 @@ class Device(TimingEngine):
         """Return counts (channels, n) for ``volts`` (channels, n); refuses values out of range."""
         counts = np.empty(volts.shape, dtype=np.int16)
         for row, values, channel in zip(counts, volts, task.outputs, strict=True):
-            beyond = ~(np.abs(values) <= channel.range)  # includes NaN
+            low, high = channel.limits
+            slack = 1e-9 * channel.range  # of the rounding of a program's own arithmetic
+            beyond = ~((values >= low - slack) & (values <= high + slack))  # includes NaN
             if beyond.any():
                 raise DaqmxError(
                     Code.INVALID_SAMPLE,
-                    f"Value: {values[int(np.argmax(beyond))]:g}; Minimum Value: "
-                    f"{-channel.range:g}; Maximum Value: {channel.range:g}; Channel Name: "
-                    f"{channel.name}",
+                    f"Value: {values[int(np.argmax(beyond))]:g}; Minimum Value: {low:g}; "
+                    f"Maximum Value: {high:g}; Channel Name: {channel.name}",
                     written=0,
                 )
             step = channel.range / (COUNT_MAX + 1)

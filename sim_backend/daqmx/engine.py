@@ -15,6 +15,7 @@ import numpy as np
 
 from dearig.drivers.settings import RigSettings
 from dearig.sim_backend.clock import Clock
+from dearig.sim_backend.daqmx import events
 from dearig.sim_backend.daqmx.acquisition import OwnTicks, Run, SharedTicks
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.output import Generation, Waveform
@@ -193,7 +194,10 @@ class TimingEngine(Setup):
         self, task: Task, *, read: int | None = None, written: int | None = None
     ) -> None:
         if task.failed is not None:
-            raise DaqmxError(task.failed, f"Task Name: {task.name}", read=read, written=written)
+            why = f"{task.failed_why} " if task.failed_why else ""
+            raise DaqmxError(
+                task.failed, f"{why}Task Name: {task.name}", read=read, written=written
+            )
 
     # starting and ending
 
@@ -277,15 +281,19 @@ class TimingEngine(Setup):
         if self._run_start is None:
             self._run_start = now
 
-    def _abort(self, task: Task, now: float) -> None:
-        """End ``task`` in any state; its client gets the error in its next call."""
-        busy = task.state is not State.VERIFIED
+    def _abort(self, task: Task, now: float, why: str) -> None:
+        """End ``task`` in any state; its client gets the error and ``why`` in its next call."""
+        busy, running = task.state is not State.VERIFIED, task.running
         self._end(task, now)
         self._release(task)
         if busy:
-            task.failed = Code.RUNTIME_ABORTED
+            task.failed, task.failed_why = Code.RUNTIME_ABORTED, why
+        if running:
+            events.observe(task, 0, Code.RUNTIME_ABORTED)
 
     def _end(self, task: Task, now: float) -> None:
+        if task.running:
+            self._observe(task, now)
         if task.generation is not None:
             task.generation.stop(now)
             self._wire.follow(now, self._oldest)
@@ -308,6 +316,20 @@ class TimingEngine(Setup):
             return self._acquired(task, now) >= task.wanted
         return task.clock is None and task.kind is not Kind.WATCHDOG
 
+    def _observe(self, task: Task, now: float) -> None:
+        """Make the events due that have happened since the start of ``task``."""
+        if not task.listeners:
+            return
+        if task.kind.is_input:
+            samples = self._acquired(task, now)
+        else:
+            samples = task.generation.ticks(now) if task.generation is not None else 0
+        done = task.failed if task.failed is not None else None
+        if done is None and self._done(task, now):
+            events.observe(task, samples, 0)
+        else:
+            events.observe(task, samples, done)
+
     # samples
 
     def _acquired(self, task: Task, now: float) -> int:
@@ -324,13 +346,15 @@ class TimingEngine(Setup):
         if task.run is None:
             task.run = self._new_run(task)
         counts = task.run.read(first, last)
-        # while the amplifier is not enabled the film is at 0 V, whatever the output is
-        output = counts[0]
-        if self._wire.switched:
-            output = ticks.commands(first, last, self._wire.track)
+        outputs = {
+            terminal: ticks.commands(
+                first, last, self._wire.track_of(terminal), wired=self._wire.is_wired(terminal)
+            )
+            for terminal in self._wiring.monitored(task.inputs)
+        }
         task.delivered = last
         self._laser = self._wiring.laser_reading(counts, task.inputs)
-        return Reading(self._wiring.as_read(counts, output, task.inputs), complete)
+        return Reading(self._wiring.as_read(counts, outputs, task.inputs), complete)
 
     def _new_run(self, task: Task) -> Run:
         ticks = task.ticks
@@ -354,8 +378,14 @@ class TimingEngine(Setup):
         self._verify(task)
         self._check_free(task)
         self._readings += 1
-        film, output = self._wire.film_voltage(now), self._wire.track.standing(now)
-        counts = self._wiring.still(task.inputs, samples, self._readings, film, output, self._laser)
+        counts = self._wiring.still(
+            task.inputs,
+            samples,
+            self._readings,
+            self._wire.film_voltage(now),
+            {terminal: self._wire.track_of(terminal).standing(now) for terminal in OUTPUTS},
+            self._laser,
+        )
         return Reading(counts, True)
 
     def _write_still(self, task: Task, counts: np.ndarray, auto_start: bool, now: float) -> int:

@@ -30,7 +30,7 @@ class Code(IntEnum):
     OUTPUT_STARVED = -200290
     SAMPLES_NOT_YET_WRITTEN = -200292
     AI_CONVERT_RATE_TOO_HIGH = -200335
-    INVALID_CHANNEL_NAME = -200461
+    CHANNEL_NOT_IN_TASK = -200486
     NOT_SUPPORTED_IN_TASK = -200452
     NOT_AN_INPUT = -200460
     NOT_AN_OUTPUT = -200459
@@ -52,7 +52,14 @@ class Code(IntEnum):
     CONVERT_PERIOD = -200081
     WRITE_WITHOUT_START = -200846
     READ_WITHOUT_START = -200834
-    EVENT_REGISTERED = -200950
+    DONE_EVENT_REGISTERED = -200950
+    ACQUIRED_EVENT_REGISTERED = -200966
+    TRANSFERRED_EVENT_REGISTERED = -200967
+    TRANSFERRED_NOT_FOR_INPUT = -200965
+    ACQUIRED_NOT_FOR_OUTPUT = -200964
+    EVENT_INTERVAL_ZERO = -200880
+    EVENT_WITHOUT_BUFFER = -200848
+    BUFFER_NOT_MULTIPLE = -200877
     EVENT_WHILE_RUNNING = -200960
     BEYOND_FINITE = -201132
     PROPERTY_NOT_SUPPORTED = -200197
@@ -87,7 +94,7 @@ WORDS: dict[int, str] = {
     Code.SAMPLES_NOT_YET_WRITTEN: "Some or all of the samples to write could not be written to the "
     "buffer yet. More space will free up as samples currently in the buffer are generated.",
     Code.AI_CONVERT_RATE_TOO_HIGH: "Specified AI conversion rate exceeds the maximum.",
-    Code.INVALID_CHANNEL_NAME: "Channel specified is not in the task.",
+    Code.CHANNEL_NOT_IN_TASK: "Specified channel is not in the task.",
     Code.NOT_SUPPORTED_IN_TASK: "Specified property is not supported by the device or is not "
     "applicable to the task.",
     Code.NOT_AN_INPUT: "Read cannot be performed, because this task does not contain any "
@@ -121,7 +128,19 @@ WORDS: dict[int, str] = {
     "the task is not running.",
     Code.READ_WITHOUT_START: "Read cannot be performed when the auto start property is false and "
     "the task is not running.",
-    Code.EVENT_REGISTERED: "Done event is already registered within this task.",
+    Code.DONE_EVENT_REGISTERED: "Done event is already registered within this task.",
+    Code.ACQUIRED_EVENT_REGISTERED: "Every N Samples Acquired Into Buffer event is already "
+    "registered within this task.",
+    Code.TRANSFERRED_EVENT_REGISTERED: "Every N Samples Transferred From Buffer event is already "
+    "registered within this task.",
+    Code.TRANSFERRED_NOT_FOR_INPUT: "Every N Samples Transferred From Buffer event is not "
+    "supported for input tasks.",
+    Code.ACQUIRED_NOT_FOR_OUTPUT: "Every N Samples Acquired Into Buffer event is not supported "
+    "for output tasks.",
+    Code.EVENT_INTERVAL_ZERO: "Every N Samples event interval must be greater than zero.",
+    Code.EVENT_WITHOUT_BUFFER: "Every N Samples event is not supported for non-buffered tasks.",
+    Code.BUFFER_NOT_MULTIPLE: "Buffer size must be a multiple of the Every N Samples event "
+    "interval.",
     Code.EVENT_WHILE_RUNNING: "Software event cannot be registered while the task is running.",
     Code.BEYOND_FINITE: "Samples cannot be written beyond the last sample of the finite "
     "generation.",

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 import threading
 from collections.abc import Callable, Iterator
@@ -20,9 +21,11 @@ from dearig.sim_backend.daqmx import attributes
 from dearig.sim_backend.daqmx.attributes import Asked
 from dearig.sim_backend.daqmx.device import Device, Reading
 from dearig.sim_backend.daqmx.errors import WORDS, Code, DaqmxError
-from dearig.sim_backend.daqmx.tasks import Kind, Task
+from dearig.sim_backend.daqmx.tasks import Kind, Listener, Task
 
 __all__ = ["Servicer", "refuse"]
+
+log = logging.getLogger(__name__)
 
 _BY_CHANNEL = 0  # DAQmx: group by channel
 _FINITE, _CONTINUOUS = 10178, 10123
@@ -49,13 +52,13 @@ def refuse(context: grpc.ServicerContext, error: DaqmxError) -> NoReturn:
 class Servicer(pb_grpc.NiDAQmxServicer):
     """Service of the calls; the caller handles ``DaqmxError`` with ``refuse``.
 
-    The base class answers all other calls with UNIMPLEMENTED.
+    All other calls are answered with UNIMPLEMENTED, and one line in the log.
     """
 
     def __init__(self, device: Device, closing: threading.Event) -> None:
         self._device = device
         self._closing = closing
-        self._streams: set[str] = set()
+        self._streams: dict[str, Listener] = {}
 
     # tasks
 
@@ -146,7 +149,8 @@ class Servicer(pb_grpc.NiDAQmxServicer):
         return pb.CfgSampClkTimingResponse()
 
     def CfgDigEdgeStartTrig(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.set_trigger(self._task(request), request.trigger_source)
+        edge = request.trigger_edge_raw or request.trigger_edge
+        self._device.set_trigger(self._task(request), request.trigger_source, edge)
         return pb.CfgDigEdgeStartTrigResponse()
 
     def DisableStartTrig(self, request: Any, context: grpc.ServicerContext) -> Any:
@@ -280,21 +284,8 @@ class Servicer(pb_grpc.NiDAQmxServicer):
     # events: each occupies a thread while a client listens
 
     def RegisterDoneEvent(self, request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
-        task = self._task(request)
-        key = f"done {task.name}"
-        self._open_stream(task, key, context)
-        told = False  # True once the event of the present start was sent
-        while self._listening(key, context):
-            if not task.running:
-                told = False
-            elif not told:
-                status = 0
-                try:
-                    told = self._device.is_done(task)
-                except DaqmxError as error:
-                    told, status = True, error.code
-                if told:
-                    yield pb.RegisterDoneEventResponse(status=status)
+        for status in self._events("done", request, context, None):
+            yield pb.RegisterDoneEventResponse(status=status)
 
     def UnregisterDoneEvent(self, request: Any, context: grpc.ServicerContext) -> Any:
         self._close_stream("done", self._task(request))
@@ -303,52 +294,48 @@ class Servicer(pb_grpc.NiDAQmxServicer):
     def RegisterEveryNSamplesEvent(
         self, request: Any, context: grpc.ServicerContext
     ) -> Iterator[Any]:
-        task = self._task(request)
-        key = f"samples {task.name}"
-        every = request.n_samples
-        if every < 1:
-            raise DaqmxError(Code.INVALID_VALUE, f"N Samples: {every}")
-        self._open_stream(task, key, context)
-        told = 0
-        while self._listening(key, context):
-            if not task.running:
-                told = 0
-                continue
-            passed = (
-                self._device.acquired(task)
-                if task.kind is Kind.AI
-                else self._device.generated(task)
+        direction = request.every_n_samples_event_type_raw or request.every_n_samples_event_type
+        for _ in self._events("samples", request, context, request.n_samples, direction):
+            yield pb.RegisterEveryNSamplesEventResponse(
+                every_n_samples_event_type_raw=direction, n_samples=request.n_samples
             )
-            for _ in range(passed // every - told):
-                told += 1
-                yield pb.RegisterEveryNSamplesEventResponse(
-                    every_n_samples_event_type_raw=request.every_n_samples_event_type_raw,
-                    n_samples=every,
-                )
 
     def UnregisterEveryNSamplesEvent(self, request: Any, context: grpc.ServicerContext) -> Any:
         self._close_stream("samples", self._task(request))
         return pb.UnregisterEveryNSamplesEventResponse()
 
-    def _open_stream(self, task: Task, key: str, context: grpc.ServicerContext) -> None:
-        if task.running:
-            raise DaqmxError(Code.EVENT_WHILE_RUNNING, f"Task Name: {task.name}")
-        if key in self._streams:
-            raise DaqmxError(Code.EVENT_REGISTERED, f"Task Name: {task.name}")
-        self._streams.add(key)
-        task.listened = True
-        context.add_callback(lambda: self._streams.discard(key))
+    def _events(
+        self,
+        what: str,
+        request: Any,
+        context: grpc.ServicerContext,
+        every: int | None,
+        direction: int = 0,
+    ) -> Iterator[int]:
+        """Yield the status of each event of a task until the client has heard enough."""
+        task = self._task(request)
+        listener = self._device.listen(task, every, context, direction)
+        key = f"{what} {task.name}"
+        self._streams[key] = listener
+
+        def forget() -> None:
+            self._device.forget(task, listener)
+            if self._streams.get(key) is listener:
+                del self._streams[key]
+
+        if not context.add_callback(forget):
+            forget()
         # the client waits for this before it continues
         context.send_initial_metadata(())
+        while self._streams.get(key) is listener and context.is_active():
+            yield from self._device.due_events(task, listener)
+            if self._closing.wait(_POLL_S):
+                return
 
     def _close_stream(self, what: str, task: Task) -> None:
-        task.listened = False
-        self._streams.discard(f"{what} {task.name}")
-
-    def _listening(self, key: str, context: grpc.ServicerContext) -> bool:
-        """Wait one period; return True while an event's stream continues."""
-        over = self._closing.wait(_POLL_S)
-        return not over and context.is_active() and key in self._streams
+        listener = self._streams.pop(f"{what} {task.name}", None)
+        if listener is not None:
+            self._device.forget(task, listener)
 
     # shared by the calls
 
@@ -466,7 +453,12 @@ def _attribute_call(name: str, response: Any) -> Callable[[Servicer, Any, Any], 
             attributes.set_(group, number, asked, value)
             return response()
         value = attributes.get(group, number, asked)
-        return response(**{"value_raw" if raw else "value": value})
+        try:
+            return response(**{"value_raw" if raw else "value": value})
+        except (TypeError, ValueError) as error:  # beyond the type of the reply
+            raise DaqmxError(
+                Code.INVALID_VALUE, f"Property: {group} {number:#06x}; Value: {value}"
+            ) from error
 
     return answer
 
@@ -479,4 +471,22 @@ def _add_attribute_calls() -> None:
             setattr(Servicer, method.name, answer)
 
 
+def _unimplemented(name: str) -> Callable[[Servicer, Any, Any], Any]:
+    """Return the method for the call ``name``, which the card does not simulate."""
+
+    def answer(self: Servicer, request: Any, context: grpc.ServicerContext) -> Any:  # noqa: ARG001
+        log.warning("%s is not simulated; the client is told so", name)
+        context.abort(grpc.StatusCode.UNIMPLEMENTED, f"{name} is not simulated")
+
+    return answer
+
+
+def _add_unimplemented_calls() -> None:
+    """Add every other call; the base class would write a traceback for each."""
+    for method in pb.DESCRIPTOR.services_by_name["NiDAQmx"].methods:
+        if getattr(Servicer, method.name) is getattr(pb_grpc.NiDAQmxServicer, method.name):
+            setattr(Servicer, method.name, _unimplemented(method.name))
+
+
 _add_attribute_calls()
+_add_unimplemented_calls()

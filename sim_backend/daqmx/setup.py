@@ -9,6 +9,8 @@ from collections.abc import Iterable, Sequence
 from dearig.drivers.settings import RigSettings
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.tasks import (
+    FALLING,
+    RISING,
     AnalogInput,
     AnalogOutput,
     Kind,
@@ -16,6 +18,7 @@ from dearig.sim_backend.daqmx.tasks import (
     SampleClock,
     Task,
     Watchdog,
+    expanded,
     physical_names,
 )
 from dearig.sim_backend.daqmx.wiring import OUTPUT_MONITOR
@@ -29,6 +32,7 @@ LINES = tuple(f"port{port}/line{line}" for port in range(3) for line in range(8)
 DIFFERENTIAL, SINGLE, SINGLE_OWN_SENSE = 10106, 10083, 10078  #: DAQmx: DIFF, RSE, NRSE
 SECONDS, TICKS, PERIODS = 10364, 10304, 10286  #: DAQmx: units of the delay
 
+_MOST_SAMPLES = 2**32 - 1  # per channel, in a buffer
 _SLOWEST = 2**32  # ticks of the timebase between two samples
 _SETTLE_US = 10.0  # extra settling time that the driver gives an input where there is time
 _FIRST_US = 0.25  # default delay from the sample clock to the first conversion
@@ -147,6 +151,12 @@ class Setup:
                 raise DaqmxError(
                     Code.INVALID_VALUE, f"Property: SampQuant.SampPerChan; Value: {samples}"
                 )
+            if samples > _MOST_SAMPLES:
+                raise DaqmxError(
+                    Code.INVALID_VALUE,
+                    f"Property: SampQuant.SampPerChan; Requested Value: {samples}; Maximum Value: "
+                    f"{_MOST_SAMPLES}; Task Name: {task.name}",
+                )
             terminal = self._clock_source(task, source)
             task.clock = SampleClock(
                 self._coerced(task, rate, external=bool(terminal)), terminal, finite, samples
@@ -225,11 +235,19 @@ class Setup:
             )
         task.delay_units = units
 
-    def set_trigger(self, task: Task, source: str) -> None:
-        """Make ``task`` wait for a digital edge on ``source`` at its start; empty: no wait."""
+    def set_trigger(self, task: Task, source: str, edge: int = RISING) -> None:
+        """Make ``task`` wait for a digital ``edge`` on ``source`` at its start; empty: no wait.
+
+        The pulses within the card have no length here, so both of their edges are at one time.
+        """
         with self._lock:
             self._not_running(task)
+            if edge not in (RISING, FALLING):
+                raise DaqmxError(
+                    Code.INVALID_VALUE, f"Property: DigEdge.StartTrig.Edge; Value: {edge}"
+                )
             task.trigger = self._terminal(source) if source else ""
+            task.trigger_edge = edge
 
     def set_buffer(self, task: Task, samples: int) -> None:
         """Set the size of the task's buffer to ``samples`` per channel."""
@@ -345,13 +363,14 @@ class Setup:
     def _named(self, task: Task, terminals: list[str], name: str) -> Iterable[tuple[str, str]]:
         """Yield each of ``terminals`` with the unique name of its channel."""
         names = [f"{self.name}/{terminal}" for terminal in terminals]
-        given = [part.strip() for part in name.split(",")] if name else []
+        given = [n for part in name.split(",") for n in expanded(part.strip())] if name else []
         if len(given) == 1 and len(terminals) > 1:
             names = [f"{name}{i}" for i in range(len(terminals))]
         elif given:
             names = given + names[len(given) :]
+        taken = {called.lower() for called in task.channel_names}
         for called in names:
-            if called in task.channel_names or names.count(called) > 1:
+            if called.lower() in taken or [n.lower() for n in names].count(called.lower()) > 1:
                 raise DaqmxError(Code.CHANNEL_ALREADY_IN_TASK, f"Channel Name: {called}")
         return list(zip(terminals, names, strict=False))
 

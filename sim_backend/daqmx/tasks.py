@@ -11,16 +11,23 @@ from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.output import Generation, Waveform
 
 __all__ = [
+    "FALLING",
+    "RISING",
     "AnalogInput",
     "AnalogOutput",
     "Kind",
     "Lines",
+    "Listener",
     "SampleClock",
     "State",
     "Task",
     "Watchdog",
+    "expanded",
     "physical_names",
 ]
+
+
+RISING, FALLING = 10280, 10171  #: DAQmx: edges
 
 
 class Kind(Enum):
@@ -31,6 +38,11 @@ class Kind(Enum):
     AO = 10102
     DO = 10153
     WATCHDOG = -1
+
+    @property
+    def is_input(self) -> bool:
+        """Return True if tasks of this kind are read."""
+        return self is Kind.AI
 
 
 class State(Enum):
@@ -95,6 +107,20 @@ class Watchdog:
 
 
 @dataclass(eq=False)
+class Listener:
+    """Program that listens to an event of a task: each ``every`` samples, or None for its end.
+
+    ``owner`` is the call that listens. ``told`` counts the events of the present start; ``due``
+    has the status of each unsent one.
+    """
+
+    every: int | None
+    owner: object
+    told: int = 0
+    due: list[int] = field(default_factory=list)
+
+
+@dataclass(eq=False)
 class Task:
     """Task with its settings and its present state."""
 
@@ -107,6 +133,7 @@ class Task:
     watchdog: Watchdog | None = None
     clock: SampleClock | None = None
     trigger: str = ""
+    trigger_edge: int = RISING
     convert_ticks: int | None = None  # of the timebase, between two conversions
     delay_ticks: int | None = None  # from the sample clock to the first conversion
     delay_units: int = 10304
@@ -115,7 +142,8 @@ class Task:
     state: State = State.VERIFIED
     kept: State = State.VERIFIED  # state after a stop
     failed: Code | None = None
-    listened: bool = False  # True while a client listens to its events
+    failed_why: str = ""  # sentence for the client, where the code does not say it
+    listeners: list[Listener] = field(default_factory=list)
     # of an output task
     waveform: Waveform | None = None
     first_write: int = 0  # samples; the buffer's size where none was set
@@ -126,6 +154,11 @@ class Task:
     ticks: Ticks | None = None
     delivered: int = 0
     by_read: bool = False  # True if a read started it
+    read_available: bool = False  # True if a read of all takes what a finite task has by now
+
+    def listens(self, owner: object) -> bool:
+        """Return True while ``owner`` has a listener to an event of the task."""
+        return any(listener.owner is owner for listener in self.listeners)
 
     @property
     def running(self) -> bool:
@@ -153,7 +186,20 @@ class Task:
         return self.clock.samples if self.clock and self.clock.finite else None
 
 
-_RANGE = re.compile(r"^(.*?)(\d+):(\d+)$")
+_RANGE = re.compile(r"^(.*?)(\d+):(?:\1)?(\d+)$", re.IGNORECASE)
+_LONGEST_RANGE = 64  # names
+
+
+def expanded(name: str) -> list[str]:
+    """Return the names in a range such as ``ai0:2`` or ``ai0:ai2``, or the name itself."""
+    found = _RANGE.match(name)
+    if not found:
+        return [name]
+    first, last = int(found[2]), int(found[3])
+    if abs(last - first) > _LONGEST_RANGE:
+        raise DaqmxError(Code.UNKNOWN_CHANNEL, f"Physical Channel: {name}")
+    step = 1 if last >= first else -1
+    return [f"{found[1]}{n}" for n in range(first, last + step, step)]
 
 
 def physical_names(text: str, device: str) -> list[str]:
@@ -168,13 +214,5 @@ def physical_names(text: str, device: str) -> list[str]:
             raise DaqmxError(Code.INVALID_SYNTAX, f"Input: {text!r}")
         if owner.lower() != device.lower():
             raise DaqmxError(Code.UNKNOWN_DEVICE, f"Device Specified: {owner}")
-        found = _RANGE.match(rest)
-        if found:
-            first, last = int(found[2]), int(found[3])
-            if abs(last - first) > 64:
-                raise DaqmxError(Code.UNKNOWN_CHANNEL, f"Physical Channel: {part.strip()}")
-            step = 1 if last >= first else -1
-            names.extend(f"{found[1]}{n}".lower() for n in range(first, last + step, step))
-        else:
-            names.append(rest.lower())
+        names += [name.lower() for name in expanded(rest)]
     return names

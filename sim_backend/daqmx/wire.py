@@ -67,6 +67,14 @@ class Wire:
         """Return the output that is wired to the amplifier."""
         return self._tracks[self._wired]
 
+    def track_of(self, terminal: str) -> Track:
+        """Return the output ``terminal``."""
+        return self._tracks[terminal]
+
+    def is_wired(self, terminal: str) -> bool:
+        """Return True if ``terminal`` is wired to the amplifier."""
+        return terminal == self._wired
+
     def film_voltage(self, now: float) -> float:
         """Return the voltage in V at the film."""
         if not self._enabled[-1][1]:

@@ -22,6 +22,10 @@ __all__ = ["OUTPUT_MONITOR", "Wiring"]
 OUTPUT_MONITOR = "_{}_vs_aognd"
 
 
+def _is_monitor(terminal: str) -> bool:
+    return terminal.startswith("_ao") and terminal.endswith("_vs_aognd")
+
+
 class _TaskSettings(RigSettings):
     """Settings of the rig with a task's conversion times: ``conversions`` in s after the tick."""
 
@@ -44,7 +48,6 @@ class Wiring:
         self._faults = faults
         self._output = Card(settings, self._streams).channels[0].scaling
         self._names = {t: n for n, t in settings.terminals().items() if n != "voltage_command"}
-        self._monitor = OUTPUT_MONITOR.format(settings.card.ao_command)
         laser = settings.laser
         self._laser_at_rest = laser.direction * laser.rest_position_mm / laser.mm_per_V
         self.zero = int(self._output.counts(np.zeros(1))[0])
@@ -100,12 +103,20 @@ class Wiring:
         limit = ranges[0] if ranges else self._settings.card.range_displacement_V
         return int(counts[self._settings.channel_names.index("displacement"), -1]), limit
 
+    def monitored(self, inputs: Sequence[AnalogInput]) -> list[str]:
+        """Return the outputs, such as ``ao0``, that ``inputs`` read back within the card."""
+        return [c.terminal[1:].partition("_")[0] for c in inputs if _is_monitor(c.terminal)]
+
     def as_read(
-        self, counts: np.ndarray, output: np.ndarray, inputs: Sequence[AnalogInput]
+        self,
+        counts: np.ndarray,
+        outputs: Mapping[str, np.ndarray],
+        inputs: Sequence[AnalogInput],
     ) -> np.ndarray:
         """Return counts (inputs, n) of a task from the rig's ``counts`` (channels, n).
 
-        ``output`` (n,) are the counts on the output; an input without a wire reads 0.
+        ``outputs`` has the counts (n,) of each output that is read back; an input without a wire
+        reads 0.
         """
         rows = {name: i for i, name in enumerate(self._settings.channel_names)}
         read = np.zeros((len(inputs), counts.shape[1]), dtype=np.int16)
@@ -113,8 +124,8 @@ class Wiring:
             name = self._names.get(channel.terminal)
             if name is not None:
                 row[:] = counts[rows[name]]
-            elif channel.terminal == self._monitor:
-                row[:] = self._returned(output, channel)
+            else:
+                self._read_back(row, outputs, channel)
         return read
 
     def still(
@@ -123,12 +134,12 @@ class Wiring:
         samples: int,
         reading: int,
         film: float,
-        output: int,
+        outputs: Mapping[str, int],
         laser: tuple[int, float] | None,
     ) -> np.ndarray:
         """Return counts (inputs, samples) of reading number ``reading`` of a rig at rest.
 
-        ``film`` V are at the film, ``output`` counts on the output. ``laser`` is the last reading
+        ``film`` V are at the film, ``outputs`` counts on each output. ``laser`` is the last reading
         of its input in counts with its range; None: the film is at the loaded rest state.
         """
         amplifier = self._settings.amplifier
@@ -149,13 +160,18 @@ class Wiring:
             name = self._names.get(channel.terminal)
             if name is not None:
                 row[:] = card.convert(name, volts[name])
-            elif channel.terminal == self._monitor:
-                row[:] = self._returned(np.full(samples, output, dtype=np.int16), channel)
+            else:
+                held = {ao: np.full(samples, counts) for ao, counts in outputs.items()}
+                self._read_back(row, held, channel)
         return read
 
-    def _returned(self, output: np.ndarray, channel: AnalogInput) -> np.ndarray:
-        scale = self._settings.card.ao_range_V / channel.range
-        return np.clip(np.rint(output * scale), -COUNT_MAX - 1, COUNT_MAX).astype(np.int16)
+    def _read_back(
+        self, row: np.ndarray, outputs: Mapping[str, np.ndarray], channel: AnalogInput
+    ) -> None:
+        """Fill ``row`` (n,) with the output that ``channel`` reads back, if it reads one."""
+        for ao in self.monitored([channel]):
+            scale = self._settings.card.ao_range_V / channel.range
+            row[:] = np.clip(np.rint(outputs[ao] * scale), -COUNT_MAX - 1, COUNT_MAX)
 
     def _laser_volts(self, last: tuple[int, float] | None) -> float:
         if last is None:

@@ -167,7 +167,8 @@ def _one_sample(ao):
 def _read_too_much(ai):
     clock_inputs(ai, RATE, 100, source="")
     ai.start()
-    read(ai, 101)
+    read(ai, 100)
+    read(ai, 1)
 
 
 def _not_done(ai):
@@ -273,7 +274,7 @@ RULES = {
     ),
     "a channel that is not in the task": (
         _with_inputs(lambda ai: ai.ai_channels["other"].ai_max),
-        -200461,
+        -200486,
     ),
     "a watchdog that waits for ever and a day": (_watchdog(timeout=1e6), -200668),
     "a name that is taken": (_twice_the_same_name, -200089),
