@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["AddressError", "RefusedWaveform", "RigError", "RigStateError"]
+__all__ = ["AddressError", "LinkRefused", "RefusedWaveform", "RigError", "RigStateError"]
 
 
 class RigError(Exception):
@@ -15,6 +15,10 @@ class RigError(Exception):
 
 class RigStateError(RigError):
     """Call that is not allowed in the rig's present state."""
+
+
+class LinkRefused(RigError):  # noqa: N818  (the name says that it is a refusal)
+    """Connection to a card that the rig file does not allow or does not describe completely."""
 
 
 class AddressError(ValueError):

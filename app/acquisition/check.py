@@ -15,7 +15,8 @@ from rich.text import Text
 
 from dearig.acquisition.rigs import kind_of, options_of
 from dearig.config.rigfile import RigFile
-from dearig.drivers.errors import AddressError
+from dearig.drivers.daqmx.watchdog import WATCHDOG
+from dearig.drivers.errors import AddressError, LinkRefused
 from dearig.drivers.findings import Finding
 from dearig.errors import InputError, InstrumentFault
 from dearig.sim_backend.faults import FaultPlan
@@ -37,10 +38,27 @@ class CheckOutcome:
         return tuple(f for f in self.findings if f.verdict == "wrong")
 
     def refuse(self) -> None:
-        """Raise ``InstrumentFault`` with the first finding that prevents a run, if any."""
+        """Raise an error with the first finding that prevents a run, if any.
+
+        It is an ``InstrumentFault``, or an ``InputError`` where only the watchdog is undeclared.
+        """
         if self.wrong:
             more = f" (and {len(self.wrong) - 1} more)" if len(self.wrong) > 1 else ""
+            if all(finding.item == WATCHDOG for finding in self.wrong):
+                self.refuse_without_watchdog()
             raise InstrumentFault(f"{self.wrong[0].sentence}{more}")
+
+    def refuse_without_watchdog(self) -> None:
+        """Raise ``InputError`` for a real card with neither a hardware watchdog nor a declaration.
+
+        The declaration is ``card.i_have_no_watchdog``; a card that reports itself as simulated
+        needs none.
+        """
+        for finding in self.wrong:
+            if finding.item == WATCHDOG:
+                others = [f.sentence for f in self.wrong if f is not finding]
+                also = f" (also: {others[0]})" if others else ""
+                raise InputError(f"rig {self.rig!r}: {finding.sentence}{also}")
 
     @property
     def summary(self) -> str:
@@ -59,13 +77,13 @@ def check_rig(rig: str, rig_file: RigFile, faults: FaultPlan | None = None) -> C
 
     A simulated rig plays 0 V and is read. Where ``laser.port`` is not empty, the driver asks a
     simulated controller; ``faults`` occur in it. Errors of instruments are findings. Raises
-    ``InputError`` for an address that names no rig.
+    ``InputError`` for an address that names no rig, or one that the rig file does not allow.
     """
     kind = kind_of(rig)
     options = replace(options_of(rig_file), faults=faults)
     try:
         instruments = kind.inspect(rig, rig_file, options)
-    except AddressError as error:
+    except (AddressError, LinkRefused) as error:
         raise InputError(str(error)) from error
     except ValueError as error:  # a film without a rest state
         raise InputError(f"rig {rig!r} with this rig file: {error}") from error

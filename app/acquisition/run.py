@@ -124,7 +124,9 @@ def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) ->
                 f"rig {address!r}: no film is declared; give a --rig-file whose [film] has a name, "
                 f"so that its limits are those of the film on the rig"
             )
-        check_rig(address, rig_file).refuse()
+        checked = check_rig(address, rig_file)
+        checked.refuse_without_watchdog()
+        checked.refuse()
     wanted = replace(
         options_of(rig_file),
         actuator=options.actuator,

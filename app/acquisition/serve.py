@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-import ipaddress
+import os
 import sys
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dearig.acquisition.interrupts import Interrupts
 from dearig.config.rigfile import RigFile
-from dearig.drivers.errors import AddressError
+from dearig.drivers.daqmx.certificates import Certificates, read_certificates
+from dearig.drivers.daqmx.link import is_loopback
+from dearig.drivers.errors import AddressError, LinkRefused
 from dearig.errors import InputError, InstrumentFault
 from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.keyence import SimulatedController
@@ -21,7 +24,7 @@ from dearig.sim_backend.serial_port import serve_on_pty, serve_on_socket
 if TYPE_CHECKING:
     from dearig.sim_backend.daqmx.device import Device
 
-__all__ = ["Serving", "serve"]
+__all__ = ["Serving", "TlsFiles", "serve"]
 
 _POLL_S = 0.1  # s between two checks for ctrl-C
 
@@ -37,6 +40,23 @@ class Serving:
     port: int
     rig: str
     laser: str = ""
+    security: str = ""
+
+
+@dataclass(frozen=True)
+class TlsFiles:
+    """PEM files of TLS, None where there is none.
+
+    ``cert`` and ``key`` are the server's; with ``client_ca`` every client must show a certificate
+    that this authority signed (mutual TLS), as with NI's server.
+    """
+
+    cert: Path | None = None
+    key: Path | None = None
+    client_ca: Path | None = None
+
+
+_NO_TLS = TlsFiles()
 
 
 def serve(
@@ -47,6 +67,7 @@ def serve(
     host: str = "127.0.0.1",
     port: int = 0,
     anywhere: bool = False,
+    tls: TlsFiles = _NO_TLS,
     paced: bool = True,
     faults: Sequence[str] = (),
     client_timeout: float | None = 1.0,
@@ -57,16 +78,15 @@ def serve(
     """Serve the card of the simulated rig at ``address`` until ctrl-C.
 
     ``told`` is called with a ``Serving`` once it listens. ``anywhere`` allows a ``host`` that
-    other computers can reach. A client may be silent with a voltage at the film for
-    ``client_timeout`` s, without limit if None, and its link may be dead for ``link_timeout`` s.
+    other computers can reach; all files of ``tls`` must then be given. A client may be silent with
+    a voltage at the film for ``client_timeout`` s, without limit if None, and its link may be dead
+    for ``link_timeout`` s.
     Raises ``InputError`` for an address, host or port that cannot be used, and ``InstrumentFault``
     where the libraries are missing.
     """
-    if not (anywhere or _is_loopback(host)):
-        raise InputError(
-            f"--host {host} can be reached from other computers: every program that reaches the "
-            f"port can drive the rig; if that is intended, add --anywhere"
-        )
+    certificates = _certificates(host, anywhere, tls)
+    # the library's own lines about broken connections are no help at this terminal
+    os.environ.setdefault("GRPC_VERBOSITY", "NONE")
     try:
         from dearig.sim_backend.daqmx.opening import open_device
         from dearig.sim_backend.daqmx.server import DaqmxServer
@@ -86,8 +106,9 @@ def serve(
     except ValueError as error:  # an unknown fault, or a film without a rest state
         raise InputError(f"rig {address!r}: {error}") from error
     server = DaqmxServer(
-        device, host=host, port=port, client_timeout=client_timeout, link_timeout=link_timeout
-    )
+        device, host=host, port=port, client_timeout=client_timeout, link_timeout=link_timeout,
+        certificates=certificates,
+    )  # fmt: skip
     with Interrupts() as interrupts:
         try:
             try:
@@ -97,9 +118,10 @@ def serve(
                     f"port {port} on {host} cannot be listened on: another program may have it, or "
                     f"the host is not one of this computer's; --port 0 takes any that is free"
                 ) from error
-            rig = f"daqmx:{device.name}@{host}:{found}"
+            named = f"[{host}]" if ":" in host else host
+            rig = f"daqmx:{device.name}@{named}:{found}"
             with _controller(rig_file, device, plan) if laser else nullcontext("") as serial_port:
-                told(Serving(host, found, rig, serial_port))
+                told(Serving(host, found, rig, serial_port, _security(certificates)))
                 waiting = threading.Event()
                 while not interrupts.asked():
                     waiting.wait(_POLL_S)
@@ -118,10 +140,41 @@ def _controller(
     return serve_on_pty(controller, baud_rate=rig_file.laser.baud_rate)
 
 
-def _is_loopback(host: str) -> bool:
-    if host == "localhost":
-        return True
+def _certificates(host: str, anywhere: bool, tls: TlsFiles) -> Certificates | None:
+    """Return the server's certificates, None for no TLS, if ``host`` may be listened on with them.
+
+    Raises ``InputError`` where it may not.
+    """
+    if (tls.cert is None) != (tls.key is None):
+        raise InputError("--tls-cert and --tls-key belong together; give both")
+    if tls.client_ca is not None and tls.cert is None:
+        raise InputError("--tls-client-ca needs --tls-cert and --tls-key, the server's own")
+    if not is_loopback(host):
+        if not anywhere:
+            raise InputError(
+                f"--host {host} can be reached from other computers: every program that reaches "
+                f"the port can drive the rig; if that is intended, add --anywhere and the TLS "
+                f"options"
+            )
+        if tls.client_ca is None:
+            raise InputError(
+                f"--host {host} with --anywhere needs --tls-cert, --tls-key and --tls-client-ca: "
+                f"only clients with a certificate may drive the rig"
+            )
+    if tls.cert is None:
+        return None
     try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+        return read_certificates(
+            tls.client_ca or "", tls.cert, tls.key or "",
+            ("--tls-client-ca", "--tls-cert", "--tls-key"),
+        )  # fmt: skip
+    except LinkRefused as error:
+        raise InputError(str(error)) from error
+
+
+def _security(certificates: Certificates | None) -> str:
+    """Return the part of the announcement about TLS."""
+    if certificates is None:
+        return ""
+    asks = "asks clients for a certificate; " if certificates.ca else ""
+    return f"TLS, {asks}set card.tls_ca in the client's rig file; "

@@ -16,9 +16,12 @@ from dearig.errors import InputError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from dearig.acquisition.plan import Plan
     from dearig.acquisition.replay import Original
-    from dearig.acquisition.run import RunResult
+    from dearig.acquisition.run import RunObserver, RunResult
     from dearig.acquisition.serve import Serving
+    from dearig.config.rigfile import RigFile
+    from dearig.drivers.rig import RigIdentity
 
 __all__ = ["commands"]
 
@@ -134,7 +137,10 @@ def record(
         seed=seed, paced=paced, actuator=actuator, faults=faults,
     )  # fmt: skip
     with working(json) as (console, progress):
-        result = run(loaded, rig, settings, out, options, overlay=overlaid, progress=progress)
+        result = run(
+            loaded, rig, settings, out, options, overlay=overlaid, progress=progress,
+            observer=_announcer(console, settings),
+        )  # fmt: skip
     _show_run(console, result)
     write_result(_run_json(result), json)
 
@@ -156,6 +162,20 @@ def _original(sequence: str | None, like: Path | None, rig_file: Path | None) ->
             f"file; leave --rig-file out"
         )
     return None if like is None else original_of(like)
+
+
+def _announcer(console: Console, settings: RigFile) -> RunObserver:
+    """Return an observer that says, before a run on a card, whether its watchdog is wired."""
+    from dearig.acquisition.run import RunObserver
+    from dearig.drivers.daqmx.watchdog import watchdog_words
+
+    class Announcer(RunObserver):
+        def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:  # noqa: ARG002
+            if identity.address.startswith("daqmx:"):
+                words = watchdog_words(settings.card, identity.simulated)
+                print_line(console, f"hardware watchdog: {words}")
+
+    return Announcer()
 
 
 def _show_run(console: Console, result: RunResult) -> None:
@@ -242,8 +262,27 @@ def serve_daqmx(
     ] = 0,
     anywhere: Annotated[
         bool,
-        typer.Option("--anywhere", help="Allow a --host that other computers can reach."),
+        typer.Option(
+            "--anywhere",
+            help="Allow a --host that other computers can reach; needs the three TLS options.",
+        ),
     ] = False,
+    tls_cert: Annotated[
+        Path | None,
+        typer.Option("--tls-cert", metavar="FILE.pem", help="Certificate of the server."),
+    ] = None,
+    tls_key: Annotated[
+        Path | None,
+        typer.Option("--tls-key", metavar="FILE.pem", help="Private key of --tls-cert."),
+    ] = None,
+    tls_client_ca: Annotated[
+        Path | None,
+        typer.Option(
+            "--tls-client-ca",
+            metavar="FILE.pem",
+            help="Accept only clients with a certificate that this authority signed.",
+        ),
+    ] = None,
     paced: Annotated[
         bool,
         typer.Option(
@@ -289,11 +328,12 @@ def serve_daqmx(
     NI's Python library (nidaqmx) reaches it as it reaches a real card behind NI's gRPC device
     server.
     """
-    from dearig.acquisition.serve import serve
+    from dearig.acquisition.serve import TlsFiles, serve
     from dearig.config.rigfile import load_rig_file
 
     serve(
         rig, load_rig_file(rig_file), told=_announce, host=host, port=port, anywhere=anywhere,
+        tls=TlsFiles(tls_cert, tls_key, tls_client_ca),
         paced=paced, faults=fault or (),
         client_timeout=client_timeout if client_tracking else None, link_timeout=link_timeout,
         seed=seed, laser=laser,
@@ -304,7 +344,7 @@ def _announce(serving: Serving) -> None:
     """Print the addresses of the simulated instruments."""
     sys.stdout.write(
         f"simulated card at {serving.host}:{serving.port}; use it with --rig {serving.rig}; "
-        f"ctrl-C ends it\n"
+        f"{serving.security}ctrl-C ends it\n"
     )
     if serving.laser:
         sys.stdout.write(f'laser controller: port = "{serving.laser}" in [laser]\n')

@@ -126,7 +126,8 @@ def load_rig_file(path: Path | str | None) -> RigFile:
     path = Path(path)
     data = parse_toml(read_text(path, "rig file"), f"rig file {path}")
     try:
-        return RigFile.model_validate(data)
+        # the files that it names are relative to its folder
+        return RigFile.model_validate(data, context={"folder": path.resolve().parent})
     except ValidationError as error:
         raise InputError(f"rig file {path}: {_sentence(error)}") from error
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any, get_args
 
 import tomli_w
@@ -36,12 +37,16 @@ SECTIONS: dict[str, type[BaseModel]] = {
 }  # fmt: skip
 
 
-def parse_rig_file(text: str) -> RigFile:
-    """Return the rig file in ``text``. Raises ``InputError`` with a sentence for every fault."""
+def parse_rig_file(text: str, folder: Path | None = None) -> RigFile:
+    """Return the rig file in ``text``; the files that it names are relative to ``folder``.
+
+    Raises ``InputError`` with a sentence for every fault.
+    """
     found = faults_of(text)
     if found:
         raise InputError("the rig file: " + "; ".join(found.values()))
-    return RigFile.model_validate(parse_toml(text, "the rig file"))
+    data = parse_toml(text, "the rig file")
+    return RigFile.model_validate(data, context={"folder": folder})
 
 
 def faults_of(text: str) -> dict[tuple[str, str], str]:

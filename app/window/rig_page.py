@@ -180,7 +180,8 @@ class RigPage(QWidget):
             return
         self.text = text
         if not faults:
-            self.session.set_rig_file(path, text, parse_rig_file(text))
+            folder = None if path is None else path.resolve().parent
+            self.session.set_rig_file(path, text, parse_rig_file(text, folder))
         self._show_faults(faults)
 
     def _show_all(self) -> None:

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from dearig.acquisition.overlay import OverlayModel
+from dearig.drivers.daqmx.watchdog import watchdog_words
 from dearig.drivers.settings import ChannelSettings
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.channel_plots import ChannelPlots
@@ -189,6 +190,7 @@ class RunPage(QWidget):
         for field in (self.operator, self.film, self.notes, self.paced):
             field.setEnabled(not running)
         self.paced.setVisible(simulated(session.address))
+        self._describe_watchdog()
         if running:
             return
         self.controls.show_state(self.runner.state, self._simulated_label())
@@ -196,6 +198,18 @@ class RunPage(QWidget):
         self.to_sequence.setVisible(preview is not None and not preview.playable)
         if preview is not None and self.live is None:
             self.plots.show_prediction(preview)
+
+    def _describe_watchdog(self) -> None:
+        """Show whether the card's hardware watchdog is wired; a simulated rig has no card."""
+        session = self.session
+        if not session.address.startswith("daqmx:"):
+            self.watchdog.show_text("")
+            return
+        card = session.rig_file.card
+        words = watchdog_words(card, simulated=None)
+        if not (card.watchdog_s or card.i_have_no_watchdog):
+            words += "; a run on a real card needs card.i_have_no_watchdog = true in the rig file"
+        self.watchdog.show_text(f"Hardware watchdog: {words}", "" if card.watchdog_s else "warn")
 
     def _describe_plan(self) -> None:
         session, preview = self.session, self.session.preview
@@ -384,6 +398,8 @@ class RunPage(QWidget):
         column.setSpacing(SPACE // 2)
         row = QHBoxLayout()
         self.plan = Message()
+        self.watchdog = Message()
+        column.addWidget(self.watchdog)
         self.to_sequence = button("Edit the &sequence", "Go to the Sequence page")
         self.to_sequence.clicked.connect(self.show_sequence)
         row.addWidget(self.plan, 1)

@@ -20,7 +20,9 @@ class Address:
     @staticmethod
     def parse(text: str) -> Address:
         """Return the address in ``text``; raises ``AddressError`` where it names no card."""
-        found = re.fullmatch(r"daqmx:([A-Za-z][\w-]*)(?:@([^@\s/]+):(\d{1,5}))?", text)
+        found = re.fullmatch(
+            r"daqmx:([A-Za-z][\w-]*)(?:@([\w.-]+|\[[\da-fA-F:.]+\]):(\d{1,5}))?", text
+        )
         if not found or not (found[3] is None or 0 < int(found[3]) < 65536):
             raise AddressError(
                 f"rig {text!r} is not the address of a card: write daqmx:Dev1 for a card in this "

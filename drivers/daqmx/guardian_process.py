@@ -82,7 +82,7 @@ def main() -> int:
     config = json.loads(sys.argv[1])
     settings = RigSettings.model_validate(config["settings"])
     try:
-        link = Link(config["server"], settings.guardian.link_timeout_s)
+        link = Link(config["server"], settings)
         outputs = Outputs(link, config["device"], settings)
         outputs.read("voltage_monitor")  # loads and connects everything before it is needed
     except RigError as error:

@@ -10,7 +10,8 @@ from dearig.drivers.daqmx.explain import instrument_errors
 from dearig.drivers.daqmx.link import Link
 from dearig.drivers.daqmx.outputs import Outputs
 from dearig.drivers.daqmx.tasks import ClockedTasks
-from dearig.drivers.errors import RigError
+from dearig.drivers.daqmx.watchdog import watchdog_finding
+from dearig.drivers.errors import LinkRefused, RigError
 from dearig.drivers.findings import Finding
 from dearig.drivers.settings import RigSettings
 
@@ -34,14 +35,19 @@ class Inspection:
 def inspect(device: str, server: str | None, settings: RigSettings) -> Inspection:
     """Inspect the card ``device``, in this computer or behind ``server``, against ``settings``.
 
-    Never raises ``RigError``: a card that cannot be reached is a finding.
+    A card that cannot be reached is a finding. Raises ``LinkRefused`` for a connection that the
+    rig file does not allow.
     """
     name = f"card {device}"
+    unreached = watchdog_finding(name, settings.card, None, server)
     try:
-        link = Link(server, settings.guardian.link_timeout_s)
+        link = Link(server, settings)
+    except LinkRefused:
+        raise
     except RigError as error:
-        return Inspection((Finding(name, "driver", str(error), verdict="wrong"),))
+        return Inspection((Finding(name, "driver", str(error), verdict="wrong"), unreached))
     findings: list[Finding] = []
+    reached = False
     try:
         with instrument_errors(device, server):
             from nidaqmx.system import Device, System
@@ -55,8 +61,13 @@ def inspect(device: str, server: str | None, settings: RigSettings) -> Inspectio
                     f".{version.update_version}" + (f" behind {server}" if server else ""),
                 )
             )  # fmt: skip
+            if link.security:
+                findings.append(link.security)
             card = Device(device, grpc_options=link.session)
+            watchdog = watchdog_finding(name, settings.card, bool(card.is_simulated), server)
             findings += _card(name, card, settings)
+            findings.append(watchdog)
+            reached = True
         if any(finding.verdict == "wrong" for finding in findings):
             return Inspection(tuple(findings))
         findings.append(_timing(name, link, device, settings))
@@ -70,6 +81,8 @@ def inspect(device: str, server: str | None, settings: RigSettings) -> Inspectio
     except RigError as error:
         said = str(error).removeprefix(f"{name}: ")
         findings.append(Finding(name, "state", said, verdict="wrong"))
+        if not reached:
+            findings.append(unreached)
         return Inspection(tuple(findings))
     finally:
         link.close()
@@ -106,7 +119,7 @@ def _card(name: str, card: Any, settings: RigSettings) -> list[Finding]:
             Finding(
                 name, "card.do_hv_enable", "not wired", verdict="not wired",
                 advice="with a line to the amplifier's enable input, the guardian and the card's "
-                "watchdog could switch the high voltage off",
+                "watchdog can switch the high voltage off",
             )
         )  # fmt: skip
     else:

@@ -2,30 +2,50 @@
 
 from __future__ import annotations
 
+import ipaddress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from dearig.drivers.errors import RigError
+from dearig.drivers.daqmx.certificates import read_certificates
+from dearig.drivers.errors import LinkRefused, RigError
+from dearig.drivers.findings import Finding
+from dearig.drivers.settings import CardSettings, RigSettings
 
 if TYPE_CHECKING:
     import grpc
     from nidaqmx import GrpcSessionOptions
 
-__all__ = ["Link"]
+__all__ = ["Link", "is_loopback"]
 
 # s; after a time-out further calls fail sooner, so that many calls do not take many time-outs
 _LOST_TIMEOUT = 0.2
 
 
+def is_loopback(host: str) -> bool:
+    """Return True if ``host`` is this computer's loopback; no name is looked up."""
+    if host.lower() == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return False
+
+
 class Link:
     """A connection to the DAQmx driver behind ``server``, or in this computer when that is None.
 
-    ``timeout`` in s limits the server's time for an answer; without it, a call to a frozen server
-    would never end. Raises ``RigError`` where nidaqmx is not installed.
+    ``settings`` give the server's time for an answer, without which a call to a frozen server
+    would never end, and the TLS certificates. Only the ``server`` is contacted: proxies of the
+    environment are ignored. Raises ``LinkRefused`` for another computer's server without TLS that
+    the rig file does not allow, or for certificates that cannot be read; ``RigError`` where
+    nidaqmx is not installed.
     """
 
-    def __init__(self, server: str | None, timeout: float) -> None:
+    def __init__(self, server: str | None, settings: RigSettings) -> None:
         self.server = server
         self._channel: grpc.Channel | None = None
+        if server is not None:
+            _check_security(server, settings.card)
+        self.security = None if server is None else _security(server, settings.card)
         try:
             import nidaqmx  # noqa: F401
         except ImportError as error:
@@ -33,7 +53,9 @@ class Link:
                 f'the Python package nidaqmx is not installed ({error}): pip install "dearig[rig]"'
             ) from error
         if server is not None:
-            self._channel = _channel_with_deadline(server, timeout)
+            self._channel = _channel_with_deadline(
+                server, settings.guardian.link_timeout_s, settings.card
+            )
 
     @property
     def session(self) -> GrpcSessionOptions | None:
@@ -50,6 +72,32 @@ class Link:
             self._channel.close()
 
 
+def _check_security(server: str, card: CardSettings) -> None:
+    """Raise ``LinkRefused`` for another computer's server without TLS, unless it is allowed."""
+    host = server.rpartition(":")[0]
+    if not (is_loopback(host) or card.tls_ca or card.server_without_tls):
+        raise LinkRefused(
+            f"server {server} is on another computer and no TLS is set: write tls_ca, and tls_cert "
+            f"and tls_key if it asks for them, in [card] of the rig file; or server_without_tls = "
+            f"true if everybody on the network may drive the card"
+        )
+
+
+def _security(server: str, card: CardSettings) -> Finding:
+    """Return the finding on the connection's encryption and authentication."""
+    name, item = f"server {server}", "connection"
+    if card.tls_ca:
+        own = "this computer shows its certificate" if card.tls_cert else "without a client's one"
+        return Finding(name, item, f"TLS, the server's certificate is verified, {own}")
+    if is_loopback(server.rpartition(":")[0]):
+        return Finding(name, item, "on this computer, without TLS")
+    return Finding(
+        name, item, "without TLS, as card.server_without_tls allows: everybody on the network "
+        "between can read and drive the card", verdict="warning",
+        advice="set up TLS at the server and write tls_ca, tls_cert and tls_key",
+    )  # fmt: skip
+
+
 class _Details(NamedTuple):
     method: str
     timeout: float
@@ -57,7 +105,7 @@ class _Details(NamedTuple):
     credentials: Any
 
 
-def _channel_with_deadline(server: str, timeout: float) -> grpc.Channel:
+def _channel_with_deadline(server: str, timeout: float, card: CardSettings) -> grpc.Channel:
     import grpc
 
     lost_codes = (grpc.StatusCode.DEADLINE_EXCEEDED, grpc.StatusCode.UNAVAILABLE)
@@ -77,13 +125,28 @@ def _channel_with_deadline(server: str, timeout: float) -> grpc.Channel:
             return answer
 
     unlimited = -1
-    channel = grpc.insecure_channel(
-        server,
-        options=(
-            ("grpc.max_receive_message_length", unlimited),
-            ("grpc.max_send_message_length", unlimited),
-            # a proxy from the environment must not be used between a rig and its card
-            ("grpc.enable_http_proxy", 0),
-        ),
+    options = (
+        ("grpc.max_receive_message_length", unlimited),
+        ("grpc.max_send_message_length", unlimited),
+        # a proxy from the environment must not be used between a rig and its card
+        ("grpc.enable_http_proxy", 0),
+        # only the address of the host is looked up, not its service configuration
+        ("grpc.service_config_disable_resolution", 1),
     )
+    # the scheme is given, so that no part of the host is taken for another one
+    target = f"dns:///{server}"
+    if card.tls_ca:
+        channel = grpc.secure_channel(target, _credentials(card), options=options)
+    else:
+        channel = grpc.insecure_channel(target, options=options)
     return grpc.intercept_channel(channel, Deadline())
+
+
+def _credentials(card: CardSettings) -> grpc.ChannelCredentials:
+    """Return the credentials of ``card``'s certificates."""
+    import grpc
+
+    found = read_certificates(
+        card.tls_ca, card.tls_cert, card.tls_key, ("card.tls_ca", "card.tls_cert", "card.tls_key")
+    )
+    return grpc.ssl_channel_credentials(found.ca, found.key, found.cert)

@@ -67,7 +67,7 @@ class DaqmxRig:
         self._state = RigState.SAFE
         self._tasks: ClockedTasks | None = None
         self._run: _Run | None = None
-        self._link = Link(address.server, settings.guardian.link_timeout_s)
+        self._link = Link(address.server, settings)
         self._outputs = Outputs(self._link, address.device, settings)
         try:
             self._card = identify_card(self._link, address.device, settings)

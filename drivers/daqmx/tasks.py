@@ -125,11 +125,11 @@ class ClockedTasks:
             if card.do_hv_enable is None:
                 return
             line = f"{self._device}/{card.do_hv_enable}"
-            if card.hv_enable_watchdog_s > 0.0:
+            if card.watchdog_s > 0.0:
                 from nidaqmx.constants import Level
 
                 self._watchdog = WatchdogTask(
-                    self._device, timeout=card.hv_enable_watchdog_s, grpc_options=session
+                    self._device, timeout=card.watchdog_s, grpc_options=session
                 )
                 self._watchdog.cfg_watchdog_do_expir_states(
                     [DOExpirationState(physical_channel=line, expiration_state=Level.LOW)]

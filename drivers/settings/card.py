@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from dearig.drivers.settings.section import (
     AnalogInput,
@@ -15,7 +16,15 @@ from dearig.drivers.settings.section import (
     Wiring,
 )
 
-__all__ = ["CardSettings"]
+__all__ = ["WATCHDOG_DEFAULT_S", "CardSettings"]
+
+#: s; a run resets the watchdog with every read, at most 0.25 s apart, so three late reads are
+#: tolerated; with it any two faults end within 1.1 s
+WATCHDOG_DEFAULT_S = 1.0
+_WATCHDOG_MIN_S = 0.3  # s; a run that waits for samples resets it every 0.25 s
+# s; the counter holds (2**32 - 1) periods of 8 ns, 34.3597 s (NI, X Series User Manual, chapter
+# Digital I/O, section Watchdog Timer)
+_WATCHDOG_MAX_S = 34.35
 
 
 class CardSettings(Section):
@@ -82,12 +91,38 @@ class CardSettings(Section):
         description="digital line that enables the amplifier's high voltage; if left out, it "
         "is not wired",
     )
-    hv_enable_watchdog_s: float = Field(
-        default=0.0,
+    hv_enable_watchdog_s: float | None = Field(
+        default=None,
         ge=0.0,
-        le=60.0,
+        le=_WATCHDOG_MAX_S,
         description="time of silence of the program after which the card's own watchdog takes "
-        "do_hv_enable low; 0 means no watchdog",
+        f"do_hv_enable low: {_WATCHDOG_MIN_S:g} s or more, or 0 for no watchdog; if left out, it "
+        f"is {WATCHDOG_DEFAULT_S:g} s where do_hv_enable is wired",
+    )
+    i_have_no_watchdog: bool = Field(
+        default=False,
+        description="true declares that no hardware watchdog is wired: nothing takes the voltage "
+        "down if run and guardian die together; without watchdog and declaration a run on a real "
+        "card is refused",
+    )
+    tls_ca: str = Field(
+        default="",
+        description="file (PEM) of the certificate authority that signed the server's "
+        "certificate, relative to the rig file; a card behind another computer's server needs it",
+    )
+    tls_cert: str = Field(
+        default="",
+        description="file (PEM) of this computer's certificate, relative to the rig file, for a "
+        "server that asks its clients for one",
+    )
+    tls_key: str = Field(
+        default="",
+        description="file (PEM) of the private key of tls_cert, relative to the rig file",
+    )
+    server_without_tls: bool = Field(
+        default=False,
+        description="true allows a card behind another computer's server without TLS: everybody "
+        "on the network between can read and drive the card",
     )
     first_convert_us: float = Field(
         default=50.0,
@@ -136,3 +171,52 @@ class CardSettings(Section):
         le=1000.0,
         description="simulated rig only: spread of the inputs' calibration, as a part of the range",
     )
+
+    @property
+    def watchdog_s(self) -> float:
+        """Return the time of the hardware watchdog in s; 0 if there is none."""
+        if self.do_hv_enable is None:
+            return 0.0
+        wanted = self.hv_enable_watchdog_s
+        return WATCHDOG_DEFAULT_S if wanted is None else wanted
+
+    @field_validator("tls_ca", "tls_cert", "tls_key")
+    @classmethod
+    def _from_the_rig_files_folder(cls, value: str, info: ValidationInfo) -> str:
+        folder = (info.context or {}).get("folder")
+        return str(Path(folder) / value) if value and folder is not None else value
+
+    @model_validator(mode="after")
+    def _watchdog_is_possible(self) -> CardSettings:
+        wanted = self.hv_enable_watchdog_s
+        if wanted and self.do_hv_enable is None:
+            raise ValueError(
+                "card.hv_enable_watchdog_s is set, but not card.do_hv_enable, the line that it "
+                "takes low"
+            )
+        if wanted and wanted < _WATCHDOG_MIN_S:
+            raise ValueError(
+                f"card.hv_enable_watchdog_s = {wanted:g} is below {_WATCHDOG_MIN_S:g}: a run that "
+                f"waits for samples would trip it; 0 means no watchdog"
+            )
+        if self.i_have_no_watchdog and self.watchdog_s:
+            raise ValueError(
+                f"card.i_have_no_watchdog = true, but card.do_hv_enable = {self.do_hv_enable} has "
+                f"a watchdog of {self.watchdog_s:g} s: remove one of the two"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _tls_is_complete(self) -> CardSettings:
+        if bool(self.tls_cert) != bool(self.tls_key):
+            one, other = ("tls_cert", "tls_key") if self.tls_cert else ("tls_key", "tls_cert")
+            raise ValueError(f"card.{one} is set, but not card.{other}: they belong together")
+        if self.tls_cert and not self.tls_ca:
+            raise ValueError(
+                "card.tls_cert is set, but not card.tls_ca: the server must be verified too"
+            )
+        if self.server_without_tls and self.tls_ca:
+            raise ValueError(
+                "card.server_without_tls = true, but card.tls_ca is set: remove one of the two"
+            )
+        return self

@@ -199,7 +199,7 @@ class RigSettings(Section):
         return self
 
     def _check_wiring(self) -> None:
-        card, amplifier = self.card, self.amplifier
+        amplifier = self.amplifier
         names = self.channel_names
         for name in names:
             if names.count(name) > 1:
@@ -222,11 +222,6 @@ class RigSettings(Section):
                     f'{terminal} = "ai{number}" with {wiring} = "DIFF": differential inputs are '
                     f"ai0 to ai7; the second wire is the input 8 higher"
                 )
-        if card.hv_enable_watchdog_s > 0.0 and card.do_hv_enable is None:
-            raise ValueError(
-                "card.hv_enable_watchdog_s is set, but not card.do_hv_enable, the line that it "
-                "takes low"
-            )
 
     def _check_sampling(self) -> None:
         card = self.card

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dearig.sim_backend.daqmx.device import Device
+from dearig.sim_backend.daqmx.device import Device, check_watchdog
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.setup import INPUT_RANGES, INPUTS, LINES, OUTPUTS
 from dearig.sim_backend.daqmx.tasks import AnalogInput, AnalogOutput, Kind, Lines, Task, expanded
@@ -126,6 +126,7 @@ def _only(*values: Any) -> Setter:
 def _set_timeout(asked: Asked, value: float) -> None:
     watchdog = asked.own.watchdog
     if watchdog is not None:
+        check_watchdog(value)
         watchdog.timeout = value
 
 

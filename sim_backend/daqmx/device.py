@@ -15,9 +15,16 @@ from dearig.sim_backend.daqmx.tasks import Kind, Listener, State, Task, Watchdog
 from dearig.sim_backend.daqmx.wire import Change
 from dearig.sim_backend.faults import Fault, FaultKind
 
-__all__ = ["Device", "Reading"]
+__all__ = ["Device", "Reading", "check_watchdog"]
 
-_LONGEST_WATCHDOG = 429.0  # s; 2**32 ticks of 10 MHz
+# s; NI's X Series User Manual, chapter Digital I/O, section Watchdog Timer
+_LONGEST_WATCHDOG = (2**32 - 1) * 8e-9
+
+
+def check_watchdog(timeout: float) -> None:
+    """Raise ``DaqmxError`` for a time-out in s that the card's watchdog timer does not have."""
+    if timeout != -1.0 and not 0.0 < timeout <= _LONGEST_WATCHDOG:
+        raise DaqmxError(Code.WATCHDOG_TIMEOUT, f"Requested Value: {timeout:g}")
 
 
 class Device(TimingEngine):
@@ -104,8 +111,7 @@ class Device(TimingEngine):
         """Return a task of the watchdog timer, which expires ``timeout`` s after its last reset."""
         with self._lock:
             self.check_device(device)
-            if timeout != -1.0 and not 0.0 < timeout <= _LONGEST_WATCHDOG:
-                raise DaqmxError(Code.WATCHDOG_TIMEOUT, f"Requested Value: {timeout:g}")
+            check_watchdog(timeout)
             task, new = self.create(name, client, attach=False)
             if new:
                 task.kind = Kind.WATCHDOG

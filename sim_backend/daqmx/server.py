@@ -13,6 +13,7 @@ from typing import Any
 import grpc
 from nidaqmx._stubs import nidaqmx_pb2_grpc as pb_grpc
 
+from dearig.drivers.daqmx.certificates import Certificates
 from dearig.sim_backend.clock import Clock, PacedClock
 from dearig.sim_backend.daqmx.clients import Clients
 from dearig.sim_backend.daqmx.device import Device
@@ -44,7 +45,8 @@ class DaqmxServer:
     there is a voltage at the film. With None the server behaves as NI's: tasks and outputs stay
     as they are. ``link_timeout`` in s does the same for a client without a sign of life, whose
     link was cut or whose process was halted; too short a time mistakes a busy computer for that.
-    ``link`` is the clock of the link; the card has its own.
+    ``link`` is the clock of the link; the card has its own. With ``certificates`` it speaks TLS,
+    and clients must show a certificate of its ``ca`` if there is one.
     """
 
     def __init__(
@@ -56,10 +58,12 @@ class DaqmxServer:
         client_timeout: float | None = 1.0,
         link_timeout: float = 1.0,
         link: Clock | None = None,
+        certificates: Certificates | None = None,
     ) -> None:
         self.device = device
         self._address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
         self._link = link or PacedClock()
+        self._certificates = certificates
         self._closing = threading.Event()
         self.clients = (
             None if client_timeout is None else Clients(device, self._link, client_timeout)
@@ -77,7 +81,7 @@ class DaqmxServer:
     def start(self) -> int:
         """Listen; returns the port. Raises ``OSError`` where the address is not available."""
         try:
-            self.port = self._server.add_insecure_port(self._address)
+            self.port = self._listen()
         except RuntimeError as error:
             raise OSError(f"{self._address} cannot be listened on") from error
         if self.port == 0:
@@ -85,6 +89,17 @@ class DaqmxServer:
         self._server.start()
         self._watch.start()
         return self.port
+
+    def _listen(self) -> int:
+        found = self._certificates
+        if found is None:
+            return int(self._server.add_insecure_port(self._address))
+        credentials = grpc.ssl_server_credentials(
+            [(found.key, found.cert)],
+            root_certificates=found.ca,
+            require_client_auth=found.ca is not None,
+        )
+        return int(self._server.add_secure_port(self._address, credentials))
 
     def close(self) -> None:
         """Take the output to 0 V and drop every connection."""

@@ -346,10 +346,12 @@ class TestInspection:
 
     def test_no_such_device(self, bench):
         found = inspect("Dev7", bench.address.server, bench.settings)
-        assert found.findings[-1].verdict == "wrong"
-        assert "no device of that name" in found.findings[-1].found
+        state = next(f for f in found.findings if f.item == "state")
+        assert state.verdict == "wrong"
+        assert "no device of that name" in state.found
 
     def test_no_driver(self):
         found = inspect("Dev1", None, RigFile())
-        assert found.findings[-1].verdict == "wrong"
-        assert "NI-DAQmx" in found.findings[-1].found
+        state = next(f for f in found.findings if f.item == "state")
+        assert state.verdict == "wrong"
+        assert "NI-DAQmx" in state.found

@@ -22,6 +22,7 @@ from nidaqmx.stream_readers import AnalogUnscaledReader
 from nidaqmx.stream_writers import AnalogSingleChannelWriter
 
 from dearig.config.rigfile import RigFile
+from dearig.drivers.daqmx.certificates import Certificates
 from dearig.drivers.gate import GatedWaveform
 from dearig.sim_backend.clock import Clock, ManualClock
 from dearig.sim_backend.daqmx.device import Device
@@ -112,8 +113,9 @@ def served(
     client_timeout: float | None = 1.0,
     link_timeout: float = 20.0,
     link: Clock | None = None,
+    certificates: Certificates | None = None,
 ) -> Iterator[Served]:
-    """A server in this process, as fast as it can be, and a client of it."""
+    """A server in this process, as fast as it can be, and a client of it without TLS."""
     settings = settings or RigFile()
     device = open_device(
         address,
@@ -126,7 +128,11 @@ def served(
     )
     with (
         DaqmxServer(
-            device, client_timeout=client_timeout, link_timeout=link_timeout, link=link
+            device,
+            client_timeout=client_timeout,
+            link_timeout=link_timeout,
+            link=link,
+            certificates=certificates,
         ) as server,
         connected(server.port) as session,
     ):
