@@ -9,6 +9,7 @@ import typer
 
 from dearig.cli.options import Force, Json
 from dearig.cli.output import check_files, console_for, print_line, write_result
+from dearig.errors import InputError
 
 __all__ = ["docs"]
 
@@ -40,14 +41,18 @@ def docs(
     """Build the documents as HTML pages and open them in the browser, without a network."""
     import webbrowser
 
-    from platformdirs import user_cache_path
-
     from dearig.docs import HOME, build, page_named, pages
+    from dearig.model.trusted_folder import cache_root
     from dearig.recording.result_folder import result_folder
 
     check_files(force, (), json=json)
     wanted = HOME if page is None else page_named(page).path
-    folder = user_cache_path("dearig") / "docs" if out is None else result_folder(out, force)
+    if out is not None:
+        folder = result_folder(out, force)
+    elif (cache := cache_root()).path is not None:
+        folder = cache.path / "docs"
+    else:
+        raise InputError(f"there is no folder for the pages: {cache.note}; name one with --out")
     written = {path: file.resolve() for path, file in build(folder).items()}
     print_line(console_for(json), str(written[wanted]))
     listed = [

@@ -6,7 +6,6 @@ failure is one more item of the list.
 
 from __future__ import annotations
 
-import getpass
 import os
 import platform
 import shutil
@@ -20,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from dearig import log_file
 from dearig.cli.output import version
+from dearig.printable import printable
 
 if TYPE_CHECKING:
     from packaging.requirements import Requirement
@@ -149,17 +149,14 @@ def _extras() -> Iterator[Item]:
 
 
 def _folders() -> Iterator[Item]:
-    from platformdirs import user_cache_path
-
     from dearig.drivers.settings import CardSettings
+    from dearig.model.trusted_folder import cache_root
     from dearig.recording.disk_space import estimate_bytes
 
-    for name, folder in (
-        ("log", log_file.log_path().parent),
-        ("cache", user_cache_path("dearig")),
-        ("current folder", Path.cwd()),
-    ):
-        yield _folder(name, folder)
+    yield _folder("log", log_file.log_path().parent)
+    cache = cache_root()
+    yield _cache("cache", cache.path, cache.note)
+    yield _folder("current folder", Path.cwd())
     rate = CardSettings().sample_rate_Hz
     hour = estimate_bytes(4, rate, round(3600 * rate))
     free = shutil.disk_usage(Path.cwd()).free
@@ -183,8 +180,24 @@ def _folder(name: str, folder: Path) -> Item:
     whose = f" (it belongs to {owner})" if owner else ""
     return Item(
         "folders", name, f"{folder} cannot be written{whose}", "wrong",
-        f"allow {getpass.getuser()} to write there",
+        "allow this user to write there",
     )  # fmt: skip
+
+
+def _cache(name: str, folder: Path | None, note: str, found: str = "") -> Item:
+    """Return the item of a cache: its folder, and why that is not the usual one."""
+    section = "kernels" if found else "folders"
+    if folder is None:
+        return Item(
+            section, name, f"none, so every command is slower: {note}", "wrong",
+            "set XDG_CACHE_HOME or NUMBA_CACHE_DIR to a folder that only this user can write"
+            if os.name != "nt" else "allow this user to write there",
+        )  # fmt: skip
+    text = found or str(folder)
+    if note:
+        advice = "correct its owner and mode (chmod go-w), or name another folder"
+        return Item(section, name, f"{text} instead of the usual folder: {note}", "wrong", advice)
+    return Item(section, name, text)
 
 
 def _owner(path: Path) -> str:
@@ -196,22 +209,14 @@ def _owner(path: Path) -> str:
 
 
 def _kernels() -> Iterator[Item]:
-    from dearig.model.jit import cache_folder, is_compiled
+    from dearig.model.jit import cache_folder, cache_note, is_compiled
 
     folder = cache_folder()
-    ready = is_compiled()
-    owner = _owner(folder) if folder.exists() else ""
+    owner = _owner(folder) if folder else ""
     where = f"{folder}{f', owned by {owner}' if owner else ''}"
-    if folder.exists() and not os.access(folder, os.W_OK):
-        yield Item(
-            "kernels", "compiled kernels", f"{where}, cannot be written", "wrong",
-            "delete the folder, or set NUMBA_CACHE_DIR to one that can be written",
-        )  # fmt: skip
-    else:
-        yield Item(
-            "kernels", "compiled kernels",
-            where if ready else f"none yet in {where}; the first command compiles them",
-        )  # fmt: skip
+    if not is_compiled():
+        where = f"none yet in {where}; the first command compiles them"
+    yield _cache("compiled kernels", folder, cache_note(), where)
 
 
 # ---------------------------------------------------------------- instruments and window
@@ -341,7 +346,7 @@ def doctor_table(items: tuple[Item, ...]) -> RenderableType:
             advice = f"; {item.advice}" if item.advice else ""
             table.add_row(
                 Text(item.verdict, style=_STYLES[item.verdict]),
-                Text(f"{item.name}: {item.found}{advice}"),
+                Text(printable(f"{item.name}: {item.found}{advice}")),
             )
         pieces.append(table)
     return Group(*pieces, Text(_summary(items)))

@@ -10,9 +10,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import h5py
-from platformdirs import user_cache_path
 
 from dearig.errors import InputError
+from dearig.model.trusted_folder import cache_root
 from dearig.recording.files import in_words, replaced_when_done
 from dearig.recording.layout import FORMAT
 from dearig.recording.opening import read_from
@@ -148,13 +148,17 @@ def _text(parent: h5py.Group, name: str) -> str:
     return "" if found is None else text_of(found[()])
 
 
-def _cache_of(folder: Path) -> Path:
+def _cache_of(folder: Path) -> Path | None:
+    """Return the file of the cache for ``folder``; None where there is no folder for caches."""
+    root = cache_root().path
     key = hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:24]
-    return user_cache_path("dearig") / f"index-{key}.json"
+    return None if root is None else root / f"index-{key}.json"
 
 
-def _load(cache: Path) -> dict[str, tuple[tuple[int, int], Entry]]:
+def _load(cache: Path | None) -> dict[str, tuple[tuple[int, int], Entry]]:
     """Return the cache; empty where it is missing, of another version, or damaged."""
+    if cache is None:
+        return {}
     try:
         kept = json.loads(cache.read_text("utf-8"))
         if kept["format"] != KEPT:
@@ -166,7 +170,11 @@ def _load(cache: Path) -> dict[str, tuple[tuple[int, int], Entry]]:
         return {}
 
 
-def _save(cache: Path, entries: dict[str, Entry], stamps: dict[str, tuple[int, int]]) -> None:
+def _save(
+    cache: Path | None, entries: dict[str, Entry], stamps: dict[str, tuple[int, int]]
+) -> None:
+    if cache is None:
+        return
     files = [[name, *stamps[name], asdict(entry)] for name, entry in entries.items()]
     try:
         cache.parent.mkdir(parents=True, exist_ok=True)

@@ -12,7 +12,6 @@ effects of the sensor.
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import sys
 import tempfile
@@ -164,23 +163,36 @@ def _text() -> str:
     return "\n".join([*lines, ""])
 
 
-def _load() -> ModuleType:
+def _written(text: str) -> Path | None:
+    """Return the file with ``text`` in the cache folder; None where it cannot be written."""
     folder = cache_folder()
-    folder.mkdir(parents=True, exist_ok=True)
+    if folder is None:
+        return None
     path = folder / "hooks.py"
-    text = _text()
     # Written once and atomically: numba compares its modification time with the compiled kernels'.
-    if not path.exists() or path.read_text(encoding="utf-8") != text:
-        handle, partial = tempfile.mkstemp(dir=folder, suffix=".py")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(partial).replace(path)
-    spec = importlib.util.spec_from_file_location("dearig.model.effects.assembled", path)
-    if spec is None or spec.loader is None:
-        raise ImportError(f"{path} cannot be loaded")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
+    try:
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            handle, partial = tempfile.mkstemp(dir=folder, suffix=".py")
+            try:
+                with os.fdopen(handle, "w", encoding="utf-8") as file:
+                    file.write(text)
+                Path(partial).replace(path)
+            finally:
+                Path(partial).unlink(missing_ok=True)
+    except (OSError, UnicodeDecodeError):
+        return None
+    return path
+
+
+def _load() -> ModuleType:
+    name, text = "dearig.model.effects.assembled", _text()
+    path = _written(text)
+    # without a file the functions are compiled in each process
+    module = ModuleType(name)
+    module.__file__ = str(path) if path else None
+    sys.modules[name] = module
+    code = compile(text, str(path) if path else "<assembled hooks>", "exec")
+    exec(code, module.__dict__)  # noqa: S102  (the text is made above, from names that are checked)
     return module
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from dearig.drivers.rig import Block
 from dearig.errors import InputError
+from dearig.model.trusted_folder import CacheFolder
 from dearig.recording import RunMetadata, save_recording
 from dearig.recording import index as index_module
 from dearig.recording.index import Entry, index_folder, lines
@@ -98,7 +99,8 @@ def test_folders_that_cannot_be_looked_at(tmp_path: Path) -> None:
 
 
 def test_the_command(shelf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(index_module, "user_cache_path", lambda _: tmp_path / "cache")
+    (tmp_path / "cache").mkdir()
+    monkeypatch.setattr(index_module, "cache_root", lambda: CacheFolder(tmp_path / "cache"))
     answer = dearig("index", shelf, "--json", "-")
     assert answer.code == 0
     assert [e["path"] for e in answer.json["recordings"]] == [
