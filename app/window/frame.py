@@ -34,6 +34,7 @@ from dearig.window.run_page import RunPage
 from dearig.window.running import simulated
 from dearig.window.sequence_page import SequencePage
 from dearig.window.session import Session
+from dearig.window.settings import kept_bytes, kept_number, kept_text
 from dearig.window.study_page import StudyPage
 from dearig.window.theme import DARK, LIGHT, apply, system_theme
 
@@ -297,7 +298,7 @@ class MainWindow(QMainWindow):
 
     @Slot()
     def _apply_colour_scheme(self) -> None:
-        name = str(self.session.settings.value("colour_scheme", "system"))
+        name = kept_text(self.session.settings, "colour_scheme", "system")
         theme = {"light": LIGHT, "dark": DARK}.get(name) or system_theme()
         application = QApplication.instance()
         if isinstance(application, QApplication):
@@ -311,11 +312,10 @@ class MainWindow(QMainWindow):
 
     def _restore_state(self) -> None:
         settings = self.session.settings
-        geometry = settings.value("geometry")
-        if geometry is None or not self.restoreGeometry(geometry):
+        if not self.restoreGeometry(kept_bytes(settings, "geometry")):
             self._default_geometry()
         # the first start shows the Run page: a simulated rig is ready to be armed
-        row = int(str(settings.value("page", self.pages.index(self.run_page))))
+        row = kept_number(settings, "page", self.pages.index(self.run_page))
         self.list.setCurrentRow(min(max(row, 0), len(self.pages) - 1))
 
     def _default_geometry(self) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QByteArray, QSettings
+from PySide6.QtCore import QSettings
 from PySide6.QtWidgets import QSplitter
+
+from dearig.window.settings import kept_bytes
 
 __all__ = ["GROUP", "remember"]
 
@@ -14,7 +16,5 @@ GROUP = "layout"
 def remember(splitter: QSplitter, settings: QSettings, name: str) -> None:
     """Restore the sizes of ``splitter`` from ``settings``, and save them when they change."""
     key = f"{GROUP}/{name}"
-    state = settings.value(key)
-    if isinstance(state, QByteArray):
-        splitter.restoreState(state)
+    splitter.restoreState(kept_bytes(settings, key))
     splitter.splitterMoved.connect(lambda: settings.setValue(key, splitter.saveState()))

@@ -35,7 +35,7 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     require_qt()
     require_screen()
 
-    from PySide6.QtCore import QSettings, QTimer
+    from PySide6.QtCore import QTimer
     from PySide6.QtWidgets import QApplication
 
     from dearig.config.rigfile import load_rig_file
@@ -43,6 +43,7 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     from dearig.window.collector import Collector
     from dearig.window.frame import MainWindow
     from dearig.window.session import Session
+    from dearig.window.settings import open_settings
     from dearig.window.theme import prepare_plots, system_theme
 
     # before the window opens: faults of a file belong in the terminal where it was named
@@ -52,7 +53,7 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     application.setApplicationName("dearig")
     application.setOrganizationName("dearig")
     prepare_plots()
-    session = Session(folder.absolute(), QSettings(), address=rig, theme=system_theme())
+    session = Session(folder.absolute(), open_settings(), address=rig, theme=system_theme())
     if rig_file is not None:
         session.set_rig_file(rig_file.absolute(), text, settings)
     window = MainWindow(session)

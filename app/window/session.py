@@ -17,6 +17,7 @@ from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
 from dearig.model.actuator import Actuator
 from dearig.model.material import TABLE_3
+from dearig.window.settings import kept_text, kept_texts
 from dearig.window.theme import LIGHT, Theme
 
 __all__ = ["Breach", "Preview", "Session"]
@@ -98,8 +99,8 @@ class Session(QObject):
         self.overlays: tuple[OverlayModel, ...] = (self.thesis_model,)
         self.overlay_drive = "command"
         self.folder = folder
-        self.operator = str(settings.value("operator", ""))
-        self.film = str(settings.value("film", ""))
+        self.operator = kept_text(settings, "operator")
+        self.film = kept_text(settings, "film")
         self.notes = ""
         self.theme = theme
         self.running = False
@@ -177,10 +178,7 @@ class Session(QObject):
     @property
     def recent(self) -> list[Path]:
         """Recently used sequence files, the newest first."""
-        found = self.settings.value("recent", [])
-        if isinstance(found, str):  # QSettings returns a list of one as a string
-            found = [found]
-        return [Path(str(name)) for name in found] if isinstance(found, list) else []
+        return [Path(name) for name in kept_texts(self.settings, "recent", _RECENT_MAX)]
 
     def add_recent(self, path: Path) -> None:
         """Put ``path`` first among the recent sequence files."""
