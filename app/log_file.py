@@ -9,15 +9,27 @@ the log is a help for the search of errors, never a condition for a run.
 from __future__ import annotations
 
 import contextlib
+import io
 import logging
 import os
+import stat
 from collections.abc import Iterator
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
+from typing import Any
 
 from platformdirs import user_log_path
 
-__all__ = ["FOLDER_VARIABLE", "SIZE_MAX", "LogFile", "attached", "log_path"]
+from dearig.printable import printable
+
+__all__ = [
+    "FOLDER_VARIABLE",
+    "SIZE_MAX",
+    "LogFile",
+    "PrintableFormatter",
+    "attached",
+    "log_path",
+]
 
 #: Environment variable with another folder for the log file.
 FOLDER_VARIABLE = "DEARIG_LOG_DIR"
@@ -25,6 +37,8 @@ FOLDER_VARIABLE = "DEARIG_LOG_DIR"
 SIZE_MAX = 1_000_000
 #: Number of older files that are kept.
 KEPT = 3
+#: Characters of a record, at most: a hundredth of a file. Longer ones are cut in the middle.
+LINE_MAX = SIZE_MAX // 100
 
 _FORMAT = "%(asctime)s %(levelname)s [%(process)d] %(name)s: %(message)s"
 
@@ -48,20 +62,41 @@ class LogFile(RotatingFileHandler):
             path, maxBytes=SIZE_MAX, backupCount=KEPT, encoding="utf-8", delay=True,
             errors="backslashreplace",
         )  # fmt: skip
+        # platformdirs leaves the ~ where it does not know the user's home
+        self._homeless = path.parts[:1] == ("~",)
         self.setLevel(logging.INFO)
-        self.setFormatter(logging.Formatter(_FORMAT))
+        self.setFormatter(PrintableFormatter(_FORMAT))
         # other packages have news at this level that nobody needs
         self.addFilter(lambda r: r.name.startswith("dearig") or r.levelno >= logging.WARNING)
 
     def emit(self, record: logging.LogRecord) -> None:
         self.problem = None
         try:
+            if self._homeless:
+                raise OSError("the user has no home folder")  # noqa: TRY301
             self._leave_renamed()
             Path(self.baseFilename).parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             self.problem = _reason(error)
             return
         super().emit(record)
+
+    def _open(self) -> io.TextIOWrapper:
+        """Open the file of this user; links, pipes and files of other users are refused."""
+        flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT
+        # a pipe without a reader would block; Windows has neither flag
+        flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+        number = os.open(self.baseFilename, flags, 0o600)
+        found = os.fstat(number)
+        if not stat.S_ISREG(found.st_mode):
+            reason = "it is not a regular file"
+        elif os.name != "nt" and found.st_uid != os.geteuid():
+            reason = "it belongs to another user"
+        else:
+            stream = os.fdopen(number, "ab")
+            return io.TextIOWrapper(stream, encoding=self.encoding, errors=self.errors)
+        os.close(number)
+        raise OSError(reason)
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: ARG002, N802
         # inside an except clause of logging; its own report would be a traceback on the terminal
@@ -100,6 +135,18 @@ class LogFile(RotatingFileHandler):
         if not path.exists() or not os.path.samestat(path.stat(), os.fstat(self.stream.fileno())):
             self.stream.close()
             self.stream = None
+
+
+class PrintableFormatter(logging.Formatter):
+    """Formatter whose records are one line each, and whose tracebacks are printable."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802
+        """Return the line of ``record``."""
+        return printable(super().formatMessage(record), most=LINE_MAX)
+
+    def formatException(self, ei: Any) -> str:  # noqa: N802
+        """Return the traceback."""
+        return printable(super().formatException(ei), "\n", most=LINE_MAX)
 
 
 def _reason(error: OSError) -> str:

@@ -22,10 +22,12 @@ from dearig.cli.output import (
     console_for,
     optional,
     print_line,
+    print_lines,
     working,
     write_result,
 )
 from dearig.errors import InputError
+from dearig.printable import printable
 
 __all__ = ["commands"]
 
@@ -162,7 +164,7 @@ def info(
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for name, value in describe_rows(recording):
-        table.add_row(name, Text(value))
+        table.add_row(Text(printable(name)), Text(printable(value)))
     if json != "-":
         console_for().print(table, highlight=False)
     write_result(describe(recording), json)
@@ -276,6 +278,6 @@ def index_(
         found = index_folder(folder, lambda part: progress("reading", part))
     found.sort(key=lambda entry: (entry.start_time, entry.path))
     if json != "-":
-        print_line(console_for(), "\n".join(lines(found)))
+        print_lines(console_for(), lines(found))
     listed = [asdict(entry) for entry in found]
     write_result({"format": "dearig-index/1", "folder": str(folder), "recordings": listed}, json)

@@ -16,7 +16,8 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Annotated, TextIO
+from pathlib import Path
+from typing import Annotated, TextIO, cast
 
 import typer
 from typer.exceptions import TyperException
@@ -25,6 +26,7 @@ from dearig import log_file
 from dearig.cli import files, fit, run, tools
 from dearig.cli.output import version
 from dearig.errors import DearigError, InputError, Interrupted
+from dearig.printable import MESSAGE_MAX, PrintableStream, printable
 
 __all__ = ["app", "main"]
 
@@ -74,7 +76,7 @@ class _Terminal(logging.StreamHandler[TextIO]):
 
     def __init__(self) -> None:
         super().__init__(sys.stderr)
-        self.setFormatter(logging.Formatter("%(levelname)s: %(message)s"))
+        self.setFormatter(log_file.PrintableFormatter("%(levelname)s: %(message)s"))
         self.show(0)
 
     def show(self, verbose: int) -> None:
@@ -92,11 +94,45 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):
             # characters that the terminal's encoding lacks are escaped; they raise nothing
             stream.reconfigure(errors="backslashreplace")
-    with log_file.attached() as written, _terminal(), _unexpected_errors_told(written):
+    _give_matplotlib_a_folder()
+    with (
+        _printable_output(), log_file.attached() as written, _terminal(),
+        _unexpected_errors_told(written),
+    ):  # fmt: skip
         status = _run(written)
         if written.stream is not None:  # a command has started, not only --help
             log.info("ended with exit code %d", status)
     sys.exit(status)
+
+
+@contextmanager
+def _printable_output() -> Iterator[None]:
+    """Let only printable characters through to the terminal, whoever writes them."""
+    raw = sys.stdout, sys.stderr
+    sys.stdout = cast(TextIO, PrintableStream(raw[0]))
+    sys.stderr = cast(TextIO, PrintableStream(raw[1]))
+    try:
+        yield
+    finally:
+        sys.stdout, sys.stderr = raw
+
+
+def _give_matplotlib_a_folder() -> None:
+    """Set ``MPLCONFIGDIR`` where matplotlib's own folders cannot be used or trusted.
+
+    It would make a new folder in every process, and warn of it.
+    """
+    import platformdirs
+
+    from dearig.model.trusted_folder import cache_root, usable
+
+    asked = os.environ.get("MPLCONFIGDIR")
+    usual = (platformdirs.user_config_dir(), platformdirs.user_cache_dir())
+    if os.name == "nt" or all(usable(Path(f))[0] for f in ([asked] if asked else usual)):
+        return
+    root = cache_root().path
+    if root is not None:
+        os.environ["MPLCONFIGDIR"] = str(root / "matplotlib")
 
 
 @contextmanager
@@ -172,7 +208,7 @@ def _usage(error: TyperException) -> str:
 
 def _say(message: str) -> None:
     log.info("message: %s", message)
-    sys.stderr.write(f"dearig: {message}\n")
+    sys.stderr.write(f"dearig: {printable(message, most=MESSAGE_MAX)}\n")
 
 
 # ---------------------------------------------------------------- unexpected errors
@@ -193,6 +229,7 @@ def _tell_unexpected(error: BaseException, written: log_file.LogFile) -> None:
             f"the log file {written.baseFilename} cannot be written ({written.problem}); "
             f"dearig -v shows the details"
         )
+    what = printable(what, most=MESSAGE_MAX)
     sys.stderr.write(f"dearig: unexpected error, a mistake in this program ({what}); {where}\n")
 
 

@@ -9,6 +9,9 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from dearig.cli.console import PrintableConsole
+from dearig.printable import printable
+
 __all__ = ["progress"]
 
 
@@ -23,7 +26,7 @@ def progress(
     work, and a new stage only changes the bar's text. Nothing is written where standard error is
     no terminal.
     """
-    console = Console(stderr=True) if console is None else console
+    console = PrintableConsole(stderr=True) if console is None else console
     if not console.is_terminal:
         yield _unseen
         return
@@ -37,12 +40,16 @@ def progress(
         console=console,
         transient=True,
         expand=True,
+        # rich's copies of both streams would obey control characters in what others write
+        redirect_stdout=False,
+        redirect_stderr=False,
     )
     task = bar.add_task(description, total=1.0)
     current = ""
 
     def report(stage: str, fraction: float) -> None:
         nonlocal current
+        stage = printable(stage)
         done = min(max(fraction, 0.0), 1.0) if math.isfinite(fraction) else 0.0
         if stage != current and whole:
             current = stage

@@ -11,6 +11,7 @@ from rich.measure import Measurement
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from dearig.printable import printable
 from dearig.report.diagnosis import (
     before_after_table,
     effect_table,
@@ -146,7 +147,7 @@ class _Fitted:
         return Measurement(min(20, options.max_width), options.max_width)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        show = to_ascii if options.ascii_only else str
+        show = _ascii if options.ascii_only else printable
         width = options.max_width
         for i, piece in enumerate(self._pieces):
             if isinstance(piece, str):
@@ -170,6 +171,10 @@ class _Fitted:
             yield Text(show(f"Warning: {warning}"), style="yellow")
 
 
+def _ascii(text: str) -> str:
+    return printable(to_ascii(text))
+
+
 def _in_per_cent(table: Table) -> Table:
     """Return the table with its unit in the head, for use without its title."""
     head = tuple((name, f"% {unit}" if unit else "") for name, unit in table.head)
@@ -183,12 +188,12 @@ def _laid_out(table: Table, show: Callable[[str], str], width: int) -> Iterator[
         yield from _listed(table, show)
     else:
         grid = RichTable(
-            box=_ASCII_HEAD if show is to_ascii else SIMPLE_HEAD,
+            box=_ASCII_HEAD if show is _ascii else SIMPLE_HEAD,
             show_edge=False, pad_edge=False, padding=(0, _GAP - 1, 0, 0), header_style="",
         )  # fmt: skip
         for i, (name, unit) in enumerate(table.head):
             grid.add_column(
-                Text(show(f"{name}\n{unit}".strip("\n"))),
+                Text(f"{show(name)}\n{show(unit)}".strip("\n")),
                 justify="right" if i else "left",
                 no_wrap=True,
                 min_width=widths[i],

@@ -19,8 +19,9 @@ def write_json(obj: dict[str, Any], target: str | Path) -> None:
     A file appears complete or not at all. Raises ``InputError`` if it cannot be written, and
     ``ValueError`` for NaN and infinity, which JSON does not have.
     """
-    # non-ASCII characters are escaped: any terminal and any reader accepts any file name
-    text = json.dumps(obj, indent=2, allow_nan=False) + "\n"
+    # non-ASCII characters are escaped: any terminal and any reader accepts any file name; JSON
+    # leaves one control character, DEL
+    text = json.dumps(obj, indent=2, allow_nan=False).replace("\x7f", "\\u007f") + "\n"
     if str(target) == "-":
         try:
             sys.stdout.write(text)
