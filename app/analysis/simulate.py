@@ -109,7 +109,7 @@ def save_prediction(prediction: Prediction, out: str | Path, overwrite: bool = F
     if target.suffix not in (".h5", ".csv"):
         raise InputError(f"{out}: the output is a recording (.h5) or a table (.csv)")
     if target.suffix == ".csv":
-        with replaced_when_done(target) as partial:
+        with replaced_when_done(target, overwrite) as partial:
             _write_csv(partial, prediction.values)
         return target
     given = prediction.model

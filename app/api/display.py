@@ -109,6 +109,6 @@ def write_page(path: str | Path, title: str, body: str) -> Path:
         "body{font:1rem/1.5 system-ui,sans-serif;margin:2rem auto;max-width:60rem;padding:0 1rem}"
         f"</style></head><body>{body}</body></html>\n"
     )
-    with replaced_when_done(path) as partial:
+    with replaced_when_done(path, overwrite=True) as partial:
         partial.write_text(page, encoding="utf-8", errors="replace", newline="\n")
     return path

@@ -75,7 +75,7 @@ class Recording(stored.Recording):
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Copy the recording's file to ``path`` and return the path. Raises ``InputError``."""
         out = check_output(path, overwrite, self.path)
-        with replaced_when_done(out) as partial:
+        with replaced_when_done(out, overwrite) as partial:
             shutil.copyfile(self.path, partial)
         return out
 

@@ -195,7 +195,7 @@ class Sequence:
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write a sequence file (TOML) to ``path`` and return the path. Raises ``InputError``."""
         out = check_output(path, overwrite)
-        with replaced_when_done(out) as partial:
+        with replaced_when_done(out, overwrite) as partial:
             partial.write_text(self.toml, encoding="utf-8")
         return out
 

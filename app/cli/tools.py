@@ -40,7 +40,7 @@ def sequence_file(
     from dearig.recording.files import replaced_when_done
 
     check_files(force, (), out, json=None)
-    with replaced_when_done(out) as partial:
+    with replaced_when_done(out, overwrite=force) as partial:
         partial.write_text(example(), encoding="utf-8", newline="\n")
     print_line(console_for(), f"{out}: edit it, then run it with dearig record {out} --out FILE.h5")
 

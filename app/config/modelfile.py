@@ -225,7 +225,7 @@ def save_model(
 ) -> Path:
     """Write a model file completely or not at all; ``InputError`` where it may not be written."""
     out = check_output(path, overwrite)
-    with replaced_when_done(out) as partial:
+    with replaced_when_done(out, overwrite) as partial:
         partial.write_text(model_toml(name, model, history), encoding="utf-8")
     return out
 

@@ -16,6 +16,7 @@ from dearig.drivers.gate import Limits
 from dearig.drivers.settings import RigSettings, Section
 from dearig.errors import InputError
 from dearig.model.material import Film, Load
+from dearig.recording.files import check_output, replaced_when_done
 
 __all__ = [
     "REPEATED",
@@ -146,13 +147,9 @@ def write_default(path: Path | str, overwrite: bool = False) -> None:
     # the operator's own things first: film and load come last in the class, where they are added
     for name in ("film", "load", *(n for n in sections if n not in ("film", "load"))):
         lines.extend(_section_lines(name, sections[name]))
-    try:
-        with path.open("w" if overwrite else "x", encoding="utf-8", newline="\n") as file:
-            file.write("\n".join(lines))
-    except FileExistsError as error:
-        raise InputError(f"rig file {path} exists already; it is not overwritten") from error
-    except OSError as error:
-        raise InputError(f"rig file {path} cannot be written: {error.strerror or error}") from error
+    out = check_output(path, overwrite)
+    with replaced_when_done(out, overwrite) as partial:
+        partial.write_text("\n".join(lines), encoding="utf-8", newline="\n")
 
 
 def _section_lines(name: str, info: FieldInfo) -> Iterator[str]:

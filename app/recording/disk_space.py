@@ -11,6 +11,7 @@ from types import MappingProxyType
 from dearig.errors import InputError
 from dearig.recording.files import errno_of, in_words
 from dearig.recording.finish import OVERVIEW, PHYSICAL_MAX
+from dearig.recording.lock import NO_LOCKS
 
 __all__ = ["LEFT_FREE", "advice", "check_room", "estimate_bytes", "free_bytes"]
 
@@ -35,6 +36,7 @@ _ADVICE = MappingProxyType(
         errno.ENODEV: "the disk was removed: record to another disk",
         errno.ENXIO: "the disk was removed: record to another disk",
         errno.ENAMETOOLONG: "the path is too long: choose a shorter one",
+        errno.ENOLCK: f"the folder has no file locks: {NO_LOCKS}",
         # these codes are missing on some systems
         getattr(errno, "EDQUOT", -1): "your disk quota is used up: free some space, or record to "
         "another disk",

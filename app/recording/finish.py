@@ -12,8 +12,9 @@ from dearig.errors import InputError
 from dearig.recording.checksums import complete_checksums
 from dearig.recording.files import in_words
 from dearig.recording.flushes import flush_notes
-from dearig.recording.journal import Patched, changed_in_place
+from dearig.recording.journal import Patched, changed_in_place, replaced
 from dearig.recording.layout import (
+    IDENTIFIER,
     LIBVER,
     MESSAGE_BYTES,
     SIGNALS,
@@ -23,9 +24,12 @@ from dearig.recording.layout import (
     create_field,
     iso_time,
 )
+from dearig.recording.lock import FileLock, ReplacedError
+from dearig.recording.opening import opened
 from dearig.recording.physical import SLICE, Counts
 from dearig.recording.pyramid import complete_pyramid
-from dearig.recording.text import clip_text, fixed, put_text
+from dearig.recording.safe import dataset
+from dearig.recording.text import clip_text, fixed, put_text, text_of
 
 __all__ = ["OVERVIEW", "PHYSICAL_MAX", "finish"]
 
@@ -39,23 +43,31 @@ OVERVIEW = 2**13
 def finish(
     path: Path,
     *,
+    lock: FileLock,
     complete: bool,
     outcome: str,
     ended: float | None,
     displacement_model: np.ndarray | None = None,
     model_toml: str = "",
+    identifier: str = "",
     repair: Callable[[Patched], None] | None = None,
     fsync: bool = False,
 ) -> int:
     """Write physical values and closing metadata to the closed recording ``path``.
 
     All is written or nothing: outside SWMR mode a kill can make a file unreadable, and the disk can
-    be full, but the counts stay safe. ``repair`` is called with the file before HDF5 opens it.
-    ``ended`` is a Unix time in s, None if unknown. Returns the number of samples. Raises
-    ``InputError`` if it cannot be written; then the file is as it was.
+    be full, but the counts stay safe. The caller holds ``lock`` on the file; ``identifier`` is that
+    of the recording that should be in it, if known. ``repair`` is called with the file before HDF5
+    opens it. ``ended`` is a Unix time in s, None if unknown. Returns the number of samples. Raises
+    ``ReplacedError`` if another file has that name by now, and ``InputError`` if it cannot be
+    written; then it is as it was.
     """
     try:
-        with changed_in_place(path, fsync) as changes:
+        if not lock.is_at(path):
+            raise replaced(path)
+        if identifier:
+            _check_identifier(path, identifier)
+        with changed_in_place(path, lock, fsync) as changes:
             if repair is not None:
                 repair(changes)
             with h5py.File(changes, "r+", libver=LIBVER) as file:
@@ -79,6 +91,17 @@ def finish(
     except (OSError, RuntimeError) as error:
         raise InputError(f"{path} cannot be written: {in_words(error)}") from error
     return samples
+
+
+def _check_identifier(path: Path, identifier: str) -> None:
+    """Raise ``InputError`` if another program has written another recording into the file."""
+    with opened(path) as file:
+        found = dataset(file["entry"], IDENTIFIER) if "entry" in file else None
+        if found is None or text_of(found[()]) != identifier:
+            raise ReplacedError(
+                f"{path} has another content by now: another program wrote to it during the run; "
+                f"it was not finished"
+            )
 
 
 def _write_physical(entry: h5py.Group) -> int:

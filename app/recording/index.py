@@ -178,7 +178,7 @@ def _save(
     files = [[name, *stamps[name], asdict(entry)] for name, entry in entries.items()]
     try:
         cache.parent.mkdir(parents=True, exist_ok=True)
-        with replaced_when_done(cache) as partial:
+        with replaced_when_done(cache, overwrite=True) as partial:
             partial.write_text(json.dumps({"format": KEPT, "files": files}), encoding="utf-8")
     except (OSError, InputError):
         # without the cache the next index is only slower

@@ -11,6 +11,7 @@ from __future__ import annotations
 import io
 import os
 import struct
+import sys
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,7 +19,17 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["Patched", "carry_out", "changed_in_place", "journal_of", "whole_journal"]
+from dearig.recording.files import journal_of, replaced_when_done
+from dearig.recording.lock import FileLock, ReplacedError
+
+__all__ = [
+    "Patched",
+    "carry_out",
+    "changed_in_place",
+    "journal_of",
+    "replaced",
+    "whole_journal",
+]
 
 MAGIC = b"dearig-journal/1"
 #: Bytes of a page; changes are held back in pages.
@@ -27,11 +38,6 @@ HEAD = struct.Struct("<16sQQQ")  # magic, size before, size after, pages
 PIECE = struct.Struct("<QI")  # offset, length; then the old bytes, then the new ones
 #: Bytes of a journal, at most: finishing a recording never needs more.
 LARGEST = 2**28
-
-
-def journal_of(path: Path) -> Path:
-    """Return the path of the journal of the file ``path``."""
-    return path.with_name(f"{path.name}.journal")
 
 
 class Patched(io.RawIOBase):
@@ -143,14 +149,16 @@ class Patched(io.RawIOBase):
 
 
 @contextmanager
-def changed_in_place(path: Path, fsync: bool = False) -> Iterator[Patched]:
+def changed_in_place(path: Path, lock: FileLock, fsync: bool = False) -> Iterator[Patched]:
     """Yield the file at ``path`` to change; all changes are kept if the body succeeds, else none.
 
-    With ``fsync`` this holds for a power cut too. Raises ``OSError``; the file is then as it was
-    before, or, if the journal was being applied, the journal is left to be applied later.
+    The caller holds ``lock`` on the file. With ``fsync`` this holds for a power cut too. Raises
+    ``InputError`` if another file has the name ``path`` by now, and ``OSError``; the file is then
+    as it was before, or, if the journal was being applied, the journal is left to be applied later.
     """
     journal = journal_of(path)
     with path.open("r+b", buffering=0) as file:
+        _check_same(path, file, lock)
         edge = file.seek(0, 2)
         patched = Patched(file, edge, {})
         try:
@@ -172,16 +180,36 @@ def changed_in_place(path: Path, fsync: bool = False) -> Iterator[Patched]:
     journal.unlink()
 
 
+def _check_same(path: Path, file: io.FileIO, lock: FileLock) -> None:
+    if not os.path.samestat(os.fstat(file.fileno()), lock.status):
+        raise replaced(path)
+
+
+def replaced(path: Path) -> ReplacedError:
+    """Return the error for a file that another one has replaced since it was locked."""
+    return ReplacedError(
+        f"{path} is another file by now, which replaced the one that was to be finished; nothing "
+        f"was written to it"
+    )
+
+
 def _write_journal(journal: Path, patched: Patched, fsync: bool) -> None:
     parts = [HEAD.pack(MAGIC, patched.edge, patched.end, len(patched.pages))]
     for number, page in sorted(patched.pages.items()):
         parts += [PIECE.pack(number * PAGE, len(page)), patched.original(number), bytes(page)]
     content = b"".join(parts)
-    with journal.open("wb") as stream:
+    with replaced_when_done(journal, overwrite=True) as partial, partial.open("wb") as stream:
         stream.write(content + struct.pack("<I", zlib.crc32(content)))
         stream.flush()
         if fsync:
             os.fsync(stream.fileno())
+    if fsync and sys.platform != "win32":
+        # the journal's name must reach the disk before the first change of the file
+        folder = os.open(journal.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
 
 
 def _apply(file: io.FileIO, end: int, pages: dict[int, bytes]) -> None:
@@ -233,12 +261,17 @@ def _either(here: bytes, old: bytes, new: bytes) -> bool:
     return bool(((bytes_of[0] == bytes_of[1]) | (bytes_of[0] == bytes_of[2])).all())
 
 
-def carry_out(path: Path) -> bool:
-    """Apply the journal beside ``path``; return True if there was one. Raises ``OSError``."""
+def carry_out(path: Path, lock: FileLock) -> bool:
+    """Apply the journal beside ``path``; return True if there was one.
+
+    The caller holds ``lock`` on the file. Raises ``InputError`` if another file has that name by
+    now, and ``OSError``.
+    """
     found = whole_journal(path)
     if found is not None:
         _, after, pages = found
         with path.open("r+b", buffering=0) as file:
+            _check_same(path, file, lock)
             _apply(file, after, pages)
     journal_of(path).unlink(missing_ok=True)
     return found is not None

@@ -30,5 +30,5 @@ def write_json(obj: dict[str, Any], target: str | Path) -> None:
             raise InputError(f"the JSON cannot be written to standard output: {error}") from error
         return
     path = check_output(target, overwrite=True)
-    with replaced_when_done(path) as partial:
+    with replaced_when_done(path, overwrite=True) as partial:
         partial.write_text(text, encoding="utf-8", newline="\n")

@@ -3,6 +3,7 @@
 /                       format, default="entry"
 /entry                  NXentry: format, kind, complete, outcome, samples, default="data"
 /entry/title, start_time, end_time
+/entry/entry_identifier_uuid   identifies the recording, whatever its file is called
 /entry/data             NXdata: time and the physical values, and beside them NAME_counts
                         also of the channels that the rig file declares, by their names
 /entry/instrument/*     one NXinstrument for each instrument; channels/NAME links to the counts
@@ -19,6 +20,7 @@
 
 from __future__ import annotations
 
+import uuid
 from datetime import UTC, datetime
 from types import MappingProxyType
 
@@ -32,6 +34,7 @@ __all__ = [
     "EVENT_TYPE",
     "FORMAT",
     "FORMAT_NAME",
+    "IDENTIFIER",
     "KINDS",
     "LIBVER",
     "LINEAR",
@@ -100,6 +103,9 @@ LONG_NAMES = MappingProxyType(
         "nominal_stress": "nominal stress",
     }
 )
+
+#: Name of the recording's identifier in /entry, as NeXus has it.
+IDENTIFIER = "entry_identifier_uuid"
 
 #: Interpolation of the voltage between samples: a converter holds it, imported data are linear.
 ZERO_ORDER, LINEAR = "zero-order", "linear"
@@ -218,6 +224,7 @@ def lay_out(file: h5py.File, kind: str, title: str, started: float) -> h5py.Grou
     entry.attrs["complete"] = False
     put_text(entry, "title", title)
     put_text(entry, "start_time", iso_time(started))
+    put_text(entry, IDENTIFIER, str(uuid.uuid4()))
     data = entry.create_group("data")
     data.attrs["NX_class"] = fixed("NXdata")
     data.attrs["signal"] = fixed(SIGNALS[kind])

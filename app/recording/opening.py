@@ -10,7 +10,7 @@ from typing import TypeVar
 import h5py
 
 from dearig.errors import InputError
-from dearig.recording.files import in_words, one_line
+from dearig.recording.files import in_words, journal_of, one_line
 from dearig.recording.journal import Patched, whole_journal
 from dearig.recording.safe import Refused
 from dearig.recording.superblock import SIZE, flags_of, repair_superblock
@@ -52,19 +52,38 @@ def damage(path: Path, error: Exception) -> InputError:
 def read_from(path: Path, look: Callable[[h5py.File], T]) -> T:
     """Return what ``look`` returns for the file at ``path``; ``InputError`` if it is unreadable.
 
-    A file that is being written is read again after an error: a write may have been half done.
+    A file that is being written, or that was changed meanwhile, is read again after an error: a
+    write may have been half done.
     """
     for left in reversed(range(LOOKS)):
-        with opened(path) as file:
-            growing = file.driver == "fileobj"
-            try:
-                return look(file)
-            except Refused as error:
-                raise InputError(f"{path}: {error}") from error
-            except UNREADABLE as error:
-                if not (growing and left):
-                    raise damage(path, error) from error
+        before = _state(path)
+        try:
+            with opened(path) as file:
+                growing = file.driver == "fileobj"
+                try:
+                    return look(file)
+                except Refused as error:
+                    raise InputError(f"{path}: {error}") from error
+                except UNREADABLE as error:
+                    if not (growing and left):
+                        raise damage(path, error) from error
+        except InputError:
+            if not left or _state(path) == before:
+                raise
     raise InputError(f"{path} cannot be read")
+
+
+def _state(path: Path) -> tuple[int, ...]:
+    """Return what differs once a file, or its journal, has been changed or replaced."""
+    found: list[int] = []
+    for name in (path, journal_of(path)):
+        try:
+            about = name.stat()
+        except OSError:
+            found.append(-1)
+        else:
+            found += (about.st_ino, about.st_size, about.st_mtime_ns)
+    return tuple(found)
 
 
 @contextmanager
@@ -93,7 +112,7 @@ def opened(path: Path) -> Iterator[h5py.File]:
         if flags and not flags & WRITTEN_IN_ORDER:
             raise InputError(f"{path} {BEING_WRITTEN}")
         try:
-            file = h5py.File(_as_closed(patched) if flags else patched if journal else path, "r")
+            file = _open(path, patched, as_closed=bool(flags), whole=not journal)
         except UNREADABLE as error:
             if "truncated" in str(error):
                 reason = "is truncated: it was not copied or downloaded completely"
@@ -104,6 +123,20 @@ def opened(path: Path) -> Iterator[h5py.File]:
             raise InputError(f"{path} {reason}") from error
         with file:
             yield file
+
+
+def _open(path: Path, patched: Patched, as_closed: bool, whole: bool) -> h5py.File:
+    if as_closed:
+        return h5py.File(_as_closed(patched), "r")
+    if whole:
+        try:
+            return h5py.File(path, "r")
+        except OSError as error:
+            # reading needs no lock: where there are none, or another program has it, HDF5 reads
+            # through Python
+            if "lock file" not in str(error):
+                raise
+    return h5py.File(patched, "r")
 
 
 def _as_closed(patched: Patched) -> Patched:

@@ -68,7 +68,10 @@ def save_recording(
 
     started = now()
     noted = gather(started, metadata)
-    with replaced_when_done(path) as partial, h5py.File(partial, "w", libver=LIBVER) as file:
+    with (
+        replaced_when_done(path, overwrite) as partial,
+        h5py.File(partial, "w", libver=LIBVER, locking=False) as file,
+    ):
         entry = lay_out(file, kind, metadata.title, started)
         data = entry["data"]
         for name, array in values.items():

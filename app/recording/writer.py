@@ -29,11 +29,18 @@ from dearig.drivers.rig import Block, Event, RigIdentity
 from dearig.errors import DearigError, DiskFault, InputError, InstrumentFault
 from dearig.recording.checksums import ChecksumWriter
 from dearig.recording.disk_space import advice
-from dearig.recording.files import check_output, in_words, put_back, set_aside
+from dearig.recording.files import (
+    check_output,
+    in_words,
+    keep_permissions,
+    put_back,
+    set_aside,
+)
 from dearig.recording.finish import finish
 from dearig.recording.layout import (
     EVENT_LEVELS,
     EVENT_TYPE,
+    IDENTIFIER,
     LIBVER,
     MESSAGE_BYTES,
     UNITS,
@@ -43,12 +50,13 @@ from dearig.recording.layout import (
     lay_out,
     make_own_scale,
 )
+from dearig.recording.lock import ReplacedError, create_locked
 from dearig.recording.metadata import RunMetadata
 from dearig.recording.physical import TEMPERATURE_UNITS, write_channel
 from dearig.recording.provenance import gather, write_provenance
 from dearig.recording.pyramid import PyramidWriter
 from dearig.recording.sample import write_sample
-from dearig.recording.text import clip_text, fixed, put_text
+from dearig.recording.text import clip_text, fixed, put_text, text_of
 
 __all__ = ["FLUSH_INTERVAL", "RecordingWriter"]
 
@@ -111,11 +119,21 @@ class RecordingWriter:
             self._old = set_aside(self._path) if overwrite else None
         try:
             with _disk_errors(self._path, InputError):
-                # "x" fails if another process has created the file since the check
-                self._file = h5py.File(self._path, "x", libver=LIBVER)
+                # fails if another process has created the file since the check
+                self._lock = create_locked(self._path)
+                if self._old is not None:
+                    keep_permissions(self._old, self._path)
+            try:
+                with _disk_errors(self._path, InputError):
+                    # the lock replaces that of HDF5, which ends with the start of SWMR mode
+                    self._file = h5py.File(self._path, "w", libver=LIBVER, locking=False)
+            except BaseException:
+                self._remove_own()
+                raise
             try:
                 with _disk_errors(self._path, InputError):
                     entry = lay_out(self._file, "actuator", metadata.title or name, started)
+                    self._identifier = text_of(entry[IDENTIFIER][()])
                     put_text(entry, "sequence", metadata.sequence_toml)
                     write_sample(entry, metadata)
                     write_provenance(entry, provenance)
@@ -126,10 +144,14 @@ class RecordingWriter:
                     self._flush()
             except BaseException:
                 self._let_go()
-                self._path.unlink(missing_ok=True)
+                self._remove_own()
                 raise
-        except BaseException:
-            put_back(self._old, self._path)
+        except BaseException as error:
+            if not put_back(self._old, self._path):
+                raise InputError(
+                    f"{self._path} was taken by another program; the recording that had this name "
+                    f"is {self._old}"
+                ) from error
             raise
         self._last_flush = now()
 
@@ -201,6 +223,12 @@ class RecordingWriter:
         """True after ``close``."""
         return self._closed
 
+    def _remove_own(self) -> None:
+        """Delete the file, unless another one has its name by now, and release the lock."""
+        if self._lock.is_at(self._path):
+            self._path.unlink(missing_ok=True)
+        self._lock.release()
+
     def append(self, block: Block) -> None:
         """Write the next block and its events.
 
@@ -253,6 +281,8 @@ class RecordingWriter:
                 yield
         except DiskFault as error:
             self._let_go()
+            # so that the file can be recovered
+            self._lock.release()
             self._written = self._flushed
             self._failure = DiskFault(
                 f"{error}; the {self._flushed} samples until then are in the file, as counts: "
@@ -356,6 +386,10 @@ class RecordingWriter:
                 f"the recording {self._written} samples"
             )
         self._closed = True
+        with self._lock:
+            self._finish(outcome, displacement_model, model_toml)
+
+    def _finish(self, outcome: str, displacement_model: np.ndarray | None, model_toml: str) -> None:
         moment = self._now()
         with self._writing():
             self._write_pending(moment)
@@ -365,6 +399,8 @@ class RecordingWriter:
         try:
             finish(
                 self._path,
+                lock=self._lock,
+                identifier=self._identifier,
                 complete=True,
                 outcome=outcome,
                 ended=moment,
@@ -372,6 +408,8 @@ class RecordingWriter:
                 model_toml=model_toml,
                 fsync=self._fsync,
             )
+        except ReplacedError as error:
+            raise DiskFault(str(error)) from error
         except InputError as error:
             raise DiskFault(
                 f"{error}; the whole run is in the file, as counts: free some space and recover it"
@@ -383,8 +421,13 @@ class RecordingWriter:
             self._closed = True
             if self._failure is None:
                 self._let_go()
-            self._path.unlink(missing_ok=True)
-            put_back(self._old, self._path)
+            self._remove_own()
+            if not put_back(self._old, self._path):
+                log.warning(
+                    "%s was taken by another program; the recording that had this name is %s",
+                    self._path,
+                    self._old,
+                )
 
     def __enter__(self) -> RecordingWriter:
         """Return the writer."""

@@ -24,7 +24,7 @@ def save_png(figure: Figure, path: str | Path, dpi: int = 200) -> Path:
     picture = io.BytesIO()
     with style():
         figure.savefig(picture, format="png", dpi=dpi)
-    with replaced_when_done(path) as partial:
+    with replaced_when_done(path, overwrite=True) as partial:
         partial.write_bytes(picture.getvalue())
     return path
 

@@ -127,7 +127,7 @@ def write_page(path: str | Path, template: str, contents: Callable[[], dict[str,
 
     path = check_output(path, overwrite=True)  # before seconds are spent on figures
     page = _render(template, contents())
-    with replaced_when_done(path) as partial:
+    with replaced_when_done(path, overwrite=True) as partial:
         # bytes of a file name that are no text are shown as ?
         partial.write_text(page, encoding="utf-8", errors="replace", newline="\n")
     return path

@@ -144,7 +144,7 @@ class RigPage(QWidget):
 
         def write() -> tuple[Path, None]:
             out = check_output(path, overwrite=True)
-            with replaced_when_done(out) as partial:
+            with replaced_when_done(out, overwrite=True) as partial:
                 partial.write_text(text, encoding="utf-8")
             return out, None
 

@@ -90,7 +90,7 @@ class SequencePage(QWidget):
                         f"{out.name} has comments (#), which the changed sequence cannot keep; "
                         f"nothing was written: save again to replace it, or choose another name"
                     )
-            with replaced_when_done(out) as partial:
+            with replaced_when_done(out, overwrite=True) as partial:
                 partial.write_text(text, encoding="utf-8")
             return out, None
 

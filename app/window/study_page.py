@@ -26,7 +26,8 @@ from PySide6.QtWidgets import (
 from dearig.analysis.compatibility import BRANCHES_MAX
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome
 from dearig.analysis.study import Study, Task, study
-from dearig.recording.files import in_words
+from dearig.errors import InputError
+from dearig.recording.files import check_output, replaced_when_done
 from dearig.report import diagnosis, sentences, tables
 from dearig.report.page import write_report
 from dearig.report.tables import Table
@@ -388,9 +389,11 @@ class StudyPage(QWidget):
         if self._shown is None:
             return
         try:
-            shutil.copyfile(self._shown.model, path)
-        except OSError as error:
-            self.message.show_text(f"{path} cannot be written: {in_words(error)}")
+            out = check_output(path, overwrite=True)
+            with replaced_when_done(out, overwrite=True) as partial:
+                shutil.copyfile(self._shown.model, partial)
+        except InputError as error:
+            self.message.show_text(str(error))
         else:
             self.message.show_text(f"Saved {path}", "good")
 

@@ -45,7 +45,7 @@ def test_default_file_says_what_the_defaults_are(tmp_path):
     text = path.read_text(encoding="utf-8")
     assert "# highest voltage at the film (a number above 0, at most 100)" in text
     assert "# [thermometer]" in text
-    with pytest.raises(InputError, match="exists already; it is not overwritten"):
+    with pytest.raises(InputError, match="exists already; choose another name"):
         write_default(path)
 
 

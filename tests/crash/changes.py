@@ -74,5 +74,7 @@ def again(change: Change, folder: Path) -> None:
                     file.write(change.data)
         case "R":
             path.rename(folder / Path(os.fsdecode(change.data)).name)
+        case "L":
+            (folder / Path(os.fsdecode(change.data)).name).hardlink_to(path)
         case "U":
             path.unlink()

@@ -3,7 +3,7 @@
    Preloaded (LD_PRELOAD) with CRASH_FOLDER (absolute) and CRASH_LOG. Each change is a record in the
    log: a letter, three 64-bit numbers (offset, length of the name, length of the data), the name,
    the data. W: data written at offset; T: cut or grown to offset; C: created or emptied;
-   R: renamed, the data being the new name; U: unlinked. */
+   R: renamed, the data being the new name; L: linked, likewise; U: unlinked. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -124,6 +124,15 @@ int rename(const char *from, const char *to) {
     int known = realpath(from, full) && inside(full);
     int done = real(from, to);
     if (!done && known && realpath(to, target)) note('R', 0, full, target, strlen(target));
+    return done;
+}
+
+int link(const char *from, const char *to) {
+    REAL(int, link, const char *, const char *);
+    char full[PATH_MAX], target[PATH_MAX];
+    int known = realpath(from, full) && inside(full);
+    int done = real(from, to);
+    if (!done && known && realpath(to, target)) note('L', 0, full, target, strlen(target));
     return done;
 }
 

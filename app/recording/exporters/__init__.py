@@ -53,6 +53,6 @@ def export_recording(
         raise InputError(f"a recording is exported to {', '.join(EXPORTS)}, not to {to!r}")
     out = check_output(path.with_suffix(f".{to}") if out is None else out, overwrite, path)
     recording = open_recording(path)
-    with replaced_when_done(out) as partial:
+    with replaced_when_done(out, overwrite) as partial:
         EXPORTS[to].write(recording, partial)
     return out
