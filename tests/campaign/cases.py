@@ -7,12 +7,13 @@ a server in this process; whether the film is at 0 V is read off the simulated w
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -30,6 +31,8 @@ from dearig.sim_backend.daqmx.server import DaqmxServer
 from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.keyence import SimulatedController
 from dearig.sim_backend.serial_port import serve_on_socket
+from tests.campaign.link import Link
+from tests.campaign.trouble import ACTS, Load, Run, hostile_files, planted_code_ran, stalling_disk
 
 __all__ = ["KINDS", "Outcome", "run_case"]
 
@@ -58,13 +61,14 @@ RIG = """\
 [film]
 name = "campaign"
 [card]
-do_hv_enable = "port0/line0"
-hv_enable_watchdog_s = 1.0
+{watchdog}
 [limits]
 ramp_down_s = 0.3
 [laser]
 port = "{port}"
 """
+WATCHDOG = 'do_hv_enable = "port0/line0"\nhv_enable_watchdog_s = 1.0'
+NO_WATCHDOG = "i_have_no_watchdog = true"
 
 ZERO = 50.0  # V at the film that count as 0
 LEAD_IN = 0.3  # s
@@ -74,45 +78,96 @@ STARTS_WITHIN = 120.0  # s, on a machine that is busy
 ENDS_WITHIN = 60.0  # s
 FLUSH = 0.25 + 0.2  # s of a run that a kill may take: since the last flush, and two blocks
 RAMP = 0.3 + 0.1  # s, and a block
-LATE = 0.4  # s for whatever the machine does meanwhile
+# s that a response may take after the detection: after one fault, or under a load of 20 processes
+RESPONSE, RESPONSE_LOADED = 0.5, 1.0
+RESPONSE_HARDWARE = 0.1  # s; after two faults the card itself responds
+STALL = 10.0  # s
+LOST = 0.4  # s; blocks that the machine had not delivered yet
+_FREEZES = "client-frozen"  # kinds after which the run is let go on
 
 
 @dataclass(frozen=True)
 class Expected:
-    """How a run ends: its exit ``codes``, 0 V within ``bound`` s, ``event`` in the recording."""
+    """How a run has to end.
+
+    ``codes`` are its exit codes. The trouble is detected within ``detection`` s; infinity stands
+    for a trouble that does not end the run. ``ramp`` says whether the voltage is then ramped down,
+    ``faults`` how many parts fail at once. ``event`` is part of an event in the recording, ``said``
+    part of what the terminal says. ``recorded`` is False where nothing may be recorded.
+    """
 
     codes: tuple[int, ...]
-    bound: float
+    detection: float = 0.0
+    ramp: bool = False
+    faults: int = 1
+    load: int = 0
+    watchdog: bool = True
     event: str = ""
+    said: str = ""
     recorded: bool = True
 
+    @property
+    def bound(self) -> float:
+        """Time in s until 0 V."""
+        response = RESPONSE_LOADED if self.load else RESPONSE
+        if self.faults > 1:
+            response = RESPONSE_HARDWARE
+        return self.detection + RAMP * self.ramp + response
+
+
+_KILLED = (-signal.SIGKILL,)
+_ENABLE_LOW = 1.0  # s; hv_enable_watchdog_s above
+_FROZEN = 1.0  # s; guardian.timeout_s, by default
+_UNANSWERED = 0.5  # s; an acknowledgement of the guardian
+_LOOK = 1.0  # s between two looks at the file
+_NOT_SAFE = "NOT CONFIRMED"
+_DEAF = Expected((4,), _ENABLE_LOW, said=_NOT_SAFE)  # nobody can reach the card but its watchdog
 
 #: Trouble -> how it has to end.
 KINDS: dict[str, Expected] = {
-    "arc": Expected((3,), LATE + 0.1, "interlock"),
-    "film-rupture": Expected((3,), LATE + 0.1, "interlock"),
-    "amplifier-trip": Expected((3,), LATE + 0.1, "interlock"),
-    "monitor-wire-off": Expected((3,), LATE + 0.1, "interlock"),
-    "electrode-open": Expected((3,), 2.0 + RAMP + LATE, "interlock"),
-    "sensor-stuck": Expected((3,), 0.5 + RAMP + LATE, "interlock"),
-    "sensor-out-of-range": Expected((3,), RAMP + LATE, "interlock"),
-    "sensor-noise-burst": Expected((3,), RAMP + LATE, "interlock"),
-    "ai-overflow": Expected((4,), LATE + 0.1, "instrument fault"),
+    "arc": Expected((3,), event="interlock"),
+    "film-rupture": Expected((3,), event="interlock"),
+    "amplifier-trip": Expected((3,), event="interlock"),
+    "monitor-wire-off": Expected((3,), event="interlock"),
+    "electrode-open": Expected((3,), 2.0, ramp=True, event="interlock"),
+    "sensor-stuck": Expected((3,), 0.5, ramp=True, event="interlock"),
+    "sensor-out-of-range": Expected((3,), ramp=True, event="interlock"),
+    "sensor-noise-burst": Expected((3,), ramp=True, event="interlock"),
+    "ai-overflow": Expected((4,), event="instrument fault"),
     # seen when samples stop coming, and the output is asked why
-    "ao-underflow": Expected((4,), 0.5 + LATE, "instrument fault"),
+    "ao-underflow": Expected((4,), 0.5, event="instrument fault"),
     "short-read": Expected((0,), np.inf),
     # longer than the guardian's patience
-    "late-reply": Expected((3, 4), 1.0 + 0.5, "fault"),
-    # nobody can reach the card: its watchdog takes the enable line low
-    "server-frozen": Expected((4,), 1.0 + 0.5, "THE RIG COULD NOT BE MADE SAFE"),
-    "server-gone": Expected((4,), 0.5 + LATE, "THE RIG COULD NOT BE MADE SAFE"),
-    "serial-garbage": Expected((4,), 0.0, recorded=False),
-    "client-killed": Expected((-signal.SIGKILL,), 0.5),
-    "client-frozen": Expected((4,), 1.0 + 0.5, "fault"),
-    "guardian-killed": Expected((4,), RAMP + LATE, "guardian"),
+    "late-reply": Expected((3, 4), _FROZEN, event="fault"),
+    "server-frozen": _DEAF,
+    "server-gone": Expected((4,), 0.5, said=_NOT_SAFE),
+    "link-cut": _DEAF,
+    "link-silent": _DEAF,
+    "link-delayed": _DEAF,
+    "link-corrupted": _DEAF,
+    "link-trickling": _DEAF,
+    "serial-garbage": Expected((4,), recorded=False),
+    "client-killed": Expected(_KILLED),
+    "client-killed-loaded": Expected(_KILLED, load=20),
+    "client-killed-hostile-folder": Expected(_KILLED),
+    "client-frozen": Expected((4,), _FROZEN, event="fault"),
+    "client-frozen-loaded": Expected((4,), _FROZEN, event="fault", load=20),
+    "guardian-killed": Expected((4,), ramp=True, event="guardian"),
+    "guardian-killed-loaded": Expected((4,), ramp=True, event="guardian", load=20),
+    "guardian-frozen": Expected((4,), _UNANSWERED, ramp=True, event="guardian"),
+    "guardian-frozen-client-killed": Expected(_KILLED, _ENABLE_LOW, faults=2),
+    "both-killed": Expected(_KILLED, _ENABLE_LOW, faults=2),
+    # nothing can be done then, so the run has to say so beforehand
+    "both-killed-no-watchdog": Expected(
+        _KILLED, np.inf, faults=2, watchdog=False, said="no hardware watchdog"
+    ),
     # seen when the file next grows: it is extended by a second, and written every quarter of one
-    "disk-full": Expected((4,), 1.25 + RAMP + LATE),
-    "operator-stops": Expected((130,), RAMP + LATE, "interrupted by the operator"),
+    "disk-full": Expected((4,), 1.25, ramp=True),
+    "disk-stalled": Expected((0,), np.inf),
+    "file-deleted": Expected((4,), _LOOK, ramp=True),
+    "file-replaced": Expected((4,), _LOOK, ramp=True),
+    "folder-renamed": Expected((4,), _LOOK, ramp=True),
+    "operator-stops": Expected((130,), ramp=True, event="interrupted by the operator"),
 }
 
 
@@ -134,14 +189,18 @@ def run_case(kind: str, seed: int, folder: Path, patience: float = 0.0) -> Outco
 
     ``patience`` in s is added to the time that is allowed until 0 V.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    out = folder / f"{kind}-{seed}.h5"
-    out.unlink(missing_ok=True)
+    expected = KINDS[kind]
+    folder = folder / f"{kind}-{seed}"
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / "recordings").mkdir(parents=True)
+    out, stalled = folder / "recordings" / "run.h5", folder / "stalled"
     garbled = kind == FaultKind.SERIAL_GARBAGE
     moment = float(np.random.default_rng((seed, *kind.encode())).uniform(EARLIEST, LATEST))
-    rig_file, sequence = folder / f"{kind}-{seed}.toml", folder / f"{kind}-{seed}-sequence.toml"
-    with _laser_port(garbled) as port:
-        rig_file.write_text(RIG.format(port=port), encoding="utf-8")
+    rig_file, sequence = folder / "rig.toml", folder / "sequence.toml"
+    with ExitStack() as stack:
+        port = stack.enter_context(_laser_port(garbled))
+        watchdog = WATCHDOG if expected.watchdog else NO_WATCHDOG
+        rig_file.write_text(RIG.format(port=port, watchdog=watchdog), encoding="utf-8")
         sequence.write_text(SEQUENCE, encoding="utf-8")
         settings = load_rig_file(rig_file)
         faults = FaultPlan.parse([f"{kind}@{moment:.6f}"] if kind in set(FaultKind) else [])
@@ -152,22 +211,31 @@ def run_case(kind: str, seed: int, folder: Path, patience: float = 0.0) -> Outco
         )  # fmt: skip
         # NI's own server does not watch its clients: only a link that is cut asks for that
         tracking = 1.0 if kind == FaultKind.SERVER_GONE else None
-        with DaqmxServer(device, client_timeout=tracking) as server:
-            run = subprocess.Popen(
-                [
-                    sys.executable, "-m", "dearig", "record", str(sequence),
-                    "--rig", f"daqmx:Dev1@127.0.0.1:{server.port}",
-                    "--rig-file", str(rig_file), "--out", str(out),
-                ],
-                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-                cwd=Path(__file__).parents[2],
-            )  # fmt: skip
-            try:
-                return _observe(kind, seed, moment, run, device, clock, out, patience)
-            except (RuntimeError, TimeoutError) as error:
-                return Outcome(kind, seed, moment, None, run.poll(), "", [str(error)])
-            finally:
-                _end(run)
+        server = stack.enter_context(DaqmxServer(device, client_timeout=tracking))
+        link = stack.enter_context(Link(server.port, seed))
+        load = stack.enter_context(Load(expected.load))
+        environment = dict(os.environ)
+        if kind == "disk-stalled":
+            environment = stack.enter_context(stalling_disk(stalled))
+        if kind == "client-killed-hostile-folder":
+            hostile_files(folder)
+        process = subprocess.Popen(
+            [
+                # -P: the console script that an operator starts has no working folder on its path
+                sys.executable, "-P", "-m", "dearig", "record", str(sequence),
+                "--rig", f"daqmx:Dev1@127.0.0.1:{link.port}",
+                "--rig-file", str(rig_file), "--out", str(out),
+            ],
+            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, cwd=folder,
+            env=environment,
+        )  # fmt: skip
+        try:
+            run = Run(process, out, link, stalled, STALL, load)
+            return _observe(kind, seed, moment, run, device, clock, patience)
+        except (RuntimeError, TimeoutError) as error:
+            return Outcome(kind, seed, moment, None, process.poll(), "", [str(error)])
+        finally:
+            _end(process)
 
 
 @contextmanager
@@ -186,35 +254,35 @@ def _observe(
     kind: str,
     seed: int,
     moment: float,
-    run: subprocess.Popen[str],
+    run: Run,
     device: Device,
     clock: PacedClock,
-    out: Path,
     patience: float,
 ) -> Outcome:
     expected = KINDS[kind]
     bound = expected.bound + patience
-    children: list[psutil.Process] = []
     struck = None
     if expected.recorded:
-        start = _started(run, device)
-        children = psutil.Process(run.pid).children(recursive=True)
+        start = _started(run.process, device)
+        run.children = psutil.Process(run.process.pid).children(recursive=True)
         struck = start + moment
-        if kind in _DO:
+        if kind in ACTS:
             _wait(lambda: clock.now() >= struck, LATEST + 1.0)
             struck = clock.now()
-            _DO[kind](run, children, out)
-        if kind == "client-frozen":
+            ACTS[kind](run)
+        if _FREEZES in kind:
             end = struck + bound
             _wait(lambda: device.wire_voltage() == 0.0 or clock.now() > end, bound + 5.0)
             before = device.wire_voltage()
-            os.kill(run.pid, signal.SIGCONT)
+            os.kill(run.process.pid, signal.SIGCONT)
     try:
-        _, said = run.communicate(timeout=ENDS_WITHIN)
+        run.process.wait(ENDS_WITHIN)
+        _kill_stopped(run.children, lambda: device.wire_voltage() == 0.0, bound)
+        _, said = run.process.communicate(timeout=ENDS_WITHIN)
     except subprocess.TimeoutExpired:
         return Outcome(kind, seed, moment, None, None, "", ["it did not end"])
     # whoever comes late is given time to spoil it: for as long as a guardian takes
-    _wait(lambda: not any(child.is_running() for child in children), 10.0)
+    _wait(lambda: not any(child.is_running() for child in run.children), 10.0)
     wrong = []
     history = device.history()
     # the wire is noted when it leaves 0 V and when it is back
@@ -227,37 +295,67 @@ def _observe(
             wrong.append(f"0 V after {to_zero:.3f} s, {bound:.3f} s are allowed")
     elif standing:
         wrong.append("there was a voltage")
-    if kind == "client-frozen" and abs(before) > ZERO:
+    if _FREEZES in kind and abs(before) > ZERO:
         wrong.append(f"{before:.0f} V at the end of the freeze")
-    if abs(device.wire_voltage()) > ZERO or device.line("port0/line0"):
+    stays = kind == "both-killed-no-watchdog"
+    if not stays and (abs(device.wire_voltage()) > ZERO or device.line("port0/line0")):
         wrong.append(
             f"at the end: {device.wire_voltage():.0f} V, enable line {device.line('port0/line0')}"
         )
-    if run.returncode not in expected.codes:
-        wrong.append(f"exit code {run.returncode}, not {expected.codes}")
+    wrong += _terminal_faults(expected, run.process.returncode, said.splitlines())
+    if planted_code_ran(run.out.parents[1]):
+        wrong.append("a module of the working folder was imported")
+    wrong += _recording_faults(kind, expected, moment, run)
     said = " ".join(said.split())
+    return Outcome(kind, seed, moment, to_zero, run.process.returncode, said[-400:], wrong)
+
+
+def _kill_stopped(children: list[psutil.Process], down: Callable[[], bool], bound: float) -> None:
+    """End a frozen guardian, which outlives a run that is killed, when ``bound`` s have passed."""
+    for child in children:
+        if child.is_running() and child.status() == psutil.STATUS_STOPPED:
+            end = time.monotonic() + bound
+            _wait(lambda: down() or time.monotonic() > end, bound + 5.0)  # noqa: B023
+            child.kill()
+
+
+def _terminal_faults(expected: Expected, code: int, lines: list[str]) -> Iterator[str]:
+    said = " ".join(" ".join(lines).split())
+    last = lines[-1] if lines else ""
+    if code not in expected.codes:
+        yield f"exit code {code}, not {expected.codes}"
     if "Traceback" in said:
-        wrong.append("a traceback")
-    if run.returncode not in (0, -signal.SIGKILL) and "dearig: " not in said:
-        wrong.append("no sentence on the terminal")
-    wrong += _recording_faults(kind, expected, moment, out)
-    return Outcome(kind, seed, moment, to_zero, run.returncode, said[-400:], wrong)
+        yield "a traceback"
+    if code not in (0, -signal.SIGKILL) and not last.startswith(("dearig: ", "guardian: ")):
+        yield f"the terminal ends with {last!r}"
+    if expected.said not in said:
+        yield f"the terminal does not say {expected.said!r}"
 
 
-def _recording_faults(kind: str, expected: Expected, moment: float, out: Path) -> list[str]:
+def _recording_faults(kind: str, expected: Expected, moment: float, run: Run) -> list[str]:
+    found = sorted(run.out.parents[1].rglob("*.h5"))
     if not expected.recorded:
-        return ["there is a recording"] if out.exists() else []
+        return ["there is a recording"] if found else []
+    if run.process.returncode == 0 and found != [run.out]:
+        return [f"the run ended well, and left {found}"]
+    if kind in ("file-deleted", "file-replaced"):
+        # its data were saved beside, or are gone and the run says so
+        found = [path for path in found if path != run.out or kind == "file-deleted"]
+        if not found:
+            return []
+    if len(found) != 1:
+        return [f"{len(found)} recordings"]
     try:
-        recording = open_recording(out)
+        recording = open_recording(found[0])
     except DearigError as error:
         return [f"the recording cannot be read: {error}"]
     wrong = []
     seconds = recording.samples / SAMPLE_RATE
-    if seconds < moment - FLUSH - LATE:
+    if seconds < moment - FLUSH - LOST:
         wrong.append(f"{seconds:.2f} s were recorded of {moment:.2f} s")
     if expected.event and not any(expected.event in event.message for event in recording.events):
         wrong.append(f"no event {expected.event!r} in the recording")
-    if kind != "client-killed" and kind != "disk-full" and not recording.complete:
+    if -signal.SIGKILL not in expected.codes and kind != "disk-full" and not recording.complete:
         wrong.append("the recording was not closed")
     return wrong
 
@@ -293,29 +391,3 @@ def _end(run: subprocess.Popen[str]) -> None:
         run.wait()
     if run.stderr is not None:
         run.stderr.close()
-
-
-def _fill_disk(run: subprocess.Popen[str], _: list[psutil.Process], out: Path) -> None:
-    """From now on the file cannot grow, as on a full disk."""
-    import resource
-
-    size = out.stat().st_size
-    resource.prlimit(run.pid, resource.RLIMIT_FSIZE, (size, size))
-
-
-def _kill_guardian(_: subprocess.Popen[str], children: list[psutil.Process], __: Path) -> None:
-    guardians = [c for c in children if any("guardian_process" in a for a in c.cmdline())]
-    if len(guardians) != 1:
-        raise RuntimeError(f"{len(guardians)} guardians are running")
-    guardians[0].kill()
-
-
-_Act = Callable[[subprocess.Popen[str], list[psutil.Process], Path], None]
-_DO: dict[str, _Act] = {
-    "client-killed": lambda run, *_: os.kill(run.pid, signal.SIGKILL),
-    "client-frozen": lambda run, *_: os.kill(run.pid, signal.SIGSTOP),
-    # as ctrl-C, which a program started in the background may have been told to ignore
-    "operator-stops": lambda run, *_: os.kill(run.pid, signal.SIGTERM),
-    "guardian-killed": _kill_guardian,
-    "disk-full": _fill_disk,
-}
