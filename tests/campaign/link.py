@@ -29,6 +29,7 @@ class Link:
         self._server_port = server_port
         self._random = random.Random(seed)  # noqa: S311
         self._listener = socket.create_server(("127.0.0.1", 0))
+        self._listener.settimeout(_POLL)  # a close does not wake up a thread that waits
         self.port: int = self._listener.getsockname()[1]
         self._sockets: list[socket.socket] = []
         self._ended = threading.Event()
@@ -45,9 +46,10 @@ class Link:
         traceback: TracebackType | None,
     ) -> None:
         self._ended.set()
+        self._threads[0].join(1.0)
         self._listener.close()
         self._close_all()
-        for thread in self._threads:
+        for thread in self._threads[1:]:
             thread.join(_DELAY + 1.0)
 
     def set_mode(self, mode: str) -> None:
@@ -64,16 +66,17 @@ class Link:
                 continue  # its other end was faster
 
     def _accept(self) -> None:
-        while True:
+        while not self._ended.is_set():
             try:
                 here, _ = self._listener.accept()
-            except OSError:
-                return
+            except TimeoutError:
+                continue
             if self.mode == "cut":
                 here.close()
                 continue
             there = socket.create_connection(("127.0.0.1", self._server_port))
             for one in (here, there):
+                one.settimeout(None)
                 one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self._sockets += [here, there]
             for source, target in ((here, there), (there, here)):
