@@ -6,6 +6,7 @@ what it needs when it runs.
 
 from __future__ import annotations
 
+import errno
 import io
 import logging
 import os
@@ -25,7 +26,7 @@ from typer.exceptions import TyperException
 from dearig import log_file
 from dearig.cli import files, fit, run, tools
 from dearig.cli.output import version
-from dearig.errors import DearigError, InputError, Interrupted
+from dearig.errors import DearigError, DiskFault, InputError, Interrupted
 from dearig.printable import MESSAGE_MAX, PrintableStream, printable
 
 __all__ = ["app", "main"]
@@ -170,10 +171,38 @@ def _run(written: log_file.LogFile) -> int:
         # rich and typer both turn a broken pipe into a SystemExit; nothing else here raises one
         # with a code that is not 0
         return _reader_left()
-    except Exception as error:  # noqa: BLE001  (the last resort: it is logged with its traceback)
+    except Exception as error:
+        exhausted = _exhausted(error)
+        if exhausted:
+            log.exception(exhausted)
+            _say(exhausted)
+            return DiskFault.exit_code
         _tell_unexpected(error, written)
         return DearigError.exit_code
     return status if isinstance(status, int) else 0
+
+
+#: Errors of a system whose disk is full, over its quota or broken.
+_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+
+
+def _exhausted(error: Exception) -> str:
+    """Return a sentence if ``error`` is the computer's lack of memory or disk; else nothing.
+
+    Errors of a disk reach this only from standard output and from temporary files: what writes
+    results has a sentence of its own.
+    """
+    if isinstance(error, MemoryError):
+        return (
+            "the computer has no memory left; close other programs, or give this command less at a "
+            "time; files that it had finished are whole"
+        )
+    if isinstance(error, OSError) and error.errno in _DISK_ERRORS:
+        return (
+            f"standard output or a temporary file could not be written ({os.strerror(error.errno)})"
+            f"; free some space; files that the command had finished are whole"
+        )
+    return ""
 
 
 def _reader_left() -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import subprocess
@@ -61,6 +62,31 @@ def test_an_unexpected_error_is_one_sentence_and_its_traceback_is_in_the_log(
     assert "started: dearig rig-file x.toml" in text
     assert f"dearig {metadata.version('dearig')}, Python {sys.version.split()[0]}" in text
     assert text.splitlines()[-1].endswith("ended with exit code 1")
+
+
+@pytest.mark.parametrize(
+    ("lack", "said"),
+    [(MemoryError(), "no memory left"), (OSError(errno.ENOSPC, "full"), "free some space")],
+    ids=["memory", "disk"],
+)
+def test_a_computer_without_memory_or_disk_is_no_mistake_of_the_program(
+    lack: Exception,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def exhausted(*_: object, **__: object) -> None:
+        raise lack
+
+    monkeypatch.setenv("DEARIG_LOG_DIR", str(tmp_path))
+    monkeypatch.setattr("dearig.config.rigfile.write_default", exhausted)
+    assert ended(monkeypatch, "rig-file", "x.toml") == 4
+    errors = capsys.readouterr().err
+    assert said in errors
+    assert "mistake" not in errors
+    assert errors.count("\n") == 1
+    assert "Traceback" in (tmp_path / "dearig.log").read_text(encoding="utf-8")
 
 
 def test_without_a_log_file_it_says_how_to_see_the_details(
