@@ -11,17 +11,33 @@ from dearig.sim_backend.daqmx import events
 from dearig.sim_backend.daqmx.engine import Reading, TimingEngine
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.setup import LINES, OUTPUTS
-from dearig.sim_backend.daqmx.tasks import Kind, Listener, State, Task, Watchdog
+from dearig.sim_backend.daqmx.tasks import (
+    CURRENT_READ,
+    CURRENT_WRITE,
+    HIGH,
+    LOW,
+    NO_CHANGE,
+    READ_OFFSET,
+    READ_RELATIVE_TO,
+    TRISTATE,
+    WRITE_OFFSET,
+    WRITE_RELATIVE_TO,
+    Kind,
+    Listener,
+    State,
+    Task,
+    Watchdog,
+)
 from dearig.sim_backend.daqmx.wire import Change
 from dearig.sim_backend.faults import Fault, FaultKind
 
-__all__ = ["Device", "Reading", "check_watchdog"]
+__all__ = ["Device", "Reading"]
 
 # s; NI's X Series User Manual, chapter Digital I/O, section Watchdog Timer
 _LONGEST_WATCHDOG = (2**32 - 1) * 8e-9
 
 
-def check_watchdog(timeout: float) -> None:
+def _check_watchdog(timeout: float) -> None:
     """Raise ``DaqmxError`` for a time-out in s that the card's watchdog timer does not have."""
     if timeout != -1.0 and not 0.0 < timeout <= _LONGEST_WATCHDOG:
         raise DaqmxError(Code.WATCHDOG_TIMEOUT, f"Requested Value: {timeout:g}")
@@ -111,7 +127,7 @@ class Device(TimingEngine):
         """Return a task of the watchdog timer, which expires ``timeout`` s after its last reset."""
         with self._lock:
             self.check_device(device)
-            check_watchdog(timeout)
+            _check_watchdog(timeout)
             task, new = self.create(name, client, attach=False)
             if new:
                 task.kind = Kind.WATCHDOG
@@ -329,6 +345,7 @@ class Device(TimingEngine):
         ``most`` bounds the number for -1.
         """
         self._of_kind(task, Kind.AI, Code.NOT_AN_INPUT)
+        _check_place(task, READ_RELATIVE_TO, CURRENT_READ, READ_OFFSET)
         with self._lock:
             self._raise_failure(task, read=0)
             if task.clock is None:
@@ -379,6 +396,16 @@ class Device(TimingEngine):
                 self.stop(task)
         return reading
 
+    def scaled(self, task: Task, counts: np.ndarray) -> np.ndarray:
+        """Return what a program reads for ``counts`` (channels, n): V, or a custom scale's unit."""
+        values = np.empty(counts.shape)
+        for row, raw, channel in zip(values, counts, task.inputs, strict=True):
+            coefficients = self._wiring.coefficients(channel)
+            row[:] = np.polynomial.polynomial.polyval(raw.astype(np.float64), coefficients)
+            if channel.scale is not None:
+                row[:] = channel.scale.scaled(row)
+        return values
+
     # writing
 
     def to_counts(self, task: Task, volts: np.ndarray) -> np.ndarray:
@@ -386,8 +413,9 @@ class Device(TimingEngine):
         counts = np.empty(volts.shape, dtype=np.int16)
         for row, values, channel in zip(counts, volts, task.outputs, strict=True):
             low, high = channel.limits
-            slack = 1e-9 * channel.range  # of the rounding of a program's own arithmetic
+            slack = 1e-9 * max(abs(low), abs(high))  # of the rounding of a program's own arithmetic
             beyond = ~((values >= low - slack) & (values <= high + slack))  # includes NaN
+            held = values if channel.scale is None else channel.scale.pre_scaled(values)
             if beyond.any():
                 raise DaqmxError(
                     Code.INVALID_SAMPLE,
@@ -396,7 +424,7 @@ class Device(TimingEngine):
                     written=0,
                 )
             step = channel.range / (COUNT_MAX + 1)
-            row[:] = np.clip(np.rint(values / step), COUNT_MIN, COUNT_MAX)
+            row[:] = np.clip(np.rint(held / step), COUNT_MIN, COUNT_MAX)
         return counts
 
     def write(self, task: Task, counts: np.ndarray, auto_start: bool, timeout: float) -> int:
@@ -404,6 +432,7 @@ class Device(TimingEngine):
         with self._lock:
             now = self._settle()
             self._of_kind(task, Kind.AO, Code.NOT_AN_OUTPUT)
+            _check_place(task, WRITE_RELATIVE_TO, CURRENT_WRITE, WRITE_OFFSET)
             self._raise_failure(task, written=0)
             if counts.shape[1] == 0:
                 return 0
@@ -452,15 +481,27 @@ class Device(TimingEngine):
 
     # the watchdog
 
-    def set_expiration(self, task: Task, physical: str, high: bool) -> None:
-        """Set the level that the lines ``physical`` take when the watchdog of ``task`` expires."""
+    def set_expiration(self, task: Task, physical: str, level: int) -> None:
+        """Set DAQmx's level of the lines ``physical`` when the watchdog of ``task`` expires."""
         with self._lock:
             watchdog = self._watchdog(task)
             self._not_running(task)
+            if level not in (HIGH, LOW, TRISTATE, NO_CHANGE):
+                raise DaqmxError(
+                    Code.INVALID_VALUE, f"Property: DO_EXPIR_STATE; Requested Value: {level}"
+                )
             for line in self.lines_of(physical):
-                watchdog.states[line] = high
+                watchdog.states[line] = level
 
-    def expiration(self, task: Task, physical: str) -> bool:
+    def set_watchdog_timeout(self, task: Task, timeout: float) -> None:
+        """Set the time in s after which the watchdog of ``task`` expires; -1: never."""
+        with self._lock:
+            watchdog = self._watchdog(task)
+            self._not_running(task)
+            _check_watchdog(timeout)
+            watchdog.timeout = timeout
+
+    def expiration(self, task: Task, physical: str) -> int:
         """Return the level that the first of the lines ``physical`` takes then."""
         with self._lock:
             line = self.lines_of(physical)[0]
@@ -488,3 +529,14 @@ class Device(TimingEngine):
                 raise DaqmxError(Code.WATCHDOG_EXPIRED_NO_RESET, f"Task Name: {task.name}")
             elif task.running:
                 self._start_watchdog(watchdog, now)
+
+
+def _check_place(task: Task, relative_to: str, current: int, offset: str) -> None:
+    """Refuse a read or a write from another place than where the last one ended."""
+    kept = task.kept_properties
+    if kept.get(relative_to, current) != current or kept.get(offset, 0) != 0:
+        raise DaqmxError(
+            Code.INVALID_VALUE,
+            f"Properties: {relative_to}, {offset}; only the current position without offset is "
+            f"simulated. Task Name: {task.name}",
+        )

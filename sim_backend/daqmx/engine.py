@@ -20,7 +20,15 @@ from dearig.sim_backend.daqmx.acquisition import OwnTicks, Run, SharedTicks
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.output import Generation, Waveform
 from dearig.sim_backend.daqmx.setup import LINES, OUTPUTS, Setup
-from dearig.sim_backend.daqmx.tasks import Kind, SampleClock, State, Task, Watchdog
+from dearig.sim_backend.daqmx.tasks import (
+    HIGH,
+    NO_CHANGE,
+    Kind,
+    SampleClock,
+    State,
+    Task,
+    Watchdog,
+)
 from dearig.sim_backend.daqmx.wire import Wire
 from dearig.sim_backend.daqmx.wiring import Wiring
 from dearig.sim_backend.faults import Fault, FaultKind, FaultPlan
@@ -87,7 +95,9 @@ class TimingEngine(Setup):
                 watchdog.expired = True
                 self._wire.follow(at, self._oldest)
                 for line, level in watchdog.states.items():
-                    self._wire.set_line(line, level, at)
+                    if level != NO_CHANGE:
+                        # a line that nobody drives is pulled down by the card
+                        self._wire.set_line(line, level == HIGH, at)
         for task in self._tasks.values():
             generation = task.generation
             if generation is not None and generation.settle(now) is not None:
@@ -228,7 +238,7 @@ class TimingEngine(Setup):
             ),
             None,
         )
-        if clock.source:
+        if self.clock_source(task):
             task.ticks = SharedTicks()
             if generation is not None:
                 self._share(task, generation, generation.ticks(now) + 1, now)

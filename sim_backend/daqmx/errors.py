@@ -55,14 +55,28 @@ class Code(IntEnum):
     DONE_EVENT_REGISTERED = -200950
     ACQUIRED_EVENT_REGISTERED = -200966
     TRANSFERRED_EVENT_REGISTERED = -200967
-    TRANSFERRED_NOT_FOR_INPUT = -200965
-    ACQUIRED_NOT_FOR_OUTPUT = -200964
+    TRANSFERRED_NOT_FOR_INPUT = -200980
+    ACQUIRED_NOT_FOR_OUTPUT = -200981
     EVENT_INTERVAL_ZERO = -200880
     EVENT_WITHOUT_BUFFER = -200848
     BUFFER_NOT_MULTIPLE = -200877
     EVENT_WHILE_RUNNING = -200960
     BEYOND_FINITE = -201132
     PROPERTY_NOT_SUPPORTED = -200197
+    PROPERTY_CANNOT_BE_SET = -200231
+    PROPERTY_CANNOT_BE_RESET = -200236
+    NO_DEVICE_CONTEXT = -201118
+    ONLY_WHEN_RESERVED = -200983
+    TRIGGER_ON_DEMAND = -200262
+    INVALID_ROUTE_DESTINATION = -89121
+    UNKNOWN_SCALE = -200378
+    UNITS_NOT_FROM_SCALE = -200447
+    NOT_FOR_THIS_SCALE = -200601
+    PRE_SCALED_EQUAL = -200602
+    ZERO_SLOPE = -200409
+    TABLE_SIZES_DIFFER = -200350
+    TABLE_TOO_SHORT = -200434
+    NO_COEFFICIENTS = -200404
     NO_BUFFER_ON_DEMAND = -200217
 
 
@@ -134,9 +148,9 @@ WORDS: dict[int, str] = {
     Code.TRANSFERRED_EVENT_REGISTERED: "Every N Samples Transferred From Buffer event is already "
     "registered within this task.",
     Code.TRANSFERRED_NOT_FOR_INPUT: "Every N Samples Transferred From Buffer event is not "
-    "supported for input tasks.",
+    "supported by the device for input tasks.",
     Code.ACQUIRED_NOT_FOR_OUTPUT: "Every N Samples Acquired Into Buffer event is not supported "
-    "for output tasks.",
+    "by the device for output tasks.",
     Code.EVENT_INTERVAL_ZERO: "Every N Samples event interval must be greater than zero.",
     Code.EVENT_WITHOUT_BUFFER: "Every N Samples event is not supported for non-buffered tasks.",
     Code.BUFFER_NOT_MULTIPLE: "Buffer size must be a multiple of the Every N Samples event "
@@ -145,6 +159,23 @@ WORDS: dict[int, str] = {
     Code.BEYOND_FINITE: "Samples cannot be written beyond the last sample of the finite "
     "generation.",
     Code.PROPERTY_NOT_SUPPORTED: "Specified property is not supported by the device.",
+    Code.PROPERTY_CANNOT_BE_SET: "Specified property cannot be set.",
+    Code.PROPERTY_CANNOT_BE_RESET: "Specified property cannot be reset to its default.",
+    Code.NO_DEVICE_CONTEXT: "Specified property does not support a device context.",
+    Code.ONLY_WHEN_RESERVED: "Specified property can be read only while the task is reserved, "
+    "committed or running.",
+    Code.TRIGGER_ON_DEMAND: "Start and reference triggers need a sample clock; the sample timing "
+    "is On Demand.",
+    Code.INVALID_ROUTE_DESTINATION: "Destination terminal to be routed could not be found on the "
+    "device.",
+    Code.UNKNOWN_SCALE: "Custom scale specified does not exist.",
+    Code.UNITS_NOT_FROM_SCALE: "A custom scale is given, but the units are not From Custom Scale.",
+    Code.NOT_FOR_THIS_SCALE: "Specified property is not supported for this type of scale.",
+    Code.PRE_SCALED_EQUAL: "Minimum and maximum of the values before scaling are equal.",
+    Code.ZERO_SLOPE: "Slope of a linear scale is zero.",
+    Code.TABLE_SIZES_DIFFER: "Scaled and pre-scaled values of a table differ in number.",
+    Code.TABLE_TOO_SHORT: "A table needs two or more values.",
+    Code.NO_COEFFICIENTS: "A polynomial scale needs forward and reverse coefficients.",
     Code.NO_BUFFER_ON_DEMAND: "Buffered operations cannot use On Demand for the sample timing.",
 }
 

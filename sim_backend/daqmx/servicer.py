@@ -8,6 +8,7 @@ import logging
 import re
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any, NoReturn
 
 import grpc
@@ -19,22 +20,28 @@ from session_pb2 import Session
 from dearig.drivers.channels import COUNT_MAX, COUNT_MIN
 from dearig.sim_backend.daqmx import attributes
 from dearig.sim_backend.daqmx.attributes import Asked
+from dearig.sim_backend.daqmx.channel_properties import FROM_CUSTOM_SCALE, VOLTS
 from dearig.sim_backend.daqmx.device import Device, Reading
 from dearig.sim_backend.daqmx.errors import WORDS, Code, DaqmxError
+from dearig.sim_backend.daqmx.properties import name_of
+from dearig.sim_backend.daqmx.scales import (
+    LINEAR,
+    MAP,
+    POLYNOMIAL,
+    TABLE,
+    Scale,
+    reverse_coefficients,
+)
 from dearig.sim_backend.daqmx.tasks import Kind, Listener, Task
 
 __all__ = ["Servicer", "refuse"]
 
 log = logging.getLogger(__name__)
 
+_ACTIVE_EDGE = 0x1301  # SAMP_CLK_ACTIVE_EDGE
 _BY_CHANNEL = 0  # DAQmx: group by channel
 _FINITE, _CONTINUOUS = 10178, 10123
-_RISING = 10280
 _POLL_S = 0.02  # period at which an event's stream checks whether it is due
-_GROUPS = (
-    "Buffer", "Chan", "Device", "PhysicalChan", "Read", "SystemInfo", "Task", "Timing", "Trig",
-    "Watchdog", "Write",
-)  # fmt: skip
 
 
 def refuse(context: grpc.ServicerContext, error: DaqmxError) -> NoReturn:
@@ -111,6 +118,7 @@ class Servicer(pb_grpc.NiDAQmxServicer):
             request.name_to_assign_to_channel,
             request.terminal_config_raw or request.terminal_config,
             (request.min_val, request.max_val),
+            self._scale(request),
         )
         return pb.CreateAIVoltageChanResponse()
 
@@ -120,6 +128,7 @@ class Servicer(pb_grpc.NiDAQmxServicer):
             request.physical_channel,
             request.name_to_assign_to_channel,
             (request.min_val, request.max_val),
+            self._scale(request),
         )
         return pb.CreateAOVoltageChanResponse()
 
@@ -135,17 +144,15 @@ class Servicer(pb_grpc.NiDAQmxServicer):
     def CfgSampClkTiming(self, request: Any, context: grpc.ServicerContext) -> Any:
         mode = request.sample_mode_raw or request.sample_mode
         edge = request.active_edge_raw or request.active_edge
-        if mode not in (_FINITE, _CONTINUOUS) or edge != _RISING:
+        if mode not in (_FINITE, _CONTINUOUS):
             raise DaqmxError(
-                Code.INVALID_VALUE, f"Property: SampQuant.SampMode or SampClk.ActiveEdge: {mode}"
+                Code.INVALID_VALUE, f"Property: SAMP_QUANT_SAMP_MODE; Requested Value: {mode}"
             )
+        task = self._task(request)
         self._device.set_clock(
-            self._task(request),
-            request.rate,
-            request.source,
-            mode == _FINITE,
-            request.samps_per_chan,
+            task, request.rate, request.source, mode == _FINITE, request.samps_per_chan
         )
+        attributes.set_("Timing", _ACTIVE_EDGE, Asked(self._device, task), edge)
         return pb.CfgSampClkTimingResponse()
 
     def CfgDigEdgeStartTrig(self, request: Any, context: grpc.ServicerContext) -> Any:
@@ -157,16 +164,82 @@ class Servicer(pb_grpc.NiDAQmxServicer):
         self._device.set_trigger(self._task(request), "")
         return pb.DisableStartTrigResponse()
 
+    # custom scales
+
+    def CreateLinScale(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._add_scale(request, LINEAR, slope=request.slope, y_intercept=request.y_intercept)
+        return pb.CreateLinScaleResponse()
+
+    def CreateMapScale(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._add_scale(
+            request,
+            MAP,
+            map_pre_scaled=(request.prescaled_min, request.prescaled_max),
+            map_scaled=(request.scaled_min, request.scaled_max),
+        )
+        return pb.CreateMapScaleResponse()
+
+    def CreatePolynomialScale(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._add_scale(
+            request,
+            POLYNOMIAL,
+            forward=tuple(request.forward_coeffs),
+            reverse=tuple(request.reverse_coeffs),
+        )
+        return pb.CreatePolynomialScaleResponse()
+
+    def CreateTableScale(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._add_scale(
+            request,
+            TABLE,
+            table_pre_scaled=tuple(request.prescaled_vals),
+            table_scaled=tuple(request.scaled_vals),
+        )
+        return pb.CreateTableScaleResponse()
+
+    def SaveScale(self, request: Any, context: grpc.ServicerContext) -> Any:
+        """Keep a scale in the list of saved ones, until the server ends."""
+        scale = self._device.scale(request.scale_name)
+        self._device.add_scale(replace(scale, name=request.save_as or scale.name, saved=True))
+        return pb.SaveScaleResponse()
+
+    def DeleteSavedScale(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._device.remove_scale(request.scale_name)
+        return pb.DeleteSavedScaleResponse()
+
+    def CalculateReversePolyCoeff(self, request: Any, context: grpc.ServicerContext) -> Any:
+        return pb.CalculateReversePolyCoeffResponse(
+            reverse_coeffs=reverse_coefficients(
+                list(request.forward_coeffs),
+                request.min_val_x,
+                request.max_val_x,
+                request.num_points_to_compute,
+                request.reverse_poly_order,
+            )
+        )
+
+    def _add_scale(self, request: Any, kind: int, **fields: Any) -> None:
+        units = request.pre_scaled_units_raw or request.pre_scaled_units
+        self._device.add_scale(
+            Scale(
+                request.name,
+                kind,
+                pre_scaled_units=units,
+                scaled_units=request.scaled_units,
+                **fields,
+            )
+        )
+
     # reading
 
     def ReadAnalogF64(self, request: Any, context: grpc.ServicerContext) -> Any:
         task = self._task(request)
         reading = self._read(task, request, request.array_size_in_samps)
-        volts = self._volts(task, reading.counts)
+        values = self._device.scaled(task, reading.counts)
         return pb.ReadAnalogF64Response(
             status=_status(reading),
-            read_array=_laid_out(volts, request, request.array_size_in_samps),
-            samps_per_chan_read=volts.shape[1],
+            read_array=_laid_out(values, request, request.array_size_in_samps),
+            samps_per_chan_read=values.shape[1],
         )
 
     def ReadAnalogScalarF64(self, request: Any, context: grpc.ServicerContext) -> Any:
@@ -174,7 +247,9 @@ class Servicer(pb_grpc.NiDAQmxServicer):
         reading = self._device.read(task, 1, request.timeout)
         if not reading.complete:
             raise DaqmxError(Code.SAMPLES_NOT_YET_AVAILABLE, read=0)
-        return pb.ReadAnalogScalarF64Response(value=float(self._volts(task, reading.counts)[0, 0]))
+        return pb.ReadAnalogScalarF64Response(
+            value=float(self._device.scaled(task, reading.counts)[0, 0])
+        )
 
     def ReadBinaryI16(self, request: Any, context: grpc.ServicerContext) -> Any:
         reading = self._read(self._task(request), request, request.array_size_in_samps)
@@ -273,7 +348,7 @@ class Servicer(pb_grpc.NiDAQmxServicer):
         task = self._task(request)
         names = [name.strip() for name in request.channel_names.split(",")]
         for name, value in zip(names, request.expir_state_array, strict=True):
-            self._device.set_expiration(task, name, attributes.level(value))
+            self._device.set_expiration(task, name, value)
         return pb.CfgWatchdogDOExpirStatesResponse()
 
     def ControlWatchdogTask(self, request: Any, context: grpc.ServicerContext) -> Any:
@@ -349,7 +424,7 @@ class Servicer(pb_grpc.NiDAQmxServicer):
         if "device_name" in fields:
             self._device.check_device(request.device_name)
         channel = ""
-        for field in ("channel", "physical_channel", "lines"):
+        for field in ("channel", "physical_channel", "lines", "scale_name"):
             if field in fields:
                 channel = getattr(request, field)
         return Asked(self._device, task, channel)
@@ -360,12 +435,16 @@ class Servicer(pb_grpc.NiDAQmxServicer):
             raise DaqmxError(Code.READ_BUFFER_TOO_SMALL, f"Task Name: {task.name}", read=0)
         return self._device.read(task, samples, request.timeout, most)
 
-    def _volts(self, task: Task, counts: np.ndarray) -> np.ndarray:
-        volts = np.empty(counts.shape)
-        for row, raw, channel in zip(volts, counts, task.inputs, strict=True):
-            coefficients = self._device.scaling(task, channel.name)
-            row[:] = np.polynomial.polynomial.polyval(raw.astype(np.float64), coefficients)
-        return volts
+    def _scale(self, request: Any) -> Scale | None:
+        """Return the custom scale of a new channel; None for V."""
+        units, name = request.units_raw or request.units, request.custom_scale_name
+        if units == FROM_CUSTOM_SCALE:
+            return self._device.scale(name)
+        if units != VOLTS:
+            raise DaqmxError(Code.INVALID_VALUE, f"Requested Value: {units}; units of a voltage")
+        if name:
+            raise DaqmxError(Code.UNITS_NOT_FROM_SCALE, f"Custom Scale Name: {name}")
+        return None
 
     def _outputs(self, task: Task) -> None:
         if task.kind is not Kind.AO:
@@ -433,8 +512,8 @@ def _laid_out(values: np.ndarray, request: Any, room: int) -> np.ndarray:
 
 def _attribute_call(name: str, response: Any) -> Callable[[Servicer, Any, Any], Any] | None:
     """Return the method for the call ``name``, such as ``GetTimingAttributeDouble``, or None."""
-    found = re.match(r"(Get|Set|Reset)([A-Za-z]+)Attribute", name)
-    if not found or found[2] not in _GROUPS:
+    found = re.match(r"(Get|Set|Reset)([A-Za-z]+?)Attribute", name)
+    if not found or found[2] not in attributes.TABLES:
         return None
     verb, group = found[1], found[2]
     raw = "value_raw" in response.DESCRIPTOR.fields_by_name
@@ -442,6 +521,8 @@ def _attribute_call(name: str, response: Any) -> Callable[[Servicer, Any, Any], 
     def answer(self: Servicer, request: Any, context: grpc.ServicerContext) -> Any:  # noqa: ARG001
         asked = self._asked(request)
         number = request.attribute_raw or request.attribute
+        if "device_names" in request.DESCRIPTOR.fields_by_name:
+            attributes.check_device_context(number, asked)
         if verb == "Reset":
             attributes.reset(group, number, asked)
             return response()
@@ -457,7 +538,7 @@ def _attribute_call(name: str, response: Any) -> Callable[[Servicer, Any, Any], 
             return response(**{"value_raw" if raw else "value": value})
         except (TypeError, ValueError) as error:  # beyond the type of the reply
             raise DaqmxError(
-                Code.INVALID_VALUE, f"Property: {group} {number:#06x}; Value: {value}"
+                Code.INVALID_VALUE, f"Property: {name_of(group, number)}; Value: {value}"
             ) from error
 
     return answer

@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from dearig.drivers.settings import RigSettings
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.scales import Scale
 from dearig.sim_backend.daqmx.tasks import (
+    DIGITAL_EDGE,
     FALLING,
+    NO_TRIGGER,
     RISING,
     AnalogInput,
     AnalogOutput,
@@ -23,12 +27,35 @@ from dearig.sim_backend.daqmx.tasks import (
 )
 from dearig.sim_backend.daqmx.wiring import OUTPUT_MONITOR
 
-__all__ = ["INPUTS", "INPUT_RANGES", "LINES", "OUTPUTS", "Setup"]
+__all__ = [
+    "CLOCKED_KINDS",
+    "INPUTS",
+    "INPUT_RANGES",
+    "LINES",
+    "OUTPUTS",
+    "PINS",
+    "SOURCES",
+    "Setup",
+]
 
 INPUT_RANGES = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1)  #: V, plus and minus, as the PCIe-6361 has them
 INPUTS = 16
 OUTPUTS = ("ao0", "ao1")
 LINES = tuple(f"port{port}/line{line}" for port in range(3) for line in range(8))
+#: Terminals on the connector and the bus, in lower case.
+PINS = {f"pfi{i}": f"PFI{i}" for i in range(16)} | {f"rtsi{i}": f"RTSI{i}" for i in range(8)}
+#: Sources of clocks and triggers, by their names in lower case.
+SOURCES = PINS | {
+    name.lower(): name
+    for name in (
+        "ai/SampleClock",
+        "ai/StartTrigger",
+        "ao/SampleClock",
+        "ao/StartTrigger",
+        "OnboardClock",
+    )
+}
+CLOCKED_KINDS = (Kind.AI, Kind.AO)  #: kinds of tasks with a sample clock
 DIFFERENTIAL, SINGLE, SINGLE_OWN_SENSE = 10106, 10083, 10078  #: DAQmx: DIFF, RSE, NRSE
 SECONDS, TICKS, PERIODS = 10364, 10304, 10286  #: DAQmx: units of the delay
 
@@ -51,51 +78,129 @@ class Setup:
         self.name = settings.card.device
         self._card = settings.card
         self._lock = threading.RLock()
+        self.scales: dict[str, Scale] = {}  # by name in lower case
+        self.kept: dict[object, object] = {}  # properties of the device without effect
 
     def check_device(self, name: str) -> None:
         """Refuse a device that is not this one."""
         if name.lower() != self.name.lower():
             raise DaqmxError(Code.UNKNOWN_DEVICE, f"Device Specified: {name}")
 
+    def add_scale(self, scale: Scale) -> None:
+        """Add ``scale``, or replace the one of the same name."""
+        scale.check()
+        with self._lock:
+            self.scales[scale.name.lower()] = scale
+
+    def remove_scale(self, name: str) -> None:
+        """Forget the custom scale called ``name``."""
+        with self._lock:
+            del self.scales[self.scale(name).name.lower()]
+
+    def scale(self, name: str) -> Scale:
+        """Return the custom scale called ``name``."""
+        with self._lock:
+            if name.lower() not in self.scales:
+                raise DaqmxError(Code.UNKNOWN_SCALE, f"Custom Scale Name: {name}")
+            return self.scales[name.lower()]
+
     def add_inputs(
-        self, task: Task, physical: str, name: str, wiring: int, limits: tuple[float, float]
-    ) -> None:
-        """Add the inputs ``physical`` with ``wiring`` (-1: the default) and ``limits`` in V."""
+        self,
+        task: Task,
+        physical: str,
+        name: str,
+        wiring: int,
+        limits: tuple[float, float],
+        scale: Scale | None = None,
+    ) -> list[AnalogInput]:
+        """Add the inputs ``physical`` with ``wiring`` (-1: the default) and ``limits``.
+
+        The limits are in V, or in the unit of ``scale``. Returns the new channels.
+        """
         with self._lock:
             self._may_add(task, Kind.AI)
-            taken = _range(limits, INPUT_RANGES)
-            made = []
+            taken = _range(limits if scale is None else scale.limits(limits), INPUT_RANGES)
+            made: list[AnalogInput] = []
             terminals = physical_names(physical, self.name)
             for terminal, called in self._named(task, terminals, name):
-                if terminal.startswith("ai") and terminal[2:].isdigit():
-                    pair = int(terminal[2:]) % 16 < 8
-                    known = int(terminal[2:]) < INPUTS
-                    how = (DIFFERENTIAL if pair else SINGLE) if wiring == -1 else wiring
-                    if how not in (DIFFERENTIAL, SINGLE, SINGLE_OWN_SENSE) or (
-                        how == DIFFERENTIAL and not pair
-                    ):
-                        raise DaqmxError(
-                            Code.INVALID_VALUE,
-                            f"Property: AI.TermCfg; Channel: {self.name}/{terminal}",
-                        )
-                else:
-                    known = terminal in [OUTPUT_MONITOR.format(ao) for ao in OUTPUTS]
-                    how = DIFFERENTIAL
-                if not known:
-                    raise DaqmxError(
-                        Code.UNKNOWN_CHANNEL, f"Physical Channel: {self.name}/{terminal}"
-                    )
-                made.append(AnalogInput(called, terminal, limits, taken, how))
+                how = self._wiring_of(terminal, wiring)
+                made.append(AnalogInput(called, terminal, limits, taken, how, scale))
             task.kind = Kind.AI
             task.inputs += made
+            return made
+
+    def _wiring_of(self, terminal: str, wiring: int) -> int:
+        """Return the wiring of the input ``terminal`` for ``wiring`` (-1: the default)."""
+        if terminal in [OUTPUT_MONITOR.format(ao) for ao in OUTPUTS]:
+            return DIFFERENTIAL
+        known = terminal.startswith("ai") and terminal[2:].isdigit()
+        if not known or int(terminal[2:]) >= INPUTS:
+            raise DaqmxError(Code.UNKNOWN_CHANNEL, f"Physical Channel: {self.name}/{terminal}")
+        # an input and the eighth one after it make a pair
+        pair = int(terminal[2:]) % 16 < 8
+        how = (DIFFERENTIAL if pair else SINGLE) if wiring == -1 else wiring
+        offered = (DIFFERENTIAL, SINGLE, SINGLE_OWN_SENSE)
+        if how not in offered or (how == DIFFERENTIAL and not pair):
+            raise DaqmxError(
+                Code.INVALID_VALUE,
+                f"Property: AI_TERM_CFG; Requested Value: {how}; Channel Name: "
+                f"{self.name}/{terminal}",
+            )
+        return how
+
+    def set_wiring(self, task: Task, channel: AnalogInput, wiring: int) -> None:
+        """Set the wiring of an input (-1: the default)."""
+        with self._lock:
+            self._not_set_while_running(task)
+            channel.wiring = self._wiring_of(channel.terminal, wiring)
+
+    def set_limits(
+        self,
+        task: Task,
+        channel: AnalogInput | AnalogOutput,
+        low: float | None = None,
+        high: float | None = None,
+    ) -> None:
+        """Set one of a channel's limits, or both; their order is checked with the task."""
+        with self._lock:
+            self._not_set_while_running(task)
+            present = channel.limits
+            limits = (present[0] if low is None else low, present[1] if high is None else high)
+            volts = limits if channel.scale is None else channel.scale.limits(limits)
+            channel.range = _fitting(volts, self._offered(channel))
+            channel.limits = limits
+
+    def set_range(self, task: Task, channel: AnalogInput | AnalogOutput, limit: float) -> None:
+        """Set the range of a channel to the smallest one that includes ``limit`` V."""
+        with self._lock:
+            self._not_set_while_running(task)
+            channel.range = _fitting((-limit, limit), self._offered(channel))
+
+    def set_scale(self, task: Task, channel: AnalogInput | AnalogOutput, name: str) -> None:
+        """Set the custom scale of a channel; an empty ``name`` removes it."""
+        with self._lock:
+            self._not_set_while_running(task)
+            scale = self.scale(name) if name else None
+            volts = channel.limits if scale is None else scale.limits(channel.limits)
+            channel.range = _fitting(volts, self._offered(channel))
+            channel.scale = scale
+
+    def _offered(self, channel: AnalogInput | AnalogOutput) -> Sequence[float]:
+        return INPUT_RANGES if isinstance(channel, AnalogInput) else (self._card.ao_range_V,)
 
     def add_outputs(
-        self, task: Task, physical: str, name: str, limits: tuple[float, float]
+        self,
+        task: Task,
+        physical: str,
+        name: str,
+        limits: tuple[float, float],
+        scale: Scale | None = None,
     ) -> None:
-        """Add the outputs ``physical`` within ``limits`` V."""
+        """Add the outputs ``physical`` within ``limits``, in V or in the unit of ``scale``."""
         with self._lock:
             self._may_add(task, Kind.AO)
-            taken = _range(limits, (self._card.ao_range_V,))
+            volts = limits if scale is None else scale.limits(limits)
+            taken = _range(volts, (self._card.ao_range_V,))
             made = []
             terminals = physical_names(physical, self.name)
             for terminal, called in self._named(task, terminals, name):
@@ -103,7 +208,7 @@ class Setup:
                     raise DaqmxError(
                         Code.UNKNOWN_CHANNEL, f"Physical Channel: {self.name}/{terminal}"
                     )
-                made.append(AnalogOutput(called, terminal, limits, taken))
+                made.append(AnalogOutput(called, terminal, limits, taken, scale))
             task.kind = Kind.AO
             task.outputs += made
 
@@ -113,9 +218,10 @@ class Setup:
             self._may_add(task, Kind.DO)
             lines = self.lines_of(physical)
             if together:
-                # not the range of lines, which a client would expand into one name each
-                port = lines[0].partition("/")[0]
-                given = name or f"{self.name}/{port}_{len(task.lines) + 1}"
+                # the driver's name for several lines is that of the first one and three dots
+                whole = [p for p in physical_names(physical, self.name) if "/" not in p]
+                more = "..." if len(lines) > 1 else ""
+                given = name or f"{self.name}/{whole[0] if whole else lines[0] + more}"
                 groups = [(given, tuple(lines))]
             else:
                 groups = [(called, (line,)) for line, called in self._named(task, lines, name)]
@@ -140,38 +246,57 @@ class Setup:
         """Give ``task`` a sample clock of ``rate`` Hz from the terminal ``source``."""
         with self._lock:
             self._not_running(task)
-            if task.kind not in (Kind.AI, Kind.AO):
-                raise DaqmxError(
-                    Code.NOT_WITHOUT_CHANNELS
-                    if task.kind is Kind.EMPTY
-                    else Code.NOT_SUPPORTED_IN_TASK,
-                    f"Task Name: {task.name}",
-                )
-            if samples < (2 if finite else 0):
-                raise DaqmxError(
-                    Code.INVALID_VALUE, f"Property: SampQuant.SampPerChan; Value: {samples}"
-                )
+            self._has_timing(task)
             if samples > _MOST_SAMPLES:
                 raise DaqmxError(
                     Code.INVALID_VALUE,
-                    f"Property: SampQuant.SampPerChan; Requested Value: {samples}; Maximum Value: "
-                    f"{_MOST_SAMPLES}; Task Name: {task.name}",
+                    f"Property: SAMP_QUANT_SAMP_PER_CHAN; Requested Value: {samples}; Maximum "
+                    f"Value: {_MOST_SAMPLES}; Task Name: {task.name}",
                 )
-            terminal = self._clock_source(task, source)
-            task.clock = SampleClock(
-                self._coerced(task, rate, external=bool(terminal)), terminal, finite, samples
+            coerced = self._coerced(task, rate, external=self._is_external(source))
+            task.timing = SampleClock(coerced, source, finite, samples)
+            task.clocked = True
+
+    def change_clock(self, task: Task, **changes: Any) -> None:
+        """Set fields of the timing of ``task`` without a change between clock and on demand."""
+        with self._lock:
+            clocked = task.clocked
+            fields = ("rate", "source", "finite", "samples")
+            wanted = {name: getattr(task.timing, name) for name in fields} | changes
+            self.set_clock(task, **wanted)
+            task.clocked = clocked
+
+    def set_clocked(self, task: Task, clocked: bool) -> None:
+        """Give ``task`` its sample clock, or make it sample on demand."""
+        with self._lock:
+            self._not_running(task)
+            self._has_timing(task)
+            task.clocked = clocked
+
+    def timing_of(self, task: Task) -> SampleClock:
+        """Return the settings of the sample clock of ``task``; raises an error if it has none."""
+        self._has_timing(task)
+        return task.timing
+
+    def samples_of(self, task: Task) -> int:
+        """Return the samples per channel; refuses a number that a finite task cannot have."""
+        timing = self.timing_of(task)
+        if timing.samples < (2 if timing.finite else 0):
+            raise DaqmxError(
+                Code.INVALID_VALUE,
+                f"Property: SAMP_QUANT_SAMP_PER_CHAN; Requested Value: {timing.samples}; Minimum "
+                f"Value: 2; Task Name: {task.name}",
             )
+        return timing.samples
 
-    def set_rate(self, task: Task, rate: float) -> None:
-        """Change the rate of a task's sample clock."""
-        clock = self.clock_of(task)
-        self.set_clock(task, rate, clock.source, clock.finite, clock.samples)
-
-    def clock_of(self, task: Task) -> SampleClock:
-        """Return the sample clock of ``task``; raises an error without one."""
-        if task.clock is None:
+    def _has_timing(self, task: Task) -> None:
+        if task.kind is Kind.EMPTY:
+            raise DaqmxError(Code.NOT_WITHOUT_CHANNELS, f"Task Name: {task.name}")
+        if task.kind not in CLOCKED_KINDS:
             raise DaqmxError(Code.NOT_SUPPORTED_IN_TASK, f"Task Name: {task.name}")
-        return task.clock
+
+    def _is_external(self, source: str) -> bool:
+        return source.strip().lower().rpartition("/")[2] not in ("", "onboardclock")
 
     def convert_ticks(self, task: Task) -> int:
         """Return the ticks of the timebase between two conversions of an input task."""
@@ -209,7 +334,7 @@ class Setup:
         if task.delay_units == TICKS:
             return float(ticks)
         seconds = ticks / self._timebase
-        return seconds if task.delay_units == SECONDS else seconds * self.clock_of(task).rate
+        return seconds if task.delay_units == SECONDS else seconds * task.timing.rate
 
     def set_delay(self, task: Task, value: float) -> None:
         """Set the delay, in the unit that the program has chosen."""
@@ -220,7 +345,7 @@ class Setup:
             if task.delay_units == SECONDS:
                 ticks = value * self._timebase
             elif task.delay_units == PERIODS:
-                ticks = value / self.clock_of(task).rate * self._timebase
+                ticks = value / task.timing.rate * self._timebase
             if not 0.0 <= ticks < _SLOWEST:
                 raise DaqmxError(
                     Code.INVALID_VALUE, f"Property: DelayFromSampClk.Delay; Value: {value:g}"
@@ -248,19 +373,32 @@ class Setup:
                 )
             task.trigger = self._terminal(source) if source else ""
             task.trigger_edge = edge
+            task.trigger_type = DIGITAL_EDGE if source else NO_TRIGGER
 
-    def set_buffer(self, task: Task, samples: int) -> None:
-        """Set the size of the task's buffer to ``samples`` per channel."""
+    def set_trigger_edge(self, task: Task, edge: int) -> None:
+        """Set the edge of the start trigger."""
+        kind = task.trigger_type
+        self.set_trigger(task, task.trigger, edge)
+        task.trigger_type = kind
+
+    def set_trigger_type(self, task: Task, kind: int) -> None:
+        """Set the type of the start trigger; its source is checked with the task."""
         with self._lock:
-            if task.running:
-                raise DaqmxError(Code.PROPERTY_WHILE_RUNNING, f"Task Name: {task.name}")
+            self._not_running(task)
+            task.trigger_type = kind
+            if kind == NO_TRIGGER:
+                task.trigger = ""
+
+    def set_buffer(self, task: Task, samples: int | None) -> None:
+        """Set the size of the task's buffer to ``samples`` per channel; None: the default."""
+        with self._lock:
+            self._not_set_while_running(task)
             task.buffer = samples
 
     def set_regeneration(self, task: Task, allowed: bool) -> None:
         """Set whether an output task repeats the written samples."""
         with self._lock:
-            if task.running:
-                raise DaqmxError(Code.PROPERTY_WHILE_RUNNING, f"Task Name: {task.name}")
+            self._not_set_while_running(task)
             task.regenerates = allowed
             task.waveform = None
 
@@ -282,7 +420,36 @@ class Setup:
     def _verify(self, task: Task) -> None:
         if task.kind is Kind.EMPTY:
             raise DaqmxError(Code.NOT_WITHOUT_CHANNELS, f"Task Name: {task.name}")
-        if task.clock is None or task.kind is not Kind.AI:
+        for terminal in task.exports.values():
+            if terminal and self._pin(terminal) not in PINS:
+                raise DaqmxError(
+                    Code.INVALID_ROUTE_DESTINATION,
+                    f"Destination Terminal: {terminal}; Task Name: {task.name}",
+                )
+        analog: list[AnalogInput | AnalogOutput] = [*task.inputs, *task.outputs]
+        for channel in analog:
+            _in_order(channel.limits)
+            if max(abs(v) for v in channel.volts) > channel.range * (1.0 + 1e-9):
+                raise DaqmxError(
+                    Code.INVALID_VALUE,
+                    f"Requested Values: {channel.volts}; Range: +-{channel.range:g} V; Channel "
+                    f"Name: {channel.name}; Task Name: {task.name}",
+                )
+        if task.clock is None:
+            if task.trigger_type != NO_TRIGGER:
+                raise DaqmxError(Code.TRIGGER_ON_DEMAND, f"Task Name: {task.name}")
+            return
+        if task.trigger_type not in (NO_TRIGGER, DIGITAL_EDGE):
+            raise DaqmxError(
+                Code.INVALID_VALUE,
+                f"Property: START_TRIG_TYPE; Requested Value: {task.trigger_type}; You Can Select: "
+                f"{NO_TRIGGER}, {DIGITAL_EDGE}; Task Name: {task.name}",
+            )
+        if task.trigger_type == DIGITAL_EDGE and not task.trigger:
+            raise DaqmxError(Code.INVALID_ROUTE_SOURCE, f"Source Terminal: ; Task: {task.name}")
+        self.samples_of(task)
+        self.clock_source(task)
+        if task.kind is not Kind.AI:
             return
         self._coerced(task, task.clock.rate, external=True)
         # the last input's conversion must have begun before the next tick
@@ -327,22 +494,29 @@ class Setup:
         several = len(task.inputs)
         return 1e3 * self._card.ai_rate_max_kHz / several if several > 1 else self.fastest_input
 
-    def _terminal(self, source: str) -> str:
-        """Return a terminal such as ``/Dev1/ao/SampleClock`` without its device, in lower case."""
+    def _pin(self, source: str) -> str:
+        """Return a terminal such as ``/Dev1/PFI0`` without its device, in lower case."""
         text = source.strip().lower()
         if text.startswith("/"):
             owner, _, text = text[1:].partition("/")
             if owner != self.name.lower():
                 raise DaqmxError(Code.INVALID_ROUTE_SOURCE, f"Source Terminal: {source}")
-        known = {
-            f"{side}/{what}" for side in ("ai", "ao") for what in ("sampleclock", "starttrigger")
-        }
-        if text not in known | {f"pfi{i}" for i in range(16)} | {"onboardclock"}:
+        return text
+
+    def _terminal(self, source: str) -> str:
+        """Return the source ``/Dev1/ao/SampleClock`` without its device, in lower case."""
+        text = self._pin(source)
+        if text not in SOURCES:
             raise DaqmxError(Code.INVALID_ROUTE_SOURCE, f"Source Terminal: {source}")
         return text
 
-    def _clock_source(self, task: Task, source: str) -> str:
+    def full_terminal(self, source: str) -> str:
+        """Return the full name of a source, such as ``/Dev1/PFI0`` for ``pfi0``."""
+        return f"/{self.name}/{SOURCES[self._terminal(source)]}"
+
+    def clock_source(self, task: Task) -> str:
         """Return the terminal that clocks ``task``; empty for its own clock."""
+        source = task.timing.source
         if not source or self._terminal(source) == "onboardclock":
             return ""
         terminal = self._terminal(source)
@@ -374,6 +548,10 @@ class Setup:
                 raise DaqmxError(Code.CHANNEL_ALREADY_IN_TASK, f"Channel Name: {called}")
         return list(zip(terminals, names, strict=False))
 
+    def _not_set_while_running(self, task: Task) -> None:
+        if task.running:
+            raise DaqmxError(Code.PROPERTY_WHILE_RUNNING, f"Task Name: {task.name}")
+
     def _not_running(self, task: Task) -> None:
         if task.running:
             raise DaqmxError(Code.NOT_WHILE_RUNNING, f"Task Name: {task.name}")
@@ -392,11 +570,20 @@ class Setup:
 
 def _range(limits: tuple[float, float], offered: Sequence[float]) -> float:
     """Return the smallest of the ranges ``offered`` in V that includes ``limits``."""
+    _in_order(limits)
+    return _fitting(limits, offered)
+
+
+def _in_order(limits: tuple[float, float]) -> None:
     low, high = limits
     if not low < high:
         raise DaqmxError(
             Code.MIN_NOT_LESS_THAN_MAX, f"Minimum Value: {low:g}; Maximum Value: {high:g}"
         )
+
+
+def _fitting(limits: tuple[float, float], offered: Sequence[float]) -> float:
+    low, high = limits
     fitting = [r for r in offered if max(abs(low), abs(high)) <= r * (1.0 + 1e-9)]
     if not fitting:
         raise DaqmxError(

@@ -5,16 +5,31 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
 from dearig.sim_backend.daqmx.acquisition import Run, Ticks
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.output import Generation, Waveform
+from dearig.sim_backend.daqmx.scales import Scale
 
 __all__ = [
+    "CURRENT_READ",
+    "CURRENT_WRITE",
+    "DIGITAL_EDGE",
     "FALLING",
+    "HIGH",
+    "LOW",
+    "NO_CHANGE",
+    "NO_TRIGGER",
+    "READ_OFFSET",
+    "READ_RELATIVE_TO",
     "RISING",
+    "TRISTATE",
+    "WRITE_OFFSET",
+    "WRITE_RELATIVE_TO",
     "AnalogInput",
     "AnalogOutput",
+    "Channel",
     "Kind",
     "Lines",
     "Listener",
@@ -28,6 +43,12 @@ __all__ = [
 
 
 RISING, FALLING = 10280, 10171  #: DAQmx: edges
+HIGH, LOW, TRISTATE, NO_CHANGE = 10192, 10214, 10310, 10160  #: DAQmx: levels of a line
+NO_TRIGGER, DIGITAL_EDGE = 10230, 10150  #: DAQmx: types of a trigger
+CURRENT_READ, CURRENT_WRITE = 10425, 10430  #: DAQmx: reads and writes go on where they were
+#: Keys of properties that are kept, and refused when they would take effect.
+READ_RELATIVE_TO, READ_OFFSET = "read relative to", "read offset"
+WRITE_RELATIVE_TO, WRITE_OFFSET = "write relative to", "write offset"
 
 
 class Kind(Enum):
@@ -56,13 +77,24 @@ class State(Enum):
 
 @dataclass
 class AnalogInput:
-    """Input channel: ``limits`` V were requested, ``range`` V, plus and minus, is in use."""
+    """Input channel: ``limits`` were requested, ``range`` V, plus and minus, is in use.
+
+    With a ``scale`` the limits are in its unit, otherwise in V. ``kept`` has the properties
+    without effect.
+    """
 
     name: str
     terminal: str
     limits: tuple[float, float]
     range: float
     wiring: int
+    scale: Scale | None = None
+    kept: dict[object, Any] = field(default_factory=dict)
+
+    @property
+    def volts(self) -> tuple[float, float]:
+        """Return the limits in V."""
+        return self.limits if self.scale is None else self.scale.limits(self.limits)
 
 
 @dataclass
@@ -73,6 +105,13 @@ class AnalogOutput:
     terminal: str
     limits: tuple[float, float]
     range: float
+    scale: Scale | None = None
+    kept: dict[object, Any] = field(default_factory=dict)
+
+    @property
+    def volts(self) -> tuple[float, float]:
+        """Return the limits in V."""
+        return self.limits if self.scale is None else self.scale.limits(self.limits)
 
 
 @dataclass
@@ -81,11 +120,17 @@ class Lines:
 
     name: str
     lines: tuple[str, ...]
+    kept: dict[object, Any] = field(default_factory=dict)
+
+
+Channel = AnalogInput | AnalogOutput | Lines
 
 
 @dataclass
 class SampleClock:
     """Sample clock of actual ``rate`` Hz; ``source`` is empty for the task's own clock.
+
+    The driver checks ``source`` and ``samples`` when the task is verified, not when they are set.
 
     ``samples`` is the requested number; with ``finite`` the task ends after it.
     """
@@ -98,10 +143,10 @@ class SampleClock:
 
 @dataclass
 class Watchdog:
-    """Watchdog timer: ``timeout`` s, the lines' levels on expiration, and its time."""
+    """Watchdog timer: ``timeout`` s, the lines' levels of DAQmx on expiration, and its time."""
 
     timeout: float
-    states: dict[str, bool] = field(default_factory=dict)
+    states: dict[str, int] = field(default_factory=dict)
     deadline: float | None = None
     expired: bool = False
 
@@ -131,9 +176,12 @@ class Task:
     outputs: list[AnalogOutput] = field(default_factory=list)
     lines: list[Lines] = field(default_factory=list)
     watchdog: Watchdog | None = None
-    clock: SampleClock | None = None
+    timing: SampleClock = field(default_factory=lambda: SampleClock(1000.0, "", False, 1000))
+    clocked: bool = False  # False: samples on demand
     trigger: str = ""
     trigger_edge: int = RISING
+    trigger_type: int = NO_TRIGGER
+    exports: dict[str, str] = field(default_factory=dict)  # terminals by signal
     convert_ticks: int | None = None  # of the timebase, between two conversions
     delay_ticks: int | None = None  # from the sample clock to the first conversion
     delay_units: int = 10304
@@ -143,6 +191,7 @@ class Task:
     kept: State = State.VERIFIED  # state after a stop
     failed: Code | None = None
     failed_why: str = ""  # sentence for the client, where the code does not say it
+    kept_properties: dict[object, Any] = field(default_factory=dict)  # without effect
     listeners: list[Listener] = field(default_factory=list)
     # of an output task
     waveform: Waveform | None = None
@@ -166,7 +215,7 @@ class Task:
         return self.state is State.RUNNING
 
     @property
-    def channels(self) -> list[AnalogInput | AnalogOutput | Lines]:
+    def channels(self) -> list[Channel]:
         """Return the task's channels, which are of one kind."""
         return [*self.inputs, *self.outputs, *self.lines]
 
@@ -179,6 +228,11 @@ class Task:
     def line_names(self) -> list[str]:
         """Return the digital lines in their order."""
         return [line for channel in self.lines for line in channel.lines]
+
+    @property
+    def clock(self) -> SampleClock | None:
+        """Return the sample clock; None on demand."""
+        return self.timing if self.clocked else None
 
     @property
     def wanted(self) -> int | None:

@@ -244,8 +244,8 @@ def _transferred(made, every):
         ("ai", _acquired, (100, 100), -200966),
         ("ao", _transferred, (100, 100), -200967),
         ("ai", lambda made, _: made.register_done_event(_nothing), (0, 0), -200950),
-        ("ai", _transferred, (100,), -200965),
-        ("ao", _acquired, (100,), -200964),
+        ("ai", _transferred, (100,), -200980),
+        ("ao", _acquired, (100,), -200981),
         ("ai", _acquired, (0,), -200880),
     ],
 )

@@ -5,8 +5,12 @@ import numpy as np
 import pytest
 from nidaqmx import GrpcSessionOptions, SessionInitializationBehavior
 from nidaqmx.constants import (
+    Coupling,
+    ReadRelativeTo,
     TaskMode,
     TerminalConfiguration,
+    TriggerType,
+    VoltageUnits,
 )
 from nidaqmx.errors import DaqError, RpcError
 from nidaqmx.stream_readers import AnalogUnscaledReader
@@ -81,6 +85,7 @@ def _ai_clock(rate, samples=100, inputs=("ai0", "ai1", "ai2"), **more):
         with task(session) as ai:
             add_inputs(ai, *inputs)
             ai.timing.cfg_samp_clk_timing(rate, samps_per_chan=samples, **more)
+            ai.control(TaskMode.TASK_VERIFY)
 
     return attempt
 
@@ -169,6 +174,33 @@ def _read_too_much(ai):
     ai.start()
     read(ai, 100)
     read(ai, 1)
+
+
+def _upside_down(ai):
+    ai.ai_channels[0].ai_min = 5.0
+    ai.ai_channels[0].ai_max = -5.0
+    ai.control(TaskMode.TASK_VERIFY)
+
+
+def _triggered_on_demand(ai):
+    ai.triggers.start_trigger.cfg_dig_edge_start_trig("/Dev1/PFI0")
+    ai.start()
+
+
+def _analog_trigger(ai):
+    clock_inputs(ai, RATE, source="")
+    ai.triggers.start_trigger.trig_type = TriggerType.ANALOG_EDGE
+    ai.start()
+
+
+def _exported_to_nowhere(ai):
+    ai.export_signals.start_trig_output_term = "nowhere"
+    ai.control(TaskMode.TASK_VERIFY)
+
+
+def _read_from_the_first(ai):
+    ai.in_stream.relative_to = ReadRelativeTo.FIRST_SAMPLE
+    ai.read()
 
 
 def _not_done(ai):
@@ -268,10 +300,30 @@ RULES = {
         lambda s: Device("Dev1", grpc_options=s).ai_bridge_rngs,
         -200197,
     ),
-    "a property that cannot be set": (
-        _with_inputs(lambda ai: setattr(ai.ai_channels[0], "ai_max", 1.0)),
-        -200197,
+    "a property of another kind of channel": (
+        _with_inputs(lambda ai: ai.ai_channels[0].ai_bridge_cfg),
+        -200452,
     ),
+    "a value that a property has not": (
+        _with_inputs(lambda ai: setattr(ai.ai_channels[0], "ai_coupling", Coupling.AC)),
+        -200077,
+    ),
+    "limits upside down, set one after the other": (_with_inputs(_upside_down), -200082),
+    "a trigger without a clock": (_with_inputs(_triggered_on_demand), -200262),
+    "a trigger that is not simulated": (_with_inputs(_analog_trigger), -200077),
+    "an export to nowhere": (_with_inputs(_exported_to_nowhere), -89121),
+    "a property of one device of the task": (
+        lambda s: _with_inputs(lambda ai: ai.timing[Device("Dev1", grpc_options=s)].samp_clk_rate)(
+            s
+        ),
+        -201118,
+    ),
+    "a scale that is not there": (
+        _ai("Dev1/ai0", units=VoltageUnits.FROM_CUSTOM_SCALE, custom_scale_name="nothing"),
+        -200378,
+    ),
+    "a scale of another unit": (_ai("Dev1/ai0", custom_scale_name="nothing"), -200447),
+    "a read from another place": (_with_inputs(_read_from_the_first), -200077),
     "a channel that is not in the task": (
         _with_inputs(lambda ai: ai.ai_channels["other"].ai_max),
         -200486,

@@ -1,0 +1,134 @@
+"""Properties of the system, of the card and of its physical channels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from dearig.sim_backend.daqmx.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.properties import Asked, given
+from dearig.sim_backend.daqmx.setup import INPUT_RANGES, INPUTS, LINES, OUTPUTS
+
+__all__ = ["DEVICE", "PHYSICAL_CHANNEL", "SERIAL", "SYSTEM"]
+
+SERIAL = 0x0D1E1EC7  #: serial number of the simulated card
+DRIVER = (25, 0, 0)  #: driver version that the server reports
+
+_PRODUCT, _PRODUCT_NUMBER = "PCIe-6361", 0x7434
+_X_SERIES, _PCIE = 15858, 13612
+_VOLTAGE, _CURRENT = 10322, 10134
+_START, _REFERENCE, _PAUSE, _ARM_START = 1 << 2, 1 << 3, 1 << 1, 1 << 5
+_DC = 1 << 1  # bit of the coupling
+_SAMPLE_CLOCK, _ON_DEMAND, _CHANGE_DETECTION = 10388, 10390, 12504
+
+
+def _names(asked: Asked, parts: Sequence[str]) -> str:
+    return ", ".join(f"{asked.device.name}/{part}" for part in parts)
+
+
+def _ranges(limits: Sequence[float]) -> list[float]:
+    return [side * limit for limit in sorted(limits) for side in (-1.0, 1.0)]
+
+
+def _ports() -> list[str]:
+    return sorted({line.partition("/")[0] for line in LINES})
+
+
+def _terminals(asked: Asked) -> str:
+    inside = [f"{s}/{t}" for s in ("ai", "ao") for t in ("SampleClock", "StartTrigger")]
+    inside += [f"{s}/SampleClockTimebase" for s in ("ai", "ao")]
+    names = [f"PFI{i}" for i in range(16)] + inside
+    return ", ".join(f"/{asked.device.name}/{name}" for name in names)
+
+
+SYSTEM = {
+    "NIDAQ_MAJOR_VERSION": given(DRIVER[0]),
+    "NIDAQ_MINOR_VERSION": given(DRIVER[1]),
+    "NIDAQ_UPDATE_VERSION": given(DRIVER[2]),
+    "DEV_NAMES": given(lambda a: a.device.name),
+    "TASKS": given(""),  # saved ones
+    "GLOBAL_CHANS": given(""),
+    "SCALES": given(lambda a: ", ".join(s.name for s in a.device.scales.values() if s.saved)),
+}
+
+DEVICE = {
+    "PRODUCT_TYPE": given(_PRODUCT),
+    "PRODUCT_NUM": given(_PRODUCT_NUMBER),
+    "PRODUCT_CATEGORY": given(_X_SERIES),
+    "SERIAL_NUM": given(SERIAL),
+    "IS_SIMULATED": given(True),
+    "BUS_TYPE": given(_PCIE),
+    "PCI_BUS_NUM": given(0),
+    "PCI_DEV_NUM": given(0),
+    "ACCESSORY_PRODUCT_TYPES": given(""),
+    "ACCESSORY_PRODUCT_NUMS": given(()),
+    "ACCESSORY_SERIAL_NUMS": given(()),
+    "NUM_DMA_CHANS": given(8),
+    "TERMINALS": given(_terminals),
+    "DIG_TRIG_SUPPORTED": given(True),
+    "ANLG_TRIG_SUPPORTED": given(False),
+    "AI_PHYSICAL_CHANS": given(lambda a: _names(a, [f"ai{i}" for i in range(INPUTS)])),
+    "AI_SUPPORTED_MEAS_TYPES": given([_VOLTAGE]),
+    "AI_VOLTAGE_RNGS": given(lambda _: _ranges(INPUT_RANGES)),
+    "AI_VOLTAGE_INT_EXCIT_DISCRETE_VALS": given(()),
+    "AI_GAINS": given(()),
+    "AI_COUPLINGS": given(_DC),
+    "AI_MAX_SINGLE_CHAN_RATE": given(lambda a: a.device.fastest_input),
+    "AI_MAX_MULTI_CHAN_RATE": given(lambda a: 1e3 * a.device.settings.card.ai_rate_max_kHz),
+    "AI_MIN_RATE": given(lambda a: a.device.slowest),
+    "AI_SIMULTANEOUS_SAMPLING_SUPPORTED": given(False),
+    "AI_NUM_SAMP_TIMING_ENGINES": given(1),
+    "AI_SAMP_MODES": given([10178, 10123]),
+    "AI_TRIG_USAGE": given(_START | _REFERENCE),
+    "AO_PHYSICAL_CHANS": given(lambda a: _names(a, OUTPUTS)),
+    "AO_SUPPORTED_OUTPUT_TYPES": given([_VOLTAGE]),
+    "AO_VOLTAGE_RNGS": given(lambda a: _ranges([a.device.settings.card.ao_range_V])),
+    "AO_SAMP_CLK_SUPPORTED": given(True),
+    "AO_NUM_SAMP_TIMING_ENGINES": given(1),
+    "AO_SAMP_MODES": given([10178, 10123]),
+    "AO_MAX_RATE": given(lambda a: 1e3 * a.device.settings.card.ao_rate_max_kHz),
+    "AO_MIN_RATE": given(lambda a: a.device.slowest),
+    "AO_TRIG_USAGE": given(_START),
+    "DI_LINES": given(""),
+    "DI_PORTS": given(""),
+    "DO_LINES": given(lambda a: _names(a, LINES)),
+    "DO_PORTS": given(lambda a: _names(a, _ports())),
+    "CI_PHYSICAL_CHANS": given(""),
+    "CO_PHYSICAL_CHANS": given(""),
+}
+
+
+def _input(asked: Asked) -> int:
+    """Return the number of the asked input; raises an error unless the card has it."""
+    name = asked.channel.rpartition("/")[2].lower()
+    if not (name.startswith("ai") and name[2:].isdigit() and int(name[2:]) < INPUTS):
+        raise DaqmxError(Code.UNKNOWN_CHANNEL, f"Physical Channel: {asked.channel}")
+    return int(name[2:])
+
+
+def _output(asked: Asked) -> str:
+    """Return the asked output; raises an error unless the card has it."""
+    name = asked.channel.rpartition("/")[2].lower()
+    if name not in OUTPUTS:
+        raise DaqmxError(Code.UNKNOWN_CHANNEL, f"Physical Channel: {asked.channel}")
+    return name
+
+
+def _wirings(asked: Asked) -> int:
+    """Return the bits of an input's wirings: RSE, NRSE, and DIFF for the first of a pair."""
+    return 0b111 if _input(asked) % 16 < 8 else 0b011
+
+
+def _port_lines(asked: Asked) -> int:
+    return len(asked.device.lines_of(asked.channel))
+
+
+PHYSICAL_CHANNEL = {
+    "PHYSICAL_CHAN_AI_TERM_CFGS": given(_wirings),
+    "PHYSICAL_CHAN_AI_SUPPORTED_MEAS_TYPES": given(lambda a: [_VOLTAGE] if _input(a) + 1 else []),
+    "PHYSICAL_CHAN_AO_TERM_CFGS": given(lambda a: 0b001 if _output(a) else 0),
+    "PHYSICAL_CHAN_AO_SUPPORTED_OUTPUT_TYPES": given(lambda a: [_VOLTAGE] if _output(a) else []),
+    "PHYSICAL_CHAN_DO_PORT_WIDTH": given(_port_lines),
+    "PHYSICAL_CHAN_DO_SAMP_CLK_SUPPORTED": given(
+        lambda a: all(line.startswith("port0") for line in a.device.lines_of(a.channel))
+    ),
+}
