@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from types import MappingProxyType, NoneType
+from typing import Any
 
 import h5py
 
@@ -19,17 +21,22 @@ from dearig.recording.opening import read_from
 from dearig.recording.physical import read_channels, sample_count
 from dearig.recording.safe import Refused, dataset, group
 from dearig.recording.text import text_of
+from dearig.recording.timestamps import local_time
 
 __all__ = ["ENDINGS", "Entry", "glance", "index_folder", "lines"]
 
 ENDINGS = (".h5", ".hdf5", ".nxs")
 #: Version of the cache; another one is not read.
-KEPT = "dearig-index/1"
+KEPT = "dearig-index/2"
 
 
 @dataclass(frozen=True)
 class Entry:
-    """Summary of one file. ``trouble`` is the reason why it is not a recording, or ""."""
+    """Summary of one file.
+
+    ``trouble`` is the reason why it is not a recording, or "". ``passing``: the reason is one of
+    the system, not of the file, which may be readable the next time.
+    """
 
     path: str
     bytes: int
@@ -44,6 +51,20 @@ class Entry:
     film_id: str = ""
     operator: str = ""
     trouble: str = ""
+    passing: bool = False
+
+
+#: Types of the facts in the cache.
+_TYPES: Mapping[str, Any] = MappingProxyType(
+    {
+        **{f.name: str for f in fields(Entry)},
+        "bytes": int,
+        "samples": int,
+        "duration_s": (int, float, NoneType),
+        "complete": bool,
+        "passing": bool,
+    }
+)
 
 
 def index_folder(
@@ -51,16 +72,17 @@ def index_folder(
 ) -> list[Entry]:
     """Return the recordings in ``folder`` and its subfolders, sorted by relative path.
 
-    A file whose size and time of change are those in ``cache`` is not opened again. The cache is by
-    default in the user's cache folder. ``progress`` is called with the part of the files that is
-    done. Raises ``InputError`` if there is no such folder.
+    A file whose size and time of change are those in ``cache`` is not opened again, unless the
+    system could not read it then. The cache is by default in the user's cache folder. ``progress``
+    is called with the part of the files that is done. A folder that cannot be read is an entry,
+    whose path ends in ``/``. Raises ``InputError`` if ``folder`` itself cannot be read.
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"{folder} is {'not a folder' if folder.exists() else 'not there'}")
     cache = _cache_of(folder) if cache is None else cache
     kept = _load(cache)
-    found = sorted(_files(folder))
+    found, unread = _files(folder)
     entries: dict[str, Entry] = {}
     stamps: dict[str, tuple[int, int]] = {}
     fresh = 0
@@ -72,14 +94,21 @@ def index_folder(
             if progress is not None:
                 progress((i + 1) / len(found))
         entries[name], stamps[name] = entry, (size, changed)
-    if fresh or len(kept) != len(entries):
-        _save(cache, entries, stamps)
-    return list(entries.values())
+    # what cannot be read now may be readable the next time
+    known = {name: entry for name, entry in entries.items() if not entry.passing}
+    if fresh or len(kept) != len(known):
+        _save(cache, known, stamps)
+    return sorted([*entries.values(), *unread], key=lambda entry: entry.path)
 
 
-def _files(folder: Path) -> Iterator[tuple[str, int, int]]:
-    """Yield relative path, size and time of change in ns of every file that may be a recording."""
+def _files(folder: Path) -> tuple[list[tuple[str, int, int]], list[Entry]]:
+    """Return the files that may be recordings, and an entry for each folder that cannot be read.
+
+    Each file has its relative path, its size, and the time of its last change in ns.
+    """
     # text is faster than Path: there may be ten thousand files
+    found: list[tuple[str, int, int]] = []
+    unread: list[Entry] = []
     waiting = [""]
     while waiting:
         here = waiting.pop()
@@ -91,9 +120,13 @@ def _files(folder: Path) -> Iterator[tuple[str, int, int]]:
                         waiting.append(f"{name}/")
                     elif name.lower().endswith(ENDINGS) and item.is_file():
                         about = item.stat()
-                        yield name, about.st_size, about.st_mtime_ns
+                        found.append((name, about.st_size, about.st_mtime_ns))
         except OSError as error:
-            raise InputError(f"{folder / here} cannot be read: {in_words(error)}") from error
+            reason = f"{folder / here} cannot be read: {in_words(error)}"
+            if not here:
+                raise InputError(reason) from error
+            unread.append(Entry(here, 0, trouble=reason, passing=True))
+    return sorted(found), unread
 
 
 def glance(path: Path, name: str, size: int) -> Entry:
@@ -101,7 +134,9 @@ def glance(path: Path, name: str, size: int) -> Entry:
     try:
         return read_from(path, lambda file: _entry(file, name, size))
     except InputError as error:
-        return Entry(name, size, trouble=str(error))
+        # HDF5 raises them for the errors of the disk
+        passing = isinstance(error.__cause__, OSError | MemoryError | RuntimeError)
+        return Entry(name, size, trouble=str(error), passing=passing)
 
 
 def _entry(file: h5py.File, name: str, size: int) -> Entry:
@@ -164,10 +199,20 @@ def _load(cache: Path | None) -> dict[str, tuple[tuple[int, int], Entry]]:
         if kept["format"] != KEPT:
             return {}
         return {
-            name: ((size, changed), Entry(**facts)) for name, size, changed, facts in kept["files"]
+            str(name): ((int(size), int(changed)), _entry_from(facts))
+            for name, size, changed, facts in kept["files"]
         }
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return {}
+
+
+def _entry_from(facts: dict[str, Any]) -> Entry:
+    """Return the entry with ``facts``. Raises ``TypeError`` for those that no entry has."""
+    entry = Entry(**facts)
+    for name, kind in _TYPES.items():
+        if not isinstance(getattr(entry, name), kind):
+            raise TypeError(f"{name} is {getattr(entry, name)!r}")
+    return entry
 
 
 def _save(
@@ -186,19 +231,18 @@ def _save(
 
 
 def lines(entries: Sequence[Entry]) -> list[str]:
-    """Return a line for each entry: start, length, path and content."""
+    """Return a line for each entry: start in local time, length, path and content."""
     if not entries:
         return ["no recordings"]
     shown = []
     for entry in entries:
         if entry.trouble:
-            shown.append(f"{'not read':<19}  {'':>10}  {entry.path}: {entry.trouble}")
+            shown.append(f"{'not read':<25}  {'':>10}  {entry.path}: {entry.trouble}")
             continue
         length = "" if entry.duration_s is None else f"{entry.duration_s:.6g} s"
         facts = [entry.title, entry.rig, entry.film_id, entry.operator]
         if not entry.complete:
             facts.append(f"INCOMPLETE: {entry.outcome}")
-        start = entry.start_time[:19].replace("T", " ")
         told = ", ".join(fact for fact in facts if fact)
-        shown.append(f"{start:<19}  {length:>10}  {entry.path}: {told}")
+        shown.append(f"{local_time(entry.start_time):<25}  {length:>10}  {entry.path}: {told}")
     return shown

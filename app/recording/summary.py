@@ -10,6 +10,7 @@ import numpy as np
 
 from dearig.recording.layout import FORMAT, LINEAR, ZERO_ORDER
 from dearig.recording.recording import Recording
+from dearig.recording.timestamps import local_time
 
 __all__ = ["describe", "describe_rows"]
 
@@ -167,9 +168,9 @@ def describe_rows(recording: Recording) -> list[tuple[str, str]]:
         rows.append((instrument.role, "; ".join(parts)))
     rows += [(f"{event.level} at {event.time:.4g} s", event.message) for event in recording.events]
     wanted = ("start_time", "operator", "host", "rig", "source", "seed", "dearig_version")
-    rows += [
-        (name.replace("_", " "), str(recording.provenance[name]))
-        for name in (*wanted, "git_revision")
-        if recording.provenance.get(name) not in (None, "")
-    ]
+    for name in (*wanted, "git_revision"):
+        value = recording.provenance.get(name)
+        if value not in (None, ""):
+            text = local_time(str(value)) if name == "start_time" else str(value)
+            rows.append((name.replace("_", " "), text))
     return rows

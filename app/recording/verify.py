@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from dearig.recording.checksums import wrong_blocks
 from dearig.recording.finish import OVERVIEW
 from dearig.recording.flushes import flush_notes
 from dearig.recording.journal import whole_journal
-from dearig.recording.layout import SIGNALS, counts_name
+from dearig.recording.layout import EVENT_LEVELS, SIGNALS, counts_name
 from dearig.recording.opening import UNREADABLE, damage, opened
 from dearig.recording.physical import SLICE, Counts
 from dearig.recording.pyramid import BINS
@@ -26,6 +26,7 @@ from dearig.recording.recording import Recording
 from dearig.recording.safe import Refused, dataset, group
 from dearig.recording.superblock import consistency_flags
 from dearig.recording.text import text_of
+from dearig.recording.timestamps import compare_clocks, local_time
 
 __all__ = ["Verification", "verify"]
 
@@ -33,6 +34,9 @@ __all__ = ["Verification", "verify"]
 ROUNDING = 1e-12
 #: Largest relative difference of sample clock and computer's clock, in runs of this many s or more.
 CLOCKS_APART, CLOCKS_OVER = 0.01, 10.0
+#: Attributes of the time at which a channel is sampled, and of the rest of the displacement.
+_TIMING = ("skew_s", "delay_s", "delay_error_s")
+_REST = ("rest_reading", "rest_samples")
 #: Faults of one kind that are listed one by one, at most.
 LISTED = 5
 
@@ -100,6 +104,7 @@ class _Check:
         if self.recording.channels:
             counts = Counts(self.entry, self.samples)
             self.counts_shapes()
+            self.timing()
             self.checksums(counts)
             self.pyramid(counts)
             self.physical(counts)
@@ -152,6 +157,8 @@ class _Check:
 
     def counts_shapes(self) -> None:
         claimed = int(self.entry.attrs.get("samples", self.samples))
+        if not self.finished and "time" in self.data:
+            self.fault("/entry has physical values, but no number of samples")
         there = {c.name: self.data[counts_name(c.name)].shape[0] for c in self.recording.channels}
         if self.finished:
             for name, many in there.items():
@@ -172,6 +179,27 @@ class _Check:
         self.done(
             f"number of samples: {self.samples} in each of {len(self.recording.channels)} channels"
         )
+
+    def timing(self) -> None:
+        """Check that the times of each channel are possible, and are those of its counts."""
+        for channel in self.recording.channels:
+            raw = self.data[counts_name(channel.name)]
+            for key in _TIMING:
+                value = float(raw.attrs.get(key, 0.0))
+                if not 0.0 <= value < np.inf:
+                    self.fault(f"{raw.name}: {key} = {value:g} is impossible")
+            if channel.name not in self.data:
+                if self.finished and self.recording.arrays.stored:
+                    self.fault(f"/entry/data/{channel.name} is missing")
+                continue
+            values = self.data[channel.name]
+            for key in (*_TIMING, *_REST):
+                if key in values.attrs and values.attrs[key] != raw.attrs.get(key):
+                    self.fault(
+                        f"{values.name}: {key} = {values.attrs[key]:g}, and its counts have "
+                        f"{raw.attrs.get(key)}"
+                    )
+        self.done("the times of the channels")
 
     def checksums(self, counts: Counts) -> None:
         if dataset(self.entry, "checksums") is None:
@@ -200,6 +228,8 @@ class _Check:
             return
         for size in BINS:
             level = stored[f"bins_of_{size}"]
+            if int(level.attrs.get("bin_samples", size)) != size:
+                self.fault(f"{level.name} claims bins of {level.attrs['bin_samples']} samples")
             rows = min(level.shape[0], self.samples // size)
             if self.finished and level.shape[0] != self.samples // size:
                 self.fault(
@@ -246,6 +276,11 @@ class _Check:
                 f"displacement is counted from {rest.reading:.9g} m, and the sensor's mean over "
                 f"the lead-in is {found.reading:.9g} m"
             )
+        if self.finished and found.samples != rest.samples:
+            self.fault(
+                f"displacement claims a lead-in of {rest.samples} samples, and the voltage has one "
+                f"of {found.samples}"
+            )
         if stored:
             self.done("stored values against counts and scaling")
 
@@ -267,39 +302,95 @@ class _Check:
         notes = flush_notes(self.entry)
         if notes is None:
             return
+        claimed = self.entry["wall_clock"].shape[0]
         if not self.finished:
             notes = notes[notes["sample"] <= self.samples]  # their samples are left out too
+        elif notes.size != claimed:
+            self.fault(f"/entry/wall_clock has {claimed} rows, of which {notes.size} are filled")
         at, moments = notes["sample"], notes["unix_time"]
-        if (np.diff(at) < 0).any() or (at.size and int(at[-1]) > self.samples):
+        if (np.diff(at) < 0).any() or (at.size and not 0 <= at[0] <= at[-1] <= self.samples):
             self.fault("/entry/wall_clock has sample numbers that go back, or that do not exist")
             return
+        if not (np.isfinite(moments) & (moments > 0.0)).all():
+            self.fault("/entry/wall_clock has times that are impossible")
+            return
+        if self.recording.complete and at.size and int(at[-1]) != self.samples:
+            self.fault(
+                f"/entry/wall_clock ends at sample {at[-1]}, and the run at sample {self.samples}"
+            )
+        self.start_of_clock(moments)
         if (np.diff(moments) < 0.0).any():
             self.found.notes.append("the computer's clock was set back during the run")
         elif at.size > 1 and not self.recording.provenance.get("simulated", False):
             # the first row was written before the run started
-            took, counted = float(moments[-1] - moments[1]), float(at[-1] - at[1])
-            rate = self.recording.rate or 0.0
-            if took >= CLOCKS_OVER and abs(counted / rate - took) > CLOCKS_APART * took:
-                self.fault(
-                    f"the sample clock counted {counted / rate:.6g} s and the computer's clock "
-                    f"{took:.6g} s: rate_Hz is wrong, or samples are missing"
-                )
+            self.rate_of_clock(at[1:], moments[1:])
         self.done("the sample clock against the computer's clock")
 
-    def events(self) -> None:
+    def start_of_clock(self, moments: np.ndarray) -> None:
+        """Check that the clock's first time is the start of the run; both were read at once."""
+        started = self.moment("start_time")
+        if started is not None and moments.size:
+            apart = float(moments[0]) - started.timestamp()
+            if abs(apart) > 1.0:
+                self.fault(
+                    f"/entry/start_time is {started.isoformat()}, and the computer's clock said "
+                    f"{datetime.fromtimestamp(float(moments[0]), UTC).isoformat()} then"
+                )
+
+    def rate_of_clock(self, at: np.ndarray, moments: np.ndarray) -> None:
         rate = self.recording.rate
-        for event in self.recording.events:
+        if rate is None:
+            return
+        clocks = compare_clocks(at, moments, rate)
+        if clocks.step:
+            self.found.notes.append(
+                f"the computer's clock was set {'forward' if clocks.step > 0.0 else 'back'} by "
+                f"{abs(clocks.step):.4g} s during the run, or the computer slept, at sample "
+                f"{clocks.step_sample} ({clocks.step_sample / rate:.4g} s); the sample clock is "
+                f"not affected"
+            )
+        took, counted = clocks.computer, clocks.counted
+        if took >= CLOCKS_OVER and abs(counted - took) > CLOCKS_APART * took:
+            self.fault(
+                f"the sample clock counted {counted:.6g} s and the computer's clock {took:.6g} s: "
+                f"rate_Hz is wrong, or samples are missing"
+            )
+
+    def moment(self, name: str) -> datetime | None:
+        """Return the time ``name`` in /entry; None where there is none or it cannot be read."""
+        try:
+            return datetime.fromisoformat(text_of(self.entry[name][()]))
+        except (KeyError, ValueError):
+            return None
+
+    def events(self) -> None:
+        rate, events = self.recording.rate, self.recording.events
+        rows = dataset(self.entry, "events")
+        if rows is None:
+            if self.recording.channels and self.finished:
+                self.fault("/entry/events is missing")
+        elif rows.ndim != 1 or (self.finished and rows.shape[0] != len(events)):
+            self.fault(f"/entry/events claims {rows.shape} events and holds {len(events)}")
+        unnamed = [event.level for event in events if event.level not in EVENT_LEVELS]
+        if unnamed and self.finished:
+            self.fault(
+                f"{len(unnamed)} of {len(events)} events are empty, or have a level that is none "
+                f"of {', '.join(EVENT_LEVELS)}"
+            )
+        planned = max(self.samples, self.recording.samples_expected or 0)
+        for event in events:
             where = f"the event {event.message[:60]!r}"
             if not 0 <= event.sample <= self.samples:
                 # a kill can lose the samples of a block and leave its events
-                say = self.fault if self.recording.complete else self.found.notes.append
+                lost = not self.recording.complete and 0 <= event.sample <= planned
+                say = self.found.notes.append if lost else self.fault
                 say(f"{where} is at sample {event.sample}, which does not exist")
-            elif rate is not None and abs(event.time - event.sample / rate) > 1e-6 / rate:
+            elif rate is not None and not abs(event.time - event.sample / rate) <= 1e-6 / rate:
                 self.fault(
                     f"{where} is at {event.time:.9g} s, and its sample {event.sample} at "
                     f"{event.sample / rate:.9g} s"
                 )
-        self.done(f"{len(self.recording.events)} events")
+        self.done(f"{len(events)} events")
 
     def provenance(self) -> None:
         noted = self.recording.provenance
@@ -310,6 +401,13 @@ class _Check:
                     "/entry/provenance: the configuration does not have the SHA-256 stored with it"
                 )
             self.done("the configuration's SHA-256")
+        said = self.moment("start_time")
+        started = noted.get("start_time")
+        if said is not None and started not in (None, "", text_of(self.entry["start_time"][()])):
+            self.fault(
+                f"/entry/provenance says that the run started at {started}, and /entry at "
+                f"{said.isoformat()}"
+            )
         moments = [
             text_of(self.entry[n][()]) for n in ("start_time", "end_time") if n in self.entry
         ]
@@ -319,7 +417,10 @@ class _Check:
             self.fault(f"/entry: one of {', '.join(moments)} is not a time")
             return
         if any(later < earlier for earlier, later in pairwise(times)):
-            self.found.notes.append(f"it ended at {moments[1]}, before its start at {moments[0]}")
+            self.found.notes.append(
+                f"it ended at {local_time(moments[1])}, before its start at "
+                f"{local_time(moments[0])}"
+            )
 
     def for_viewers(self) -> None:
         """Check the attributes that lead a NeXus viewer to the default plot."""

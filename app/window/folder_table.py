@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
 from dearig.analysis.summary import RecordingSummary
+from dearig.recording.timestamps import local_time
 from dearig.report.numbers import NO_VALUE, significant
 from dearig.units import SHOWN
 from dearig.window.session import Session
@@ -41,7 +42,7 @@ COLUMNS = (
     ("Recording", "Name of the file"),
     ("Sequence", "Name of the sequence"),
     ("Film", "Name of the film"),
-    ("Start", "Start of the run"),
+    ("Start", "Start of the run: local time, with its offset from UTC"),
     ("Duration", "Duration in s"),
     ("RMS", "RMS error of the chosen model, in µm (kPa for a film driven by stretch)"),
     ("NRMSE", "RMS error in % of the measured range"),
@@ -243,12 +244,8 @@ def _tip(path: Path, summary: RecordingSummary | None, column: int) -> str:
 
 
 def _when(started: str, changed: float) -> str:
-    """Return the start of the run in local time, or the time of the file's last change."""
-    try:
-        moment = datetime.fromisoformat(started)
-    except ValueError:
-        moment = datetime.fromtimestamp(changed).astimezone()
-    return moment.astimezone().strftime("%Y-%m-%d %H:%M")
+    """Return the start of the run, or the time of the file's last change, in local time."""
+    return local_time(started or datetime.fromtimestamp(changed, UTC).isoformat())
 
 
 class ThumbnailDelegate(QStyledItemDelegate):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from dearig.model.trusted_folder import CacheFolder
 from dearig.recording import RunMetadata, save_recording
 from dearig.recording import index as index_module
 from dearig.recording.index import Entry, index_folder, lines
+from dearig.recording.timestamps import local_time
 from tests.recording.test_reader import film_values
 from tests.tools.command import dearig
 from tests.tools.recordings import Clock, run_counts, write_run, writer
@@ -109,8 +111,61 @@ def test_the_command(shelf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     told = dearig("index", shelf).out.splitlines()
     assert told[0].startswith("not read")
     assert told[2] == (
-        "2027-01-15 08:00:00     2.999 s  day 1/run.h5: two lobes, sim:7, film 3, Ada"
+        f"{local_time('2027-01-15T08:00:00+00:00')}     2.999 s  day 1/run.h5: two lobes, sim:7, "
+        f"film 3, Ada"
     )
     assert told[3].endswith("INCOMPLETE: killed, or still running")
     assert dearig("index", tmp_path / "no").code == 2
     assert len(list((tmp_path / "cache").iterdir())) == 1
+
+
+def test_a_file_that_could_not_be_read_for_a_moment_is_read_again(
+    shelf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, cache = tmp_path / "shelf", tmp_path / "c.json"
+    shutil.copytree(shelf, folder)
+    real = Path.open
+
+    def refuse(path: Path, *args: object, **options: object) -> object:
+        if path.name == "film.h5":
+            raise PermissionError(13, "Permission denied")
+        return real(path, *args, **options)  # type: ignore[call-overload]
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "open", refuse)
+        found = {entry.path: entry for entry in index_folder(folder, cache=cache)}
+        assert found["film.h5"].trouble.endswith("cannot be read: Permission denied")
+    found = {entry.path: entry for entry in index_folder(folder, cache=cache)}
+    assert found["film.h5"].title == "pull"
+
+
+def test_a_folder_that_cannot_be_read_is_one_line(
+    shelf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "shelf"
+    shutil.copytree(shelf, folder)
+    (folder / "other").mkdir()
+    real = os.scandir
+
+    def refuse(path: Path) -> object:
+        if Path(path).name == "other":
+            raise PermissionError(13, "Permission denied")
+        return real(path)
+
+    monkeypatch.setattr(os, "scandir", refuse)
+    answer = dearig("index", folder)
+    assert answer.code == 0
+    assert len(answer.out.splitlines()) == 5
+    assert f"other/: {folder / 'other'} cannot be read: Permission denied" in answer.out
+    with pytest.raises(InputError, match="other cannot be read"):
+        index_folder(folder / "other", cache=tmp_path / "c.json")
+
+
+@pytest.mark.parametrize("key", ["samples", "duration_s", "title", "complete"])
+def test_a_cache_of_another_kind_is_not_believed(shelf: Path, tmp_path: Path, key: str) -> None:
+    cache = tmp_path / "c.json"
+    first = index_folder(shelf, cache=cache)
+    kept = json.loads(cache.read_text("utf-8"))
+    kept["files"][1][3][key] = ["wrong"]
+    cache.write_text(json.dumps(kept), "utf-8")
+    assert lines(index_folder(shelf, cache=cache)) == lines(first)
