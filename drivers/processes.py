@@ -6,6 +6,7 @@ or ``numbers.py`` there would replace the standard library's module in a child p
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 from collections.abc import Iterator
@@ -14,8 +15,10 @@ from pathlib import Path
 from types import ModuleType
 
 import dearig
+import dearig.drivers
+from dearig.drivers import isolated
 
-__all__ = ["child_environment", "child_path", "isolated_spawn"]
+__all__ = ["child_environment", "child_path", "isolated_command", "isolated_spawn"]
 
 
 def child_path() -> list[str]:
@@ -40,6 +43,24 @@ def child_environment() -> dict[str, str]:
         "PYTHONPATH": os.pathsep.join(child_path()),
         "PYTHONSAFEPATH": "1",  # as the option -P
     }
+
+
+def isolated_command(module: str, *arguments: str) -> list[str]:
+    """Return the command of a child process that calls ``module.main(*arguments)``.
+
+    The child loads this package from the folder from which this process has it, and all else from
+    the standard library and the installed distributions; the rest of ``child_path`` is searched
+    last. ``-I`` keeps out the environment (``PYTHONPATH``, ``PYTHONSTARTUP``), the working folder
+    and the user's own site folder.
+    """
+    packages = {
+        package.__name__: str(Path(package.__path__[0]).resolve())
+        for package in (dearig, dearig.drivers)
+    }
+    places = {"packages": packages, "path": [e for e in child_path() if Path(e).is_absolute()]}
+    script = str(Path(isolated.__file__).resolve())
+    command = [sys.executable, "-I", "-X", "utf8", script, module, json.dumps(places)]
+    return [*command, *arguments]
 
 
 @contextmanager

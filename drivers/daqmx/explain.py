@@ -8,14 +8,29 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from dearig.drivers.errors import RigError
 
-__all__ = ["INPUT_OVERWRITTEN", "RESERVED", "TIMEOUT", "explained", "instrument_errors"]
+if TYPE_CHECKING:
+    from nidaqmx.errors import RpcError
 
+__all__ = [
+    "ABORTED",
+    "INPUT_OVERWRITTEN",
+    "RESERVED",
+    "TIMEOUT",
+    "explained",
+    "instrument_errors",
+]
+
+ABORTED = (-88708, -88709, -200088)  #: a reset ended the task, or somebody cleared it
 RESERVED = -50103  #: another task holds the card
 TIMEOUT = -200284  #: samples did not arrive in time
 INPUT_OVERWRITTEN = -200279  #: the reader was too late
+
+#: gRPC's words on a peer that answers in another protocol
+_NOT_GRPC = r"(?i)http/?2|http status|unexpected content-type"
 
 #: code -> (what happened and why, what to do)
 _KNOWN: dict[int, tuple[str, str]] = {
@@ -39,7 +54,10 @@ _KNOWN: dict[int, tuple[str, str]] = {
         "the sample rate is too high for so many channels",
         "lower card.sample_rate_Hz",
     ),
-    -200081: ("the sample rate is out of its range", "change card.sample_rate_Hz"),
+    -200081: (
+        "the conversions of all inputs do not fit between two samples",
+        "lower card.sample_rate_Hz or card.convert_interval_us, or read fewer inputs",
+    ),
     -200279: (
         "the inputs were read too late and the oldest samples were overwritten",
         "close other programs, lower card.sample_rate_Hz or enlarge card.ai_buffer_samples",
@@ -61,8 +79,8 @@ _KNOWN: dict[int, tuple[str, str]] = {
         "check that nothing else uses the card's clocks; reset it and try again",
     ),
     -200561: (
-        "the program wrote more channels than the task has",
-        "this is an error in the program; report it",
+        "a value to be output is beyond the range of its channel",
+        "compare card.ao_range_V, amplifier.gain_V_per_V and amplifier.offset_V with the rig",
     ),
     -200560: (
         "the task did not end in the expected time",
@@ -111,10 +129,26 @@ def instrument_errors(device: str, server: str | None) -> Iterator[None]:
     except nidaqmx.errors.DaqError as error:
         raise RigError(explained(device, error.error_code, str(error)), error.error_code) from error
     except nidaqmx.errors.RpcError as error:
-        raise RigError(
-            f"card {device}: its server {server} does not answer "
-            f"({getattr(error.rpc_code, 'name', error.rpc_code)}); check that it runs and that the "
-            f"network works"
-        ) from error
+        raise RigError(f"card {device}: {_server_fault(server, error)}") from error
     except nidaqmx.errors.Error as error:
         raise RigError(f"card {device}: {error}") from error
+
+
+def _server_fault(server: str | None, error: RpcError) -> str:
+    """Return the fault of ``server`` as a clause, with what to do."""
+    code = getattr(error.rpc_code, "name", str(error.rpc_code))
+    if code == "UNIMPLEMENTED":
+        return (
+            f"at {server} answers a server that does not know this call ({code}); it is not NI's "
+            f"gRPC device server with NI-DAQmx, or an older one: check the port, update the server"
+        )
+    details = getattr(error.__context__, "details", None)  # nidaqmx replaces gRPC's own words
+    if details is not None and re.search(_NOT_GRPC, details() or ""):
+        return (
+            f"at {server} answers a program that does not speak gRPC ({code}); it is not a DAQmx "
+            f"server: check the port"
+        )
+    return (
+        f"its server {server} does not answer ({code}); check that it runs and that the network "
+        f"works"
+    )

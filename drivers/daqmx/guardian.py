@@ -1,7 +1,8 @@
 """Guardian, seen from the run: a process that sets 0 V when the run no longer can.
 
 It detects that the run dies (the pipe between them closes) or freezes (no beat arrives). The run
-tells it when there is nothing to guard. It has its own interpreter and connection to the card.
+detects that the guardian dies or freezes: every word is acknowledged, and a word that is not
+acknowledged in time ends the run. The guardian has its own interpreter and connection to the card.
 """
 
 from __future__ import annotations
@@ -9,53 +10,108 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import queue
 import subprocess
-import sys
 import threading
+import time
 from collections import deque
-from typing import Protocol
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
 
+from dearig.drivers import sources
 from dearig.drivers.daqmx.address import Address
 from dearig.drivers.errors import RigError
-from dearig.drivers.processes import child_environment
+from dearig.drivers.processes import isolated_command
 from dearig.drivers.settings import RigSettings
 
-__all__ = ["WORD", "Guardian", "GuardianProcess"]
+__all__ = ["WORD", "Guardian", "GuardianProcess", "TakeOver"]
 
 #: Prefix of the guardian's lines for the run. All other lines on its error stream come from Python
 #: or from a library.
 WORD = "guardian> "
 
 _STARTS_WITHIN = 60.0  # s: an interpreter, the driver's library, a connection
+# s from a beat to its acknowledgement. With ten beats a second, a guardian that stops is noticed
+# within 0.5 s: up to 0.1 s to the next beat, this time, and up to 0.1 s to the read after it.
+_HEARS_WITHIN = 0.3
+_LATE = 0.05  # s of wall time for an acknowledgement that has arrived and was not read yet
+_ANSWERS_WITHIN = 0.5  # s from a word other than a beat to its acknowledgement
 _TAKES_OVER_WITHIN = 5.0  # s; it keeps trying after that, but the operator must be told
 _ENDS_WITHIN = 5.0  # s
 # s; a process that has ended has written its error by then, and the message must not wait longer
 _ERROR_WITHIN = 0.5
 _LINES_KEPT = 20  # of its error stream; the last line of a traceback names the error
-_LINE_MAX = 2000  # characters of a line
+_LINE_MAX = 20_000  # characters of a line; "ready" has a digest for each module
+
+
+@dataclass(frozen=True)
+class TakeOver:
+    """Guardian's report: it took the output to 0 V, or failed to.
+
+    ``why`` is the reason, ``at`` the time in s since 1970, ``seconds`` the time that it took.
+    ``error`` is empty if the voltage monitor confirmed 0 V.
+    """
+
+    why: str
+    at: float
+    seconds: float
+    error: str = ""
+
+    @property
+    def confirmed(self) -> bool:
+        """Return True if the voltage monitor showed 0 V."""
+        return not self.error
+
+    @property
+    def sentence(self) -> str:
+        """Return the report as a sentence."""
+        when = time.strftime("%H:%M:%S", time.localtime(self.at))
+        if self.error:
+            return (
+                f"the guardian acted at {when} ({self.why}), and THE OUTPUT COULD NOT BE TAKEN TO "
+                f"0 V ({self.error})"
+            )
+        return (
+            f"the guardian acted at {when} ({self.why}): the output was taken to 0 V within "
+            f"{self.seconds:.2f} s, and the voltage monitor confirmed it"
+        )
 
 
 class Guardian(Protocol):
-    """Guardian: takes over when a run dies or freezes."""
+    """Guardian: takes over when a run dies or freezes. No call blocks longer than it says."""
+
+    @property
+    def granted(self) -> tuple[str, ...]:
+        """Return what the system granted it, such as real-time priority, in words."""
+        ...
+
+    @property
+    def refused(self) -> tuple[str, ...]:
+        """Return what the system refused it, in words."""
+        ...
 
     def arm(self) -> None:
-        """Start to watch: silence means a frozen run. Raises ``RigError`` if it has ended."""
+        """Start to watch: silence means a frozen run. Raises ``RigError`` without an answer."""
         ...
 
     def beat(self) -> bool:
-        """Report that the run is alive; returns False if the guardian is not."""
+        """Report that the run is alive; returns False if the guardian is not. Never blocks."""
         ...
 
-    def last_error(self) -> str:
-        """Return why the guardian has ended, as far as that is known."""
+    def fault(self) -> str:
+        """Return why the guardian gives no answer, as far as that is known."""
+        ...
+
+    def report(self, within: float = 0.0) -> TakeOver | None:
+        """Return its last take-over since ``arm``, waiting up to ``within`` s for one."""
         ...
 
     def disarm(self) -> None:
         """Stop watching: the output is at 0 V."""
         ...
 
-    def take_over(self) -> None:
+    def take_over(self) -> TakeOver:
         """Request 0 V now, where the run cannot set it."""
         ...
 
@@ -67,32 +123,41 @@ class Guardian(Protocol):
 class GuardianProcess:
     """A guardian for the card at ``address``, started at once.
 
-    Raises ``RigError`` when it cannot be started or does not reach the card, with the last line
-    of its error stream.
+    Raises ``RigError`` when it cannot be started, does not reach the card or runs other sources
+    than this program, with the last line of its error stream. ``clock`` measures its answers.
+
+    At most one beat is on its way, because the next one waits for the acknowledgement. The pipe to
+    the guardian therefore never fills, and writing to it never blocks.
     """
 
-    def __init__(self, address: Address, settings: RigSettings) -> None:
+    def __init__(
+        self,
+        address: Address,
+        settings: RigSettings,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._clock = clock
         self._guards = self._trying = False
-        self._said: queue.Queue[str | None] = queue.Queue()  # None: the guardian has ended
+        self._news = threading.Condition()  # guards what the listener changes, down to _ended
+        self._unheard: deque[float] = deque()  # times of the words that are not acknowledged
+        self._ready: dict[str, Any] | None = None
+        self._refusal = ""  # sentence of a guardian that cannot start
+        self._reports = 0
+        self._report: TakeOver | None = None
+        self._ended = False
         self._errors: deque[str] = deque(maxlen=_LINES_KEPT)
         config = {
             "device": address.device,
             "server": address.server,
+            "folder": _working_folder(),
             # only the settings that give wiring, scaling and limits
             "settings": RigSettings.model_validate(
                 {name: getattr(settings, name) for name in RigSettings.model_fields}
             ).model_dump(mode="json"),
         }
         self._process = subprocess.Popen(  # noqa: S603  (this interpreter, a module of ours)
-            [
-                sys.executable,
-                "-P",
-                "-X",
-                "utf8",
-                "-m",
-                "dearig.drivers.daqmx.guardian_process",
-                json.dumps(config),
-            ],
+            isolated_command("dearig.drivers.daqmx.guardian_process", json.dumps(config)),
             stdin=subprocess.PIPE,
             # its standard output is the terminal's error stream, which outlives the run: its
             # messages to the operator must not pass through this process
@@ -100,7 +165,8 @@ class GuardianProcess:
             stderr=subprocess.PIPE,
             encoding="utf-8",
             errors="replace",
-            env=child_environment(),
+            # libraries look for files in the working folder, and it may be deleted
+            cwd=sources.ROOT,
             # ctrl-C at the terminal ends the run only: the guardian must outlive it
             start_new_session=os.name == "posix",
             creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
@@ -108,8 +174,8 @@ class GuardianProcess:
         self._listener = threading.Thread(target=self._listen, name="guardian", daemon=True)
         self._listener.start()
         try:
-            self._expect_word("ready", _STARTS_WITHIN)
-        except RigError:
+            self._await_ready()
+        except BaseException:
             self.close()
             raise
 
@@ -118,26 +184,55 @@ class GuardianProcess:
         """Process number."""
         return self._process.pid
 
+    @property
+    def granted(self) -> tuple[str, ...]:
+        """Return what the system granted it, such as real-time priority, in words."""
+        return tuple(self._ready["granted"]) if self._ready else ()
+
+    @property
+    def refused(self) -> tuple[str, ...]:
+        """Return what the system refused it, in words."""
+        return tuple(self._ready["refused"]) if self._ready else ()
+
     def arm(self) -> None:
-        """Start to watch: silence means a frozen run. Raises ``RigError`` if it has ended."""
-        if not self._send("arm"):
+        """Start to watch: silence means a frozen run. Raises ``RigError`` without an answer."""
+        with self._news:
+            self._report = None
+        if not self._ask("arm"):
             raise RigError(
-                f"the guardian process has ended ({self.last_error()}): nothing would take the "
+                f"the guardian process gives no answer ({self.fault()}): nothing would take the "
                 f"output to 0 V if this program died; start the run again"
             )
         self._guards = True
 
     def beat(self) -> bool:
-        """Report that the run is alive; returns False if the guardian is not."""
+        """Report that the run is alive; returns False if the guardian is not. Never blocks."""
+        if self._process.poll() is not None:
+            return False
+        with self._news:
+            if self._unheard and self._clock() - self._unheard[0] > _HEARS_WITHIN:
+                # this process may itself have been frozen, and its listener with it
+                self._news.wait_for(lambda: not self._unheard, _LATE)
+                return not self._unheard
+            if self._unheard:
+                return True
         return self._send("beat")
 
-    def last_error(self) -> str:
-        """Return why the guardian has ended, as far as that is known."""
+    def fault(self) -> str:
+        """Return why the guardian gives no answer, as far as that is known."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(_ERROR_WITHIN)
+        if self._process.poll() is None:
+            return "it is running and does not answer: it is stopped, or the computer is overloaded"
         self._listener.join(_ERROR_WITHIN)
         lines = [line for line in self._errors if line]
         return f"exit code {self._process.returncode}" + (f", {lines[-1]}" if lines else "")
+
+    def report(self, within: float = 0.0) -> TakeOver | None:
+        """Return its last take-over since ``arm``, waiting up to ``within`` s for one."""
+        with self._news:
+            self._news.wait_for(lambda: self._report is not None or self._ended, within)
+            return self._report
 
     def disarm(self) -> None:
         """Stop watching: the output is at 0 V."""
@@ -145,15 +240,26 @@ class GuardianProcess:
             self._guards = False
             self._send("disarm")
 
-    def take_over(self) -> None:
+    def take_over(self) -> TakeOver:
         """Request 0 V now. Raises ``RigError`` where the guardian does not set it."""
         if self._trying:
             raise RigError("the guardian process is still trying to reach the card")
-        if not self._send("take over"):
-            raise RigError(f"the guardian process has ended too ({self.last_error()})")
+        reports = self._reports
+        if not self._ask("take over"):
+            raise RigError(f"the guardian process gives no answer either ({self.fault()})")
         self._trying = True
-        self._expect_word("safe", _TAKES_OVER_WITHIN)
+        with self._news:
+            self._news.wait_for(lambda: self._reports > reports or self._ended, _TAKES_OVER_WITHIN)
+            report = self._report if self._reports > reports else None
+        if report is None:
+            raise RigError(
+                f"the guardian process has not taken the output to 0 V within "
+                f"{_TAKES_OVER_WITHIN:g} s, and goes on trying"
+            )
         self._trying = False
+        if not report.confirmed:
+            raise RigError(report.sentence)
+        return report
 
     def close(self) -> None:
         """End the guardian; one that still tries to reach the card goes on and reports the end."""
@@ -163,32 +269,60 @@ class GuardianProcess:
                 self._process.stdin.close()
         if self._trying:
             return
+        with self._news:
+            # one that does not answer is stopped; it must not wake up in a later run
+            self._news.wait_for(lambda: self._ended or not self._unheard, _ANSWERS_WITHIN)
+            answers = self._ended or not self._unheard
         try:
-            self._process.wait(_ENDS_WITHIN)
+            self._process.wait(_ENDS_WITHIN if answers else 0.0)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
         self._listener.join(_ENDS_WITHIN)
 
+    def _await_ready(self) -> None:
+        with self._news:
+            self._news.wait_for(
+                lambda: self._ready is not None or self._refusal or self._ended, _STARTS_WITHIN
+            )
+            ready, refusal, ended = self._ready, self._refusal, self._ended
+        if refusal:
+            raise RigError(f"the guardian process does not work: {refusal}")
+        if ready is None and ended:
+            raise RigError(f"the guardian process has ended ({self.fault()})")
+        if ready is None:
+            raise RigError(
+                f"the guardian process does not work: it was not ready within {_STARTS_WITHIN:g} s"
+            )
+        own = {"version": sources.version(), **sources.AT_START}
+        theirs = {"version": ready["version"], **ready["sources"]}
+        other = sorted(name for name, value in theirs.items() if value != own.get(name))
+        if other:
+            raise RigError(
+                f"the guardian process has other sources than this program ({', '.join(other)} in "
+                f"{sources.ROOT}): dearig was changed while this program was running; start it "
+                f"again"
+            )
+
+    def _ask(self, word: str) -> bool:
+        """Send ``word``; returns True once the guardian has acknowledged all words."""
+        if not self._send(word):
+            return False
+        with self._news:
+            self._news.wait_for(lambda: not self._unheard or self._ended, _ANSWERS_WITHIN)
+            return not self._unheard and not self._ended
+
     def _send(self, word: str) -> bool:
         if self._process.poll() is not None or self._process.stdin is None:
             return False
+        with self._news:
+            self._unheard.append(self._clock())
         try:
             self._process.stdin.write(word + "\n")
             self._process.stdin.flush()
         except (OSError, ValueError):
             return False
         return True
-
-    def _expect_word(self, word: str, within: float) -> None:
-        try:
-            said = self._said.get(timeout=within)
-        except queue.Empty:
-            said = f"it did not answer within {within:g} s"
-        if said is None:
-            raise RigError(f"the guardian process has ended ({self.last_error()})")
-        if said != word:
-            raise RigError(f"the guardian process does not work: {said}")
 
     def _listen(self) -> None:
         """Read the guardian's lines at once, so that it never waits for this process.
@@ -201,10 +335,33 @@ class GuardianProcess:
             with stream:
                 while line := stream.readline(_LINE_MAX):
                     if line.startswith(WORD):
-                        self._said.put(line.removeprefix(WORD).strip())
+                        self._hear(*line.removeprefix(WORD).strip().split(" ", 1))
                     else:
                         self._errors.append(line.strip())
-        self._said.put(None)
+        with self._news:
+            self._ended = True
+            self._news.notify_all()
+
+    def _hear(self, word: str, rest: str = "") -> None:
+        with self._news:
+            if word == "heard" and self._unheard:
+                self._unheard.popleft()
+            elif word == "ready":
+                self._ready = json.loads(rest)
+            elif word == "cannot":
+                self._refusal = rest
+            elif word == "acted":
+                self._report = TakeOver(**json.loads(rest))
+                self._reports += 1
+            self._news.notify_all()
+
+
+def _working_folder() -> str | None:
+    """Return the folder for relative paths of the settings, None if it was deleted."""
+    try:
+        return str(Path.cwd())
+    except OSError:
+        return None
 
 
 def _terminal() -> int:

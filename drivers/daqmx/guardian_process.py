@@ -1,13 +1,15 @@
 """Process of the guardian: it reads beats on standard input, and sets 0 V when they stop.
 
 Words in, one a line: ``arm``, ``beat``, ``disarm``, ``take over``, ``bye``. Words out, on the error
-stream with the prefix ``WORD``: ``ready``, ``safe`` after a take-over, or a sentence about a fault.
-Standard output goes to the terminal, for the operator.
+stream with the prefix ``WORD``: ``ready`` with a JSON object (version and digests of the sources,
+what the system granted) or ``cannot`` with a sentence; ``heard`` for each word; ``acted`` with a
+JSON object after a take-over. Standard output goes to the terminal, for the operator.
 """
 
 from __future__ import annotations
 
 import contextlib
+import gc
 import json
 import queue
 import signal
@@ -15,9 +17,10 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 
-from dearig.drivers.daqmx.guardian import WORD
+from dearig.drivers import priority, sources
+from dearig.drivers.daqmx.guardian import WORD, TakeOver
 from dearig.drivers.daqmx.link import Link
 from dearig.drivers.daqmx.outputs import Outputs
 from dearig.drivers.errors import RigError
@@ -44,6 +47,8 @@ class Guard:
 
     def hear(self, word: str | None) -> bool:
         """Act on ``word``, None for the end of the run's pipe; returns False to end."""
+        if word is not None:
+            self.say("heard")
         if word == "arm":
             self.armed = True
         elif word == "disarm":
@@ -61,38 +66,38 @@ class Guard:
         self.take_over("the run is frozen")
 
     def take_over(self, why: str) -> None:
-        """Set 0 V and the enable line low."""
+        """Set 0 V and the enable line low, then report it to the run and to the operator."""
         self.armed = False
+        at, start, error = time.time(), time.monotonic(), ""
         try:
             self.zero()
-        except RigError as error:
-            self.tell(f"guardian: {why}, and THE OUTPUT COULD NOT BE TAKEN TO 0 V ({error})")
-            self.say(f"the output could not be taken to 0 V: {error}")
-            return
-        self.tell(f"guardian: {why}; the output was taken to 0 V")
-        self.say("safe")
+        except RigError as failed:
+            error = str(failed)
+        report = TakeOver(why, at, time.monotonic() - start, error)
+        self.say(f"acted {json.dumps(asdict(report))}")
+        self.tell(report.sentence)
 
 
-def main() -> int:
+def main(configuration: str) -> int:
     """Guard until the run says ``bye`` or ends."""
     # ctrl-C ends the run only; the guardian must outlive it
     for name in ("SIGINT", "SIGHUP", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    config = json.loads(sys.argv[1])
-    settings = RigSettings.model_validate(config["settings"])
+    config = json.loads(configuration)
+    settings = RigSettings.model_validate(config["settings"], context=config)
     try:
         link = Link(config["server"], settings)
         outputs = Outputs(link, config["device"], settings)
-        outputs.read("voltage_monitor")  # loads and connects everything before it is needed
+        outputs.prepare()
     except RigError as error:
-        _say(str(error))
+        _say(f"cannot {error}")
         return 1
 
     guard = Guard(lambda: _insist(outputs), _say, _tell)
     words: queue.SimpleQueue[str | None] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(words,), daemon=True).start()
-    _say("ready")
+    _say(f"ready {json.dumps(_ready())}")
     while True:
         try:
             word = words.get(timeout=settings.guardian.timeout_s if guard.armed else None)
@@ -101,8 +106,23 @@ def main() -> int:
             continue
         if not guard.hear(word):
             break
+    outputs.close()
     link.close()
     return 0
+
+
+def _ready() -> dict[str, object]:
+    """Prepare to act without delay, and return what the run must know of this process."""
+    gc.collect()
+    gc.freeze()
+    gc.disable()  # the loop makes no cycles, and a collection would delay a take-over
+    granted, refused = priority.claim()
+    return {
+        "version": sources.version(),
+        "sources": sources.loaded(),
+        "granted": granted,
+        "refused": refused,
+    }
 
 
 def _insist(outputs: Outputs) -> None:
@@ -133,7 +153,3 @@ def _say(word: str) -> None:
 def _tell(sentence: str) -> None:
     with contextlib.suppress(OSError):  # the terminal is closed
         print(sentence, flush=True)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

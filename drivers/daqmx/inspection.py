@@ -48,6 +48,7 @@ def inspect(device: str, server: str | None, settings: RigSettings) -> Inspectio
         return Inspection((Finding(name, "driver", str(error), verdict="wrong"), unreached))
     findings: list[Finding] = []
     reached = False
+    outputs = Outputs(link, device, settings)
     try:
         with instrument_errors(device, server):
             from nidaqmx.system import Device, System
@@ -71,7 +72,6 @@ def inspect(device: str, server: str | None, settings: RigSettings) -> Inspectio
         if any(finding.verdict == "wrong" for finding in findings):
             return Inspection(tuple(findings))
         findings.append(_timing(name, link, device, settings))
-        outputs = Outputs(link, device, settings)
         monitors = Monitors.of_volts(
             settings.amplifier, outputs.read("voltage_monitor"), outputs.read("current_monitor")
         )
@@ -85,6 +85,7 @@ def inspect(device: str, server: str | None, settings: RigSettings) -> Inspectio
             findings.append(unreached)
         return Inspection(tuple(findings))
     finally:
+        outputs.close()
         link.close()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dearig.drivers.daqmx.certificates import read_certificates
@@ -47,11 +48,13 @@ class Link:
             _check_security(server, settings.card)
         self.security = None if server is None else _security(server, settings.card)
         try:
-            import nidaqmx  # noqa: F401
+            import nidaqmx.errors
         except ImportError as error:
             raise RigError(
                 f'the Python package nidaqmx is not installed ({error}): pip install "dearig[rig]"'
             ) from error
+        # a task that could not be cleared is reported as an error of its own
+        warnings.filterwarnings("ignore", category=nidaqmx.errors.DaqResourceWarning)
         if server is not None:
             self._channel = _channel_with_deadline(
                 server, settings.guardian.link_timeout_s, settings.card

@@ -5,17 +5,18 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
 from dearig.drivers.daqmx.address import Address
-from dearig.drivers.daqmx.explain import TIMEOUT, explained
-from dearig.drivers.daqmx.guardian import Guardian, GuardianProcess
+from dearig.drivers.daqmx.explain import ABORTED, TIMEOUT, explained
+from dearig.drivers.daqmx.guardian import Guardian, GuardianProcess, TakeOver
 from dearig.drivers.daqmx.link import Link
 from dearig.drivers.daqmx.outputs import Outputs
 from dearig.drivers.daqmx.tasks import ClockedTasks, identify_card
-from dearig.drivers.errors import RigError
+from dearig.drivers.errors import RigError, RigStateError
 from dearig.drivers.gate import GatedWaveform, ramp_down
 from dearig.drivers.identity import instruments
 from dearig.drivers.rig import Block, Event, RigIdentity, RigState, expect
@@ -28,6 +29,7 @@ log = logging.getLogger(__name__)
 _BLOCK = 0.1  # s; the library's users recommend ten reads a second
 _WAIT = 0.25  # s for samples, between two beats of the guardian
 _OVERDUE = 2.0  # s without a sample while the clock should run
+_REPORT_WITHIN = 0.5  # s from the end of a task by the guardian to the guardian's report
 
 
 def open_daqmx_rig(
@@ -76,6 +78,7 @@ class DaqmxRig:
             self._outputs.zero()
         except RigError:
             self._guardian.close()
+            self._outputs.close()
             self._link.close()
             raise
 
@@ -83,6 +86,11 @@ class DaqmxRig:
     def state(self) -> RigState:
         """Return the state of the rig."""
         return self._state
+
+    @property
+    def taken_over(self) -> TakeOver | None:
+        """Return what the guardian did since the rig was armed, None if it did nothing."""
+        return self._guardian.report()
 
     @property
     def waiting(self) -> float:
@@ -145,10 +153,13 @@ class DaqmxRig:
 
     def start(self) -> None:
         """Start the sample clock."""
-        with self._lock:
+        with self._lock, self._guardian_named():
             expect(self._state, "start", RigState.ARMED)
             tasks, run = self._loaded()
             self._guardian.beat()
+            if self._guardian.refused:
+                refused = ", ".join(self._guardian.refused)
+                run.events.append(Event(0, "info", f"the system refused the guardian: {refused}"))
             tasks.start()
             run.heard = self._clock()
             self._state = RigState.RUNNING
@@ -157,11 +168,12 @@ class DaqmxRig:
         """Wait for the next block and return it, or None after the last one.
 
         Raises ``RigError`` for a fault of the card, for missing samples, and, after a ramp to 0 V,
-        for a guardian process that died. Raises ``RigStateError`` where the rig was made safe.
+        for a guardian process that gave no answer. Raises ``RigStateError`` where the rig was made
+        safe.
         """
         while True:
             # release the lock between two waits, so that other threads can make the rig safe
-            with self._lock:
+            with self._lock, self._guardian_named():
                 if self._state is RigState.DONE:
                     return None
                 expect(self._state, "read", RigState.RUNNING)
@@ -170,7 +182,11 @@ class DaqmxRig:
                 if not guarded and not run.unguarded:
                     run.unguarded = True
                     run.events.append(
-                        Event(run.delivered, "fault", "the guardian process died: ramping to 0 V")
+                        Event(
+                            run.delivered,
+                            "fault",
+                            "no answer from the guardian process: ramping to 0 V",
+                        )
                     )
                     self._stop(tasks, run)
                 if run.delivered == run.total:
@@ -183,7 +199,7 @@ class DaqmxRig:
 
     def stop(self) -> None:
         """End the run early with a ramp to 0 V; acquired samples stay readable."""
-        with self._lock:
+        with self._lock, self._guardian_named():
             if self._state is RigState.DONE:
                 return  # the waveform ended just before the call
             expect(self._state, "stop", RigState.RUNNING)
@@ -218,6 +234,7 @@ class DaqmxRig:
             finally:
                 self._state = RigState.CLOSED
                 self._guardian.close()
+                self._outputs.close()
                 self._link.close()
 
     def _fetch(self, tasks: ClockedTasks, run: _Run) -> Block | None:
@@ -247,6 +264,8 @@ class DaqmxRig:
         before = self._clock()
         # keep at least the first sample, which is 0 V: a recording needs one
         played = max(1, tasks.hold())
+        if played < run.delivered:
+            raise RigError(explained(self._address.device, ABORTED[0], ""), ABORTED[0])
         if played >= run.total:
             return
         ramp = ramp_down(run.waveform, played - 1, self._settings.limits.ramp_down_s)
@@ -267,9 +286,24 @@ class DaqmxRig:
         self._state = RigState.DONE
         if run.unguarded:
             raise RigError(
-                f"the guardian process died during the run ({self._guardian.last_error()}), which "
-                f"was therefore ramped to 0 V; find out what ended it before the next run"
+                f"the guardian process gave no answer during the run ({self._guardian.fault()}), "
+                f"which was therefore ramped to 0 V; find out what ended or stopped it before the "
+                f"next run"
             )
+
+    @contextmanager
+    def _guardian_named(self) -> Iterator[None]:
+        """Add to an error of the card what the guardian did, where it has taken over."""
+        try:
+            yield
+        except RigStateError:
+            raise
+        except RigError as error:
+            # a task that was ended from elsewhere: the guardian is about to say that it did so
+            acted = self._guardian.report(_REPORT_WITHIN if error.code in ABORTED else 0.0)
+            if acted is None:
+                raise
+            raise RigError(f"{error}; {acted.sentence}", error.code) from error
 
     def _loaded(self) -> tuple[ClockedTasks, _Run]:
         if self._tasks is None or self._run is None:
@@ -283,12 +317,16 @@ class DaqmxRig:
             if tasks is not None:
                 try:
                     tasks.release()
-                except RigError as error:  # the reset clears all tasks
+                except RigError as error:  # the reset aborts all tasks
                     log.warning("%s", error)
             self._outputs.zero(force=True)
         finally:
             if tasks is not None:
-                tasks.disable()
+                try:
+                    tasks.disable()
+                except RigError as error:  # such as a task that the guardian's reset has ended
+                    log.warning("%s; the enable line is set by a new task", error)
+                    self._outputs.disable()
 
     def _drop_tasks(self) -> None:
         tasks, self._tasks, self._run = self._tasks, None, None

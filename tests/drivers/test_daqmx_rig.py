@@ -15,6 +15,7 @@ from dearig.config.rigfile import RigFile
 from dearig.drivers.contract.rig import RigContract, begin, drain, lobes, play
 from dearig.drivers.daqmx import inspect
 from dearig.drivers.daqmx.address import Address
+from dearig.drivers.daqmx.guardian import TakeOver
 from dearig.drivers.daqmx.rig import DaqmxRig
 from dearig.drivers.errors import RigError
 from dearig.drivers.rig import RigState
@@ -33,6 +34,9 @@ class Watcher:
         self.words: list[str] = []
         self.dead = False
         self.fails = ""
+        self.granted: tuple[str, ...] = ()
+        self.refused: tuple[str, ...] = ()
+        self.reported: TakeOver | None = None
 
     def arm(self) -> None:
         self.words.append("arm")
@@ -40,16 +44,20 @@ class Watcher:
     def beat(self) -> bool:
         return not self.dead
 
-    def last_error(self) -> str:
+    def fault(self) -> str:
         return "exit code -9"
+
+    def report(self, within: float = 0.0) -> TakeOver | None:  # noqa: ARG002
+        return self.reported
 
     def disarm(self) -> None:
         self.words.append("disarm")
 
-    def take_over(self) -> None:
+    def take_over(self) -> TakeOver:
         self.words.append("take over")
         if self.fails:
             raise RigError(self.fails)
+        return TakeOver("asked", 0.0, 0.1)
 
     def close(self) -> None:
         self.words.append("close")
@@ -213,13 +221,15 @@ def test_a_dead_guardian_ramps_the_run_down(bench):
             bench.guardian.dead = len(blocks) > 1
 
     begin(bench.rig, LONG)
-    with pytest.raises(RigError, match="guardian process died"):
+    with pytest.raises(
+        RigError, match=r"guardian process gave no answer during the run \(exit code -9\)"
+    ):
         go_on()
     command = np.concatenate([block.counts[0] for block in blocks])
     assert command[-1] == 0
     assert 500 <= command.size < 0.5 * LONG.voltage.size
     events = [event for block in blocks for event in block.events]
-    assert "guardian process died" in events[0].message
+    assert "no answer from the guardian process" in events[0].message
     assert bench.device.wire_voltage() == 0.0
 
 

@@ -1,7 +1,10 @@
 """The guardian's judgement: which words and which silence take the output to 0 V."""
 
+import json
+
 import pytest
 
+from dearig.drivers.daqmx.guardian import TakeOver
 from dearig.drivers.daqmx.guardian_process import Guard
 from dearig.drivers.errors import RigError
 
@@ -16,6 +19,10 @@ class Bench:
         self._fails = fails
         self.guard = Guard(self._zero, self.said.append, self.told.append)
 
+    def reports(self) -> list[TakeOver]:
+        acted = [word.removeprefix("acted ") for word in self.said if word.startswith("acted ")]
+        return [TakeOver(**json.loads(report)) for report in acted]
+
     def _zero(self) -> None:
         self.zeroed += 1
         if self._fails:
@@ -26,7 +33,7 @@ class Bench:
     ("words", "goes_on", "zeroed", "told"),
     [
         (["arm", "beat", "beat"], True, 0, ""),
-        (["arm", "beat", None], False, 1, "the run has died; the output was taken to 0 V"),
+        (["arm", "beat", None], False, 1, "(the run has died): the output was taken to 0 V"),
         (["arm", None], False, 1, "the run has died"),
         (["arm", "disarm", None], False, 0, ""),
         (["arm", "beat", "disarm", "bye"], False, 0, ""),
@@ -45,7 +52,9 @@ def test_words(words, goes_on, zeroed, told):
     assert results[:-1] == [True] * (len(words) - 1)
     assert results[-1] is goes_on
     assert bench.zeroed == zeroed
-    assert bench.said == ["safe"] * zeroed
+    assert bench.said.count("heard") == len([word for word in words if word is not None])
+    assert len(bench.reports()) == zeroed
+    assert all(report.confirmed for report in bench.reports())
     assert told in "".join(bench.told[-1:])
 
 
@@ -64,4 +73,5 @@ def test_what_cannot_be_done_is_told_to_the_run_and_to_the_person():
     bench.guard.hear("arm")
     bench.guard.hear("take over")
     assert "THE OUTPUT COULD NOT BE TAKEN TO 0 V (the server does not answer)" in bench.told[0]
-    assert bench.said == ["the output could not be taken to 0 V: the server does not answer"]
+    assert [report.error for report in bench.reports()] == ["the server does not answer"]
+    assert not bench.reports()[0].confirmed

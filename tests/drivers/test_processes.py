@@ -13,6 +13,7 @@ import dearig.drivers
 import dearig.model
 import dearig.sim_backend
 from dearig.config.rigfile import RigFile
+from dearig.drivers import isolated
 from dearig.drivers.daqmx.address import Address
 from dearig.drivers.daqmx.guardian import GuardianProcess
 from dearig.drivers.errors import RigError
@@ -103,8 +104,9 @@ def test_spawned_worker_starts_from_a_main_module_of_the_working_folder(tmp_path
 
 
 def test_guardian_that_cannot_import_says_why(tmp_path, monkeypatch):
-    (tmp_path / "pydantic.py").write_text('raise ImportError("pydantic is broken")\n')
-    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    broken = tmp_path / "isolated.py"
+    broken.write_text('raise ImportError("pydantic is broken")\n')
+    monkeypatch.setattr(isolated, "__file__", str(broken))
     with pytest.raises(RigError, match=r"has ended \(exit code 1, ImportError: pydantic is bro"):
         GuardianProcess(Address("Dev1"), RigFile())
 
@@ -119,7 +121,7 @@ def test_guardian_that_was_killed_is_not_armed_and_says_so():
     with served() as bench:
         guardian = GuardianProcess(Address("Dev1", f"127.0.0.1:{bench.server.port}"), RigFile())
         os.kill(guardian.pid, 9)
-        with pytest.raises(RigError, match=r"the guardian process has ended \(exit code -?\d+"):
+        with pytest.raises(RigError, match=r"gives no answer \(exit code -?\d+"):
             _beat_until_it_is_dead(guardian)
         guardian.close()
 
@@ -144,6 +146,8 @@ def test_every_child_process_of_the_program_gets_this_environment():
                 started.append(source.name)
                 assert "'-P'" in call, source
                 assert "env=child_environment()" in call, source
+            if "isolated_command(" in call and ast.unparse(node.func) == "subprocess.Popen":
+                started.append(source.name)
             if ast.unparse(node.func).endswith("get_context"):
                 started.append(source.name)
                 assert "with isolated_spawn():" in source.read_text(encoding="utf-8"), source
