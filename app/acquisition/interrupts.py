@@ -4,15 +4,36 @@ from __future__ import annotations
 
 import signal
 import threading
+import weakref
 from collections.abc import Callable
 from types import FrameType, TracebackType
 
-__all__ = ["Interrupts"]
+__all__ = ["Interrupts", "terminal_closed"]
 
 # the voltage must not stay on when a terminal is closed or a service stopped
-_NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+_REASONS = {
+    "SIGINT": "by the operator",
+    "SIGTERM": "by the signal SIGTERM, which asks a program to end",
+    "SIGHUP": "because the terminal was closed",
+    "SIGBREAK": "by the operator",
+}
+_OPERATOR, _CLOSED = _REASONS["SIGINT"], _REASONS["SIGHUP"]
 
 _Handler = Callable[[int, FrameType | None], object] | int | None
+
+_runs: weakref.WeakSet[Interrupts] = weakref.WeakSet()
+
+
+def terminal_closed() -> None:
+    """End the run of this program, if there is one: nobody sees what it says any more.
+
+    Nothing happens where the signal of a closed terminal is ignored, as under ``nohup``.
+    """
+    hangup = getattr(signal, "SIGHUP", None)
+    if hangup is not None and signal.getsignal(hangup) == signal.SIG_IGN:
+        return
+    for run in list(_runs):
+        run.ask(_CLOSED)
 
 
 class Interrupts:
@@ -20,26 +41,49 @@ class Interrupts:
 
     An exception at the first ctrl-C could come between the reading and the writing of a block, and
     the samples around the ramp to 0 V would be lost. The second ends a run on a rig that does not
-    answer. Handlers that a host program has set stay, and ignored signals stay ignored. Outside
-    the main thread nothing is installed, because signals are not delivered there.
+    answer. A terminal that is closed sends its signal more than once: it counts once. Handlers that
+    a host program has set stay, and ignored signals stay ignored. Outside the main thread nothing
+    is installed, because signals are not delivered there.
     """
 
     def __init__(self) -> None:
         self._asked = self._at_once = False
         self._raises = True
+        self._reason = _OPERATOR
+        self._count = 0
         self._before: dict[int, _Handler] = {}
+
+    @property
+    def reason(self) -> str:
+        """Who or what asked first, as in "interrupted by the operator"."""
+        return self._reason
+
+    @property
+    def by_operator(self) -> bool:
+        """True if the operator asked first."""
+        return self._reason == _OPERATOR
+
+    @property
+    def count(self) -> int:
+        """Number of times that the operator has asked; a closed terminal does not count."""
+        return self._count
 
     def asked(self) -> bool:
         """Return whether the run is to end."""
         return self._asked
 
-    def ask(self) -> None:
+    def ask(self, reason: str = _OPERATOR) -> None:
         """Ask for the end of the run, as the first ctrl-C does; may be called from any thread."""
+        if not self._asked:
+            self._reason = reason
         self._asked = True
+        if reason != _CLOSED:
+            self._count += 1
 
     def ask_at_once(self) -> None:
         """Ask for 0 V at once, without a ramp; may be called from any thread."""
-        self._asked = self._at_once = True
+        self.ask()
+        self._at_once = True
 
     def at_once(self) -> bool:
         """Return whether the run is to end without a ramp."""
@@ -51,8 +95,9 @@ class Interrupts:
 
     def __enter__(self) -> Interrupts:
         """Install the handlers."""
+        _runs.add(self)
         if threading.current_thread() is threading.main_thread():
-            for name in _NAMES:
+            for name in _REASONS:
                 number = getattr(signal, name, None)
                 if number is None:
                     continue
@@ -69,11 +114,13 @@ class Interrupts:
         trace: TracebackType | None,
     ) -> None:
         """Restore the handlers that were there before."""
+        _runs.discard(self)
         for number, before in self._before.items():
             signal.signal(number, before)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002
-        if self._asked and self._raises:
+        again, reason = self._asked, _REASONS[signal.Signals(number).name]
+        self.ask(reason)
+        if again and reason != _CLOSED and self._raises:
             self._raises = False
             raise KeyboardInterrupt
-        self._asked = True

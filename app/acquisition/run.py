@@ -1,17 +1,19 @@
-"""A run: sequence, gate, rig and recording, with interlocks on every sample and 0 V at its end."""
+"""A run: sequence, gate, rig and recording, with interlocks on every sample and 0 V at its end.
+
+The loop that reads the rig touches no disk and no terminal: both can stall, and a voltage is up.
+"""
 
 from __future__ import annotations
 
 import logging
-import shutil
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from dearig.acquisition.check import check_rig
+from dearig.acquisition.event_log import EventLog
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.overlay import Overlay, OverlayModel
 from dearig.acquisition.plan import Plan, plan
@@ -24,7 +26,6 @@ from dearig.drivers.interlocks import Interlocks, Trip
 from dearig.drivers.rig import Block, Event, Rig, RigIdentity
 from dearig.errors import (
     DearigError,
-    DiskFault,
     InputError,
     InstrumentFault,
     Interrupted,
@@ -37,6 +38,7 @@ from dearig.progress import Progress, quiet
 from dearig.recording.disk_space import check_room
 from dearig.recording.files import check_output
 from dearig.recording.metadata import RunMetadata
+from dearig.recording.recorder import Recorder
 from dearig.recording.writer import RecordingWriter
 from dearig.sim_backend.faults import FaultPlan
 
@@ -44,7 +46,10 @@ __all__ = ["RunObserver", "RunOptions", "RunResult", "open_rig", "record"]
 
 log = logging.getLogger(__name__)
 
-_DISK_INTERVAL = 1.0  # s between two checks of the free space on the disk
+#: s at 0 V after which the operator is told that the disk is still being waited for.
+_TELL_AFTER = 5.0
+#: Number of ctrl-C after which the run stops waiting for the disk.
+_GIVE_UP = 2
 
 
 @dataclass(frozen=True)
@@ -188,6 +193,12 @@ def record(
             except RigError as error:
                 raise InstrumentFault(str(error)) from error
             check_room(out, len(identity.channels), rate, waveform.voltage.size)
+            stepped = None
+            if overlay is not None:
+                try:
+                    stepped = Overlay(overlay.actuator, identity.channels, rate)
+                except ModelError as error:
+                    raise InputError(f"the overlay model: {error}") from error
             metadata = RunMetadata(
                 film=rig_file.as_film(),
                 load=rig_file.as_load(),
@@ -195,28 +206,33 @@ def record(
                 notes=options.notes,
                 operator=options.operator,
                 sequence_toml=loaded.toml,
+                model_toml=overlay.toml if overlay is not None else "",
                 configuration=options.configuration,
                 seed=options.seed if is_simulated(address) else None,
             )
             writer = RecordingWriter(
                 out, identity, rate, waveform.voltage.size, metadata,
-                overwrite=options.overwrite, fsync=options.fsync,
+                overwrite=options.overwrite, fsync=options.fsync, overlay=stepped is not None,
             )  # fmt: skip
             observer = observer or RunObserver()
             observer.started(planned, identity, rate)
             interlocks = Interlocks(
                 rig_file, identity.channels, rate, planned.displacement_of_samples, planned.voltage
             )
-            stepped = None
-            if overlay is not None:
-                try:
-                    stepped = Overlay(overlay.actuator, identity.channels, rate)
-                except ModelError as error:
-                    raise InputError(f"the overlay model: {error}") from error
-            model_toml = overlay.toml if overlay is not None else ""
-            run = _Run(rig, writer, interlocks, interrupts, observer, clock, stepped, model_toml)
-            events = run.follow(waveform.voltage.size, progress)
-        return RunResult(out, writer.samples, rate, "finished", events, waveform.margins)
+            recorder = Recorder(
+                writer,
+                ramp_s=rig_file.limits.ramp_down_s,
+                model=None if stepped is None else stepped.advance,
+                waits=is_simulated(address) and not options.paced,
+                hurried=interrupts.asked,
+                clock=clock,
+            )
+            with EventLog() as event_log:
+                run = _Run(
+                    rig, recorder, interlocks, interrupts, observer, event_log, progress, clock
+                )
+                events = run.follow(waveform.voltage.size)
+        return RunResult(out, recorder.samples, rate, "finished", events, waveform.margins)
     finally:
         _close(rig)
 
@@ -227,33 +243,33 @@ class _Run:
     def __init__(
         self,
         rig: Rig,
-        writer: RecordingWriter,
+        recorder: Recorder,
         interlocks: Interlocks,
         interrupts: Interrupts,
         observer: RunObserver,
+        event_log: EventLog,
+        progress: Progress,
         clock: Callable[[], float],
-        overlay: Overlay | None,
-        model_toml: str,
     ) -> None:
         self._rig = rig
-        self._writer = writer
+        self._recorder = recorder
         self._interlocks = interlocks
         self._interrupts = interrupts
         self._observer = observer
+        self._event_log = event_log
+        self._progress = progress
         self._clock = clock
-        self._disk_checked = clock()
         self._events: list[str] = []
-        self._overlay = overlay
-        self._model_toml = model_toml
-        self._modelled: list[np.ndarray] = []  # m, of the overlay, in single precision
         self._trip: Trip | None = None  # the first one; later ones follow from it
+        self._waiting_since: float | None = None  # for the disk, at 0 V
+        self._asked_before = 0  # calls to end the run before it waited for the disk
 
-    def follow(self, samples: int, progress: Progress) -> tuple[str, ...]:
+    def follow(self, samples: int) -> tuple[str, ...]:
         """Play and record; every exit takes the rig to 0 V first and then closes the file."""
-        writer = self._writer
+        recorder = self._recorder
         try:
             try:
-                self._play(samples, progress)
+                self._play(samples)
             finally:
                 # 0 V first: a disk that is slow or full must not keep the voltage up
                 self._interrupts.close()
@@ -266,20 +282,22 @@ class _Run:
             if self._interrupts.at_once():
                 raise self._ended_at_once()
             if self._interrupts.asked():
-                kept = self._end("interrupted by the operator; ramped down to 0 V")
-                raise Interrupted(f"interrupted: the voltage was ramped down to 0 V, and {kept}")
-            if writer.samples == 0:
+                kept = self._end(f"interrupted {self._interrupts.reason}; ramped down to 0 V")
+                raise self._interrupted(f"the voltage was ramped down to 0 V, and {kept}")
+            recorder.drain(self._given_up, self._progress)
+            recorder.check()
+            if recorder.samples == 0:
                 raise InstrumentFault(f"the rig gave no samples; {self._end('no samples')}")
-            self._close_file("finished")
+            recorder.close("finished", given_up=self._given_up, progress=self._progress)
         except KeyboardInterrupt as error:
             raise self._ended_at_once() from error
         except RigError as error:
             kept = self._end(f"instrument fault: {error}", f"instrument fault: {error}", "fault")
             raise InstrumentFault(f"{error}; the rig was made safe, and {kept}") from error
         except DearigError as error:
-            if writer.closed:
+            if recorder.closed:
                 raise
-            kept = self._end(f"ended early: {error}", f"ended early: {error}", "fault")
+            kept = self._end(f"ended early: {error}", f"ended early: {error}", "fault", error)
             safe = "" if isinstance(error, NotSafe) else "the rig was made safe, and "
             raise type(error)(f"{error}; {safe}{kept}") from error
         finally:
@@ -288,11 +306,18 @@ class _Run:
         return tuple(self._events)
 
     def _ended_at_once(self) -> Interrupted:
-        kept = self._end("interrupted by the operator", "interrupted by the operator: 0 V at once")
-        return Interrupted(f"interrupted: the output was taken to 0 V at once, and {kept}")
+        how = f"interrupted {self._interrupts.reason}"
+        kept = self._end(how, f"{how}: 0 V at once")
+        return self._interrupted(f"the output was taken to 0 V at once, and {kept}")
 
-    def _play(self, samples: int, progress: Progress) -> None:
-        rig, interrupts = self._rig, self._interrupts
+    def _interrupted(self, done: str) -> Interrupted:
+        interrupts = self._interrupts
+        why = "" if interrupts.by_operator else f" {interrupts.reason}"
+        return Interrupted(f"interrupted{why}: {done}")
+
+    def _play(self, samples: int) -> None:
+        rig, recorder, interrupts = self._rig, self._recorder, self._interrupts
+        self._progress("recording", 0.0)  # a display is made ready before there is a voltage
         rig.arm()
         if interrupts.asked():
             return
@@ -301,40 +326,45 @@ class _Run:
             stopping = False
             while (block := rig.read()) is not None:
                 self._take(block)
-                progress("recording", self._writer.samples / samples)
+                self._progress("recording", recorder.received / samples)
                 trip = self._watch(block)
-                if trip is not None and trip.action == "at once":
+                if (trip is not None and trip.action == "at once") or interrupts.at_once():
                     return
-                if interrupts.at_once():
-                    return
-                if (trip is not None or interrupts.asked()) and not stopping:
-                    stopping = True
-                    if trip is None:
-                        self._note(
-                            self._writer.samples,
-                            "warning",
-                            "interrupted by the operator: ramping down to 0 V",
-                        )
-                    rig.stop()
+                if stopping:
+                    continue
+                if (fault := recorder.fault) is not None:
+                    what = fault if isinstance(fault, DearigError) else "an error of the program"
+                    self._note(recorder.received, "fault", f"{what}: ramping down to 0 V")
+                elif interrupts.asked() and trip is None:
+                    self._note(
+                        recorder.received,
+                        "warning",
+                        f"interrupted {interrupts.reason}: ramping down to 0 V",
+                    )
+                elif trip is None:
+                    continue
+                stopping = True
+                rig.stop()
         except (RigError, KeyboardInterrupt):
             raise
         except BaseException:
-            # the instruments work: after a disk fault or a program error the voltage is ramped down
+            # the instruments work: after an error of the program the voltage is ramped down
             _ramp_down(rig)
             raise
 
     def _take(self, block: Block) -> None:
-        self._writer.append(block)
-        if self._overlay is not None:
-            self._modelled.append(self._overlay.advance(block).astype(np.float32))
+        self._recorder.append(block)
         self._observer.block(block)
         for event in block.events:
             self._tell(event)
 
     def _watch(self, block: Block) -> Trip | None:
         """Return the interlock that trips now, if any; every one is recorded as an event."""
+        free = self._recorder.free_bytes()
         trips = self._interlocks.watch(block)
-        trips += [trip for trip in (self._interlocks.late(self._rig.waiting), self._disk()) if trip]
+        late = self._interlocks.late(self._rig.waiting)
+        full = None if free is None else self._interlocks.disk(free)
+        trips += [trip for trip in (late, full) if trip is not None]
         for trip in trips:
             self._note(trip.sample, "fault", f"interlock {trip.interlock}: {trip.message}")
             self._trip = self._trip or trip
@@ -343,62 +373,55 @@ class _Run:
         # the stronger action is taken
         return next((trip for trip in trips if trip.action == "at once"), trips[0])
 
-    def _disk(self) -> Trip | None:
-        now = self._clock()
-        if now - self._disk_checked < _DISK_INTERVAL:
-            return None
-        self._disk_checked = now
-        folder = self._writer.path.parent
-        try:
-            free = shutil.disk_usage(folder).free
-        except OSError as error:
-            raise DiskFault(
-                f"{folder} is gone: {error.strerror}; check that the drive is connected"
-            ) from error
-        return self._interlocks.disk(free)
-
     def _note(self, sample: int, level: str, message: str) -> None:
         event = Event(sample, level, message)
-        self._writer.event(sample, level, message)
+        self._recorder.event(sample, level, message)
         self._tell(event)
 
-    def _end(self, outcome: str, event: str = "", level: str = "warning") -> str:
+    def _end(
+        self,
+        outcome: str,
+        event: str = "",
+        level: str = "warning",
+        said: DearigError | None = None,
+    ) -> str:
         """Close the recording of a run that ended early, and return a clause that names its file.
 
         A disk that fails here too is reported with it, and must not hide what ended the run.
+        ``said`` is an error that the caller reports.
         """
-        writer = self._writer
-        if writer.closed:
-            return f"what was recorded is in {writer.path}"
-        if writer.samples == 0:
-            writer.discard()
-            return "nothing was recorded"
-        trouble = ""
+        recorder = self._recorder
+        if recorder.closed:
+            return f"what was recorded is in {recorder.path}"
+        trouble = recorder.fault
         try:
-            if event:
-                writer.event(writer.samples - 1, level, event)
+            recorder.close(outcome, event, level, given_up=self._given_up, progress=self._progress)
         except DearigError as error:
-            trouble = str(error)
-        try:
-            self._close_file(outcome)
-        except DearigError as error:
-            trouble = str(error)
-        where = f"what was recorded is in {writer.path} ({writer.samples} samples)"
-        return f"{where}; {trouble}" if trouble else where
+            trouble = error
+        if recorder.samples == 0:
+            where = "nothing was recorded"
+        else:
+            where = f"what was recorded is in {recorder.path} ({recorder.samples} samples)"
+        return where if trouble is None or trouble is said else f"{where}; {trouble}"
 
-    def _close_file(self, outcome: str) -> None:
-        """Finish the recording, with the displacement of the overlay model."""
-        modelled = None
-        if self._overlay is not None and self._modelled:
-            modelled = np.concatenate(self._modelled)[: self._writer.samples]
-        if modelled is not None and modelled.size < self._writer.samples:
-            modelled = None  # the model failed in a block that was written
-        model = "" if modelled is None else self._model_toml
-        self._writer.close(outcome, displacement_model=modelled, model_toml=model)
+    def _given_up(self) -> bool:
+        """Return whether the operator stops waiting for the disk: has asked for it twice."""
+        asked = self._interrupts.count
+        if self._waiting_since is None:
+            self._waiting_since, self._asked_before = self._clock(), asked
+        elif self._clock() - self._waiting_since > _TELL_AFTER:
+            self._waiting_since = math.inf
+            recorder = self._recorder
+            log.warning(
+                "the output is at 0 V; %d of %d samples are still being written to %s; press "
+                "ctrl-C twice to stop waiting for the disk",
+                recorder.received - recorder.samples, recorder.received, recorder.path,
+            )  # fmt: skip
+        return asked - self._asked_before >= _GIVE_UP
 
     def _tell(self, event: Event) -> None:
         self._events.append(f"{event.level}: {event.message}")
-        log.log(_LEVELS.get(event.level, logging.INFO), "%s", event.message)
+        self._event_log.add(event)
         self._observer.event(event)
 
 
@@ -431,5 +454,4 @@ def _close(rig: Rig) -> None:
         ) from error
 
 
-_LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "fault": logging.ERROR}
 _DONE = {"ramp": "the voltage was ramped down", "at once": "the output was taken at once"}

@@ -25,6 +25,7 @@ from dearig.recording.layout import (
     iso_time,
 )
 from dearig.recording.lock import FileLock, ReplacedError
+from dearig.recording.modelled import keep_modelled
 from dearig.recording.opening import opened
 from dearig.recording.physical import SLICE, Counts
 from dearig.recording.pyramid import complete_pyramid
@@ -47,8 +48,6 @@ def finish(
     complete: bool,
     outcome: str,
     ended: float | None,
-    displacement_model: np.ndarray | None = None,
-    model_toml: str = "",
     identifier: str = "",
     repair: Callable[[Patched], None] | None = None,
     fsync: bool = False,
@@ -73,16 +72,11 @@ def finish(
             with h5py.File(changes, "r+", libver=LIBVER) as file:
                 entry = file["entry"]
                 samples = _write_physical(entry)
-                if displacement_model is not None:
-                    model = displacement_model[:samples]
-                    _write_field(entry["data"], "displacement_model", samples, {})[:] = model
-                    entry["data"].attrs["auxiliary_signals"] = fixed(["displacement_model"])
+                keep_modelled(entry, samples)
                 for plot in (entry["data"], entry.get("overview")):
                     # a very long run has its physical values, and so its time, in counts only
                     if plot is not None and "time" in plot:
                         attach_time(plot)
-                if model_toml:
-                    put_text(entry, "model", model_toml)
                 if ended is not None:
                     put_text(entry, "end_time", iso_time(ended))
                 entry.attrs["samples"] = samples

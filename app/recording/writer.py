@@ -26,7 +26,7 @@ import numpy as np
 
 from dearig.drivers.channels import CHANNEL_NAMES, RESERVED_NAMES, Channel
 from dearig.drivers.rig import Block, Event, RigIdentity
-from dearig.errors import DearigError, DiskFault, InputError, InstrumentFault
+from dearig.errors import DearigError, DiskFault, InputError
 from dearig.recording.checksums import ChecksumWriter
 from dearig.recording.disk_space import advice
 from dearig.recording.files import (
@@ -52,6 +52,7 @@ from dearig.recording.layout import (
 )
 from dearig.recording.lock import ReplacedError, create_locked
 from dearig.recording.metadata import RunMetadata
+from dearig.recording.modelled import ModelledWriter
 from dearig.recording.physical import TEMPERATURE_UNITS, write_channel
 from dearig.recording.provenance import gather, write_provenance
 from dearig.recording.pyramid import PyramidWriter
@@ -74,9 +75,10 @@ class RecordingWriter:
     ``identity`` names the channels in the order of the blocks. ``rate_Hz`` is that of the sample
     clock. ``samples_expected`` is only stored, so that a reader sees how many samples are missing.
     Without a title in ``metadata`` the run takes the name of its sequence, without a seed that of
-    the identity. ``now`` returns Unix time in s. With ``fsync`` every flush reaches the disk, so
-    that flushed samples survive a power cut. A recording that is overwritten stays until the first
-    flush of samples, as ``FILE.h5.old``.
+    the identity. With ``overlay`` every block comes with the displacement of an overlay model; the
+    metadata's ``model_toml`` has its parameters. ``now`` returns Unix time in s. With ``fsync``
+    every flush reaches the disk, so that flushed samples survive a power cut. A recording that is
+    overwritten stays until the first flush of samples, as ``FILE.h5.old``.
 
     Raises ``InputError`` before anything is changed if the file exists (unless ``overwrite``), its
     folder does not, or the sequence is not TOML. ``ValueError`` is a programming error.
@@ -92,6 +94,7 @@ class RecordingWriter:
         *,
         overwrite: bool = False,
         fsync: bool = False,
+        overlay: bool = False,
         now: Callable[[], float] = time.time,
     ) -> None:
         if not (math.isfinite(rate_Hz) and rate_Hz > 0.0):
@@ -138,6 +141,9 @@ class RecordingWriter:
                     write_sample(entry, metadata)
                     write_provenance(entry, provenance)
                     self._lay_out_run(entry, identity, samples_expected)
+                    self._modelled = ModelledWriter(entry, self._chunk) if overlay else None
+                    if metadata.model_toml:
+                        put_text(entry, "model", metadata.model_toml)
                     self._note_wall_clock(started)
                     self._file.flush()
                     self._file.swmr_mode = True
@@ -160,7 +166,7 @@ class RecordingWriter:
         data.attrs["rate_Hz"] = self._rate
         data.attrs["samples_expected"] = int(samples_expected)
         # about one second: every flush writes a changed chunk again
-        chunk = int(min(max(self._rate, 1024), 65536))
+        self._chunk = chunk = int(min(max(self._rate, 1024), 65536))
         self._counts = []
         for place, channel in enumerate(self._channels):
             counts = data.create_dataset(
@@ -209,6 +215,16 @@ class RecordingWriter:
         return self._path
 
     @property
+    def channels(self) -> int:
+        """Number of channels of a block."""
+        return len(self._channels)
+
+    @property
+    def rate_Hz(self) -> float:  # noqa: N802
+        """Rate of the sample clock in Hz."""
+        return self._rate
+
+    @property
     def samples(self) -> int:
         """Samples appended so far."""
         return self._written
@@ -229,11 +245,10 @@ class RecordingWriter:
             self._path.unlink(missing_ok=True)
         self._lock.release()
 
-    def append(self, block: Block) -> None:
-        """Write the next block and its events.
+    def append(self, block: Block, modelled: np.ndarray | None = None) -> None:
+        """Write the next block and its events, with the displacement ``modelled`` (n,) m.
 
-        Raises ``InstrumentFault`` if samples before it are missing or come a second time, and
-        records an event; ``DiskFault`` if the disk cannot be written.
+        Raises ``DiskFault`` if the disk cannot be written.
         """
         counts = block.counts
         if counts.ndim != 2 or counts.shape[0] != len(self._channels) or counts.dtype != np.int16:
@@ -242,7 +257,9 @@ class RecordingWriter:
                 f"not {counts.dtype} {counts.shape}"
             )
         if block.start != self._written:
-            raise self._out_of_step(block.start)
+            raise ValueError(f"a block starts at sample {block.start}, not at {self._written}")
+        if (modelled is None) != (self._modelled is None):
+            raise ValueError("an overlay model is recorded from the first block to the last")
         end = self._written + counts.shape[1]
         with self._writing():
             self._check_room()
@@ -251,19 +268,12 @@ class RecordingWriter:
                 dataset[self._written : end] = row
             self._pyramid.add(counts)
             self._checksums.add(counts)
+            if self._modelled is not None and modelled is not None:
+                self._modelled.append(modelled)
             self._written = end
             self._dirty = True
             self._append_events(block.events)
             self._flush_when_due()
-
-    def _out_of_step(self, start: int) -> InstrumentFault:
-        lost = start - self._written
-        what = f"{lost} samples are missing" if lost > 0 else f"{-lost} samples came twice"
-        self.event(self._written, "fault", f"{what} from here on; the run was ended")
-        return InstrumentFault(
-            f"{self._path}: a block starts at sample {start}, expected sample {self._written}: "
-            f"{what}; the rig cannot keep up, record again at a lower rate"
-        )
 
     def event(self, sample: int, level: str, message: str) -> None:
         """Record an event at ``sample``; ``level`` is info, warning or fault."""
@@ -365,31 +375,19 @@ class RecordingWriter:
         if self._fsync:
             os.fsync(self._file.id.get_vfd_handle())
 
-    def close(
-        self,
-        outcome: str = "finished",
-        *,
-        displacement_model: np.ndarray | None = None,
-        model_toml: str = "",
-    ) -> None:
+    def close(self, outcome: str = "finished") -> None:
         """Finish the recording: physical values, end time, sample count; calling it again is fine.
 
-        ``outcome`` is a sentence on how the run ended. ``displacement_model`` (samples,) m is that
-        of the live overlay, ``model_toml`` its parameters. Raises ``DiskFault`` if the physical
-        values cannot be written; the counts are in the file then.
+        ``outcome`` is a sentence on how the run ended. Raises ``DiskFault`` if the physical values
+        cannot be written; the counts are in the file then.
         """
         if self._closed:
             return
-        if displacement_model is not None and displacement_model.shape != (self._written,):
-            raise ValueError(
-                f"the overlay has shape {displacement_model.shape}, "
-                f"the recording {self._written} samples"
-            )
         self._closed = True
         with self._lock:
-            self._finish(outcome, displacement_model, model_toml)
+            self._finish(outcome)
 
-    def _finish(self, outcome: str, displacement_model: np.ndarray | None, model_toml: str) -> None:
+    def _finish(self, outcome: str) -> None:
         moment = self._now()
         with self._writing():
             self._write_pending(moment)
@@ -404,8 +402,6 @@ class RecordingWriter:
                 complete=True,
                 outcome=outcome,
                 ended=moment,
-                displacement_model=displacement_model,
-                model_toml=model_toml,
                 fsync=self._fsync,
             )
         except ReplacedError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -33,6 +34,7 @@ from dearig.errors import (
 from dearig.model.actuator import Actuator
 from dearig.model.material import TABLE_3
 from dearig.recording import open_recording
+from dearig.recording.recorder import Recorder, is_writing
 from dearig.recording.writer import RecordingWriter
 from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.rig import SimulatedRig
@@ -135,6 +137,19 @@ def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         return dearig("record", sequence, "--out", tmp_path / "run.h5")
 
     return run
+
+
+@pytest.fixture
+def in_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rig is read when the disk has taken the block before, as on a clock in real time."""
+    append = Recorder.append
+
+    def written(recorder: Recorder, block: Block) -> None:
+        append(recorder, block)
+        with recorder._changed:
+            recorder._changed.wait_for(lambda: not recorder._queue)
+
+    monkeypatch.setattr(Recorder, "append", written)
 
 
 def closed_at_zero(rig: Troubled, last: str = "close") -> bool:
@@ -283,12 +298,13 @@ def test_an_interlock_ends_the_run_at_zero_volts(
         assert run.voltage_command[-1] == pytest.approx(0.0, abs=0.2)
 
 
+@pytest.mark.usefixtures("in_step")
 def test_a_disk_that_gets_full_ends_the_run_before_it_is(
     command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ticks = iter(np.arange(0.0, 100.0, 0.15))
     monkeypatch.setattr(
-        "dearig.acquisition.run.shutil.disk_usage", lambda _: SimpleNamespace(free=80_000_000)
+        "dearig.recording.recorder.shutil.disk_usage", lambda _: SimpleNamespace(free=80_000_000)
     )
     rig = Troubled("", lambda: None)
     monkeypatch.setattr("dearig.acquisition.run.open_rig", lambda *_, **__: rig)
@@ -374,6 +390,7 @@ def full_disk(*_: object) -> None:
     raise DiskFault("run.h5 cannot be written: No space left on device; see that it has room")
 
 
+@pytest.mark.usefixtures("in_step")
 def test_a_full_disk_does_not_keep_the_voltage_up(
     command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -381,14 +398,14 @@ def test_a_full_disk_does_not_keep_the_voltage_up(
     append = RecordingWriter.append
     close = RecordingWriter.close
 
-    def failing(self: RecordingWriter, block: Block) -> None:
+    def failing(self: RecordingWriter, block: Block, modelled: None) -> None:
         if block.start == 600:
             full_disk()
-        append(self, block)
+        append(self, block, modelled)
 
-    def noted(self: RecordingWriter, *arguments: object, **options: object) -> None:
+    def noted(self: RecordingWriter, outcome: str) -> None:
         rig.diary.append(f"file closed with the rig {rig.state.value}")
-        close(self, *arguments, **options)  # type: ignore[arg-type]
+        close(self, outcome)
 
     monkeypatch.setattr(RecordingWriter, "append", failing)
     monkeypatch.setattr(RecordingWriter, "close", noted)
@@ -402,6 +419,93 @@ def test_a_full_disk_does_not_keep_the_voltage_up(
     assert closed_at_zero(rig)
     run = open_recording(tmp_path / "run.h5")
     assert (run.complete, run.samples) == (True, 600)
+
+
+class Stalled:
+    """A disk that takes nothing until it is opened, under a rig that does not wait for it."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, rig: Troubled) -> None:
+        self.rig = rig
+        self.open = threading.Event()
+        append = RecordingWriter.append
+
+        def stalled(writer: RecordingWriter, block: Block, modelled: None) -> None:
+            self.open.wait()
+            append(writer, block, modelled)
+
+        monkeypatch.setattr(RecordingWriter, "append", stalled)
+        monkeypatch.setattr("dearig.acquisition.run.open_rig", lambda *_, **__: rig)
+        # the clock of a paced rig does not wait
+        self.options = RunOptions(paced=True)
+
+
+LONG = """\
+name = "long hold"
+lead_in_s = 0.4
+tail_s = 0.1
+[[segment]]
+kind = "ramp"
+to_kV = 2.0
+duration_s = 0.5
+[[segment]]
+kind = "hold"
+voltage_kV = 2.0
+duration_s = 14.0
+[[segment]]
+kind = "ramp"
+to_kV = 0.0
+duration_s = 0.5
+"""
+
+
+def test_a_stalled_disk_does_not_delay_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk = Stalled(monkeypatch, rig := Troubled("make safe", lambda: disk.open.set()))
+    result = record(LOADED, "sim", RIG_FILE, tmp_path / "run.h5", disk.options)
+    assert closed_at_zero(rig)
+    assert not any(line.startswith("stop at") for line in rig.diary)
+    run = open_recording(tmp_path / "run.h5")
+    assert (run.samples, run.outcome) == (result.samples, "finished") == (1501, "finished")
+
+
+def test_a_disk_that_stalls_for_too_long_ends_the_run_by_a_ramp(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk = Stalled(monkeypatch, rig := Troubled("make safe", lambda: disk.open.set()))
+    loaded = parse_sequence(LONG, "hold", Path())
+    with pytest.raises(DiskFault, match=rf"disk of {tmp_path} is 12 s behind.*was made safe"):
+        record(loaded, "sim", RIG_FILE, tmp_path / "run.h5", disk.options)
+    assert closed_at_zero(rig)
+    assert "stop at 2000 V" in rig.diary
+    run = open_recording(tmp_path / "run.h5")
+    assert run.complete
+    assert run.outcome.startswith(f"ended early: the disk of {tmp_path} is 12 s behind the run")
+    assert any(e.message.endswith("ramping down to 0 V") for e in run.events)
+    # the ramp is recorded, and no sample is missing before it
+    assert run.voltage_command is not None
+    assert run.voltage_command[-1] == pytest.approx(0.0, abs=0.2)
+    assert np.abs(np.diff(run.voltage_command)).max() < 20.0
+
+
+def test_ctrl_c_twice_stops_waiting_for_a_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk = Stalled(monkeypatch, rig := Troubled("", lambda: None))
+
+    def pressing(stage: str, fraction: float) -> None:
+        if stage == "writing":
+            assert rig.inner.output == fraction == 0.0
+            assert rig.diary[-1] == "make safe"
+            key()
+
+    with pytest.raises(DiskFault, match=r"not taken the last 1501 of 1501 .* made safe, and noth"):
+        record(LOADED, "sim", RIG_FILE, tmp_path / "run.h5", disk.options, progress=pressing)
+    assert closed_at_zero(rig)
+    assert is_writing()
+    disk.open.set()
+    next(thread for thread in threading.enumerate() if thread.name == "recording").join()
+    assert open_recording(tmp_path / "run.h5").samples == 1501
 
 
 def test_a_disk_that_is_full_to_the_end_keeps_the_counts(

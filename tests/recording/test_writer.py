@@ -13,9 +13,10 @@ from dearig.drivers.channels import Channel, Scaling
 from dearig.drivers.rig import Block, Event, RigIdentity
 from dearig.errors import DearigError, InputError, InstrumentFault
 from dearig.model.material import THESIS_FILM, THESIS_LOAD, Film, Load
-from dearig.recording import open_recording
+from dearig.recording import open_recording, recover
 from dearig.recording import writer as writer_module
 from dearig.recording.provenance import git_revision
+from dearig.recording.verify import verify
 from tests.tools.recordings import CHANNELS, IDENTITY, RATE, SEQUENCE, Clock, run_counts
 from tests.tools.recordings import write_run as write
 from tests.tools.recordings import writer as make
@@ -239,20 +240,17 @@ def test_channels_it_cannot_record(
     assert not list(tmp_path.iterdir())
 
 
-def test_lost_samples_are_a_fault(tmp_path: Path) -> None:
+def test_what_is_no_block_is_not_written(tmp_path: Path) -> None:
     recorder = make(tmp_path / "run.h5")
     recorder.append(Block(0, run_counts(100)))
-    with pytest.raises(InstrumentFault, match="sample 150, expected sample 100: 50 samples are"):
+    with pytest.raises(ValueError, match="starts at sample 150, not at 100"):
         recorder.append(Block(150, run_counts(100)))
-    with pytest.raises(InstrumentFault, match="60 samples came twice"):
-        recorder.append(Block(40, run_counts(100)))
     with pytest.raises(ValueError, match=r"counts \(4, n\), not float64"):
         recorder.append(Block(100, np.zeros((4, 10))))
+    with pytest.raises(ValueError, match="from the first block to the last"):
+        recorder.append(Block(100, run_counts(100)), np.zeros(100))
     recorder.close()
-    assert [(e.sample, e.level, e.message) for e in open_recording(recorder.path).events] == [
-        (100, "fault", "50 samples are missing from here on; the run was ended"),
-        (100, "fault", "60 samples came twice from here on; the run was ended"),
-    ]
+    assert open_recording(recorder.path).samples == 100
 
 
 def test_a_run_that_fails_keeps_what_it_had(tmp_path: Path) -> None:
@@ -311,20 +309,42 @@ def test_messages_of_any_length_and_script(tmp_path: Path) -> None:
     assert second.message.endswith("\N{GREEK SMALL LETTER LAMDA}...")
 
 
-def test_the_overlay_and_its_parameters(tmp_path: Path) -> None:
+@pytest.mark.parametrize("long", [False, True])
+def test_the_overlay_and_its_parameters(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, long: bool
+) -> None:
+    if long:
+        monkeypatch.setattr("dearig.recording.finish.PHYSICAL_MAX", 50)
     path = tmp_path / "run.h5"
     overlay = np.linspace(0.0, 1e-3, 100)
     overlay[:10] = np.nan
-    recorder = make(path)
-    recorder.append(Block(0, run_counts(100)))
-    with pytest.raises(ValueError, match=r"shape \(3,\)"):
-        recorder.close(displacement_model=np.zeros(3))
-    recorder.close("stopped by the operator", displacement_model=overlay, model_toml="mu = 1\n")
+    recorder = make(path, overlay=True, model_toml="mu = 1\n")
+    recorder.append(Block(0, run_counts(100)[:, :60]), overlay[:60])
+    with pytest.raises(ValueError, match="from the first block to the last"):
+        recorder.append(Block(60, run_counts(100)[:, 60:]))
+    recorder.append(Block(60, run_counts(100)[:, 60:]), overlay[60:])
+    recorder.close("stopped by the operator")
     recorder.close()
+    assert verify(path).sound
     run = open_recording(path)
-    np.testing.assert_array_equal(run.displacement_model, overlay)
+    np.testing.assert_allclose(run.displacement_model, overlay, rtol=1e-6)
+    assert run.displacement is not None
+    assert run.unit("displacement_model") == "m"
     assert run.model_toml == "mu = 1\n"
     assert run.outcome == "stopped by the operator"
+
+
+def test_the_overlay_of_a_run_that_was_killed(tmp_path: Path) -> None:
+    path, copy = tmp_path / "run.h5", tmp_path / "copy.h5"
+    recorder = make(path, overlay=True, model_toml="mu = 1\n")
+    recorder.append(Block(0, run_counts(100)), np.full(100, 1e-3))
+    recorder._flush_all(1.8e9)
+    copy.write_bytes(path.read_bytes())
+    recorder.close()
+    assert open_recording(copy).samples == 100
+    assert recover(copy, now=lambda: 4e9)
+    assert verify(copy).sound
+    np.testing.assert_allclose(open_recording(copy).displacement_model, 1e-3, rtol=1e-6)
 
 
 def test_a_run_without_a_lead_in_counts_from_its_first_reading(tmp_path: Path) -> None:

@@ -1,0 +1,316 @@
+"""The recording of a run on a thread of its own: a disk that stalls does not delay the run.
+
+The loop that reads the rig and checks its interlocks only puts blocks into a queue. The thread
+takes them out, writes them, looks at the disk every second, and closes the file at the end. HDF5's
+lock is held while a write stalls, so the loop must make no call of h5py.
+"""
+
+from __future__ import annotations
+
+import shutil
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dearig.drivers.rig import Block, Event
+from dearig.errors import DearigError, DiskFault, InstrumentFault
+from dearig.progress import Progress, quiet
+from dearig.recording.files import in_words
+from dearig.recording.writer import RecordingWriter
+
+__all__ = ["HOLDS", "LOOK_INTERVAL", "Recorder", "is_writing"]
+
+#: Samples that wait for the disk, in s of the run: a stall of 10 s, and what waited before it (a
+#: flush is due every quarter of a second) and comes before the disk has caught up.
+HOLDS = 12.0
+#: s of the run that are kept beyond that, besides its ramp to 0 V: the reader's last blocks.
+LAST_BLOCKS = 1.0
+#: s between two looks at the disk.
+LOOK_INTERVAL = 1.0
+#: s between two calls of ``progress`` and ``given_up`` while the run waits for the disk at 0 V.
+POLL = 0.1
+
+_THREAD = "recording"
+_COUNT_BYTES = 2
+
+
+def is_writing() -> bool:
+    """Return True while a recorder's thread lives, also one whose end nobody waits for any more.
+
+    Python and HDF5 wait for it when they exit, which does not end on a disk that does not answer.
+    """
+    return any(thread.name == _THREAD for thread in threading.enumerate())
+
+
+@dataclass(frozen=True)
+class _End:
+    outcome: str
+    event: str
+    level: str
+
+
+class Recorder:
+    """Writes a run with ``writer``; the methods are called by the run's loop, and are quick.
+
+    ``ramp_s`` is the time in s of a ramp to 0 V, which is recorded too after the disk has fallen
+    behind. ``model`` returns the displacement (n,) m of an overlay model for each block. With
+    ``waits`` the rig waits for its reader, as a simulated rig without a real clock: a full queue
+    then delays ``append`` while the disk takes data and ``hurried`` is False. ``clock`` returns s.
+    """
+
+    def __init__(
+        self,
+        writer: RecordingWriter,
+        *,
+        ramp_s: float = 0.0,
+        model: Callable[[Block], np.ndarray] | None = None,
+        waits: bool = False,
+        hurried: Callable[[], bool] = lambda: False,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._writer = writer
+        self._model = model
+        self._waits = waits
+        self._hurried = hurried
+        self._clock = clock
+        second = _COUNT_BYTES * writer.channels * writer.rate_Hz
+        self._bytes_max = int(second * HOLDS)
+        self._bytes_last = int(second * (HOLDS + ramp_s + LAST_BLOCKS))
+        self._looked = clock()
+        # the thread and the loop share what follows, under this lock
+        self._changed = threading.Condition()
+        self._queue: deque[Block | Event] = deque()
+        self._bytes = 0
+        self._received = 0
+        self._fault: BaseException | None = None
+        self._dropping = False
+        self._free: int | None = None
+        self._end: _End | None = None
+        self._ended = False
+        self._end_fault: BaseException | None = None
+        self._given_up: DiskFault | None = None
+        self._thread = threading.Thread(target=self._work, name=_THREAD, daemon=True)
+        self._thread.start()
+
+    @property
+    def path(self) -> Path:
+        """Path of the recording."""
+        return self._writer.path
+
+    @property
+    def received(self) -> int:
+        """Samples that ``append`` has taken."""
+        return self._received
+
+    @property
+    def samples(self) -> int:
+        """Samples that are written."""
+        return self._writer.samples
+
+    @property
+    def closed(self) -> bool:
+        """True from the first call of ``close`` on."""
+        return self._end is not None
+
+    @property
+    def fault(self) -> BaseException | None:
+        """Why the recording cannot go on, None while it can; ``append`` then drops samples."""
+        return self._fault
+
+    def check(self) -> None:
+        """Raise ``fault``, if there is one."""
+        if self._fault is not None:
+            raise self._fault
+
+    def free_bytes(self) -> int | None:
+        """Return the free bytes of the disk if they were looked at since the last call."""
+        free, self._free = self._free, None
+        return free
+
+    def append(self, block: Block) -> None:
+        """Take the next block and its events.
+
+        Raises ``InstrumentFault`` if samples before it are missing or come a second time, and
+        records an event. A failure of the disk is in ``fault``.
+        """
+        if block.start != self._received:
+            raise self._out_of_step(block.start)
+        # a copy: a driver may use its array again
+        counts = np.array(block.counts)
+        with self._changed:
+            if self._waits:
+                self._wait_for_room(counts.nbytes)
+            self._received += counts.shape[1]
+            if self._bytes and self._bytes + counts.nbytes > self._bytes_max:
+                self._fault = self._fault or DiskFault(self._behind())
+            if self._bytes + counts.nbytes > max(self._bytes_last, counts.nbytes):
+                self._dropping = True  # later blocks too: a recording has no gaps
+            if self._dropping:
+                return
+            self._queue.append(Block(block.start, counts, block.events))
+            self._bytes += counts.nbytes
+            self._changed.notify_all()
+
+    def event(self, sample: int, level: str, message: str) -> None:
+        """Take an event at ``sample``; ``level`` is info, warning or fault."""
+        with self._changed:
+            if not self._dropping:
+                self._queue.append(Event(sample, level, message))
+                self._changed.notify_all()
+
+    def _out_of_step(self, start: int) -> InstrumentFault:
+        lost = start - self._received
+        what = f"{lost} samples are missing" if lost > 0 else f"{-lost} samples came twice"
+        self.event(self._received, "fault", f"{what} from here on; the run was ended")
+        return InstrumentFault(
+            f"a block of the rig starts at sample {start}, expected sample {self._received}: "
+            f"{what}; the rig cannot keep up, record again at a lower rate"
+        )
+
+    def _wait_for_room(self, size: int) -> None:
+        began = self._clock()
+        while self._bytes + size > max(self._bytes_max, size) and not self._dropping:
+            if self._hurried() or self._clock() - began > HOLDS:
+                return
+            self._changed.wait(POLL)
+
+    def _behind(self) -> str:
+        rate = self._writer.rate_Hz
+        late = self._bytes / (_COUNT_BYTES * self._writer.channels * rate)
+        return (
+            f"the disk of {self._writer.path.absolute().parent} is {late:.3g} s behind the run, "
+            f"and no more samples fit into memory: it does not answer, or it is too slow; see that "
+            f"it is connected, or record to another disk"
+        )
+
+    # ------------------------------------------------------------ at the end of the run, at 0 V
+
+    def drain(
+        self, given_up: Callable[[], bool] = lambda: False, progress: Progress = quiet
+    ) -> None:
+        """Wait until the disk has taken all samples, or cannot.
+
+        ``progress`` is called meanwhile, and so is ``given_up``: where it returns True this
+        raises ``DiskFault``, and so does every later call.
+        """
+        self._wait(lambda: not self._queue and not self._bytes, given_up, progress)
+
+    def close(
+        self,
+        outcome: str,
+        event: str = "",
+        level: str = "warning",
+        *,
+        given_up: Callable[[], bool] = lambda: False,
+        progress: Progress = quiet,
+    ) -> None:
+        """Write what waits, then ``event`` at the last sample, and finish the recording.
+
+        Without a sample there is no recording: its file is deleted. Raises what kept the disk from
+        finishing it. ``given_up`` and ``progress`` are those of ``drain``. Calling it again is
+        fine.
+        """
+        with self._changed:
+            if self._end is None:
+                self._end = _End(outcome, event, level)
+                self._changed.notify_all()
+        self._wait(lambda: self._ended, given_up, progress)
+        self._thread.join()
+        fault, self._end_fault = self._end_fault, None
+        if fault is not None:
+            raise fault
+
+    def _wait(
+        self, done: Callable[[], bool], given_up: Callable[[], bool], progress: Progress
+    ) -> None:
+        if self._given_up is not None:
+            raise self._given_up
+        while True:
+            with self._changed:
+                if self._changed.wait_for(done, POLL):
+                    return
+            progress("writing", self.samples / max(self._received, 1))
+            if given_up():
+                self._given_up = DiskFault(
+                    f"the disk of {self._writer.path.absolute().parent} had not taken the last "
+                    f"{self._received - self.samples} of {self._received} samples when the "
+                    f"operator stopped waiting for it; finish the file with dearig recover "
+                    f"{self._writer.path}"
+                )
+                raise self._given_up
+
+    # ------------------------------------------------------------ the thread
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._queue or self._end, LOOK_INTERVAL)
+                item = self._queue[0] if self._queue else None
+                end = self._end
+            if item is None and end is not None:
+                break
+            try:
+                if item is not None:
+                    self._write(item)
+                self._look_when_due()
+            except Exception as error:  # noqa: BLE001  (the loop raises it)
+                self._fail(error)
+            with self._changed:
+                if item is not None and self._queue:
+                    self._queue.popleft()
+                    self._bytes -= item.counts.nbytes if isinstance(item, Block) else 0
+                self._changed.notify_all()
+        try:
+            self._finish(end)
+        except Exception as error:  # noqa: BLE001  (``close`` raises it)
+            self._end_fault = error
+        with self._changed:
+            self._ended = True
+            self._changed.notify_all()
+
+    def _write(self, item: Block | Event) -> None:
+        if isinstance(item, Event):
+            self._writer.event(item.sample, item.level, item.message)
+        else:
+            self._writer.append(item, None if self._model is None else self._model(item))
+
+    def _fail(self, error: Exception) -> None:
+        with self._changed:
+            self._fault = self._fault or error
+            self._dropping = True
+            self._queue.clear()
+            self._bytes = 0
+
+    def _look_when_due(self) -> None:
+        now = self._clock()
+        if now - self._looked < LOOK_INTERVAL:
+            return
+        self._looked = now
+        folder = self._writer.path.parent
+        try:
+            self._free = shutil.disk_usage(folder).free
+        except OSError as error:
+            raise DiskFault(
+                f"the folder {folder} is gone ({in_words(error)}); check that the drive is "
+                f"connected"
+            ) from error
+
+    def _finish(self, end: _End) -> None:
+        writer = self._writer
+        if writer.samples == 0:
+            writer.discard()
+            return
+        trouble: DearigError | None = None
+        if end.event:
+            try:
+                writer.event(writer.samples - 1, end.level, end.event)
+            except DearigError as error:
+                trouble = error
+        writer.close(end.outcome)
+        if trouble is not None:
+            raise trouble
