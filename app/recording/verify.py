@@ -189,7 +189,7 @@ class _Check:
                 if not 0.0 <= value < np.inf:
                     self.fault(f"{raw.name}: {key} = {value:g} is impossible")
             if channel.name not in self.data:
-                if self.finished and self.recording.arrays.stored:
+                if self.finished and "time" in self.recording.arrays.stored:
                     self.fault(f"/entry/data/{channel.name} is missing")
                 continue
             values = self.data[channel.name]
