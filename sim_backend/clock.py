@@ -55,4 +55,4 @@ class PacedClock:
 
     def wait(self, until: float, wake: threading.Event) -> None:
         """Wait until ``until``, or until ``wake`` is set."""
-        wake.wait(max(0.0, until - self.now()))
+        wake.wait(min(max(0.0, until - self.now()), threading.TIMEOUT_MAX))

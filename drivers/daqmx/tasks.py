@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Card", "ClockedTasks", "identify_card"]
 
 _READER_BUFFER = 4.0  # times the reader's delay that ends a run
+_PIECE = 1 << 20  # samples in one request: a server bounds its size
 _ODD_BUFFER = 4095  # samples; an output buffer of exactly this size misbehaved on a 6361
 
 
@@ -310,7 +311,9 @@ class ClockedTasks:
         with self._errors():
             writer = AnalogSingleChannelWriter(self._output().out_stream, auto_start=False)
             writer.verify_array_shape = False
-            writer.write_many_sample(volts, timeout=self._settings.guardian.link_timeout_s / 2.0)
+            timeout = self._settings.guardian.link_timeout_s / 2.0
+            for start in range(0, volts.size, _PIECE):
+                writer.write_many_sample(volts[start : start + _PIECE], timeout=timeout)
 
     def _output(self) -> nidaqmx.Task:
         if self._ao is None:

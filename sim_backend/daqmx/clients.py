@@ -18,6 +18,7 @@ __all__ = ["Clients"]
 log = logging.getLogger(__name__)
 
 _OUTPUTS = (Kind.AO, Kind.DO, Kind.WATCHDOG)
+_FORGET_S = 60.0  # a client that calls again later is counted as a new one
 _DEADLINE_S = 0.05  # a call that ends with less time left than this has timed out
 
 
@@ -110,11 +111,21 @@ class Clients:
         for name in names:
             self.gone(name)
 
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Return the clients that are tracked."""
+        with self._lock:
+            return tuple(self._clients)
+
     def check(self) -> None:
-        """Find a client that is silent while there is a voltage at the film."""
-        if not self._device.live():
-            return
+        """Find a client that is silent while there is a voltage at the film.
+
+        Without a voltage, clients that have no tasks and are silent are forgotten.
+        """
         now = self._clock.now()
+        if not self._device.live():
+            self._forget(now)
+            return
         with self._lock:
             silent = [
                 name
@@ -123,7 +134,23 @@ class Clients:
             ]
         for name in silent:
             if self._device.drives(name):
-                self._make_safe(name, f"it is silent for more than {self._timeout:g} s")
+                self._make_safe(
+                    name,
+                    f"it was silent for more than {self._timeout:g} s (--client-timeout) with a "
+                    f"voltage at the film",
+                )
+
+    def _forget(self, now: float) -> None:
+        """Forget the clients without tasks that made no call for a while."""
+        with self._lock:
+            silent = [
+                name
+                for name, client in self._clients.items()
+                if client.calls == 0 and now - client.heard > _FORGET_S
+            ]
+            for name in silent:
+                if not self._device.tasks_of(name):
+                    del self._clients[name]
 
     def _make_safe(self, name: str, why: str) -> None:
         self._device.make_safe(name, f"The client was lost: {why}.")

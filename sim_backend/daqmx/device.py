@@ -33,6 +33,7 @@ from dearig.sim_backend.faults import Fault, FaultKind
 
 __all__ = ["Device", "Reading"]
 
+_TASKS_MAX = 1000  # of programs that never clear theirs
 # s; NI's X Series User Manual, chapter Digital I/O, section Watchdog Timer
 _LONGEST_WATCHDOG = (2**32 - 1) * 8e-9
 
@@ -117,6 +118,11 @@ class Device(TimingEngine):
                 if attach:
                     return self._tasks[name], False
                 raise DaqmxError(Code.DUPLICATE_TASK, f"Task Name: {name}")
+            if len(self._tasks) >= _TASKS_MAX:
+                raise DaqmxError(
+                    Code.MEMORY_FULL,
+                    f"The card keeps {_TASKS_MAX} tasks that no program has cleared; clear some.",
+                )
             while not name or name in self._tasks:
                 name = f"_unnamedTask<{self._numbered:X}>"
                 self._numbered += 1

@@ -11,6 +11,8 @@ class Code(IntEnum):
     """Codes of NI-DAQmx that the simulated card uses."""
 
     RESOURCE_RESERVED = -50103
+    RESOURCE_NOT_AVAILABLE = -50101
+    MEMORY_FULL = -50352
     RUNTIME_ABORTED = -88709
     ROUTE_NOT_SUPPORTED = -89136
     INVALID_ROUTE_SOURCE = -89120
@@ -83,6 +85,8 @@ class Code(IntEnum):
 WORDS: dict[int, str] = {
     Code.RESOURCE_RESERVED: "The specified resource is reserved. The operation could not be "
     "completed as specified.",
+    Code.RESOURCE_NOT_AVAILABLE: "The specified resource is not available.",
+    Code.MEMORY_FULL: "There is not enough memory for the operation.",
     Code.RUNTIME_ABORTED: "The operation was aborted: the device was reset or the task aborted.",
     Code.ROUTE_NOT_SUPPORTED: "Specified route cannot be satisfied, because the hardware does not "
     "support it.",

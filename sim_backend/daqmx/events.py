@@ -11,6 +11,9 @@ __all__ = ["check_intervals", "check_registration", "collect", "observe", "resta
 
 _ACQUIRED, _TRANSFERRED = 1, 2  # DAQmx: samples acquired into, or transferred from, the buffer
 
+# events that wait for a program to hear them; more become due once it has heard some
+_DUE_MAX = 10_000
+
 
 def check_registration(task: Task, every: int | None, direction: int) -> None:
     """Refuse an event that ``task`` cannot have; ``every`` is None for the done event."""
@@ -59,8 +62,9 @@ def observe(task: Task, samples: int, status: int | None) -> None:
     for listener in task.listeners:
         if listener.every is not None:
             passed = samples // listener.every
-            listener.due += [0] * (passed - listener.told)
-            listener.told = max(listener.told, passed)
+            more = max(0, min(passed - listener.told, _DUE_MAX - len(listener.due)))
+            listener.due += [0] * more
+            listener.told += more
         elif status is not None and not listener.told:
             listener.told = 1
             listener.due.append(status)

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import logging
-import math
 import threading
-from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
-from typing import Any
 
 import grpc
 from nidaqmx._stubs import nidaqmx_pb2_grpc as pb_grpc
@@ -17,19 +13,24 @@ from dearig.drivers.daqmx.certificates import Certificates
 from dearig.sim_backend.clock import Clock, PacedClock
 from dearig.sim_backend.daqmx.clients import Clients
 from dearig.sim_backend.daqmx.device import Device
-from dearig.sim_backend.daqmx.errors import DaqmxError
-from dearig.sim_backend.daqmx.servicer import Servicer, refuse
+from dearig.sim_backend.daqmx.interceptor import THREADS, Interceptor
+from dearig.sim_backend.daqmx.servicer import Servicer
 from dearig.sim_backend.faults import FaultKind
 
 __all__ = ["DaqmxServer"]
 
 log = logging.getLogger(__name__)
 
-_THREADS = 32  # concurrent calls; an event that a client listens to is one
 _POLL_S = 0.05  # period of the search for silent clients
+_REQUEST_MAX = 2**26  # bytes: 8 million samples in float64
 _OPTIONS = (
     ("grpc.max_send_message_length", -1),
-    ("grpc.max_receive_message_length", -1),
+    ("grpc.max_receive_message_length", _REQUEST_MAX),
+    # who connects and says nothing is dropped; a busy client needs milliseconds
+    ("grpc.server_handshake_timeout_ms", 2000),
+    # a process may have 1024 files on Linux by default
+    ("grpc.max_allowed_incoming_connections", 256),
+    ("grpc.max_concurrent_streams", 256),  # calls at a time on one connection
     ("grpc.so_reuseport", 0),  # a port in use is an error; it is not shared
     # a client may check the link at any rate
     ("grpc.http2.max_ping_strikes", 0),
@@ -68,10 +69,10 @@ class DaqmxServer:
         self.clients = (
             None if client_timeout is None else Clients(device, self._link, client_timeout)
         )
-        self._pool = ThreadPoolExecutor(_THREADS, thread_name_prefix="daqmx")
+        self._pool = ThreadPoolExecutor(THREADS, thread_name_prefix="daqmx")
         self._server = grpc.server(
             self._pool,
-            interceptors=(_Interceptor(self, self._link, self._closing),),
+            interceptors=(Interceptor(device, self.clients, self._link, self._closing),),
             options=_OPTIONS if client_timeout is None else _OPTIONS + _pings(link_timeout),
         )
         pb_grpc.add_NiDAQmxServicer_to_server(Servicer(device, self._closing), self._server)
@@ -141,79 +142,3 @@ def _pings(timeout: float) -> tuple[tuple[str, int], ...]:
         ("grpc.keepalive_permit_without_calls", 1),
         ("grpc.http2.max_pings_without_data", 0),
     )
-
-
-class _Interceptor(grpc.ServerInterceptor):
-    """Interceptor of every call: faults of the link, the caller's identity, and error replies."""
-
-    def __init__(self, server: DaqmxServer, link: Clock, closing: threading.Event) -> None:
-        self._server = server
-        self._link = link
-        self._closing = closing
-
-    def intercept_service(
-        self, continuation: Callable[[Any], Any], handler_call_details: Any
-    ) -> Any:
-        """See ``grpc.ServerInterceptor``."""
-        handler = continuation(handler_call_details)
-        if handler is None:
-            return None
-        if handler.unary_unary is not None:
-            return grpc.unary_unary_rpc_method_handler(
-                self._answering(handler.unary_unary),
-                handler.request_deserializer,
-                handler.response_serializer,
-            )
-        return grpc.unary_stream_rpc_method_handler(
-            self._streaming(handler.unary_stream),
-            handler.request_deserializer,
-            handler.response_serializer,
-        )
-
-    def _answering(self, call: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-        def answer(request: Any, context: grpc.ServicerContext) -> Any:
-            clients = self._server.clients
-            watched = nullcontext() if clients is None else clients.call(context.peer(), context)
-            # a call that is held does not arrive, so its client counts as silent
-            self._freeze()
-            try:
-                with watched:
-                    response = call(request, context)
-                    self._delay()  # a client that waits for a late reply is not silent
-            except DaqmxError as error:
-                self._freeze()
-                refuse(context, error)
-            self._freeze()
-            return response
-
-        return answer
-
-    def _streaming(
-        self, call: Callable[[Any, Any], Iterator[Any]]
-    ) -> Callable[[Any, Any], Iterator[Any]]:
-        def answer(request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
-            clients = self._server.clients
-            try:
-                if clients is not None:
-                    clients.listen(context.peer(), request.task.name, context)
-                yield from call(request, context)
-            except DaqmxError as error:
-                refuse(context, error)
-
-        return answer
-
-    def _freeze(self) -> None:
-        """Hold a call while the server is frozen."""
-        fault = self._server.device.fault(FaultKind.SERVER_FROZEN)
-        if fault is None:
-            return
-        if fault.duration < math.inf:
-            self._link.wait(self._link.now() + fault.duration, self._closing)
-        else:
-            self._closing.wait()
-
-    def _delay(self) -> None:
-        """Delay one reply."""
-        fault = self._server.device.fires(FaultKind.LATE_REPLY)
-        if fault is not None:
-            self._link.wait(self._link.now() + fault.duration, self._closing)

@@ -39,6 +39,7 @@ __all__ = ["Servicer", "refuse"]
 log = logging.getLogger(__name__)
 
 _ACTIVE_EDGE = 0x1301  # SAMP_CLK_ACTIVE_EDGE
+_ERROR_TEXT = 1000  # characters
 _BY_CHANNEL = 0  # DAQmx: group by channel
 _FINITE, _CONTINUOUS = 10178, 10123
 _POLL_S = 0.02  # period at which an event's stream checks whether it is due
@@ -52,7 +53,8 @@ def refuse(context: grpc.ServicerContext, error: DaqmxError) -> NoReturn:
     if error.written is not None:
         trailing.append(("ni-samps-per-chan-written", str(error.written)))
     context.set_trailing_metadata(tuple(trailing))
-    context.abort(grpc.StatusCode.UNKNOWN, str(error))
+    # the text goes into a header, which holds 8 KiB
+    context.abort(grpc.StatusCode.UNKNOWN, str(error)[:_ERROR_TEXT])
     raise error  # not reached: abort raises
 
 
@@ -238,7 +240,7 @@ class Servicer(pb_grpc.NiDAQmxServicer):
         values = self._device.scaled(task, reading.counts)
         return pb.ReadAnalogF64Response(
             status=_status(reading),
-            read_array=_laid_out(values, request, request.array_size_in_samps),
+            read_array=_laid_out(values, request),
             samps_per_chan_read=values.shape[1],
         )
 
@@ -255,7 +257,7 @@ class Servicer(pb_grpc.NiDAQmxServicer):
         reading = self._read(self._task(request), request, request.array_size_in_samps)
         return pb.ReadBinaryI16Response(
             status=_status(reading),
-            read_array=_laid_out(reading.counts, request, request.array_size_in_samps),
+            read_array=_laid_out(reading.counts, request),
             samps_per_chan_read=reading.counts.shape[1],
         )
 
@@ -300,7 +302,8 @@ class Servicer(pb_grpc.NiDAQmxServicer):
     def WriteRaw(self, request: Any, context: grpc.ServicerContext) -> Any:
         task = self._task(request)
         self._outputs(task)
-        scans = np.frombuffer(request.write_array, dtype=np.int16)
+        whole = len(request.write_array) // 2 * 2
+        scans = np.frombuffer(request.write_array[:whole], dtype=np.int16)
         rows = len(task.outputs)
         if scans.size < request.num_samps * rows:
             raise DaqmxError(Code.WRITE_BUFFER_TOO_SMALL, written=0)
@@ -502,12 +505,13 @@ def _status(reading: Reading) -> int:
     return 0 if reading.complete else int(Code.SAMPLES_NOT_YET_AVAILABLE)
 
 
-def _laid_out(values: np.ndarray, request: Any, room: int) -> np.ndarray:
-    """Return ``values`` (channels, n) as (room,), by channel or by scan, padded with zeros."""
-    laid = np.zeros(max(room, values.size), dtype=values.dtype)
+def _laid_out(values: np.ndarray, request: Any) -> np.ndarray:
+    """Return ``values`` (channels, n) as (channels * n,), by channel or by scan.
+
+    The client's array is as large as it asked for; only what was read is sent.
+    """
     by_channel = (request.fill_mode_raw or request.fill_mode) == _BY_CHANNEL
-    laid[: values.size] = values.ravel() if by_channel else values.T.ravel()
-    return laid
+    return values.ravel() if by_channel else values.T.ravel()
 
 
 def _attribute_call(name: str, response: Any) -> Callable[[Servicer, Any, Any], Any] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -15,6 +16,7 @@ from dearig.sim_backend.daqmx.wiring import Wiring
 __all__ = ["Change", "Wire"]
 
 _AT_ONCE = 1 << 20  # samples processed at a time
+_HISTORY = 100_000  # changes that are kept, some 10 MB; a server may run for weeks
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Wire:
         self.levels = dict.fromkeys(lines, False)
         self._enable = card.do_hv_enable
         self._enabled: list[tuple[float, bool]] = [(-math.inf, self._enable is None)]
-        self.history: list[Change] = []
+        self.history: deque[Change] = deque(maxlen=_HISTORY)
         self._following: tuple[Generation, int] | None = None
         self._traced = 0  # ticks of the generation that are in the history
         self._away = False  # True while the output is not at zero
@@ -151,6 +153,8 @@ class Wire:
         """Discard the outputs before ``time``."""
         for track in self._tracks.values():
             track.forget_before(time)
+        while len(self._enabled) > 1 and self._enabled[1][0] <= time:
+            del self._enabled[0]
 
     def gated(self, counts: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Return ``counts`` (n,) of the output with those of 0 V while the amplifier is off."""
