@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-__all__ = ["AddressError", "LinkRefused", "RefusedWaveform", "RigError", "RigStateError"]
+__all__ = [
+    "AddressError",
+    "ChangedWaveform",
+    "LinkRefused",
+    "RefusedWaveform",
+    "RigError",
+    "RigStateError",
+]
 
 
 class RigError(Exception):
@@ -19,6 +26,10 @@ class RigStateError(RigError):
 
 class LinkRefused(RigError):  # noqa: N818  (the name says that it is a refusal)
     """Connection to a card that the rig file does not allow or does not describe completely."""
+
+
+class ChangedWaveform(RigError):  # noqa: N818  (the name says what happened)
+    """Waveform whose samples, computed again, are not those that passed the gate."""
 
 
 class AddressError(ValueError):

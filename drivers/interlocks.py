@@ -14,6 +14,7 @@ import numpy as np
 
 from dearig.drivers.channels import COUNT_MAX, COUNT_MIN, Channel, Scaling
 from dearig.drivers.rig import Block
+from dearig.drivers.samples import Samples, as_samples
 from dearig.drivers.settings import Action, RigSettings
 
 __all__ = ["Interlocks", "Trip", "would_trip"]
@@ -24,6 +25,7 @@ _JUMP_INTERVAL = 4e-3
 
 _NOMINAL = (0.0, 10.0 / 32768)  # V over counts of a converter of +-10 V
 _RANGE_END = 0.999  # of the laser's range; an alarm holds the analog output beyond it
+_PLANNED_BLOCK = 2**16  # samples of a planned run that are judged together
 _PLAN_TOLERANCE = 2  # counts; a command that is nearer to the plan than this follows it
 
 
@@ -41,9 +43,10 @@ class Interlocks:
     """Interlocks of one run on a rig with ``settings``, whose ``channels`` run at ``rate`` Hz.
 
     ``predicted`` (N,) m is the displacement from the loaded rest state that a model predicts under
-    the voltage ``planned`` (N,) V, NaN where there is no prediction. The interlock ``following``
-    compares the film with it while the command is the planned one; without ``predicted`` it is off.
-    Without ``planned`` every command counts as the planned one. Each interlock trips at most once.
+    the voltage ``planned`` (N,) V, NaN where there is no prediction; both are read window by
+    window. The interlock ``following`` compares the film with it while the command is the planned
+    one; without ``predicted`` it is off. Without ``planned`` every command counts as the planned
+    one. Each interlock trips at most once.
 
     Raises ``ValueError`` for a prediction and a plan of different lengths.
     """
@@ -53,13 +56,19 @@ class Interlocks:
         settings: RigSettings,
         channels: tuple[Channel, ...],
         rate: float,
-        predicted: np.ndarray | None,
-        planned: np.ndarray | None = None,
+        predicted: Samples | np.ndarray | None,
+        planned: Samples | np.ndarray | None = None,
     ) -> None:
-        if predicted is not None and planned is not None and predicted.shape != planned.shape:
+        self._predicted = None if predicted is None else as_samples(predicted)
+        self._planned = None if planned is None else as_samples(planned)
+        if (
+            self._predicted is not None
+            and self._planned is not None
+            and self._predicted.samples != self._planned.samples
+        ):
             raise ValueError(
-                f"{predicted.size} predicted displacements for {planned.size} planned voltages: "
-                f"give one for each"
+                f"{self._predicted.samples} predicted displacements for {self._planned.samples} "
+                f"planned voltages: give one for each"
             )
         scalings = {channel.name: channel.scaling for channel in channels}
         self._scalings = scalings
@@ -71,8 +80,6 @@ class Interlocks:
         self._settings = settings
         self._locks = locks = settings.interlocks
         self._rate = rate
-        self._predicted = predicted
-        self._planned = None if planned is None else self._command.counts(planned)
 
         # thresholds in counts, so that samples within bounds need no scaling
         limit = locks.current_max_mA * 1e-3
@@ -333,10 +340,11 @@ class Interlocks:
             or not self._live("following")
         ):
             return
-        predicted = self._predicted[self._watched : self._watched + command.size]
+        predicted = self._predicted.window(self._watched, self._watched + command.size)
         planned = predicted.size
         if self._planned is not None:
-            plan = self._planned[self._watched : self._watched + planned]
+            volts = self._planned.window(self._watched, self._watched + planned)
+            plan = self._command.counts(volts)
             other = np.abs(np.subtract(command[:planned], plan, dtype=np.int32)) > _PLAN_TOLERANCE
             planned = int(np.argmax(other)) if other.any() else planned
         self._left_plan = planned < command.size
@@ -399,9 +407,9 @@ class Interlocks:
 def would_trip(
     settings: RigSettings,
     rate: float,
-    voltage: np.ndarray,
-    displacement: np.ndarray,
-    predicted: np.ndarray | None = None,
+    voltage: Samples | np.ndarray,
+    displacement: Samples | np.ndarray,
+    predicted: Samples | np.ndarray | None = None,
 ) -> tuple[str, ...]:
     """Return the names of the interlocks that would trip in a run that goes as planned.
 
@@ -416,11 +424,20 @@ def would_trip(
     )
     settings = settings.model_copy(update={"interlocks": locks, "channel": free})
     channels = settings.channels(dict.fromkeys(settings.channel_names, _NOMINAL))
-    still = np.zeros(voltage.size)
-    shown = {"voltage_command": voltage, "voltage_monitor": voltage, "displacement": displacement}
-    counts = np.array([c.scaling.counts(shown.get(c.name, still)) for c in channels])
+    voltage, displacement = as_samples(voltage), as_samples(displacement)
     watch = Interlocks(settings, channels, rate, predicted, voltage)
-    return tuple(trip.interlock for trip in watch.watch(Block(0, counts)))
+    trips: list[Trip] = []
+    for start in range(0, voltage.samples, _PLANNED_BLOCK):
+        volts = voltage.window(start, start + _PLANNED_BLOCK)
+        shown = {
+            "voltage_command": volts,
+            "voltage_monitor": volts,
+            "displacement": displacement.window(start, start + _PLANNED_BLOCK),
+        }
+        still = np.zeros(volts.size)
+        counts = np.array([c.scaling.counts(shown.get(c.name, still)) for c in channels])
+        trips += watch.watch(Block(start, counts))
+    return tuple(trip.interlock for trip in trips)
 
 
 class _Debounce:

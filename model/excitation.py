@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Protocol, cast
 
 import numpy as np
@@ -417,12 +418,15 @@ class Multisine(_AboutOffset):
             total += np.sin(2.0 * np.pi * f * t - np.pi * k * (k + 1) / n)
         return total
 
-    def voltage(self, t: np.ndarray) -> np.ndarray:
-        # the crest on a grid of its own, so that the waveform does not depend on the sample clock
+    @cached_property
+    def _crest(self) -> float:
+        """Largest excursion of the sum; on a grid of its own, whatever the sample clock."""
         points = math.ceil(32.0 * max(self.frequencies) * self.length)
         grid = np.linspace(0.0, self.length, min(max(points, 64), 200_000))
-        crest = float(np.max(np.abs(self._sum(grid) * _taper(grid, self.length, self.taper))))
-        shape = self._sum(t) * _taper(t, self.length, self.taper) / crest
+        return float(np.max(np.abs(self._sum(grid) * _taper(grid, self.length, self.taper))))
+
+    def voltage(self, t: np.ndarray) -> np.ndarray:
+        shape = self._sum(t) * _taper(t, self.length, self.taper) / self._crest
         return np.asarray(self.start + self.amplitude * np.clip(shape, -1.0, 1.0))
 
 
@@ -521,13 +525,15 @@ class Sequence:
         """The thesis's excitation, eq. 49; the defaults are the identification set."""
         return cls(name, (Lobes(tuple(amplitudes), tuple(frequencies), periods),))
 
-    @property
+    @cached_property
     def boundaries(self) -> np.ndarray:
-        """Times in s at which segments start, and the one at which the last ends."""
+        """Times in s at which segments start, and the one at which the last ends; read-only."""
         edges = [self.lead_in]
         for segment in self.segments:
             edges.append(edges[-1] + segment.duration)
-        return np.array(edges)
+        found = np.array(edges)
+        found.setflags(write=False)
+        return found
 
     @property
     def duration(self) -> float:
@@ -539,27 +545,48 @@ class Sequence:
         t = np.asarray(t, dtype=np.float64)
         v = np.zeros_like(t)
         order = np.argsort(t, kind="stable")
-        ticks = t[order]
-        edges = self.boundaries
-        # one slice a segment: thousands of repeats of a short one would else read t as often
-        cuts = np.searchsorted(ticks, edges)
-        for i, segment in enumerate(self.segments):
-            inside = slice(cuts[i], cuts[i + 1])
-            local = np.minimum(ticks[inside] - edges[i], segment.duration)
-            v[order[inside]] = segment.voltage(local)
+        v[order] = self._voltage_at(t[order])
+        return v
+
+    def ticks(self, rate: float) -> int:
+        """Return the number of samples on a clock of ``rate`` Hz. Raises ``ModelError``."""
+        if not (math.isfinite(rate) and rate > 0.0):
+            raise ModelError(f"sample rate {rate!r} Hz must be a finite number above 0")
+        count = self.duration * rate
+        if not math.isfinite(count):
+            raise ModelError(f"the sequence lasts {self.duration:.4g} s, too long at {rate:g} Hz")
+        return math.ceil(count - 1e-9) + 1
+
+    def window(self, rate: float, start: int, stop: int) -> np.ndarray:
+        """Return the samples ``start`` to ``stop`` of ``sample(rate)``, without the others."""
+        v = self._voltage_at(np.arange(start, stop) / rate)
+        if stop >= self.ticks(rate) and v.size:
+            v[-1] = 0.0
         return v
 
     def sample(self, rate: float) -> tuple[np.ndarray, np.ndarray]:
         """``(time, voltage)`` (N,) at the ticks k/rate of a clock of ``rate`` Hz, ending at 0 V."""
-        if not (math.isfinite(rate) and rate > 0.0):
-            raise ModelError(f"sample rate {rate!r} Hz must be a finite number above 0")
-        count = self.duration * rate
+        count = self.ticks(rate)
         if count > _SAMPLES_MAX:
             raise ModelError(
                 f"the sequence lasts {self.duration:.4g} s, {count:.3g} samples at {rate:g} Hz; "
                 f"at most {_SAMPLES_MAX:.0g} can be played: shorten it or lower the rate"
             )
-        t = np.arange(math.ceil(count - 1e-9) + 1) / rate
-        v = self.voltage(t)
-        v[-1] = 0.0
-        return t, v
+        return np.arange(count) / rate, self.window(rate, 0, count)
+
+    def _voltage_at(self, ticks: np.ndarray) -> np.ndarray:
+        """Voltage in V at times ``ticks`` (N,) s that do not decrease."""
+        v = np.zeros(ticks.size)
+        if not ticks.size:
+            return v
+        # of thousands of short segments only those that the times meet
+        first = max(int(np.searchsorted(self.boundaries, ticks[0], side="right")) - 1, 0)
+        last = int(np.searchsorted(self.boundaries, ticks[-1], side="right"))
+        edges = self.boundaries[first : last + 1]
+        cuts = np.searchsorted(ticks, edges)
+        for i, segment in enumerate(self.segments[first:last]):
+            inside = slice(cuts[i], cuts[i + 1])
+            if inside.start < inside.stop:
+                local = np.minimum(ticks[inside] - edges[i], segment.duration)
+                v[inside] = segment.voltage(local)
+        return v

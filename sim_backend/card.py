@@ -71,10 +71,6 @@ class Card:
         timebase = card.timebase_MHz * 1e6
         return timebase / max(1, round(timebase / rate))
 
-    def command_counts(self, voltage: np.ndarray) -> np.ndarray:
-        """Return the output counts (N,) int16 for ``voltage`` (N,) V at the film."""
-        return self._channels["voltage_command"].scaling.counts(voltage)
-
     def put_out(self, counts: np.ndarray) -> np.ndarray:
         """Return the volts (N,) at the output terminal for ``counts``."""
         return self._converters["voltage_command"].physical(counts)

@@ -7,8 +7,9 @@ import threading
 
 import numpy as np
 
+from dearig.drivers.command import Command
 from dearig.drivers.errors import RigError, RigStateError
-from dearig.drivers.gate import GatedWaveform, ramp_down
+from dearig.drivers.gate import GatedWaveform
 from dearig.drivers.identity import instruments
 from dearig.drivers.rig import Block, Event, RigIdentity, RigState
 from dearig.drivers.settings import RigSettings
@@ -46,11 +47,8 @@ _CARD_ERRORS = {
 class _Run:
     """One waveform being played, with its computed and delivered samples."""
 
-    def __init__(
-        self, waveform: GatedWaveform, counts: np.ndarray, path: SignalPath, state: PathState
-    ) -> None:
-        self.waveform = waveform
-        self.command = counts
+    def __init__(self, command: Command, path: SignalPath, state: PathState) -> None:
+        self.command = command
         self.started = 0.0  # s on the rig's clock
         self.delivered = 0  # samples handed to the reader
         self.stopped = False
@@ -65,7 +63,7 @@ class _Run:
 
     @property
     def total(self) -> int:
-        return self.command.size
+        return self.command.samples
 
     def take(self, end: int) -> np.ndarray:
         """Return counts (channels, n) of the samples after the delivered ones, up to ``end``."""
@@ -76,25 +74,26 @@ class _Run:
         self.delivered = end
         return counts
 
-    def replace_from(self, sample: int, counts: np.ndarray) -> None:
-        """Replace the waveform from ``sample`` on with ``counts``.
+    def ramp_from(self, sample: int, seconds: float) -> tuple[float, int]:
+        """Replace the command from ``sample`` on with a ramp; returns as ``Command.ramp_from``.
 
         ``sample`` is later than all delivered samples, so only the newest chunk can hold samples
         that were computed ahead and are no longer valid. That chunk is computed again.
         """
-        self.command = np.concatenate((self.command[:sample], counts))
+        ramp = self.command.ramp_from(sample, seconds)
         if self._chunks * CHUNK > sample:
             self._chunks -= 1
             self._state = self._before
             self._ready = self._ready[:, :0]
             # the new computation also returns the undelivered samples of this chunk
             self.events = [e for e in self.events if e.sample < self._chunks * CHUNK]
+        return ramp
 
     def _compute(self) -> None:
         first = self._chunks * CHUNK
         self._before = self._state
         counts, events, self._state = self._path.advance(
-            self._chunks, self.command[first : first + CHUNK], self._before
+            self._chunks, self.command.window(first, first + CHUNK), self._before
         )
         counts = counts[:, max(0, self.delivered - first) :]
         self._ready = np.concatenate((self._ready, counts), axis=1) if self._ready.size else counts
@@ -158,7 +157,8 @@ class SimulatedRig:
             if self._state is not RigState.RUNNING or run is None:
                 return 0.0
             at = min(self._ticks(run), run.total - 1)
-            return float(self._card.channels[0].scaling.physical(run.command[at : at + 1])[0])
+            scaling = self._card.channels[0].scaling
+            return float(scaling.physical(run.command.window(at, at + 1))[0])
 
     def identify(self) -> RigIdentity:
         """Return the rig's instruments; the output does not change."""
@@ -195,8 +195,8 @@ class SimulatedRig:
             path = SignalPath(
                 self._settings, self._card, self._streams, self._runs, rate, self._faults
             )
-            counts = self._card.command_counts(waveform.voltage)
-            self._run = _Run(waveform, counts, path, path.start(self._plant))
+            command = Command(waveform, self._card.channels[0].scaling)
+            self._run = _Run(command, path, path.start(self._plant))
             self._runs += 1
             self._rate = rate
             self._state = RigState.LOADED
@@ -219,8 +219,9 @@ class SimulatedRig:
         """Wait for the next block and return it, or None after the last one.
 
         Raises ``RigError`` with DAQmx's code -200279 where the reader was so late that samples were
-        overwritten, or for a planned fault of the card; the output is then at 0 V. Raises
-        ``RigStateError`` where the rig was made safe.
+        overwritten, for a planned fault of the card, and ``ChangedWaveform`` for a waveform that
+        is not the admitted one; the output is then at 0 V. Raises ``RigStateError`` where the rig
+        was made safe.
         """
         while True:
             with self._lock:
@@ -236,12 +237,12 @@ class SimulatedRig:
                 try:
                     self._card.check_buffer(acquired - run.delivered)
                     self._card_fails(run)
+                    silent = self._silent(run)
+                    if acquired >= end and not silent:
+                        return self._deliver(run, end)
                 except RigError:
                     self.make_safe()
                     raise
-                silent = self._silent(run)
-                if acquired >= end and not silent:
-                    return self._deliver(run, end)
                 due = run.silent_until if silent else self._due(run, end)
                 self._wake.clear()
             self._clock.wait(due, self._wake)
@@ -265,16 +266,14 @@ class SimulatedRig:
             played = self._ticks(run) + 1  # with the sample that is on the output now
             if run.stopped or played >= run.total:
                 return
-            seconds = self._settings.limits.ramp_down_s
-            ramp = ramp_down(run.waveform, played - 1, seconds)
-            run.replace_from(played, self._card.command_counts(ramp))
+            volts, samples = run.ramp_from(played, self._settings.limits.ramp_down_s)
             run.stopped = True
             run.events.append(
                 Event(
                     played,
                     "info",
-                    f"stopped: ramping from {run.waveform.voltage[played - 1] * 1e-3:.4g} kV to 0 "
-                    f"in {ramp.size / self._rate:.3g} s",
+                    f"stopped: ramping from {volts * 1e-3:.4g} kV to 0 in "
+                    f"{samples / self._rate:.3g} s",
                 )
             )
             self._wake.set()

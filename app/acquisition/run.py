@@ -180,7 +180,7 @@ def record(
     once.
     """
     out = check_output(out, options.overwrite)
-    planned = plan(loaded, rig_file, options.actuator, options.film_id)
+    planned = plan(loaded, rig_file, options.actuator, options.film_id, progress)
     waveform = planned.admitted()
     rig = open_rig(address, rig_file, options)
     try:
@@ -192,7 +192,7 @@ def record(
                 raise InputError(f"the rig refuses the sequence: {error}") from error
             except RigError as error:
                 raise InstrumentFault(str(error)) from error
-            check_room(out, len(identity.channels), rate, waveform.voltage.size)
+            check_room(out, len(identity.channels), rate, waveform.samples)
             stepped = None
             if overlay is not None:
                 try:
@@ -211,13 +211,13 @@ def record(
                 seed=options.seed if is_simulated(address) else None,
             )
             writer = RecordingWriter(
-                out, identity, rate, waveform.voltage.size, metadata,
+                out, identity, rate, waveform.samples, metadata,
                 overwrite=options.overwrite, fsync=options.fsync, overlay=stepped is not None,
             )  # fmt: skip
             observer = observer or RunObserver()
             observer.started(planned, identity, rate)
             interlocks = Interlocks(
-                rig_file, identity.channels, rate, planned.displacement_of_samples, planned.voltage
+                rig_file, identity.channels, rate, planned.displacement_of_samples, waveform
             )
             recorder = Recorder(
                 writer,
@@ -231,7 +231,7 @@ def record(
                 run = _Run(
                     rig, recorder, interlocks, interrupts, observer, event_log, progress, clock
                 )
-                events = run.follow(waveform.voltage.size)
+                events = run.follow(waveform.samples)
         return RunResult(out, recorder.samples, rate, "finished", events, waveform.margins)
     finally:
         _close(rig)

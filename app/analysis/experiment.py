@@ -13,12 +13,14 @@ import numpy as np
 import tomli_w
 
 from dearig.acquisition.plan import Plan, plan
+from dearig.acquisition.prediction import peaks_of
 from dearig.analysis.outcomes import SeparatingExperiment
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
 from dearig.drivers.gate import GatedWaveform
 from dearig.drivers.interlocks import would_trip
+from dearig.drivers.samples import Repeated
 from dearig.errors import InputError
 from dearig.model.actuator import Actuator, Drive
 from dearig.model.excitation import THESIS_AMPLITUDES
@@ -176,7 +178,7 @@ def _playable(
             waveform = planned.admitted()
         except InputError:
             continue
-        predictions = _predictions(rivals, waveform)
+        predictions = _predictions(rivals, waveform, planned.stride)
         if predictions is None:
             continue
         if not any(_would_end(planned, waveform, p, rig_file, noise) for p in predictions):
@@ -187,17 +189,24 @@ def _playable(
 def _would_end(
     planned: Plan, waveform: GatedWaveform, moved: np.ndarray, rig_file: RigFile, noise: float
 ) -> bool:
-    """Return whether a film at ``moved`` (N,) m would trip an interlock or be too fast to measure.
+    """Return whether a film at ``moved`` (M,) m would trip an interlock or be too fast to measure.
 
-    The laser has its own clock, so the age of a reading is uncertain by its period.
+    There is one position for each stride of the plan. The laser has its own clock, so the age of a
+    reading is uncertain by its period.
     """
-    speed = float(np.max(np.abs(np.diff(moved)))) * waveform.rate
+    speed = float(np.max(np.abs(np.diff(moved)))) * waveform.rate / planned.stride
     if speed * rig_file.laser.delay_error > _DELAY_BLUR * noise:
         return True
     predicted = planned.displacement_of_samples
     # a film that moves more than predicted, and one that moves less
     return any(
-        would_trip(rig_file, waveform.rate, waveform.voltage, part * moved, predicted)
+        would_trip(
+            rig_file,
+            waveform.rate,
+            waveform,
+            Repeated(part * moved, planned.stride, waveform.samples),
+            predicted,
+        )
         for part in (1.0 / _INTERLOCK_MARGIN, _INTERLOCK_MARGIN)
     )
 
@@ -222,11 +231,14 @@ def _scaled(text: str, scale: float) -> str:
 
 
 def _predictions(
-    rivals: Sequence[tuple[str, str, Actuator]], waveform: GatedWaveform
+    rivals: Sequence[tuple[str, str, Actuator]], waveform: GatedWaveform, stride: int
 ) -> list[np.ndarray] | None:
-    """Return displacements of all rivals in m; None where one fails or exceeds the field limit."""
-    time = np.arange(waveform.voltage.size) / waveform.rate
-    drive = Drive(time, waveform.voltage, hold=True)
+    """Return displacements (M,) of all rivals in m, one for each ``stride`` of the samples.
+
+    None where one fails or exceeds the field limit.
+    """
+    peaks = peaks_of(waveform, stride)
+    drive = Drive(np.arange(peaks.size) * (stride / waveform.rate), peaks, hold=True)
     found = []
     for _, _, model in rivals:
         response = model.simulate(drive)

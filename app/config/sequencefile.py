@@ -20,15 +20,25 @@ from dearig.config.presets import PRESETS
 from dearig.config.segments import SEGMENT_KINDS, SegmentTable
 from dearig.config.segments.base import SEGMENTS_MAX
 from dearig.config.toml_input import Table, allowed, meant, parse_toml, read_text, shown
+from dearig.drivers.samples import Computed, Samples
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
 from dearig.model.excitation import Segment, Sequence
 
-__all__ = ["HEAD_FIELDS", "SAMPLES_MAX", "LoadedSequence", "load_sequence", "parse_sequence"]
+__all__ = [
+    "HEAD_FIELDS",
+    "HELD_SAMPLES_MAX",
+    "SAMPLES_MAX",
+    "LoadedSequence",
+    "load_sequence",
+    "parse_sequence",
+]
 
-#: Samples of a run, at most: 69 h at 1 kHz, 12 min at the card's full rate. A run holds some
-#: 40 bytes of each, and they must fit into an ordinary memory.
-SAMPLES_MAX = 250_000_000
+#: Samples of a run, at most: 11 days at 1 kHz, 16 min at 1 MHz. A run does not hold them, but a
+#: plan computes each of them, some 10 million a second.
+SAMPLES_MAX = 1_000_000_000
+#: Samples that ``LoadedSequence.sample`` returns at most: 4 GB of time and voltage.
+HELD_SAMPLES_MAX = 250_000_000
 
 
 @dataclass(frozen=True)
@@ -45,15 +55,35 @@ class LoadedSequence:
     def sample(self, rate: float) -> tuple[np.ndarray, np.ndarray]:
         """Return time in s and voltage in V, (N,) each, at ``rate`` Hz.
 
+        Raises ``InputError`` as ``on_clock`` does, and for more than ``HELD_SAMPLES_MAX`` samples.
+        """
+        self._check_clock(rate, HELD_SAMPLES_MAX)
+        try:
+            return self.sequence.sample(rate)
+        except ModelError as error:
+            raise InputError(f"sequence {self.sequence.name!r}: {error}") from error
+
+    def on_clock(self, rate: float) -> Samples:
+        """Return the voltage in V at ``rate`` Hz, computed window by window.
+
         Raises ``InputError`` for a sequence that is too long to be played, and for a segment of
         less than two samples or with a frequency above half the rate.
         """
+        self._check_clock(rate, SAMPLES_MAX)
+        sequence = self.sequence
+        try:
+            samples = sequence.ticks(rate)
+        except ModelError as error:
+            raise InputError(f"sequence {sequence.name!r}: {error}") from error
+        return Computed(samples, lambda start, stop: sequence.window(rate, start, stop))
+
+    def _check_clock(self, rate: float, samples_max: int) -> None:
         sequence, count = self.sequence, self.sequence.duration * rate
         name = f"sequence {sequence.name!r}"
-        if not count <= SAMPLES_MAX:
+        if not count <= samples_max:
             raise InputError(
                 f"{name} lasts {sequence.duration:.4g} s, which is {count:.3g} samples at "
-                f"{rate:g} Hz, and at most {SAMPLES_MAX:,} can be played: shorten it, or lower "
+                f"{rate:g} Hz, and at most {samples_max:,} can be played: shorten it, or lower "
                 f"card.sample_rate_Hz in the rig file"
             )
         for i, segment in enumerate(sequence.segments):
@@ -69,10 +99,6 @@ class LoadedSequence:
                     f"{label} reaches {fastest:g} Hz, and {rate:g} samples a second play at most "
                     f"{0.5 * rate:g} Hz: lower it, or raise card.sample_rate_Hz in the rig file"
                 )
-        try:
-            return sequence.sample(rate)
-        except ModelError as error:
-            raise InputError(f"{name}: {error}") from error
 
 
 class _Head(Table):

@@ -74,7 +74,7 @@ class Live(RunObserver):
     # called from the rig's thread
 
     def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:
-        run = _Run(planned.voltage.size, identity.channels, rate)
+        run = _Run(planned.samples, identity.channels, rate)
         run.follow(*self._wanted)
         self._run = run
         self._thread = threading.Thread(target=self._work, name="live", daemon=True)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from PySide6.QtCore import QObject, Slot
+from PySide6.QtCore import QObject, Signal, Slot
 
-from dearig.acquisition.plan import Plan, plan
+from dearig.acquisition.plan import plan
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
-from dearig.drivers.gate import Limits
-from dearig.errors import InputError
+from dearig.errors import InputError, Interrupted
+from dearig.progress import Progress, quiet
 from dearig.window.background import Background
 from dearig.window.session import Breach, Preview, Session
 from dearig.window.traces import Pyramid
@@ -22,11 +23,18 @@ _BREACHES_MAX = 50  # time spans marked in one plot; more are drawn as one
 
 
 class Planner(QObject):
-    """Keeps ``session.preview`` up to date with the sequence, the rig file and the film."""
+    """Keeps ``session.preview`` up to date with the sequence, the rig file and the film.
+
+    A plan that is no longer wanted ends at its next piece. ``progressed`` carries the part of the
+    present plan that is done, 0 to 1.
+    """
+
+    progressed = Signal(float)
 
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._session = session
+        self._wanted = 0  # number of the newest plan
         self._background = Background(self)
         self._background.done.connect(self._done)
         session.sequence_changed.connect(self.renew)
@@ -38,10 +46,18 @@ class Planner(QObject):
         s = self._session
         s.preview = None
         toml, folder, rig_file, film = s.sequence_toml, s.sequence_folder, s.rig_file, s.film
-        self._background.start(lambda: make_preview(toml, folder, rig_file, film))
+        self._wanted = number = self._wanted + 1
+
+        def progress(stage: str, part: float) -> None:  # noqa: ARG001
+            if number != self._wanted:
+                raise Interrupted("another plan is asked for")
+            self.progressed.emit(part)
+
+        self._background.start(lambda: make_preview(toml, folder, rig_file, film, progress))
 
     def close(self) -> None:
-        """Wait for the thread."""
+        """End the plan, and wait for the thread."""
+        self._wanted += 1
         self._background.close()
 
     @Slot(object)
@@ -49,33 +65,58 @@ class Planner(QObject):
         self._session.set_preview(preview)
 
 
-def make_preview(toml: str, folder: Path, rig_file: RigFile, film: str = "") -> Preview:
+def make_preview(
+    toml: str, folder: Path, rig_file: RigFile, film: str = "", progress: Progress = quiet
+) -> Preview:
     """Plan the sequence ``toml``; a fault in it becomes ``Preview.sentence``."""
     try:
         loaded = parse_sequence(toml, "the sequence", folder)
     except InputError as error:
         return Preview(toml, sentence=str(error))
+    rate, limits = float(rig_file.card.sample_rate_Hz), rig_file.gate_limits()
     try:
-        planned = plan(loaded, rig_file, film=film)
+        voltage = Pyramid(loaded.on_clock(rate).samples)
+        high, low, steep = _Spans(), _Spans(), _Steep(rate, limits.slew)
+
+        def observe(start: int, volts: np.ndarray) -> None:
+            voltage.push(volts)
+            high.take(start, volts > limits.voltage_max)
+            low.take(start, volts < limits.voltage_min)
+            steep.take(start, volts)
+
+        planned = plan(loaded, rig_file, film=film, progress=progress, observe=observe)
     except InputError as error:
         return Preview(toml, loaded, sentence=str(error))
+    field = _Spans()
+    field.take(0, planned.field > limits.field)  # NaN, an unknown field, is not marked
+    steps = rate / planned.stride
     return Preview(
         toml,
         loaded,
         planned,
         curves={
-            name: _thinned(getattr(planned, name), planned.rate)
-            for name in ("voltage", "displacement", "field")
+            "voltage": _curve(voltage, rate),
+            "displacement": _thinned(planned.displacement, steps),
+            "field": _thinned(planned.field, steps),
         },
-        breaches=_breaches(planned, rig_file.gate_limits()),
-        segments=_segments(loaded, float(planned.time[-1])),
+        breaches=(
+            *high.breaches("voltage", rate),
+            *low.breaches("voltage", rate),
+            *steep.breaches("slew", rate),
+            *field.breaches("true field", steps),
+        ),
+        segments=_segments(loaded, planned.duration),
     )
 
 
 def _thinned(values: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
     pyramid = Pyramid(values.size)
     pyramid.push(values)
-    samples, extremes = pyramid.view(0, values.size)
+    return _curve(pyramid, rate)
+
+
+def _curve(pyramid: Pyramid, rate: float) -> tuple[np.ndarray, np.ndarray]:
+    samples, extremes = pyramid.view(0, pyramid.samples)
     return samples / rate, extremes
 
 
@@ -89,23 +130,44 @@ def _segments(loaded: LoadedSequence, end: float) -> tuple[tuple[str, float, flo
     return (*found, ("tail", at, end))
 
 
-def _breaches(planned: Plan, limits: Limits) -> tuple[Breach, ...]:
-    """Return the time spans in which an instantaneous limit of the gate is exceeded."""
-    volts, rate = planned.voltage, planned.rate
-    slew = np.abs(np.diff(volts, append=volts[-1:])) * rate
-    broken = {
-        "voltage": (volts > limits.voltage_max) | (volts < limits.voltage_min),
-        "slew": slew > limits.slew,
-        "true field": planned.field > limits.field,  # NaN, an unknown field, is not marked
-    }
-    found: list[Breach] = []
-    for quantity, where in broken.items():
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], where, [False]))))
-        starts, ends = edges[::2], edges[1::2]
-        if starts.size > _BREACHES_MAX:
-            starts, ends = starts[:1], ends[-1:]
-        found += [
-            Breach(quantity, float(a / rate), float(b / rate))
-            for a, b in zip(starts, ends, strict=True)
-        ]
-    return tuple(found)
+class _Spans:
+    """Spans of samples in which a limit is exceeded, found piece by piece."""
+
+    def __init__(self) -> None:
+        self._spans: list[tuple[int, int]] = []
+        self._many = False  # more spans than can be marked: they become one
+
+    def take(self, start: int, broken: np.ndarray) -> None:
+        """Include ``broken`` (n,), which begins at sample ``start`` and continues the last one."""
+        if not broken.any():
+            return
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], broken, [False])))) + start
+        for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+            if self._spans and (self._spans[-1][1] == first or self._many):
+                self._spans[-1] = (self._spans[-1][0], last)
+            else:
+                self._spans.append((first, last))
+            if len(self._spans) > _BREACHES_MAX:
+                self._spans = [(self._spans[0][0], last)]
+                self._many = True
+
+    def breaches(self, quantity: str, rate: float) -> Iterator[Breach]:
+        """Yield the spans of ``quantity`` at ``rate`` Hz."""
+        for first, last in self._spans:
+            yield Breach(quantity, first / rate, last / rate)
+
+
+class _Steep(_Spans):
+    """Spans in which the voltage changes faster than ``slew`` V/s; each begins before a step."""
+
+    def __init__(self, rate: float, slew: float) -> None:
+        super().__init__()
+        self._rate, self._slew = rate, slew
+        self._before = np.empty(0)
+
+    def take(self, start: int, volts: np.ndarray) -> None:
+        """Include the samples ``volts`` (n,) V from ``start`` on."""
+        joined = np.concatenate((self._before, volts))
+        self._before = volts[-1:].copy()
+        steps = np.abs(np.diff(joined)) * self._rate
+        super().take(start + volts.size - joined.size, steps > self._slew)

@@ -47,8 +47,7 @@ class PreviewPanel(QWidget):
         self._clear.stop()
         self.plots.show_preview(preview)
         if preview.playable and preview.plan is not None:
-            seconds = float(preview.plan.time[-1])
-            samples = preview.plan.voltage.size
+            seconds, samples = preview.plan.duration, preview.plan.samples
             self.state.show_text(
                 f"✓ Within all limits: {seconds:.2f} s, {samples:,} samples", "good"
             )

@@ -73,11 +73,13 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
                 words = "no prediction: the sequence cannot be played"
             elif y.size and not np.isfinite(y).any():
                 words = "no prediction: a limit is already exceeded"
+            elif not np.isfinite(y).all():
+                words = "prediction up to where a limit is exceeded or the model fails"
             self._plots[name].setTitle(words, color=self._session.theme.muted, size="9pt")
         self._mark()
         if preview is None or preview.plan is None:
             return
-        self._plots["voltage"].setXRange(0.0, float(preview.plan.time[-1]), padding=0.01)
+        self._plots["voltage"].setXRange(0.0, preview.plan.duration, padding=0.01)
         for plot in self._plots.values():
             plot.enableAutoRange(axis="y")
 
@@ -90,7 +92,7 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
     def mouseDoubleClickEvent(self, event: object) -> None:  # noqa: N802
         super().mouseDoubleClickEvent(event)
         if self._preview is not None and self._preview.plan is not None:
-            self._plots["voltage"].setXRange(0.0, float(self._preview.plan.time[-1]), padding=0.01)
+            self._plots["voltage"].setXRange(0.0, self._preview.plan.duration, padding=0.01)
 
     def _restyle(self) -> None:
         theme = self._session.theme

@@ -218,7 +218,7 @@ class RunPage(QWidget):
         elif preview.plan is None:
             self.plan.show_text(preview.sentence, "bad")
         elif preview.loaded is not None:
-            name, seconds = preview.loaded.sequence.name, float(preview.plan.time[-1])
+            name, seconds = preview.loaded.sequence.name, preview.plan.duration
             if preview.playable:
                 rate = preview.plan.rate
                 self.plan.show_text(

@@ -117,7 +117,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
         self._high = {"voltage": 1e3, "displacement": 1e-4, "residual": _RESIDUAL_LEAST}
         self._duration = 1.0
         if preview is not None and preview.plan is not None:
-            self._duration = float(preview.plan.time[-1])
+            self._duration = preview.plan.duration
             for name in ("voltage", "displacement"):
                 x, y = preview.curves[name]
                 self._include(name, y)

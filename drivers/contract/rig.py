@@ -236,7 +236,7 @@ class RigContract:
             assert block.counts.dtype == np.int16
             assert block.counts.shape[0] == len(rig.identify().channels)
             expected += block.counts.shape[1]
-        assert expected == waveform.voltage.size
+        assert expected == waveform.samples
         assert rig.read() is None
 
     def test_command_channel_is_the_waveform_within_half_a_count(self, rig: Rig) -> None:
@@ -244,7 +244,7 @@ class RigContract:
         command = play(rig, waveform).physical(rig, "voltage_command")
         scaling = rig.identify().channels[0].scaling
         half = 0.5 * abs(scaling.gain * scaling.coefficients[1])
-        assert np.abs(command - waveform.voltage).max() <= half * (1.0 + 1e-9)
+        assert np.abs(command - waveform.window()).max() <= half * (1.0 + 1e-9)
 
     def test_voltage_monitor_follows_the_command(self, rig: Rig) -> None:
         record = play(rig, lobes())
@@ -274,10 +274,10 @@ class RigContract:
             assert first == 50 * blocks_read
             counts = np.concatenate([*(b.counts for b in head), tail.counts], axis=1)
             command = rig.identify().channels[0].scaling.physical(counts[0])
-        assert command.size < waveform.voltage.size
+        assert command.size < waveform.samples
         assert command[-1] == pytest.approx(0.0, abs=1.0)
         # the same as without the stop, then a straight line to 0 within the limits
-        played = np.flatnonzero(np.abs(command - waveform.voltage[: command.size]) > 1.0)
+        played = np.flatnonzero(np.abs(command - waveform.window(0, command.size)) > 1.0)
         at = played[0] if played.size else command.size
         assert np.all(np.diff(command[at - 1 :]) <= 1.0)
         assert np.all(np.abs(np.diff(command)) * RATE <= LIMITS.slew * 1.01)
@@ -297,7 +297,7 @@ class RigContract:
         rig.make_safe()
         assert rig.state is (RigState.CLOSED if state is RigState.CLOSED else RigState.SAFE)
         if state is not RigState.CLOSED:
-            assert play(rig, lobes()).counts.shape[1] == lobes().voltage.size
+            assert play(rig, lobes()).counts.shape[1] == lobes().samples
 
     @pytest.mark.parametrize("state", list(RigState))
     def test_close_at_any_time_and_twice(self, rig: Rig, state: RigState) -> None:
@@ -308,9 +308,9 @@ class RigContract:
 
     def test_runs_again(self, rig: Rig) -> None:
         first, second = play(rig, lobes()), play(rig, lobes(peaks=(5000.0,)))
-        assert first.counts.shape[1] == lobes().voltage.size
+        assert first.counts.shape[1] == lobes().samples
         assert second.blocks[0].start == 0
-        assert second.counts.shape[1] == lobes(peaks=(5000.0,)).voltage.size
+        assert second.counts.shape[1] == lobes(peaks=(5000.0,)).samples
 
     def test_same_seed_gives_the_same_bytes(self) -> None:
         records = []

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from dearig.drivers.command import Command
 from dearig.drivers.daqmx.address import Address
 from dearig.drivers.daqmx.explain import ABORTED, TIMEOUT, explained
 from dearig.drivers.daqmx.guardian import Guardian, GuardianProcess, TakeOver
@@ -17,7 +18,7 @@ from dearig.drivers.daqmx.link import Link
 from dearig.drivers.daqmx.outputs import Outputs
 from dearig.drivers.daqmx.tasks import ClockedTasks, identify_card
 from dearig.drivers.errors import RigError, RigStateError
-from dearig.drivers.gate import GatedWaveform, ramp_down
+from dearig.drivers.gate import GatedWaveform
 from dearig.drivers.identity import instruments
 from dearig.drivers.rig import Block, Event, RigIdentity, RigState, expect
 from dearig.drivers.settings import RigSettings
@@ -133,13 +134,13 @@ class DaqmxRig:
             self._drop_tasks()
             tasks = ClockedTasks(self._link, self._address.device, self._settings)
             try:
-                counts = self._card.channels[0].scaling.counts(waveform.voltage)
-                rate = tasks.prepare(counts, waveform.rate)
+                command = Command(waveform, self._card.channels[0].scaling)
+                rate = tasks.prepare(command, waveform.rate)
             except BaseException:
                 tasks.close()
                 raise
             self._tasks = tasks
-            self._run = _Run(waveform, counts, rate)
+            self._run = _Run(command, rate)
             self._state = RigState.LOADED
             return rate
 
@@ -254,7 +255,7 @@ class DaqmxRig:
         run.delivered = end
         due = tuple(e for e in run.events if e.sample < end or end == run.total)
         run.events = [e for e in run.events if e not in due]
-        return Block(start, np.vstack((run.command[start:end], counts)), due)
+        return Block(start, np.vstack((run.command.window(start, end), counts)), due)
 
     def _stop(self, tasks: ClockedTasks, run: _Run) -> None:
         """Leave the waveform at its present sample, and ramp to 0 V linearly."""
@@ -268,16 +269,14 @@ class DaqmxRig:
             raise RigError(explained(self._address.device, ABORTED[0], ""), ABORTED[0])
         if played >= run.total:
             return
-        ramp = ramp_down(run.waveform, played - 1, self._settings.limits.ramp_down_s)
-        counts = self._card.channels[0].scaling.counts(ramp)
-        run.command = np.concatenate((run.command[:played], counts))
-        tasks.continue_with(run.command, played)
+        volts, samples = run.command.ramp_from(played, self._settings.limits.ramp_down_s)
+        tasks.continue_from(played)
         run.events.append(
             Event(
                 played,
                 "info",
-                f"stopped: ramping from {run.waveform.voltage[played - 1] * 1e-3:.4g} kV to 0 in "
-                f"{ramp.size / run.rate:.3g} s; the sample clock stood still for "
+                f"stopped: ramping from {volts * 1e-3:.4g} kV to 0 in "
+                f"{samples / run.rate:.3g} s; the sample clock stood still for "
                 f"{(self._clock() - before) * 1e3:.0f} ms before",
             )
         )
@@ -335,10 +334,9 @@ class DaqmxRig:
 
 
 class _Run:
-    """One waveform being played: ``command`` (total,) int16 are the output counts."""
+    """One waveform being played: ``command`` has the output counts."""
 
-    def __init__(self, waveform: GatedWaveform, command: np.ndarray, rate: float) -> None:
-        self.waveform = waveform
+    def __init__(self, command: Command, rate: float) -> None:
         self.command = command
         self.rate = rate
         self.delivered = 0  # samples handed to the reader
@@ -349,4 +347,4 @@ class _Run:
 
     @property
     def total(self) -> int:
-        return self.command.size
+        return self.command.samples

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dearig.drivers.channels import Channel
+from dearig.drivers.command import Command
 from dearig.drivers.daqmx.explain import TIMEOUT, instrument_errors
 from dearig.drivers.daqmx.link import Link
 from dearig.drivers.errors import RigError
@@ -73,7 +74,7 @@ class ClockedTasks:
         self._ai: nidaqmx.Task | None = None
         self._enable: nidaqmx.Task | None = None
         self._watchdog: WatchdogTask | None = None
-        self._command = np.empty(0, dtype=np.int16)
+        self._command: Command | None = None
         self._rate = 0.0
         self._first = 0  # first sample of the present output task
         self._written = 0  # samples of the command written so far
@@ -103,8 +104,8 @@ class ClockedTasks:
         inputs = len(settings.channel_names) - 1
         return settings.channels(coefficients, [first + i * interval for i in range(inputs)])
 
-    def prepare(self, command: np.ndarray, rate: float) -> float:
-        """Reserve the card for ``command`` (N,) counts at ``rate`` Hz; returns the actual rate."""
+    def prepare(self, command: Command, rate: float) -> float:
+        """Reserve the card for ``command`` at ``rate`` Hz; returns the actual rate."""
         self._command = command
         self._rate = rate
         with self._errors():
@@ -175,11 +176,12 @@ class ClockedTasks:
 
     def refill(self, delivered: int) -> None:
         """Write further samples where there is room; at least ``delivered`` have been output."""
-        if self._written == self._command.size:
+        left = self._commanded().samples - self._written
+        if left == 0:
             return
         room = self._buffer - (self._written - max(delivered, self._first))
         # wait for room for a large piece
-        if room >= self._buffer // 4 or room >= self._command.size - self._written:
+        if room >= self._buffer // 4 or room >= left:
             self._write(room)
 
     def hold(self) -> int:
@@ -188,11 +190,13 @@ class ClockedTasks:
             self._output().stop()
             return int(self._inputs().in_stream.total_samp_per_chan_acquired)
 
-    def continue_with(self, command: np.ndarray, played: int) -> None:
-        """Continue with ``command`` from sample ``played``, with the same rate and inputs."""
-        self._command = command
+    def continue_from(self, played: int) -> None:
+        """Continue with the command, which has changed, from sample ``played``.
+
+        Rate and inputs stay the same.
+        """
         self._first = self._written = played
-        if played == command.size:
+        if played == self._commanded().samples:
             return
         with self._errors():
             self._time_output()
@@ -284,7 +288,7 @@ class ClockedTasks:
 
         ao = self._output()
         # a finite generation needs 2 samples: add one at 0 V, where the command ends
-        left = max(2, self._command.size - self._first)
+        left = max(2, self._commanded().samples - self._first)
         ao.timing.cfg_samp_clk_timing(
             self._rate, sample_mode=AcquisitionType.FINITE, samps_per_chan=left
         )
@@ -303,10 +307,11 @@ class ClockedTasks:
         """Write up to ``room`` samples of the command."""
         from nidaqmx.stream_writers import AnalogSingleChannelWriter
 
-        counts = self._command[self._written : self._written + room]
+        command = self._commanded()
+        counts = command.window(self._written, self._written + room)
         volts = counts * (self._settings.card.ao_range_V / 32768.0)
         self._written += volts.size
-        if self._written == self._command.size and self._command.size - self._first == 1:
+        if self._written == command.samples and command.samples - self._first == 1:
             volts = np.append(volts, volts[-1:])
         with self._errors():
             writer = AnalogSingleChannelWriter(self._output().out_stream, auto_start=False)
@@ -314,6 +319,11 @@ class ClockedTasks:
             timeout = self._settings.guardian.link_timeout_s / 2.0
             for start in range(0, volts.size, _PIECE):
                 writer.write_many_sample(volts[start : start + _PIECE], timeout=timeout)
+
+    def _commanded(self) -> Command:
+        if self._command is None:
+            raise RigError(f"card {self._device}: no waveform is loaded")
+        return self._command
 
     def _output(self) -> nidaqmx.Task:
         if self._ao is None:

@@ -170,7 +170,7 @@ def test_the_first_ctrl_c_ramps_down(command, tmp_path: Path) -> None:
     assert run.voltage_command is not None
     assert run.voltage_command[-1] == pytest.approx(0.0, abs=0.2)
     # not a sample is lost or torn around the moment: what was planned goes on until the ramp
-    planned = plan(LOADED, RIG_FILE).admitted().voltage[: run.samples]
+    planned = plan(LOADED, RIG_FILE).admitted().window(0, run.samples)
     same = int(np.argmax(np.abs(run.voltage_command - planned) > 1.0))
     assert same >= 700
     assert np.abs(np.diff(run.voltage_command)).max() < 20.0
@@ -343,7 +343,7 @@ def test_an_observer_receives_every_sample_and_event(tmp_path: Path) -> None:
     assert diary.samples == result.samples
     assert tuple(diary.events) == result.events
     assert diary.planned is not None
-    assert diary.planned.voltage.size == result.samples
+    assert diary.planned.samples == result.samples
 
 
 def test_an_overlay_model_runs_in_step_and_is_kept(tmp_path: Path) -> None:
@@ -563,7 +563,7 @@ def test_the_gate_judges_the_stretched_film() -> None:
     loaded = parse_sequence(LOBE.replace("3.0", "8.3"), "high lobe", Path())
     with pytest.raises(InputError, match=r"true field reaches 1[01]\.\d+ MV/m at .*9 MV/m"):
         plan(loaded, rig).admitted()
-    assert plan(loaded, RIG_FILE).admitted().voltage.max() == pytest.approx(8300.0)
+    assert plan(loaded, RIG_FILE).admitted().window().max() == pytest.approx(8300.0)
 
 
 def test_a_rig_that_cannot_hang_is_refused(tmp_path: Path) -> None:
@@ -579,4 +579,4 @@ def test_a_rig_that_cannot_hang_is_refused(tmp_path: Path) -> None:
 def test_a_run_knows_its_rate() -> None:
     rig = RigFile(card=CardSettings(sample_rate_Hz=250.0))
     waveform = plan(LOADED, rig).admitted()
-    assert (waveform.rate, waveform.voltage.size) == (250.0, 376)
+    assert (waveform.rate, waveform.samples) == (250.0, 376)

@@ -34,8 +34,8 @@ RIVALS = [("sensor lag", "sensor_lag", LAG), ("linear drag", "drag", DRAG)]
 
 def predicted(model: Actuator, sequence: str) -> np.ndarray:
     waveform = plan(parse_sequence(sequence, "x", Path()), SLOW).admitted()
-    time = np.arange(waveform.voltage.size) / waveform.rate
-    return model.simulate(Drive(time, waveform.voltage, hold=True)).displacement
+    time = np.arange(waveform.samples) / waveform.rate
+    return model.simulate(Drive(time, waveform.window(), hold=True)).displacement
 
 
 def test_it_separates_as_much_as_it_says():
@@ -91,22 +91,22 @@ def test_limits_lower_every_candidate():
     found, _ = separating_experiment(RIVALS, low, NOISE)
     assert len(found.tried) == len(candidates(3.0))
     waveform = plan(parse_sequence(found.sequence, "x", Path()), low).admitted()
-    assert 2e3 < waveform.voltage.max() <= 3e3
+    assert 2e3 < waveform.window().max() <= 3e3
 
 
 def test_every_candidate_passes_the_gate_of_the_thesis_rig():
     for name, text in candidates(8.0).items():
         waveform = plan(parse_sequence(text, name, Path()), SLOW).admitted()
-        assert waveform.voltage.max() > 5e3, name
+        assert waveform.window().max() > 5e3, name
 
 
 def played(found, settings: RigFile) -> tuple[np.ndarray, float, list[np.ndarray]]:
     """Voltage, its rate, and what each of the two predicts of the film."""
     waveform = plan(parse_sequence(found.sequence, "x", Path()), settings).admitted()
-    time = np.arange(waveform.voltage.size) / waveform.rate
-    drive = Drive(time, waveform.voltage, hold=True)
+    time = np.arange(waveform.samples) / waveform.rate
+    drive = Drive(time, waveform.window(), hold=True)
     moved = [model.simulate(drive).displacement for model in (LAG, DRAG)]
-    return waveform.voltage, waveform.rate, moved
+    return waveform.window(), waveform.rate, moved
 
 
 def with_interlocks(**changes: float) -> RigFile:

@@ -98,7 +98,7 @@ def shares(rig: SimulatedRig, waveform: GatedWaveform) -> tuple[dict[str, float]
 def main() -> None:
     settings = RigSettings(thermometer=ThermometerSettings())
     waveform = thesis_record(settings)
-    seconds = waveform.voltage.size / RATE
+    seconds = waveform.samples / RATE
     for address in ("sim", "sim:1"):
         rig = open_simulated_rig(address, settings, THESIS_FILM, THESIS_LOAD)
         play(rig, waveform)  # compiles

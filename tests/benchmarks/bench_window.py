@@ -30,6 +30,7 @@ from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
 from dearig.drivers.channels import Channel, Scaling
 from dearig.drivers.rig import Block, RigIdentity
+from dearig.drivers.samples import Repeated
 from dearig.window.collector import Collector
 from dearig.window.live import Live
 from dearig.window.planner import make_preview
@@ -213,7 +214,8 @@ def ours(models: int, window: float | None) -> tuple[Ours, Live, Source]:
     live = Live(session.overlays)
     loaded = parse_sequence(SEQUENCE, "bench", Path())
     # the plan says how long the run is going to be: here ten million samples, half a minute
-    planned = replace(plan(loaded, RigFile()), voltage=np.broadcast_to(0.0, 10_000_000))
+    still = Repeated(np.zeros(1), 10_000_000, 10_000_000)
+    planned = replace(plan(loaded, RigFile()), voltage=still)
     live.started(planned, RigIdentity("sim", True, (), CHANNELS), RATE)
     plots = Ours(session)
     plots.window = window

@@ -71,7 +71,7 @@ def test_the_example_plays_every_kind_within_the_default_limits() -> None:
     text = example()
     loaded = parse_sequence(text, "example", Path())
     assert set(loaded.sequence.labels) == set(SEGMENT_KINDS) - {"csv"}
-    assert plan(loaded, RigFile(), None, "").admitted().voltage.size
+    assert plan(loaded, RigFile(), None, "").admitted().samples
 
 
 def test_the_example_with_its_comments_removed_is_the_same_sequence(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dearig.config.presets import PRESETS
-from dearig.config.sequencefile import SAMPLES_MAX, load_sequence, parse_sequence
+from dearig.config.sequencefile import HELD_SAMPLES_MAX, SAMPLES_MAX, load_sequence, parse_sequence
 from dearig.errors import InputError
 from dearig.model.excitation import Sequence
 
@@ -90,11 +90,20 @@ def test_a_waveform_from_csv(tmp_path: Path, column: str, factor: float) -> None
 def test_a_run_as_long_as_it_may_be() -> None:
     text = 'name = "x"\nlead_in_s = 0.0\ntail_s = 0.0\n[[segment]]\nkind = "hold"\nduration_s = '
     longest = SAMPLES_MAX / 1000.0
-    assert (
-        parse_sequence(f"{text}{longest}\n", "x", Path()).sample(10.0)[1].size == longest * 10 + 1
-    )
+    loaded = parse_sequence(f"{text}{longest}\n", "x", Path())
+    assert loaded.on_clock(1000.0).samples == SAMPLES_MAX + 1
+    assert not loaded.on_clock(1000.0).window(SAMPLES_MAX - 9, SAMPLES_MAX + 1).any()
     with pytest.raises(InputError, match=f"at most {SAMPLES_MAX:,} can be played"):
-        parse_sequence(f"{text}{longest + 1.0}\n", "x", Path()).sample(1000.0)
+        parse_sequence(f"{text}{longest + 1.0}\n", "x", Path()).on_clock(1000.0)
+
+
+def test_a_sequence_held_whole_is_shorter() -> None:
+    text = 'name = "x"\nlead_in_s = 0.0\ntail_s = 0.0\n[[segment]]\nkind = "hold"\nduration_s = '
+    longest = HELD_SAMPLES_MAX / 1000.0
+    loaded = parse_sequence(f"{text}{longest + 1.0}\n", "x", Path())
+    assert loaded.sample(10.0)[1].size == (longest + 1.0) * 10 + 1
+    with pytest.raises(InputError, match=f"at most {HELD_SAMPLES_MAX:,} can be played"):
+        loaded.sample(1000.0)
 
 
 def test_faults_that_a_wrong_name_causes_are_not_counted() -> None:

@@ -142,7 +142,7 @@ def test_a_streamed_waveform_can_be_stopped():
         bench.rig.stop()
         tail = drain(bench.rig)
         command = np.concatenate([*(b.counts[0] for b in head), tail.counts[0]])
-        assert command.size < waveform.voltage.size
+        assert command.size < waveform.samples
         assert command[-1] == 0
         assert bench.device.wire_voltage() == 0.0
         assert any("the sample clock stood still" in event.message for event in tail.events)
@@ -175,7 +175,7 @@ def test_a_card_in_use_is_left_alone(bench):
     with pytest.raises(RigError, match="in use by another program"):
         DaqmxRig(bench.address, bench.settings, guardian)
     assert guardian.words == ["close"]
-    assert drain(bench.rig).counts.shape[1] == LONG.voltage.size - 100
+    assert drain(bench.rig).counts.shape[1] == LONG.samples - 100
 
 
 def test_the_enable_line_is_high_from_arming_to_the_end():
@@ -227,7 +227,7 @@ def test_a_dead_guardian_ramps_the_run_down(bench):
         go_on()
     command = np.concatenate([block.counts[0] for block in blocks])
     assert command[-1] == 0
-    assert 500 <= command.size < 0.5 * LONG.voltage.size
+    assert 500 <= command.size < 0.5 * LONG.samples
     events = [event for block in blocks for event in block.events]
     assert "no answer from the guardian process" in events[0].message
     assert bench.device.wire_voltage() == 0.0
@@ -336,7 +336,7 @@ class TestInspection:
         found = inspect("Dev1", bench.address.server, bench.settings)
         assert [f.verdict for f in found.findings if "in use" in f.found] == ["wrong"]
         # and whoever uses it goes on undisturbed
-        assert drain(bench.rig).counts.shape[1] == LONG.voltage.size - 100
+        assert drain(bench.rig).counts.shape[1] == LONG.samples - 100
 
     @pytest.mark.parametrize(
         ("card", "item", "verdict"),

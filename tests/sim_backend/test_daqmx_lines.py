@@ -59,7 +59,7 @@ def test_without_the_enable_line_the_film_gets_nothing(seconds):
             dog.start()
         add_output(ao)
         add_inputs(ai, "ai0", "_ao0_vs_aognd")
-        clock_output(ao, RATE, waveform.voltage.size)
+        clock_output(ao, RATE, waveform.samples)
         clock_inputs(ai, RATE)
         ao.write(volts(waveform))
         ai.start()

@@ -128,10 +128,10 @@ def test_the_same_bytes_as_the_rig_in_process_run_after_run(address):
 @pytest.mark.parametrize(("written", "taken"), [(500, 100), (777, 333), (64, 1), (5000, 4999)])
 def test_how_a_stream_is_cut_changes_nothing(session, output, inputs, written, taken):
     waveform = LONG
-    wanted, total = play(the_rig(), waveform).counts[1:], waveform.voltage.size
+    wanted, total = play(the_rig(), waveform).counts[1:], waveform.samples
     if taken == 1:  # a call each: part of it says as much
         total = 300
-    clock_output(output, RATE, waveform.voltage.size, buffer=2 * written)
+    clock_output(output, RATE, waveform.samples, buffer=2 * written)
     clock_inputs(inputs, RATE)
     source = volts(waveform)
     gone = write(output, source[:written])
@@ -159,7 +159,7 @@ def test_an_output_that_is_stopped_and_restarted_keeps_the_inputs_going(
     wanted = [rig.read().counts for _ in range(blocks)]
     rig.stop()
     wanted.append(drain(rig).counts)
-    clock_output(output, RATE, waveform.voltage.size, buffer=waveform.voltage.size)
+    clock_output(output, RATE, waveform.samples, buffer=waveform.samples)
     clock_inputs(inputs, RATE)
     write(output, volts(waveform))
     inputs.start()
@@ -168,7 +168,7 @@ def test_an_output_that_is_stopped_and_restarted_keeps_the_inputs_going(
     output.stop()
     played = inputs.in_stream.total_samp_per_chan_acquired
     assert played == 50 * blocks + 1
-    assert card.device.wire_voltage() == pytest.approx(waveform.voltage[played - 1], abs=0.2)
+    assert card.device.wire_voltage() == pytest.approx(waveform.window()[played - 1], abs=0.2)
     ramp = ramp_down(waveform, played - 1, card.device.settings.limits.ramp_down_s) / 1000.0
     clock_output(output, RATE, ramp.size, buffer=ramp.size)
     write(output, ramp)
@@ -180,7 +180,7 @@ def test_an_output_that_is_stopped_and_restarted_keeps_the_inputs_going(
 
 def test_raw_and_scaled_reads_say_the_same(session):
     waveform = lobes()
-    size = waveform.voltage.size
+    size = waveform.samples
     found = []
     for how in ("rows", "scans", "volts"):
         with served() as card, task(card.session) as ao, task(card.session) as ai:
@@ -211,12 +211,12 @@ def test_the_card_reads_its_own_output_back(session, output):
     waveform = lobes()
     with task(session) as ai:
         add_inputs(ai, "_ao0_vs_aognd", "ai0", "ai5")
-        clock_output(output, RATE, waveform.voltage.size)
-        clock_inputs(ai, RATE, waveform.voltage.size)
+        clock_output(output, RATE, waveform.samples)
+        clock_inputs(ai, RATE, waveform.samples)
         output.write(volts(waveform))
         ai.start()
         output.start()
-        counts = read(ai, waveform.voltage.size)
+        counts = read(ai, waveform.samples)
     np.testing.assert_array_equal(counts[0], play(the_rig(), waveform).counts[0])
     assert np.abs(counts[1] - counts[0].astype(int)).max() < 60
     assert not counts[2].any()  # nothing is wired to it
@@ -240,7 +240,7 @@ def test_inputs_on_their_own_clock_follow_what_is_set_by_hand(card, session, out
 @pytest.mark.parametrize("first", ["inputs wait", "output waits"])
 def test_a_start_trigger_starts_two_clocks_at_once(session, output, inputs, first):
     waveform = lobes()
-    size = waveform.voltage.size
+    size = waveform.samples
     clock_output(output, RATE, size)
     clock_inputs(inputs, RATE, size, source="")
     output.write(volts(waveform))
@@ -326,7 +326,7 @@ def test_time_decides_what_there_is_to_read():
     with served(clock=clock) as card, task(card.session) as ao, task(card.session) as ai:
         add_output(ao)
         add_inputs(ai)
-        clock_output(ao, RATE, waveform.voltage.size)
+        clock_output(ao, RATE, waveform.samples)
         clock_inputs(ai, RATE)
         ao.write(volts(waveform))
         ai.start()
@@ -334,7 +334,7 @@ def test_time_decides_what_there_is_to_read():
         ao.start()
         clock.advance(0.0955)
         assert ai.in_stream.avail_samp_per_chan == 95
-        assert card.device.wire_voltage() == pytest.approx(waveform.voltage[95], abs=0.2)
+        assert card.device.wire_voltage() == pytest.approx(waveform.window()[95], abs=0.2)
         assert read(ai, 95).shape == (3, 95)
         pending = in_thread(lambda: read(ai, 100))
         clock.until_somebody_waits()
@@ -354,7 +354,7 @@ def test_time_decides_what_there_is_to_read():
 
 def test_what_came_before_a_timeout_is_delivered(session, output, inputs):
     waveform = lobes()
-    clock_output(output, RATE, waveform.voltage.size)
+    clock_output(output, RATE, waveform.samples)
     clock_inputs(inputs, RATE)
     output.write(volts(waveform))
     inputs.start()
@@ -364,8 +364,8 @@ def test_what_came_before_a_timeout_is_delivered(session, output, inputs):
     with pytest.raises(DaqReadError) as caught:
         reader.read_int16(counts, 1000, 1.0)
     assert caught.value.error_code == -200284
-    assert caught.value.samps_per_chan_read == waveform.voltage.size
-    packed = counts.reshape(-1)[: 3 * waveform.voltage.size].reshape(3, -1)
+    assert caught.value.samps_per_chan_read == waveform.samples
+    packed = counts.reshape(-1)[: 3 * waveform.samples].reshape(3, -1)
     np.testing.assert_array_equal(packed, play(the_rig(), waveform).counts[1:])
 
 
@@ -418,12 +418,12 @@ def test_the_output_keeps_its_value_when_its_task_ends(card, session):
     assert card.device.wire_voltage() == pytest.approx(6000.0, abs=0.2)
     with task(session) as ao:
         add_output(ao)
-        clock_output(ao, RATE, waveform.voltage.size)
+        clock_output(ao, RATE, waveform.samples)
         ao.write(volts(waveform))
         assert card.device.wire_voltage() == pytest.approx(6000.0, abs=0.2)
         ao.start()
         card.device._clock.advance(0.0955)
-    assert card.device.wire_voltage() == pytest.approx(waveform.voltage[95], abs=0.2)
+    assert card.device.wire_voltage() == pytest.approx(waveform.window()[95], abs=0.2)
 
 
 def test_a_reset_takes_everything_to_zero_and_aborts_every_task(card, session, inputs):
@@ -504,14 +504,14 @@ def test_every_n_samples_an_event_comes(card, inputs):
 def test_tasks_on_a_rate_that_only_the_clock_knows(session, output, inputs):
     """Inputs on the output's clock run at its rate, whatever they were told to expect."""
     waveform = lobes(rate=500.0)
-    clock_output(output, 500.0, waveform.voltage.size)
-    clock_inputs(inputs, 2000.0, waveform.voltage.size, source=AO_CLOCK)
+    clock_output(output, 500.0, waveform.samples)
+    clock_inputs(inputs, 2000.0, waveform.samples, source=AO_CLOCK)
     as_the_rig_file_says(inputs)
     output.write(volts(waveform))
     inputs.start()
     output.start()
     np.testing.assert_array_equal(
-        read(inputs, waveform.voltage.size), play(the_rig(), waveform).counts[1:]
+        read(inputs, waveform.samples), play(the_rig(), waveform).counts[1:]
     )
     assert inputs.timing.samp_quant_samp_mode is AcquisitionType.FINITE
 
@@ -545,12 +545,12 @@ def test_a_narrower_range_reads_the_same_volts_in_finer_steps():
         with served() as card, task(card.session) as ao, task(card.session) as ai:
             add_output(ao)
             ai.ai_channels.add_ai_voltage_chan("Dev1/ai2", min_val=-limit, max_val=limit)
-            clock_output(ao, RATE, waveform.voltage.size)
-            clock_inputs(ai, RATE, waveform.voltage.size)
+            clock_output(ao, RATE, waveform.samples)
+            clock_inputs(ai, RATE, waveform.samples)
             ao.write(volts(waveform))
             ai.start()
             ao.start()
-            found.append(np.array(ai.read(waveform.voltage.size)))
+            found.append(np.array(ai.read(waveform.samples)))
     wide, narrow = found
     # half a step of the wide range, and its calibration
     np.testing.assert_allclose(narrow, wide, atol=10.0 * 350e-6 + 10.0 / 65536)

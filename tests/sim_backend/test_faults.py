@@ -417,7 +417,7 @@ def test_faults_are_found_on_rigs_that_hide_something(kind, address):
 def test_a_run_without_faults_trips_nothing(address, preset, rate):
     record, _, trips = run(address=address, preset=preset, rate=rate)
     assert trips == []
-    assert record.counts.shape[1] == planned(preset, rate).voltage.size
+    assert record.counts.shape[1] == planned(preset, rate).samples
 
 
 def test_every_preset_runs_without_a_trip():

@@ -223,7 +223,7 @@ def test_inputs_saturate():
 def test_command_goes_out_with_the_amplifiers_offset_taken_off():
     settings = RigSettings(amplifier=AmplifierSettings(offset_V=50.0))
     card = Card(settings, Streams((1,)))
-    volts = card.put_out(card.command_counts(np.array([0.0, 1050.0])))
+    volts = card.put_out(card.channels[0].scaling.counts(np.array([0.0, 1050.0])))
     np.testing.assert_allclose(volts, [-0.05, 1.0], atol=2e-4)
 
 

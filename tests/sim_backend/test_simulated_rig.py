@@ -164,7 +164,7 @@ def test_output_is_zero_except_while_running():
     begin(rig, lobes())
     for _ in range(9):
         rig.read()
-    assert rig.output == pytest.approx(lobes().voltage[90], abs=1.0)
+    assert rig.output == pytest.approx(lobes().window()[90], abs=1.0)
     rig.make_safe()
     assert rig.output == 0.0
 
@@ -260,7 +260,7 @@ def test_a_stop_reaches_a_waiting_reader():
     begin(rig, waveform)
     rig.read()
     presses.append(rig.stop)
-    assert drain(rig).counts.shape[1] < waveform.voltage.size - 1000
+    assert drain(rig).counts.shape[1] < waveform.samples - 1000
 
 
 def test_paced_rig_takes_its_time_and_gives_the_same_bytes():

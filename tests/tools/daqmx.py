@@ -218,7 +218,7 @@ def the_rig(address: str = "sim", seed: int = 0) -> SimulatedRig:
 
 def volts(waveform: GatedWaveform) -> np.ndarray:
     """V at the output that make ``waveform`` at the film, with a gain of 1000."""
-    return waveform.voltage / 1000.0
+    return waveform.window() / 1000.0
 
 
 def play_finite(
@@ -228,12 +228,12 @@ def play_finite(
     with task(session) as ao, task(session) as ai:
         add_output(ao)
         add_inputs(ai)
-        clock_output(ao, waveform.rate, waveform.voltage.size)
-        clock_inputs(ai, waveform.rate, waveform.voltage.size)
+        clock_output(ao, waveform.rate, waveform.samples)
+        clock_inputs(ai, waveform.rate, waveform.samples)
         ao.write(volts(waveform))
         ai.start()
         ao.start()
-        counts = read(ai, waveform.voltage.size)
+        counts = read(ai, waveform.samples)
         ao.wait_until_done(0.0)
         ai.wait_until_done(0.0)
     return counts

@@ -37,7 +37,7 @@ def started(*models: OverlayModel) -> tuple[Live, np.ndarray]:
     planned = plan(LOADED, RigFile())
     live = Live(models)
     live.started(planned, RigIdentity("sim", True, (), CHANNELS), RATE)
-    return live, planned.voltage
+    return live, planned.voltage.window(0, planned.samples)
 
 
 def blocks(voltage: np.ndarray, size: int) -> list[Block]:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
@@ -80,7 +81,14 @@ def test_no_curve_of_another_sequence_stays(qtbot: QtBot, page: SequencePage) ->
     assert page.preview.plots.drawn == ("voltage", "displacement", "field")
     page.session.set_sequence(TOO_HIGH, Path())  # the film has no equilibrium there
     settled(qtbot, page.session)
-    assert page.preview.plots.drawn == ("voltage",)
+    assert page.preview.plots.drawn == ("voltage", "displacement", "field")
+    # the prediction ends where the voltage leaves its limits
+    assert page.session.preview is not None
+    time, volts = page.session.preview.curves["voltage"]
+    limit = page.session.rig_file.gate_limits().voltage_max
+    beyond = time[np.argmax(volts > limit)]
+    at, field = page.session.preview.curves["field"]
+    assert at[np.isfinite(field)].max() == pytest.approx(beyond, abs=4.0 * time[1])
 
 
 def test_what_is_long_in_planning_is_not_shown_as_planned(

@@ -92,9 +92,9 @@ def test_the_rig_of_a_seed_has_that_film():
     record = play(rig, waveform)
     reading = record.physical(rig, "displacement")
     reading = reading - reading[:20].mean()
-    time = np.arange(waveform.voltage.size) / waveform.rate
+    time = np.arange(waveform.samples) / waveform.rate
     plant = cases.draw(4, THESIS_FILM, THESIS_LOAD).plant()
-    motion, _ = plant.advance(time, waveform.voltage, True)
+    motion, _ = plant.advance(time, waveform.window(), True)
     assert (reading - motion.displacement).std() < 5e-6
 
 
