@@ -437,7 +437,8 @@ class _Reached:
     def take_field(self, start: int, voltage: np.ndarray, field_per_volt: np.ndarray) -> None:
         """Include the field and the energy of the same samples."""
         self.field = _higher(self.field, np.abs(voltage) * field_per_volt, start)
-        charge = self._electric_volume * field_per_volt**2 * voltage
+        # in this order no overflow makes a NaN where the voltage is 0
+        charge = (self._electric_volume * field_per_volt) * (field_per_volt * voltage)
         rises = 0.5 * (voltage[1:] + voltage[:-1]) * np.diff(charge)
         before, held = self._last
         # a waveform starts at 0 V and without charge, or it is refused
