@@ -74,13 +74,15 @@ def serve(
     link_timeout: float = 1.0,
     seed: int = 0,
     laser: bool = False,
+    sine: bool = False,
 ) -> None:
     """Serve the card of the simulated rig at ``address`` until ctrl-C.
 
     ``told`` is called with a ``Serving`` once it listens. ``anywhere`` allows a ``host`` that
     other computers can reach; all files of ``tls`` must then be given. A client may be silent with
     a voltage at the film for ``client_timeout`` s, without limit if None, and its link may be dead
-    for ``link_timeout`` s.
+    for ``link_timeout`` s. With ``sine`` the card's inputs read a sine within their limits, as
+    NI's own simulated devices give one, and not the rig.
     Raises ``InputError`` for an address, host or port that cannot be used, and ``InstrumentFault``
     where the libraries are missing.
     """
@@ -99,7 +101,7 @@ def serve(
         plan = FaultPlan.parse(faults)
         device = open_device(
             address, rig_file, rig_file.as_film(), rig_file.as_load(), seed=seed, paced=paced,
-            faults=plan,
+            faults=plan, sine=sine,
         )  # fmt: skip
     except AddressError as error:
         raise InputError(str(error)) from error

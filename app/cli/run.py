@@ -321,6 +321,14 @@ def serve_daqmx(
         bool,
         typer.Option("--laser", help="Serve the laser's controller too, at a serial port."),
     ] = False,
+    sine: Annotated[
+        bool,
+        typer.Option(
+            "--sine",
+            help="Let the inputs read a sine within their limits, as NI's own simulated devices "
+            "give one, instead of the rig.",
+        ),
+    ] = False,
     seed: Seed = 0,
 ) -> None:
     """Serve a simulated card over NI's network protocol until ctrl-C.
@@ -336,7 +344,7 @@ def serve_daqmx(
         tls=TlsFiles(tls_cert, tls_key, tls_client_ca),
         paced=paced, faults=fault or (),
         client_timeout=client_timeout if client_tracking else None, link_timeout=link_timeout,
-        seed=seed, laser=laser,
+        seed=seed, laser=laser, sine=sine,
     )  # fmt: skip
 
 

@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from dearig.sim_backend.daqmx.card_properties import DEVICE, PHYSICAL_CHANNEL, SERIAL, SYSTEM
+from dearig.sim_backend.daqmx.card_properties import (
+    CALIBRATION,
+    DEVICE,
+    PHYSICAL_CHANNEL,
+    SERIAL,
+    SYSTEM,
+)
 from dearig.sim_backend.daqmx.channel_properties import CHANNEL, kinds_of
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.properties import Asked, Property, name_of
@@ -18,6 +24,7 @@ __all__ = ["SERIAL", "TABLES", "Asked", "check_device_context", "get", "reset", 
 #: Properties by the group's name in the protocol, and by name.
 TABLES: Mapping[str, Mapping[str, Property]] = {
     "Buffer": BUFFER,
+    "CalInfo": CALIBRATION,
     "Chan": CHANNEL,
     "Device": DEVICE,
     "ExportedSignal": EXPORTED,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
-from dearig.sim_backend.daqmx.properties import Asked, given
+from dearig.sim_backend.daqmx.properties import Asked, changed, given
 from dearig.sim_backend.daqmx.setup import INPUT_RANGES, INPUTS, LINES, OUTPUTS
 
-__all__ = ["DEVICE", "PHYSICAL_CHANNEL", "SERIAL", "SYSTEM"]
+__all__ = ["CALIBRATION", "DEVICE", "PHYSICAL_CHANNEL", "SERIAL", "SYSTEM"]
 
 SERIAL = 0x0D1E1EC7  #: serial number of the simulated card
 DRIVER = (25, 0, 0)  #: driver version that the server reports
@@ -17,6 +17,7 @@ _PRODUCT, _PRODUCT_NUMBER = "PCIe-6361", 0x7434
 _X_SERIES, _PCIE = 15858, 13612
 _VOLTAGE, _CURRENT = 10322, 10134
 _START, _REFERENCE, _PAUSE, _ARM_START = 1 << 2, 1 << 3, 1 << 1, 1 << 5
+_NOTE, _NOTE_CHARACTERS = "calibration note", 4
 _DC = 1 << 1  # bit of the coupling
 _SAMPLE_CLOCK, _ON_DEMAND, _CHANGE_DETECTION = 10388, 10390, 12504
 
@@ -94,6 +95,21 @@ DEVICE = {
     "DO_PORTS": given(lambda a: _names(a, _ports())),
     "CI_PHYSICAL_CHANS": given(""),
     "CO_PHYSICAL_CHANS": given(""),
+}
+
+
+def _set_note(asked: Asked, value: str) -> None:
+    asked.device.kept[_NOTE] = value[:_NOTE_CHARACTERS]
+
+
+CALIBRATION = {
+    "SELF_CAL_SUPPORTED": given(True),
+    "SELF_CAL_LAST_TEMP": given(0.0),
+    "EXT_CAL_LAST_TEMP": given(0.0),
+    "EXT_CAL_RECOMMENDED_INTERVAL": given(24),  # months
+    "CAL_DEV_TEMP": given(0.0),  # degrees Celsius, as NI's simulated devices say
+    "CAL_USER_DEFINED_INFO": changed(lambda a: a.device.kept.get(_NOTE, ""), _set_note),
+    "CAL_USER_DEFINED_INFO_MAX_SIZE": given(_NOTE_CHARACTERS),
 }
 
 

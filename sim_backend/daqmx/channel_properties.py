@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.properties import Asked, accepted, changed, fixed, given
-from dearig.sim_backend.daqmx.tasks import Kind, Lines
+from dearig.sim_backend.daqmx.tasks import AnalogInput, Kind, Lines
 
 __all__ = ["CHANNEL", "FROM_CUSTOM_SCALE", "VOLTS", "kinds_of"]
 
@@ -52,12 +54,21 @@ def _scale_name(asked: Asked) -> str:
 
 _SCALE = changed(_scale_name, lambda a, v: a.device.set_scale(a.own, a.analog(), v), "")
 _UNITS = changed(_units, _set_units, VOLTS)
-_LOW = changed(
-    lambda a: a.analog().limits[0], lambda a, v: a.device.set_limits(a.own, a.analog(), low=v)
-)
-_HIGH = changed(
-    lambda a: a.analog().limits[1], lambda a, v: a.device.set_limits(a.own, a.analog(), high=v)
-)
+
+
+def _span(asked: Asked) -> tuple[float, float]:
+    """Return the limits of a channel; those of an input are what its range can measure."""
+    channel = asked.analog()
+    if not isinstance(channel, AnalogInput):
+        return channel.limits
+    ends = np.array([-channel.range, channel.range])
+    if channel.scale is not None:
+        ends = channel.scale.scaled(ends)
+    return float(ends.min()), float(ends.max())
+
+
+_LOW = changed(lambda a: _span(a)[0], lambda a, v: a.device.set_limits(a.own, a.analog(), low=v))
+_HIGH = changed(lambda a: _span(a)[1], lambda a, v: a.device.set_limits(a.own, a.analog(), high=v))
 _RANGE_LOW = changed(
     lambda a: -a.analog().range, lambda a, v: a.device.set_range(a.own, a.analog(), -v)
 )

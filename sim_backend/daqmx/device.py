@@ -412,6 +412,15 @@ class Device(TimingEngine):
                 row[:] = channel.scale.scaled(row)
         return values
 
+    def time_of(self, task: Task, sample: int) -> float:
+        """Return the time of ``sample`` of ``task`` in s since 1970; the present without a run."""
+        with self._lock:
+            now = self._settle()
+            at = now
+            if task.ticks is not None and task.ticks.passed(now) > sample:
+                at = float(task.ticks.times(sample, sample + 1)[0])
+            return self._born_at + at
+
     # writing
 
     def to_counts(self, task: Task, volts: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
@@ -50,7 +51,9 @@ class Reading:
 class TimingEngine(Setup):
     """Timing of the card of a rig with ``settings``; ``Device`` has the calls.
 
-    ``plant`` is the film at rest, ``noise_seed`` that of the instruments' noise.
+    ``plant`` is the film at rest, ``noise_seed`` that of the instruments' noise. With ``sine``
+    no instrument is wired to the inputs: each reads a sine within its limits, as NI's own simulated
+    devices give one.
     """
 
     def __init__(
@@ -61,12 +64,14 @@ class TimingEngine(Setup):
         *,
         noise_seed: tuple[int, ...] = (0,),
         faults: FaultPlan | None = None,
+        sine: bool = False,
     ) -> None:
         super().__init__(settings)
         self._clock = clock
         self._born = clock.now()
+        self._born_at = time.time()  # s since 1970, for the time stamps of waveforms
         self._faults = faults or FaultPlan()
-        self._wiring = Wiring(settings, plant, noise_seed, self._faults)
+        self._wiring = Wiring(settings, plant, noise_seed, self._faults, sine=sine)
         self._wiring.warm_up()
         self._wire = Wire(self._card, self._wiring, OUTPUTS, LINES, self._born)
         self._waiting: set[threading.Event] = set()
@@ -364,7 +369,7 @@ class TimingEngine(Setup):
         }
         task.delivered = last
         self._laser = self._wiring.laser_reading(counts, task.inputs)
-        return Reading(self._wiring.as_read(counts, outputs, task.inputs), complete)
+        return Reading(self._wiring.as_read(counts, outputs, task.inputs, first), complete)
 
     def _new_run(self, task: Task) -> Run:
         ticks = task.ticks

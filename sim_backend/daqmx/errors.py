@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["WORDS", "Code", "DaqmxError"]
+from nidaqmx._grpc_interpreter import _ERROR_MESSAGES
+from nidaqmx.error_codes import DAQmxErrors
+
+__all__ = ["WORDS", "Code", "DaqmxError", "message_of"]
 
 
 class Code(IntEnum):
@@ -51,6 +54,7 @@ class Code(IntEnum):
     WATCHDOG_EXPIRED_NO_RESET = -200644
     WATCHDOG_TIMEOUT = -200668
     WRITE_AFTER_WATCHDOG = -200678
+    CHANNELS_DIFFER = -200524
     CONVERT_PERIOD = -200081
     WRITE_WITHOUT_START = -200846
     READ_WITHOUT_START = -200834
@@ -140,6 +144,8 @@ WORDS: dict[int, str] = {
     Code.WATCHDOG_EXPIRED_NO_RESET: "Watchdog timer cannot be reset after it has expired.",
     Code.WATCHDOG_TIMEOUT: "Watchdog timeout is out of range and not the special value -1.",
     Code.WRITE_AFTER_WATCHDOG: "Write failed, because the watchdog timer expired.",
+    Code.CHANNELS_DIFFER: "Write cannot be performed, because the number of channels in the data "
+    "does not match the number of channels in the task.",
     Code.CONVERT_PERIOD: "Sample rate, number of channels and conversion period do not agree: "
     "the conversions of one sample take longer than the sample period.",
     Code.WRITE_WITHOUT_START: "Write cannot be performed when the auto start input is false and "
@@ -182,6 +188,17 @@ WORDS: dict[int, str] = {
     Code.NO_COEFFICIENTS: "A polynomial scale needs forward and reverse coefficients.",
     Code.NO_BUFFER_ON_DEMAND: "Buffered operations cannot use On Demand for the sample timing.",
 }
+
+
+def message_of(code: int) -> str:
+    """Return the text for ``code``: the library's own where it has one, or this module's."""
+    if code in _ERROR_MESSAGES:
+        return str(_ERROR_MESSAGES[code])
+    if code in WORDS:
+        return WORDS[code]
+    if code in {known.value for known in DAQmxErrors}:
+        return f"Error {code} ({DAQmxErrors(code).name}) occurred."
+    return "Error code could not be found. The simulated card and the library do not know it."
 
 
 class DaqmxError(Exception):

@@ -22,8 +22,12 @@ def open_device(
     paced: bool = True,
     clock: Clock | None = None,
     faults: FaultPlan | None = None,
+    sine: bool = False,
 ) -> Device:
-    """Return the card of the rig at ``address``; see ``factory.open_simulated_rig``."""
+    """Return the card of the rig at ``address``; see ``factory.open_simulated_rig``.
+
+    With ``sine`` the inputs read a sine instead of the rig, see ``TimingEngine``.
+    """
     plant, hidden = plant_of(address, film, load)
     return Device(
         settings,
@@ -31,4 +35,5 @@ def open_device(
         clock or (PacedClock() if paced else ManualClock()),
         noise_seed=(seed,) if hidden is None else (seed, hidden),
         faults=faults,
+        sine=sine,
     )

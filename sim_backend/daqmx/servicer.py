@@ -22,7 +22,7 @@ from dearig.sim_backend.daqmx import attributes
 from dearig.sim_backend.daqmx.attributes import Asked
 from dearig.sim_backend.daqmx.channel_properties import FROM_CUSTOM_SCALE, VOLTS
 from dearig.sim_backend.daqmx.device import Device, Reading
-from dearig.sim_backend.daqmx.errors import WORDS, Code, DaqmxError
+from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.properties import name_of
 from dearig.sim_backend.daqmx.scales import (
     LINEAR,
@@ -32,7 +32,9 @@ from dearig.sim_backend.daqmx.scales import (
     Scale,
     reverse_coefficients,
 )
+from dearig.sim_backend.daqmx.system_calls import SystemCalls
 from dearig.sim_backend.daqmx.tasks import Kind, Listener, Task
+from dearig.sim_backend.daqmx.waveform_calls import WaveformCalls
 
 __all__ = ["Servicer", "refuse"]
 
@@ -58,7 +60,7 @@ def refuse(context: grpc.ServicerContext, error: DaqmxError) -> NoReturn:
     raise error  # not reached: abort raises
 
 
-class Servicer(pb_grpc.NiDAQmxServicer):
+class Servicer(SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer):
     """Service of the calls; the caller handles ``DaqmxError`` with ``refuse``.
 
     All other calls are answered with UNIMPLEMENTED, and one line in the log.
@@ -100,10 +102,6 @@ class Servicer(pb_grpc.NiDAQmxServicer):
     def WaitUntilTaskDone(self, request: Any, context: grpc.ServicerContext) -> Any:
         self._device.wait_done(self._task(request), request.time_to_wait)
         return pb.WaitUntilTaskDoneResponse()
-
-    def GetErrorString(self, request: Any, context: grpc.ServicerContext) -> Any:
-        words = WORDS.get(request.error_code, f"Error {request.error_code} occurred.")
-        return pb.GetErrorStringResponse(error_string=words)
 
     def GetNthTaskChannel(self, request: Any, context: grpc.ServicerContext) -> Any:
         names = self._task(request).channel_names
@@ -326,16 +324,6 @@ class Servicer(pb_grpc.NiDAQmxServicer):
     def WriteDigitalScalarU32(self, request: Any, context: grpc.ServicerContext) -> Any:
         self._write_words(self._task(request), [request.value], request)
         return pb.WriteDigitalScalarU32Response()
-
-    # the device
-
-    def ResetDevice(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.reset(request.device_name)
-        return pb.ResetDeviceResponse()
-
-    def SelfTestDevice(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.check_device(request.device_name)
-        return pb.SelfTestDeviceResponse()
 
     # the watchdog
 

@@ -20,6 +20,8 @@ __all__ = ["OUTPUT_MONITOR", "Wiring"]
 
 #: The card's internal connection from its output to its inputs.
 OUTPUT_MONITOR = "_{}_vs_aognd"
+_SINE_SAMPLES = 100  # of one period of the sine on an input without a wire
+_SINE_PART = 0.6  # of the span between the limits, so that no count at narrow limits is beyond them
 
 
 def _is_monitor(terminal: str) -> bool:
@@ -40,14 +42,23 @@ class Wiring:
     """Instruments of ``settings`` with the film ``plant`` at rest and noise of ``noise_seed``."""
 
     def __init__(
-        self, settings: RigSettings, plant: Plant, noise_seed: tuple[int, ...], faults: FaultPlan
+        self,
+        settings: RigSettings,
+        plant: Plant,
+        noise_seed: tuple[int, ...],
+        faults: FaultPlan,
+        *,
+        sine: bool = False,
     ) -> None:
         self._settings = settings
         self._plant = plant
         self._streams = Streams(noise_seed)
         self._faults = faults
         self._output = Card(settings, self._streams).channels[0].scaling
+        self._sine = sine
         self._names = {t: n for n, t in settings.terminals().items() if n != "voltage_command"}
+        if sine:
+            self._names = {}
         laser = settings.laser
         self._laser_at_rest = laser.direction * laser.rest_position_mm / laser.mm_per_V
         self.zero = int(self._output.counts(np.zeros(1))[0])
@@ -112,11 +123,12 @@ class Wiring:
         counts: np.ndarray,
         outputs: Mapping[str, np.ndarray],
         inputs: Sequence[AnalogInput],
+        first: int = 0,
     ) -> np.ndarray:
         """Return counts (inputs, n) of a task from the rig's ``counts`` (channels, n).
 
         ``outputs`` has the counts (n,) of each output that is read back; an input without a wire
-        reads 0.
+        reads 0, or a sine. ``first`` is the number of the first sample.
         """
         rows = {name: i for i, name in enumerate(self._settings.channel_names)}
         read = np.zeros((len(inputs), counts.shape[1]), dtype=np.int16)
@@ -125,7 +137,7 @@ class Wiring:
             if name is not None:
                 row[:] = counts[rows[name]]
             else:
-                self._read_back(row, outputs, channel)
+                self._without_wire(row, outputs, channel, first)
         return read
 
     def still(
@@ -162,13 +174,24 @@ class Wiring:
                 row[:] = card.convert(name, volts[name])
             else:
                 held = {ao: np.full(samples, counts) for ao, counts in outputs.items()}
-                self._read_back(row, held, channel)
+                self._without_wire(row, held, channel, reading)
         return read
 
-    def _read_back(
-        self, row: np.ndarray, outputs: Mapping[str, np.ndarray], channel: AnalogInput
+    def _without_wire(
+        self,
+        row: np.ndarray,
+        outputs: Mapping[str, np.ndarray],
+        channel: AnalogInput,
+        first: int,
     ) -> None:
-        """Fill ``row`` (n,) with the output that ``channel`` reads back, if it reads one."""
+        """Fill ``row`` (n,) with the output that ``channel`` reads back, or with a sine."""
+        if self._sine and not _is_monitor(channel.terminal):
+            low, high = channel.volts
+            phase = 2.0 * np.pi * (first + np.arange(row.size)) / _SINE_SAMPLES
+            volts = 0.5 * (low + high) + _SINE_PART * 0.5 * (high - low) * np.sin(phase)
+            row[:] = np.clip(
+                np.rint(volts * (COUNT_MAX + 1) / channel.range), -COUNT_MAX - 1, COUNT_MAX
+            )
         for ao in self.monitored([channel]):
             scale = self._settings.card.ao_range_V / channel.range
             row[:] = np.clip(np.rint(outputs[ao] * scale), -COUNT_MAX - 1, COUNT_MAX)

