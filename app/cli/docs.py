@@ -43,6 +43,7 @@ def docs(
 
     from dearig.docs import HOME, build, page_named, pages
     from dearig.model.trusted_folder import cache_root
+    from dearig.recording.files import write_whole
     from dearig.recording.result_folder import result_folder
 
     check_files(force, (), json=json)
@@ -53,7 +54,7 @@ def docs(
         folder = cache.path / "docs"
     else:
         raise InputError(f"there is no folder for the pages: {cache.note}; name one with --out")
-    written = {path: file.resolve() for path, file in build(folder).items()}
+    written = {path: file.resolve() for path, file in build(folder, write_whole).items()}
     print_line(console_for(json), str(written[wanted]))
     listed = [
         {"title": p.title, "section": p.section, "path": p.path, "html": str(written[p.path])}

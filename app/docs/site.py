@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import posixpath
 import re
-import shutil
 from collections.abc import Callable
 from functools import cache
 from importlib.metadata import version
@@ -55,8 +54,10 @@ def slug(heading: str, taken: dict[str, int]) -> str:
     return name if number == 0 else f"{name}-{number}"
 
 
-def build(folder: Path) -> dict[str, Path]:
-    """Write every page, with its pictures, into ``folder``.
+def build(
+    folder: Path, write: Callable[[Path, bytes], object] = Path.write_bytes
+) -> dict[str, Path]:
+    """Write every page, with its pictures, into ``folder``; ``write`` writes one file.
 
     Returns
     -------
@@ -96,7 +97,7 @@ def build(folder: Path) -> dict[str, Path]:
                     return None
                 copy = folder / path
                 copy.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(picture, copy)
+                write(copy, picture.read_bytes())
                 return to(path)
 
             html = frame.render(
@@ -109,7 +110,7 @@ def build(folder: Path) -> dict[str, Path]:
                 version=version("dearig"),
                 code_style=_code_style(),
             )
-            target.write_text(html, encoding="utf-8", newline="\n")
+            write(target, html.encode("utf-8"))
             written[page.path] = target
     except OSError as error:
         raise InputError(

@@ -12,7 +12,8 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.recording.layout import UNITS
-from dearig.recording.opening import read_from
+from dearig.recording.lock import ReplacedError
+from dearig.recording.opening import identifier_of, read_from
 from dearig.recording.physical import Counts, Rest
 from dearig.recording.pyramid import reduced
 from dearig.recording.rest_noise import lead_in
@@ -38,7 +39,7 @@ class Arrays:
 
     Arrays are float64 and read-only. They are checked when they are read: values are finite and
     time increases. Every method raises ``InputError`` for values that cannot be read or fail a
-    check.
+    check, and ``ReplacedError`` if another recording than that of ``identifier`` is there by now.
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class Arrays:
         derived: tuple[str, ...],
         samples: int,
         rest: Rest | None = None,
+        identifier: str = "",
     ) -> None:
         self.path = path
         self.samples = samples
@@ -57,6 +59,7 @@ class Arrays:
         self.names = (*known, *declared)
         self._derived = derived
         self._rest = rest
+        self._identifier = identifier
         self._read: dict[str, np.ndarray] = {}
 
     def read(self, name: str) -> np.ndarray:
@@ -106,6 +109,10 @@ class Arrays:
             entry = group(file, "entry")
             if entry is None:
                 raise InputError(f"{self.path}: the group /entry is missing")
+            if identifier_of(entry) != self._identifier:
+                raise ReplacedError(
+                    f"{self.path} has been replaced by another recording since it was opened"
+                )
             return look(entry)
 
         return read_from(self.path, look_at)

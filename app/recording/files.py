@@ -34,6 +34,7 @@ __all__ = [
     "put_back",
     "replaced_when_done",
     "set_aside",
+    "write_whole",
 ]
 
 #: Largest length of a file's name in bytes; it leaves space for the ending .journal.
@@ -137,6 +138,13 @@ def replaced_when_done(path: Path, overwrite: bool) -> Iterator[Path]:
         with suppress(OSError):
             lock.path.unlink(missing_ok=True)
         lock.release()
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write ``content`` to ``path``, in place of what is there. Raises ``InputError``."""
+    out = check_output(path, overwrite=True)
+    with replaced_when_done(out, overwrite=True) as partial:
+        partial.write_bytes(content)
 
 
 def _create_partial(folder: Path) -> FileLock:

@@ -14,7 +14,6 @@ from dearig.recording.files import in_words
 from dearig.recording.flushes import flush_notes
 from dearig.recording.journal import Patched, changed_in_place, replaced
 from dearig.recording.layout import (
-    IDENTIFIER,
     LIBVER,
     MESSAGE_BYTES,
     SIGNALS,
@@ -26,11 +25,10 @@ from dearig.recording.layout import (
 )
 from dearig.recording.lock import FileLock, ReplacedError
 from dearig.recording.modelled import keep_modelled
-from dearig.recording.opening import opened
+from dearig.recording.opening import identifier_of, opened
 from dearig.recording.physical import SLICE, Counts
 from dearig.recording.pyramid import complete_pyramid
-from dearig.recording.safe import dataset
-from dearig.recording.text import clip_text, fixed, put_text, text_of
+from dearig.recording.text import clip_text, fixed, put_text
 
 __all__ = ["OVERVIEW", "PHYSICAL_MAX", "finish"]
 
@@ -90,8 +88,7 @@ def finish(
 def _check_identifier(path: Path, identifier: str) -> None:
     """Raise ``InputError`` if another program has written another recording into the file."""
     with opened(path) as file:
-        found = dataset(file["entry"], IDENTIFIER) if "entry" in file else None
-        if found is None or text_of(found[()]) != identifier:
+        if "entry" not in file or identifier_of(file["entry"]) != identifier:
             raise ReplacedError(
                 f"{path} has another content by now: another program wrote to it during the run; "
                 f"it was not finished"

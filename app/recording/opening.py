@@ -12,8 +12,10 @@ import h5py
 from dearig.errors import InputError
 from dearig.recording.files import in_words, journal_of, one_line
 from dearig.recording.journal import Patched, whole_journal
-from dearig.recording.safe import Refused
+from dearig.recording.layout import IDENTIFIER
+from dearig.recording.safe import Refused, dataset
 from dearig.recording.superblock import SIZE, flags_of, repair_superblock
+from dearig.recording.text import text_of
 
 #: Consistency flag of a file in SWMR mode.
 WRITTEN_IN_ORDER = 4
@@ -21,7 +23,15 @@ WRITTEN_IN_ORDER = 4
 FAR = 2**60
 BEING_WRITTEN = "is being written by another program, or was killed before its first sample"
 
-__all__ = ["UNREADABLE", "damage", "opened", "read_from"]
+__all__ = [
+    "LOOKS",
+    "UNREADABLE",
+    "damage",
+    "file_state",
+    "identifier_of",
+    "opened",
+    "read_from",
+]
 
 T = TypeVar("T")
 
@@ -56,7 +66,7 @@ def read_from(path: Path, look: Callable[[h5py.File], T]) -> T:
     write may have been half done.
     """
     for left in reversed(range(LOOKS)):
-        before = _state(path)
+        before = file_state(path)
         try:
             with opened(path) as file:
                 growing = file.driver == "fileobj"
@@ -68,12 +78,21 @@ def read_from(path: Path, look: Callable[[h5py.File], T]) -> T:
                     if not (growing and left):
                         raise damage(path, error) from error
         except InputError:
-            if not left or _state(path) == before:
+            if not left or file_state(path) == before:
                 raise
     raise InputError(f"{path} cannot be read")
 
 
-def _state(path: Path) -> tuple[int, ...]:
+def identifier_of(entry: h5py.Group) -> str:
+    """Return what tells this recording from every other: its identifier, or else its start."""
+    for name in (IDENTIFIER, "start_time"):
+        found = dataset(entry, name)
+        if found is not None:
+            return text_of(found[()])
+    return ""
+
+
+def file_state(path: Path) -> tuple[int, ...]:
     """Return what differs once a file, or its journal, has been changed or replaced."""
     found: list[int] = []
     for name in (path, journal_of(path)):

@@ -23,7 +23,8 @@ from dearig.recording.layout import (
     counts_name,
     declared_names,
 )
-from dearig.recording.opening import opened, read_from
+from dearig.recording.lock import ReplacedError
+from dearig.recording.opening import LOOKS, identifier_of, opened, read_from
 from dearig.recording.physical import Counts, Rest, read_channels, resolution
 from dearig.recording.provenance import read_provenance
 from dearig.recording.recording import RecordedEvent, Recording
@@ -44,10 +45,17 @@ def open_recording(path: str | Path) -> Recording:
     Raises ``InputError`` for every file that is not a valid recording; it says what and where.
     """
     path = Path(path)
-    recording = read_from(path, lambda file: _Reader(path, file).read())
-    if recording.samples <= EAGER:
-        for name in recording.arrays.stored:
-            recording.arrays.read(name)
+    for left in reversed(range(LOOKS)):
+        recording = read_from(path, lambda file: _Reader(path, file).read())
+        if recording.samples <= EAGER:
+            try:
+                for name in recording.arrays.stored:
+                    recording.arrays.read(name)
+            except ReplacedError:
+                if left:
+                    continue
+                raise
+        break
     return recording
 
 
@@ -128,7 +136,7 @@ class _Reader:
             path=self.path,
             kind=kind,
             name=self.path.stem,
-            arrays=Arrays(self.path, stored, derived, samples, rest),
+            arrays=Arrays(self.path, stored, derived, samples, rest, identifier_of(entry)),
             rate=rate,
             title=self._text(entry, "title"),
             hold=kind == "actuator" and self._hold(data),

@@ -18,7 +18,8 @@ from dearig.recording.finish import OVERVIEW
 from dearig.recording.flushes import flush_notes
 from dearig.recording.journal import whole_journal
 from dearig.recording.layout import EVENT_LEVELS, SIGNALS, counts_name
-from dearig.recording.opening import UNREADABLE, damage, opened
+from dearig.recording.lock import refuse_in_use
+from dearig.recording.opening import LOOKS, UNREADABLE, damage, file_state, opened
 from dearig.recording.physical import SLICE, Counts
 from dearig.recording.pyramid import BINS
 from dearig.recording.reader import open_recording
@@ -59,12 +60,24 @@ class Verification:
 def verify(path: str | Path) -> Verification:
     """Verify the recording at ``path``; every sample is read.
 
-    Raises ``InputError`` only if there is no such file.
+    A file that changes meanwhile is read again. Raises ``InputError`` if there is no such file, or
+    if a run that still records to it leaves it in a state that cannot be judged.
     """
     path = Path(path)
-    found = Verification(path)
     if not path.is_file():
         raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")
+    for _ in range(LOOKS):
+        before = file_state(path)
+        found = _look(path)
+        if found.sound or file_state(path) == before:
+            break
+    if not found.sound:
+        refuse_in_use(path)
+    return found
+
+
+def _look(path: Path) -> Verification:
+    found = Verification(path)
     try:
         recording = open_recording(path)
         with opened(path) as file:

@@ -19,7 +19,7 @@ from dearig.recording import RunMetadata, export_recording, open_recording, reco
 from dearig.recording.files import check_output
 from dearig.recording.finish import finish
 from dearig.recording.json_file import write_json
-from dearig.recording.lock import lock_existing
+from dearig.recording.lock import create_locked, lock_existing
 from dearig.recording.verify import verify
 from tests.tools.command import names
 from tests.tools.recordings import Clock, run_counts, write_run, writer
@@ -184,3 +184,22 @@ def test_a_run_without_locks_where_the_operator_switched_them_off(
     with pytest.raises(InputError, match=r"changed 1\.0 s ago and may still be recorded to"):
         recover(killed, now=lambda: changed + 1.0)
     assert recover(killed, now=lambda: changed + 11.0)
+
+
+def test_values_of_two_recordings_are_not_mixed(tmp_path: Path) -> None:
+    """A recording that was replaced after it had been opened has no other one's values."""
+    path, other = killed_run(tmp_path), tmp_path / "other.h5"
+    opened = open_recording(path)
+    write_run(other, run_counts(3000, seed=1))
+    other.replace(path)
+    with pytest.raises(InputError, match="has been replaced by another recording since"):
+        _ = opened.displacement
+    with pytest.raises(InputError, match="has been replaced"):
+        opened.overview("displacement", 10)
+
+
+def test_a_file_that_a_run_creates_is_not_judged(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    with create_locked(path), pytest.raises(InputError, match="is in use"):
+        verify(path)
+    assert not verify(path).sound

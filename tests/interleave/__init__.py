@@ -1,0 +1,1 @@
+"""Commands on the same files at once: ``python -m tests.interleave --cases 2000``."""

@@ -1,0 +1,122 @@
+"""What has to hold of the files after the commands of a case, however they met."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+
+from dearig.errors import InputError
+from dearig.recording import open_recording, recover
+from dearig.recording.json_file import write_json
+from dearig.recording.layout import IDENTIFIER
+from dearig.recording.opening import opened
+from dearig.recording.text import text_of
+from dearig.recording.verify import verify
+from tests.interleave.commands import Ended
+
+__all__ = ["check"]
+
+#: Exit codes of commands that did their work or were refused; and those that change a recording.
+ALLOWED = (0, 2)
+REPLACES = ("force", "import")
+
+
+def check(folder: Path, ended: list[Ended], given: dict[str, int]) -> list[str]:
+    """Return what is wrong: a sentence each.
+
+    ``given`` are the samples of the recordings that were there before, by their identifiers.
+    """
+    return [*_outputs(ended), *_recordings(folder, ended, given), *_others(folder, ended)]
+
+
+def _outputs(ended: list[Ended]) -> Iterator[str]:
+    for one in ended:
+        who = f"{one.command.kind} {one.command.name}"
+        killed = one.code == -9
+        if one.code not in ALLOWED and not killed:
+            yield f"{who} ended with {one.code}: {one.said[-300:]}"
+        if "Traceback" in one.said or "unexpected" in one.said or "hung" in one.said:
+            yield f"{who}: {one.said[-600:]}"
+        if "by now" in one.said or "damaged" in one.said or "WRONG" in one.said:
+            yield f"{who} met a file that another command had harmed: {one.said[-300:]}"
+
+
+def _recordings(folder: Path, ended: list[Ended], given: dict[str, int]) -> Iterator[str]:
+    # what each run, or the one before the case, has a right to
+    due = {identifier: (samples, True, None) for identifier, samples in given.items()}
+    for one in ended:
+        for identifier, (samples, closed) in one.runs.items():
+            due[identifier] = (samples, closed, one)
+            if one.code == 0 and not closed:
+                yield f"{one.command.kind} {one.command.name} ended with 0 and was not closed"
+    found: dict[str, Path] = {}
+    for path in sorted(folder.glob("*.h5*")):
+        if path.suffix == ".journal":
+            continue
+        identifier = _identifier(path)
+        try:
+            recover(path)
+            result = verify(path)
+            samples = open_recording(path).samples
+        except InputError as error:
+            # a run that was killed before its first flush of samples may leave such a file
+            if due.get(identifier, (0,))[0] or not _killed_run(ended, path):
+                yield f"{path.name} cannot be read: {error}"
+            continue
+        found[identifier] = path
+        if not result.sound:
+            yield f"{path.name} is not sound: {result.faults}"
+        if samples < due.get(identifier, (0,))[0]:
+            yield f"{path.name} has {samples} samples, and {due[identifier][0]} were flushed"
+    for identifier, (samples, _, one) in due.items():
+        if identifier not in found and not _replaced(one, ended):
+            who = "the recording that was there" if one is None else one.command.arguments
+            yield f"{who}: its {samples} samples are gone"
+    for path in folder.glob("*.journal"):
+        yield f"{path.name} is left after a recovery"
+
+
+def _identifier(path: Path) -> str:
+    try:
+        with opened(path) as file:
+            return text_of(file["entry"][IDENTIFIER][()])
+    except (InputError, OSError, KeyError, RuntimeError):
+        return ""
+
+
+def _killed_run(ended: list[Ended], path: Path) -> bool:
+    name = path.name.removesuffix(".old")
+    return any(
+        one.code == -9 and one.command.name == name and one.command.kind in ("record", "force")
+        for one in ended
+    )
+
+
+def _replaced(run: Ended | None, ended: list[Ended]) -> bool:
+    """Return True if another command replaced the recording after its run had ended."""
+    after = 0.0 if run is None else run.ended
+    return any(
+        one.ended >= after
+        and one is not run
+        and one.code != 2
+        and "--force" in one.command.arguments
+        and one.command.kind in REPLACES
+        and (run is None or one.command.name == run.command.name)
+        for one in ended
+    )
+
+
+def _others(folder: Path, ended: list[Ended]) -> Iterator[str]:
+    table = folder / "out.csv"
+    if table.exists():
+        with table.open(encoding="utf-8", newline="") as stream:
+            rows = list(csv.reader(stream))
+        if len(rows) < 2 or {len(row) for row in rows} != {len(rows[0])}:
+            yield f"{table.name} is damaged: {len(rows)} rows"
+    elif any(one.command.kind == "export" and one.code == 0 for one in ended):
+        yield "an export ended with 0 and its file is missing"
+    # the next output removes what killed commands have left
+    write_json({}, folder / "last.json")
+    for path in folder.glob(".*"):
+        yield f"{path.name} is left of an ended command"
