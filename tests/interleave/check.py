@@ -17,8 +17,9 @@ from tests.interleave.commands import Ended
 
 __all__ = ["check"]
 
-#: Exit codes of commands that did their work or were refused; and those that change a recording.
-ALLOWED = (0, 2)
+#: Exit codes of commands that did their work or were refused, of a verification that failed, and
+#: the commands that put another recording in the place of one.
+ALLOWED, FAILED = (0, 2), 4
 REPLACES = ("force", "import")
 
 
@@ -27,13 +28,18 @@ def check(folder: Path, ended: list[Ended], given: dict[str, int]) -> list[str]:
 
     ``given`` are the samples of the recordings that were there before, by their identifiers.
     """
-    return [*_outputs(ended), *_recordings(folder, ended, given), *_others(folder, ended)]
+    return [*_outputs(folder, ended), *_recordings(folder, ended, given), *_others(folder, ended)]
 
 
-def _outputs(ended: list[Ended]) -> Iterator[str]:
+def _outputs(folder: Path, ended: list[Ended]) -> Iterator[str]:
     for one in ended:
         who = f"{one.command.kind} {one.command.name}"
         killed = one.code == -9
+        if one.code == FAILED and "killed before its first sample" in one.said:
+            # true of a run that was killed as it created the file
+            if not _killed_run(ended, folder / one.command.name):
+                yield f"{who}: {one.said[-300:]}"
+            continue
         if one.code not in ALLOWED and not killed:
             yield f"{who} ended with {one.code}: {one.said[-300:]}"
         if "Traceback" in one.said or "unexpected" in one.said or "hung" in one.said:
