@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.properties import Asked, changed, given
+from dearig.sim_backend.daqmx.sensors import Usage
 from dearig.sim_backend.daqmx.setup import INPUT_RANGES, INPUTS, LINES, OUTPUTS
 
 __all__ = ["CALIBRATION", "DEVICE", "PHYSICAL_CHANNEL", "SERIAL", "SYSTEM"]
@@ -15,7 +16,15 @@ DRIVER = (25, 0, 0)  #: driver version that the server reports
 
 _PRODUCT, _PRODUCT_NUMBER = "PCIe-6361", 0x7434
 _X_SERIES, _PCIE = 15858, 13612
-_VOLTAGE, _CURRENT = 10322, 10134
+_VOLTAGE = 10322
+_MEASURED = (
+    _VOLTAGE,
+    Usage.CURRENT,
+    Usage.WITH_EXCITATION,
+    Usage.RESISTANCE,
+    Usage.RTD,
+    Usage.THERMISTOR,
+)
 _START, _REFERENCE, _PAUSE, _ARM_START = 1 << 2, 1 << 3, 1 << 1, 1 << 5
 _NOTE, _NOTE_CHARACTERS = "calibration note", 4
 _DC = 1 << 1  # bit of the coupling
@@ -68,7 +77,7 @@ DEVICE = {
     "DIG_TRIG_SUPPORTED": given(True),
     "ANLG_TRIG_SUPPORTED": given(False),
     "AI_PHYSICAL_CHANS": given(lambda a: _names(a, [f"ai{i}" for i in range(INPUTS)])),
-    "AI_SUPPORTED_MEAS_TYPES": given([_VOLTAGE]),
+    "AI_SUPPORTED_MEAS_TYPES": given(_MEASURED),
     "AI_VOLTAGE_RNGS": given(lambda _: _ranges(INPUT_RANGES)),
     "AI_VOLTAGE_INT_EXCIT_DISCRETE_VALS": given(()),
     "AI_GAINS": given(()),
@@ -140,7 +149,7 @@ def _port_lines(asked: Asked) -> int:
 
 PHYSICAL_CHANNEL = {
     "PHYSICAL_CHAN_AI_TERM_CFGS": given(_wirings),
-    "PHYSICAL_CHAN_AI_SUPPORTED_MEAS_TYPES": given(lambda a: [_VOLTAGE] if _input(a) + 1 else []),
+    "PHYSICAL_CHAN_AI_SUPPORTED_MEAS_TYPES": given(lambda a: _MEASURED if _input(a) + 1 else []),
     "PHYSICAL_CHAN_AO_TERM_CFGS": given(lambda a: 0b001 if _output(a) else 0),
     "PHYSICAL_CHAN_AO_SUPPORTED_OUTPUT_TYPES": given(lambda a: [_VOLTAGE] if _output(a) else []),
     "PHYSICAL_CHAN_DO_PORT_WIDTH": given(_port_lines),

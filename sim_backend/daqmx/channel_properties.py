@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
-from dearig.sim_backend.daqmx.properties import Asked, accepted, changed, fixed, given
+from dearig.sim_backend.daqmx.properties import Asked, Property, accepted, changed, fixed, given
+from dearig.sim_backend.daqmx.scales import Scale
+from dearig.sim_backend.daqmx.sensors import RTD_COEFFICIENTS, Sensor
 from dearig.sim_backend.daqmx.tasks import AnalogInput, Kind, Lines
 
 __all__ = ["CHANNEL", "FROM_CUSTOM_SCALE", "VOLTS", "kinds_of"]
@@ -33,7 +35,7 @@ def _physical(asked: Asked) -> str:
 
 
 def _units(asked: Asked) -> int:
-    return VOLTS if asked.analog().scale is None else FROM_CUSTOM_SCALE
+    return FROM_CUSTOM_SCALE if isinstance(asked.analog().scale, Scale) else VOLTS
 
 
 def _set_units(asked: Asked, value: int) -> None:
@@ -61,6 +63,8 @@ def _span(asked: Asked) -> tuple[float, float]:
     channel = asked.analog()
     if not isinstance(channel, AnalogInput):
         return channel.limits
+    if isinstance(channel.scale, Sensor) and not channel.scale.linear:
+        return channel.limits
     ends = np.array([-channel.range, channel.range])
     if channel.scale is not None:
         ends = channel.scale.scaled(ends)
@@ -77,6 +81,61 @@ _RANGE_HIGH = changed(
 )
 
 
+def _usage(asked: Asked) -> int:
+    scale = asked.input().scale
+    return scale.usage if isinstance(scale, Sensor) else _VOLTAGE
+
+
+#: Properties of sensors, all of which take effect where the sensor has them.
+_SENSOR_PROPERTIES = (
+    "AI_BRIDGE_CFG",
+    "AI_CURRENT_SHUNT_LOC",
+    "AI_CURRENT_SHUNT_RESISTANCE",
+    "AI_CURRENT_UNITS",
+    "AI_EXCIT_SRC",
+    "AI_EXCIT_USE_FOR_SCALING",
+    "AI_EXCIT_VAL",
+    "AI_RESISTANCE_CFG",
+    "AI_RESISTANCE_UNITS",
+    "AI_RTD_A",
+    "AI_RTD_B",
+    "AI_RTD_C",
+    "AI_RTD_R0",
+    "AI_RTD_TYPE",
+    "AI_TEMP_UNITS",
+    "AI_THRMSTR_A",
+    "AI_THRMSTR_B",
+    "AI_THRMSTR_C",
+    "AI_THRMSTR_R1",
+)
+_SENSOR_DEFAULTS = {"AI_EXCIT_USE_FOR_SCALING": False, "AI_RTD_R0": 100.0}
+
+
+def _of_a_sensor(name: str) -> Property:
+    """Return the property ``name`` of a sensor; it is refused where the sensor has none."""
+
+    def sensor(asked: Asked) -> Sensor:
+        scale = asked.input().scale
+        if not isinstance(scale, Sensor) or name not in scale.values:
+            raise DaqmxError(Code.NOT_SUPPORTED_IN_TASK, f"Property: {name}; {asked.where}")
+        return scale
+
+    def set_(asked: Asked, value: Any) -> None:
+        sensor(asked).values[name] = value
+        if name == "AI_RTD_TYPE" and value in RTD_COEFFICIENTS:
+            for letter, coefficient in zip("ABC", RTD_COEFFICIENTS[value], strict=True):
+                sensor(asked).values[f"AI_RTD_{letter}"] = coefficient
+
+    def default(asked: Asked) -> Any:
+        values = sensor(asked).values
+        if name in ("AI_RTD_A", "AI_RTD_B", "AI_RTD_C"):
+            kind = RTD_COEFFICIENTS.get(values["AI_RTD_TYPE"], RTD_COEFFICIENTS[10071])
+            return kind["ABC".index(name[-1])]
+        return _SENSOR_DEFAULTS.get(name, values[name])
+
+    return changed(lambda a: sensor(a).values[name], set_, default)
+
+
 def _invert(_: Asked, value: Any) -> None:
     if value:
         raise DaqmxError(Code.INVALID_VALUE, "Inverted lines are not simulated.")
@@ -89,7 +148,8 @@ CHANNEL = {
     "CHAN_DESCR": accepted(""),
     "CHAN_IS_GLOBAL": given(False),
     # analog input
-    "AI_MEAS_TYPE": given(lambda a: a.input() and _VOLTAGE),
+    "AI_MEAS_TYPE": given(_usage),
+    **{name: _of_a_sensor(name) for name in _SENSOR_PROPERTIES},
     "AI_VOLTAGE_UNITS": _UNITS,
     "AI_CUSTOM_SCALE_NAME": _SCALE,
     "AI_TERM_CFG": changed(

@@ -32,6 +32,7 @@ from dearig.sim_backend.daqmx.scales import (
     Scale,
     reverse_coefficients,
 )
+from dearig.sim_backend.daqmx.sensor_calls import SensorCalls
 from dearig.sim_backend.daqmx.system_calls import SystemCalls
 from dearig.sim_backend.daqmx.tasks import Kind, Listener, Task
 from dearig.sim_backend.daqmx.waveform_calls import WaveformCalls
@@ -60,7 +61,7 @@ def refuse(context: grpc.ServicerContext, error: DaqmxError) -> NoReturn:
     raise error  # not reached: abort raises
 
 
-class Servicer(SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer):
+class Servicer(SensorCalls, SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer):
     """Service of the calls; the caller handles ``DaqmxError`` with ``refuse``.
 
     All other calls are answered with UNIMPLEMENTED, and one line in the log.

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from dearig.drivers.settings import RigSettings
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.scales import Scale
+from dearig.sim_backend.daqmx.sensors import Sensor
 from dearig.sim_backend.daqmx.tasks import (
     DIGITAL_EDGE,
     FALLING,
@@ -111,7 +113,7 @@ class Setup:
         name: str,
         wiring: int,
         limits: tuple[float, float],
-        scale: Scale | None = None,
+        scale: Scale | Sensor | None = None,
     ) -> list[AnalogInput]:
         """Add the inputs ``physical`` with ``wiring`` (-1: the default) and ``limits``.
 
@@ -124,7 +126,12 @@ class Setup:
             terminals = physical_names(physical, self.name)
             for terminal, called in self._named(task, terminals, name):
                 how = self._wiring_of(terminal, wiring)
-                made.append(AnalogInput(called, terminal, limits, taken, how, scale))
+                own = (
+                    replace(scale, values=dict(scale.values))
+                    if isinstance(scale, Sensor)
+                    else scale
+                )
+                made.append(AnalogInput(called, terminal, limits, taken, how, own))
             task.kind = Kind.AI
             task.inputs += made
             return made
@@ -429,6 +436,8 @@ class Setup:
         analog: list[AnalogInput | AnalogOutput] = [*task.inputs, *task.outputs]
         for channel in analog:
             _in_order(channel.limits)
+            if channel.scale is not None:
+                channel.scale.check()
             if max(abs(v) for v in channel.volts) > channel.range * (1.0 + 1e-9):
                 raise DaqmxError(
                     Code.INVALID_VALUE,

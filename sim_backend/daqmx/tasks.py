@@ -11,6 +11,7 @@ from dearig.sim_backend.daqmx.acquisition import Run, Ticks
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.output import Generation, Waveform
 from dearig.sim_backend.daqmx.scales import Scale
+from dearig.sim_backend.daqmx.sensors import Sensor
 
 __all__ = [
     "CURRENT_READ",
@@ -79,8 +80,8 @@ class State(Enum):
 class AnalogInput:
     """Input channel: ``limits`` were requested, ``range`` V, plus and minus, is in use.
 
-    With a ``scale`` the limits are in its unit, otherwise in V. ``kept`` has the properties
-    without effect.
+    With a ``scale`` or a sensor the limits are in its unit, otherwise in V. ``kept`` has the
+    properties without effect.
     """
 
     name: str
@@ -88,7 +89,7 @@ class AnalogInput:
     limits: tuple[float, float]
     range: float
     wiring: int
-    scale: Scale | None = None
+    scale: Scale | Sensor | None = None
     kept: dict[object, Any] = field(default_factory=dict)
 
     @property
