@@ -120,11 +120,11 @@ class Clients:
     def check(self) -> None:
         """Find a client that is silent while there is a voltage at the film.
 
-        Without a voltage, clients that have no tasks and are silent are forgotten.
+        Others that have no tasks and are silent for long are forgotten.
         """
         now = self._clock.now()
+        self._forget(now)
         if not self._device.live():
-            self._forget(now)
             return
         with self._lock:
             silent = [
@@ -149,7 +149,7 @@ class Clients:
                 if client.calls == 0 and now - client.heard > _FORGET_S
             ]
             for name in silent:
-                if not self._device.tasks_of(name):
+                if not (self._device.drives(name) or self._device.tasks_of(name)):
                     del self._clients[name]
 
     def _make_safe(self, name: str, why: str) -> None:
