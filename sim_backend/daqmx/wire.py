@@ -16,6 +16,7 @@ from dearig.sim_backend.daqmx.wiring import Wiring
 __all__ = ["Change", "Wire"]
 
 _AT_ONCE = 1 << 20  # samples processed at a time
+_TRACED_MOST = 1 << 22  # samples of a repeated waveform that are searched for changes at a time
 _HISTORY = 100_000  # changes that are kept, some 10 MB; a server may run for weeks
 
 
@@ -139,6 +140,9 @@ class Wire:
         end = ticks if generation.finished(now) else ticks + 1
         if end <= self._traced:
             return
+        if generation.waveform.loops:
+            # on a clock that jumps, a repeated waveform has no end of changes
+            self._traced = max(self._traced, end - _TRACED_MOST)
         while self._traced < end:
             last = min(end, self._traced + _AT_ONCE)
             counts = generation.at_ticks(np.arange(self._traced, last))[row].astype(np.int64)

@@ -89,7 +89,11 @@ def hours_of_a_server(hours: float) -> list[str]:
     me, history = psutil.Process(), []
     link = ManualClock()
     reads = round(hours * 3600 * RATE / BLOCK)
-    with served(link=link, client_timeout=3600.0) as card, task(card.session) as ao, task(card.session) as ai:
+    with (
+        served(link=link, client_timeout=3600.0) as card,
+        task(card.session) as ao,
+        task(card.session) as ai,
+    ):
         add_output(ao)
         clock_output(ao, RATE)
         ao.write(np.concatenate([np.full(500, 1.0), np.zeros(500)]))

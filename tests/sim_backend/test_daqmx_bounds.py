@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import logging
+import re
+import signal
 import socket
 import struct
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
+from pathlib import Path
 
 import grpc
 import nidaqmx
@@ -15,10 +20,12 @@ import numpy as np
 import pytest
 from google.protobuf.descriptor import FieldDescriptor
 from nidaqmx._stubs import nidaqmx_pb2 as pb
-from nidaqmx.errors import DaqError
+from nidaqmx.constants import TaskMode
+from nidaqmx.errors import DaqError, RpcError
 from nidaqmx.system import Device
 
 from dearig.sim_backend.clock import ManualClock, PacedClock
+from tests.tools.certificates import make_certificates, needs_openssl
 from tests.tools.daqmx import (
     HandClock,
     Served,
@@ -286,6 +293,64 @@ def test_the_card_remembers_a_bounded_past(card: Served, output: nidaqmx.Task) -
     assert there.name
 
 
+def test_a_clock_that_jumps_far_costs_no_search_through_all_samples() -> None:
+    with served() as card, task(card.session) as ao:
+        add_output(ao)
+        clock_output(ao, 2e6)
+        ao.write(np.concatenate([np.ones(500), np.zeros(500)]))
+        ao.start()
+        with pytest.raises(DaqError) as caught:
+            ao.wait_until_done(1e9)  # 2 * 10^15 samples
+        assert caught.value.error_code == -200560
+        assert answers(card)
+        ao.stop()
+        ao.control(TaskMode.TASK_UNRESERVE)
+        with task(card.session) as zero:
+            add_output(zero)
+            zero.write(0.0)
+        assert card.device.history()[-1].wire == 0.0
+
+
+# the terminal
+
+
+@needs_openssl
+@pytest.mark.skipif(sys.platform == "win32", reason="a process cannot be asked to end there")
+def test_nothing_that_a_client_does_writes_a_traceback_to_the_terminal(tmp_path: Path) -> None:
+    there = make_certificates(tmp_path / "certificates")
+    options = ["--tls-cert", "server.pem", "--tls-key", "server.key", "--tls-client-ca", "ca.pem"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "dearig", "serve-daqmx", "--fast", *options],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=there,
+    )  # fmt: skip
+    try:
+        assert process.stdout is not None
+        port = int(re.findall(r":(\d+);", process.stdout.readline())[0])
+        for data in (b"\x00" * 1000, _PREFACE, b""):
+            with socket.create_connection(("127.0.0.1", port)) as plain:
+                plain.sendall(data)
+        with connected(port) as session, pytest.raises(RpcError):
+            nidaqmx.Task(grpc_options=session)
+        credentials = grpc.ssl_channel_credentials(
+            *((there / name).read_bytes() for name in ("ca.pem", "client.key", "client.pem"))
+        )
+        with grpc.secure_channel(f"127.0.0.1:{port}", credentials) as channel:
+            for name, data in (
+                ("CreateAIAccelChan", b""), ("CreateTask", b"\xff" * 9), ("ReadRaw", b""),
+                ("RegisterDoneEvent", b""), ("WriteRaw", b"\x0a\x02\x0a\x00"), ("NoSuchCall", b""),
+            ):  # fmt: skip
+                assert _outcome(channel, name, data)[0] is not grpc.StatusCode.OK
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60.0)
+    finally:
+        process.kill()
+        process.communicate()
+    assert process.returncode == 0
+    lines = said.splitlines()
+    assert len(lines) == 1, said
+    assert "CreateAIAccelChan is not simulated" in lines[0]
+
+
 # connections
 
 
@@ -318,7 +383,7 @@ def test_connections_without_end_do_not_take_the_servers_files(card: Served) -> 
         try:
             assert answers(card)
             break
-        except nidaqmx.errors.RpcError:
+        except RpcError:
             ended.wait(0.1)
     else:
         pytest.fail("no client is let in after the others have left")
