@@ -83,6 +83,9 @@ _DEFAULT = RunOptions()
 class RunResult:
     """A recorded run: its file, size, outcome and events.
 
+    ``path`` is not the wanted one where another program has deleted, moved or replaced that file;
+    the ``events`` say so.
+
     ``margins`` are the distances of the plan from each limit of the gate.
     """
 
@@ -224,6 +227,7 @@ def record(
                 ramp_s=rig_file.limits.ramp_down_s,
                 model=None if stepped is None else stepped.advance,
                 waits=is_simulated(address) and not options.paced,
+                new_file=rig_file.recording.lost_file == "new_file",
                 hurried=interrupts.asked,
                 clock=clock,
             )
@@ -232,7 +236,9 @@ def record(
                     rig, recorder, interlocks, interrupts, observer, event_log, progress, clock
                 )
                 events = run.follow(waveform.samples)
-        return RunResult(out, recorder.samples, rate, "finished", events, waveform.margins)
+        return RunResult(
+            recorder.path, recorder.samples, rate, "finished", events, waveform.margins
+        )
     finally:
         _close(rig)
 
@@ -289,6 +295,7 @@ class _Run:
             if recorder.samples == 0:
                 raise InstrumentFault(f"the rig gave no samples; {self._end('no samples')}")
             recorder.close("finished", given_up=self._given_up, progress=self._progress)
+            self._tell_notices()
         except KeyboardInterrupt as error:
             raise self._ended_at_once() from error
         except RigError as error:
@@ -360,6 +367,7 @@ class _Run:
 
     def _watch(self, block: Block) -> Trip | None:
         """Return the interlock that trips now, if any; every one is recorded as an event."""
+        self._tell_notices()
         free = self._recorder.free_bytes()
         trips = self._interlocks.watch(block)
         late = self._interlocks.late(self._rig.waiting)
@@ -399,7 +407,7 @@ class _Run:
         except DearigError as error:
             trouble = error
         if recorder.samples == 0:
-            where = "nothing was recorded"
+            where = "nothing of it is left" if recorder.received else "nothing was recorded"
         else:
             where = f"what was recorded is in {recorder.path} ({recorder.samples} samples)"
         return where if trouble is None or trouble is said else f"{where}; {trouble}"
@@ -418,6 +426,10 @@ class _Run:
                 recorder.received - recorder.samples, recorder.received, recorder.path,
             )  # fmt: skip
         return asked - self._asked_before >= _GIVE_UP
+
+    def _tell_notices(self) -> None:
+        for event in self._recorder.notices():
+            self._tell(event)
 
     def _tell(self, event: Event) -> None:
         self._events.append(f"{event.level}: {event.message}")

@@ -22,6 +22,7 @@ __all__ = [
     "REPEATED",
     "FilmSection",
     "LoadSection",
+    "RecordingSection",
     "RigFile",
     "fault_sentence",
     "load_rig_file",
@@ -73,11 +74,22 @@ class LoadSection(Section):
     )
 
 
+class RecordingSection(Section):
+    """The recording of a run."""
+
+    lost_file: Literal["ramp", "new_file"] = Field(
+        default="ramp",
+        description="what a run does when another program deletes, moves, replaces or overwrites "
+        "its file: ramp to 0 V, or go on in a new file beside it",
+    )
+
+
 class RigFile(RigSettings):
     """Contents of a rig file; the defaults are the rig of the thesis."""
 
     film: FilmSection = FilmSection()
     load: LoadSection = LoadSection()
+    recording: RecordingSection = RecordingSection()
 
     def as_film(self) -> Film:
         """Return the film in SI units, for the model."""

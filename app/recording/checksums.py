@@ -8,6 +8,7 @@ are written once, at the end, have HDF5's fletcher32.
 from __future__ import annotations
 
 import zlib
+from array import array
 from collections.abc import Callable
 
 import h5py
@@ -41,6 +42,11 @@ class ChecksumWriter:
         self._running = [0] * channels
         self._filled = 0
         self._pending: list[list[int]] = []
+        self._full = array("I")  # those of all full blocks: 4 bytes for 65,536 samples
+
+    def values(self) -> array[int]:
+        """Return the checksums of all blocks so far, channel by channel; the last may be short."""
+        return self._full + array("I", self._running if self._filled else ())
 
     def add(self, counts: np.ndarray) -> None:
         """Take the next ``counts`` (channels, n)."""
@@ -52,6 +58,7 @@ class ChecksumWriter:
             self._filled += stop - start
             if self._filled == BLOCK:
                 self._pending.append(self._running)
+                self._full.extend(self._running)
                 self._running, self._filled = [0] * len(self._running), 0
             start = stop
 

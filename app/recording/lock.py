@@ -78,6 +78,7 @@ class FileLock:
     def __init__(self, fd: int, path: Path, held: bool) -> None:
         self.path = path
         self.held = held
+        self.fd = fd
         #: Size, owner, permissions and identity of the file when it was opened.
         self.status = os.fstat(fd)
         # closing the descriptor releases the lock

@@ -17,9 +17,13 @@ from dearig.recording.layout import iso_time
 from dearig.recording.metadata import RunMetadata
 from dearig.recording.text import fixed, put_text, text_of
 
-__all__ = ["gather", "git_revision", "read_provenance", "write_provenance"]
+__all__ = ["CONTINUES", "gather", "git_revision", "read_provenance", "write_provenance"]
 
 ROOT = Path(__file__).resolve().parents[2]
+
+#: Name of the text with the path of the recording that a recording continues. It has no lead-in:
+#: its displacement is counted from that of the other.
+CONTINUES = "continues"
 
 #: Characters; longer texts are datasets, because an HDF5 attribute holds 64 KB at most.
 LONGEST_ATTRIBUTE = 1000

@@ -7,7 +7,6 @@ lock is held while a write stalls, so the loop must make no call of h5py.
 
 from __future__ import annotations
 
-import shutil
 import threading
 import time
 from collections import deque
@@ -20,7 +19,7 @@ import numpy as np
 from dearig.drivers.rig import Block, Event
 from dearig.errors import DearigError, DiskFault, InstrumentFault
 from dearig.progress import Progress, quiet
-from dearig.recording.files import in_words
+from dearig.recording.lost_file import LostFile
 from dearig.recording.writer import RecordingWriter
 
 __all__ = ["HOLDS", "LOOK_INTERVAL", "Recorder", "is_writing"]
@@ -61,6 +60,8 @@ class Recorder:
     behind. ``model`` returns the displacement (n,) m of an overlay model for each block. With
     ``waits`` the rig waits for its reader, as a simulated rig without a real clock: a full queue
     then delays ``append`` while the disk takes data and ``hurried`` is False. ``clock`` returns s.
+    With ``new_file`` a file that another program deletes, replaces, moves or overwrites is no
+    fault: the recording goes on in a new one beside it.
     """
 
     def __init__(
@@ -70,10 +71,13 @@ class Recorder:
         ramp_s: float = 0.0,
         model: Callable[[Block], np.ndarray] | None = None,
         waits: bool = False,
+        new_file: bool = False,
         hurried: Callable[[], bool] = lambda: False,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._writer = writer
+        self._earlier: list[RecordingWriter] = []  # those whose file was lost
+        self._new_file = new_file
         self._model = model
         self._waits = waits
         self._hurried = hurried
@@ -86,10 +90,12 @@ class Recorder:
         self._changed = threading.Condition()
         self._queue: deque[Block | Event] = deque()
         self._bytes = 0
+        self._next = 0  # sample to be written
         self._received = 0
         self._fault: BaseException | None = None
         self._dropping = False
         self._free: int | None = None
+        self._notices: deque[Event] = deque()
         self._end: _End | None = None
         self._ended = False
         self._end_fault: BaseException | None = None
@@ -109,8 +115,13 @@ class Recorder:
 
     @property
     def samples(self) -> int:
-        """Samples that are written."""
-        return self._writer.samples
+        """Samples of the run up to which they are written."""
+        writer = self._writer
+        return writer.first_sample + writer.samples
+
+    def notices(self) -> list[Event]:
+        """Return the events of the recording itself since the last call; it has them already."""
+        return [self._notices.popleft() for _ in range(len(self._notices))]
 
     @property
     def closed(self) -> bool:
@@ -274,10 +285,39 @@ class Recorder:
             self._changed.notify_all()
 
     def _write(self, item: Block | Event) -> None:
+        modelled = None
+        if isinstance(item, Block) and self._model is not None:
+            modelled = self._model(item)
+        try:
+            self._put(item, modelled)
+        except LostFile as lost:
+            self._go_on(lost)
+            if self._fault is None:
+                self._put(item, modelled)
+
+    def _put(self, item: Block | Event, modelled: np.ndarray | None) -> None:
         if isinstance(item, Event):
             self._writer.event(item.sample, item.level, item.message)
         else:
-            self._writer.append(item, None if self._model is None else self._model(item))
+            self._writer.append(item, modelled)
+            self._next = item.start + item.counts.shape[1]
+
+    def _go_on(self, lost: LostFile) -> None:
+        """Go on in a new file, or until the ramp has ended in the one that has lost its place."""
+        if not self._new_file:
+            self._fault = self._fault or lost
+            if not lost.intact:
+                self._fail(lost)
+            return
+        try:
+            writer = self._writer.continued(self._next)
+        except DearigError as error:
+            raise DiskFault(f"{lost}; no new file could be begun: {error}") from error
+        self._earlier.append(self._writer)
+        message = f"{lost}; the recording goes on in {writer.path} from sample {self._next}"
+        self._writer = writer
+        writer.event(self._next, "warning", message)
+        self._notices.append(Event(self._next, "warning", message))
 
     def _fail(self, error: Exception) -> None:
         with self._changed:
@@ -291,26 +331,40 @@ class Recorder:
         if now - self._looked < LOOK_INTERVAL:
             return
         self._looked = now
-        folder = self._writer.path.parent
         try:
-            self._free = shutil.disk_usage(folder).free
-        except OSError as error:
-            raise DiskFault(
-                f"the folder {folder} is gone ({in_words(error)}); check that the drive is "
-                f"connected"
-            ) from error
+            self._free = self._writer.look()
+        except LostFile as lost:
+            self._go_on(lost)
 
     def _finish(self, end: _End) -> None:
-        writer = self._writer
-        if writer.samples == 0:
-            writer.discard()
-            return
-        trouble: DearigError | None = None
-        if end.event:
+        troubles: list[DearigError] = []
+        if end.event and self._writer.samples:
+            last = self._writer.first_sample + self._writer.samples - 1
             try:
-                writer.event(writer.samples - 1, end.level, end.event)
+                self._writer.event(last, end.level, end.event)
             except DearigError as error:
-                trouble = error
-        writer.close(end.outcome)
-        if trouble is not None:
-            raise trouble
+                troubles.append(error)
+        if not self._writer.samples:
+            self._writer.discard()
+            if self._earlier:
+                self._writer = self._earlier.pop()
+        for writer in (*self._earlier, self._writer):
+            try:
+                writer.close(end.outcome)
+            except LostFile as lost:
+                if not (lost.intact and self._new_file):
+                    troubles.append(lost)
+                self._tell(str(lost))
+            except DearigError as error:
+                troubles.append(error)
+            else:
+                if writer is not self._writer:
+                    first = writer.first_sample
+                    self._tell(
+                        f"samples {first} to {first + writer.samples - 1} are in {writer.path}"
+                    )
+        if troubles:
+            raise troubles[0]
+
+    def _tell(self, message: str) -> None:
+        self._notices.append(Event(max(self._next - 1, 0), "warning", message))

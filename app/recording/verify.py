@@ -21,6 +21,7 @@ from dearig.recording.layout import EVENT_LEVELS, SIGNALS, counts_name
 from dearig.recording.lock import refuse_in_use
 from dearig.recording.opening import LOOKS, UNREADABLE, damage, file_state, opened
 from dearig.recording.physical import SLICE, Counts
+from dearig.recording.provenance import CONTINUES
 from dearig.recording.pyramid import BINS
 from dearig.recording.reader import open_recording
 from dearig.recording.recording import Recording
@@ -282,6 +283,13 @@ class _Check:
                         f"{there[at - start]:.9g} at sample {at}, not {expected[at - start]:.9g}"
                     )
                     break
+        if CONTINUES not in self.recording.provenance:
+            self.rest(counts)
+        if stored:
+            self.done("stored values against counts and scaling")
+
+    def rest(self, counts: Counts) -> None:
+        """Check the reading that displacement is counted from against the lead-in."""
         found = Counts(self.entry, self.samples).measured_rest()
         rest = counts.rest
         if abs(found.reading - rest.reading) > 1e-9 * abs(found.reading) + 1e-15:
@@ -294,8 +302,6 @@ class _Check:
                 f"displacement claims a lead-in of {rest.samples} samples, and the voltage has one "
                 f"of {found.samples}"
             )
-        if stored:
-            self.done("stored values against counts and scaling")
 
     def long_overview(self, counts: Counts) -> None:
         shown = group(self.entry, "overview")

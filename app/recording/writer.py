@@ -11,7 +11,6 @@ import errno
 import logging
 import math
 import os
-import re
 import shutil
 import time
 import tomllib
@@ -24,9 +23,9 @@ from types import TracebackType
 import h5py
 import numpy as np
 
-from dearig.drivers.channels import CHANNEL_NAMES, RESERVED_NAMES, Channel
 from dearig.drivers.rig import Block, Event, RigIdentity
 from dearig.errors import DearigError, DiskFault, InputError
+from dearig.recording.check_written import check_written
 from dearig.recording.checksums import ChecksumWriter
 from dearig.recording.disk_space import advice
 from dearig.recording.files import (
@@ -43,7 +42,6 @@ from dearig.recording.layout import (
     IDENTIFIER,
     LIBVER,
     MESSAGE_BYTES,
-    UNITS,
     WALL_CLOCK_TYPE,
     ZERO_ORDER,
     counts_name,
@@ -51,11 +49,15 @@ from dearig.recording.layout import (
     make_own_scale,
 )
 from dearig.recording.lock import ReplacedError, create_locked
+from dearig.recording.lost_file import LostFile, find_loss, free_name, rescued
 from dearig.recording.metadata import RunMetadata
 from dearig.recording.modelled import ModelledWriter
-from dearig.recording.physical import TEMPERATURE_UNITS, write_channel
-from dearig.recording.provenance import gather, write_provenance
+from dearig.recording.opening import UNREADABLE, opened
+from dearig.recording.physical import Counts, Rest, write_channel
+from dearig.recording.provenance import CONTINUES, gather, write_provenance
 from dearig.recording.pyramid import PyramidWriter
+from dearig.recording.run_layout import check_channels, write_instruments
+from dearig.recording.safe import Refused
 from dearig.recording.sample import write_sample
 from dearig.recording.text import clip_text, fixed, put_text, text_of
 
@@ -78,7 +80,8 @@ class RecordingWriter:
     the identity. With ``overlay`` every block comes with the displacement of an overlay model; the
     metadata's ``model_toml`` has its parameters. ``now`` returns Unix time in s. With ``fsync``
     every flush reaches the disk, so that flushed samples survive a power cut. A recording that is
-    overwritten stays until the first flush of samples, as ``FILE.h5.old``.
+    overwritten stays until the first flush of samples, as ``FILE.h5.old``. ``first_sample`` is that
+    of a run which has begun in another file; there its ``rest`` was measured.
 
     Raises ``InputError`` before anything is changed if the file exists (unless ``overwrite``), its
     folder does not, or the sequence is not TOML. ``ValueError`` is a programming error.
@@ -95,14 +98,24 @@ class RecordingWriter:
         overwrite: bool = False,
         fsync: bool = False,
         overlay: bool = False,
+        first_sample: int = 0,
+        rest: Rest | None = None,
         now: Callable[[], float] = time.time,
     ) -> None:
         if not (math.isfinite(rate_Hz) and rate_Hz > 0.0):
             raise ValueError(f"rate_Hz = {rate_Hz!r} must be a finite number above 0")
-        _check_channels(identity.channels)
+        check_channels(identity.channels)
         name = _sequence_name(metadata.sequence_toml)
         self._path = check_output(path, overwrite)
+        self._identity = identity
         self._channels = identity.channels
+        self._metadata = metadata
+        self._expected = samples_expected
+        self._overlay = overlay
+        self._first = first_sample
+        self._rest = rest
+        self._lost: LostFile | None = None
+        self._size = 0  # bytes after the last flush
         self._rate = float(rate_Hz)
         self._now = now
         self._fsync = fsync
@@ -140,13 +153,16 @@ class RecordingWriter:
                     put_text(entry, "sequence", metadata.sequence_toml)
                     write_sample(entry, metadata)
                     write_provenance(entry, provenance)
-                    self._lay_out_run(entry, identity, samples_expected)
+                    self._lay_out_run(entry)
                     self._modelled = ModelledWriter(entry, self._chunk) if overlay else None
                     if metadata.model_toml:
                         put_text(entry, "model", metadata.model_toml)
                     self._note_wall_clock(started)
                     self._file.flush()
                     self._file.swmr_mode = True
+                    # no later write changes these bytes
+                    at = entry[IDENTIFIER].id.get_offset()
+                    self._mark = (at, self._identifier.encode())
                     self._flush()
             except BaseException:
                 self._let_go()
@@ -161,10 +177,10 @@ class RecordingWriter:
             raise
         self._last_flush = now()
 
-    def _lay_out_run(self, entry: h5py.Group, identity: RigIdentity, samples_expected: int) -> None:
+    def _lay_out_run(self, entry: h5py.Group) -> None:
         data = entry["data"]
         data.attrs["rate_Hz"] = self._rate
-        data.attrs["samples_expected"] = int(samples_expected)
+        data.attrs["samples_expected"] = int(self._expected)
         # about one second: every flush writes a changed chunk again
         self._chunk = chunk = int(min(max(self._rate, 1024), 65536))
         self._counts = []
@@ -179,6 +195,9 @@ class RecordingWriter:
             write_channel(counts, channel, place)
             if channel.name == "voltage_command":
                 counts.attrs["hold"] = fixed(ZERO_ORDER)
+            if channel.name == "displacement" and self._rest is not None:
+                counts.attrs["rest_reading"] = self._rest.reading
+                counts.attrs["rest_samples"] = self._rest.samples
             self._counts.append(counts)
         self._events = entry.create_dataset(
             "events", shape=(0,), maxshape=(None,), chunks=(32,), dtype=EVENT_TYPE
@@ -194,20 +213,7 @@ class RecordingWriter:
         for name in ("events", "checksums", "wall_clock"):
             make_own_scale(entry[name])
 
-        instruments = entry.create_group("instrument")
-        instruments.attrs["NX_class"] = fixed("NXcollection")
-        links = instruments.create_group("channels")
-        links.attrs["NX_class"] = fixed("NXcollection")
-        for channel in self._channels:
-            links[channel.name] = h5py.SoftLink(f"/entry/data/{counts_name(channel.name)}")
-        for instrument in identity.instruments:
-            group = instruments.create_group(_group_name(instrument.role, instruments))
-            group.attrs["NX_class"] = fixed("NXinstrument")
-            group.attrs["role"] = fixed(instrument.role)
-            group.attrs["model"] = fixed(instrument.model)
-            group.attrs["serial"] = fixed(instrument.serial)
-            pairs = fixed([text for pair in instrument.settings for text in pair])
-            group.create_dataset("settings", data=pairs.reshape(-1, 2))
+        write_instruments(entry, self._identity)
 
     @property
     def path(self) -> Path:
@@ -223,6 +229,11 @@ class RecordingWriter:
     def rate_Hz(self) -> float:  # noqa: N802
         """Rate of the sample clock in Hz."""
         return self._rate
+
+    @property
+    def first_sample(self) -> int:
+        """Sample of the run that is the first one of this file."""
+        return self._first
 
     @property
     def samples(self) -> int:
@@ -256,8 +267,9 @@ class RecordingWriter:
                 f"a block holds int16 counts ({len(self._channels)}, n), "
                 f"not {counts.dtype} {counts.shape}"
             )
-        if block.start != self._written:
-            raise ValueError(f"a block starts at sample {block.start}, not at {self._written}")
+        due = self._first + self._written
+        if block.start != due:
+            raise ValueError(f"a block starts at sample {block.start}, not at {due}")
         if (modelled is None) != (self._modelled is None):
             raise ValueError("an overlay model is recorded from the first block to the last")
         end = self._written + counts.shape[1]
@@ -289,6 +301,8 @@ class RecordingWriter:
         try:
             with _disk_errors(self._path):
                 yield
+        except LostFile as lost:
+            raise self._give_up(lost) from lost
         except DiskFault as error:
             self._let_go()
             # so that the file can be recovered
@@ -300,10 +314,82 @@ class RecordingWriter:
             )
             raise self._failure from error
 
+    def _give_up(self, lost: LostFile) -> LostFile:
+        """Write no more to a file whose content another program has changed; return the fault."""
+        self._let_go()
+        self._lock.release()
+        try:
+            with opened(self._path) as file:
+                self._written = Counts(file["entry"]).samples
+        except (InputError, Refused, *UNREADABLE):
+            self._written = 0
+        self._flushed = self._written
+        left = f"{self._written} samples" if self._written else "nothing"
+        self._failure = fault = LostFile(f"{lost}; {left} of what was in it can be read")
+        fault.intact = False
+        return fault
+
+    def look(self) -> int:
+        """Return the free bytes of the disk, and see whether the file is what and where it was.
+
+        Raises ``LostFile`` once if it is not, and ``DiskFault`` where the disk does not answer.
+        """
+        folder = self._path.parent
+        try:
+            lost = self._newly_lost()
+            if lost is None:
+                self._find_rest()
+            free = self._free()
+        except OSError as error:
+            raise DiskFault(
+                f"the disk of {folder} does not answer ({in_words(error)}); check that it is "
+                f"connected"
+            ) from error
+        if lost is not None:
+            raise lost if lost.intact else self._give_up(lost)
+        return free
+
+    def _find_rest(self) -> None:
+        """Measure the rest for a file that has to continue this one, while this can be read."""
+        if self._rest is None and self._failure is None:
+            rest = Counts(self._file["entry"], self._written).measured_rest()
+            if rest.samples < self._written:  # the lead-in has ended
+                self._rest = rest
+
+    def _newly_lost(self) -> LostFile | None:
+        if self._lost is not None:
+            return None
+        self._lost = find_loss(self._lock, self._path, self._size, self._mark)
+        return self._lost
+
+    def continued(self, first_sample: int) -> RecordingWriter:
+        """Return the writer of a new file beside, for the samples from ``first_sample`` on.
+
+        Raises ``InputError`` where no file can be created.
+        """
+        from_here = {CONTINUES: str(self._path), "continues_from_sample": first_sample}
+        return RecordingWriter(
+            free_name(self._path, "continued"),
+            self._identity,
+            self._rate,
+            max(self._expected - (first_sample - self._first), 0),
+            replace(self._metadata, provenance={**self._metadata.provenance, **from_here}),
+            fsync=self._fsync,
+            overlay=self._overlay,
+            first_sample=first_sample,
+            rest=self._rest,
+            now=self._now,
+        )
+
     def _check_room(self) -> None:
         # checked before each write: on a full disk the order of HDF5's writes is not defined
-        if shutil.disk_usage(self._path.parent).free < self._margin:
+        if self._free() < self._margin:
             raise OSError(errno.ENOSPC, "no space for the next second")
+
+    def _free(self) -> int:
+        # by the open file where the system can: it may have no path any more
+        at = self._lock.fd if hasattr(os, "fstatvfs") else self._path.parent
+        return shutil.disk_usage(at).free
 
     def _let_go(self) -> None:
         """Close the file as a kill would: not another byte is written to it.
@@ -328,9 +414,10 @@ class RecordingWriter:
                 raise ValueError(
                     f"event level {event.level!r} is not one of {', '.join(EVENT_LEVELS)}"
                 )
+            sample = max(event.sample - self._first, 0)
             rows[i] = (
-                event.sample,
-                event.sample / self._rate,
+                sample,
+                sample / self._rate,
                 event.level.encode(),
                 clip_text(event.message, MESSAGE_BYTES),
             )
@@ -371,21 +458,32 @@ class RecordingWriter:
         self._wall_clock[n] = (self._written, moment)
 
     def _flush(self) -> None:
+        if os.fstat(self._lock.fd).st_size < self._size:
+            raise LostFile(f"another program cut {self._path} short during the run")
         self._file.flush()
         if self._fsync:
             os.fsync(self._file.id.get_vfd_handle())
+        self._size = os.fstat(self._lock.fd).st_size
 
     def close(self, outcome: str = "finished") -> None:
         """Finish the recording: physical values, end time, sample count; calling it again is fine.
 
-        ``outcome`` is a sentence on how the run ended. Raises ``DiskFault`` if the physical values
-        cannot be written; the counts are in the file then.
+        ``outcome`` is a sentence on how the run ended. A file that is no more in its place is
+        finished where it is, or as a copy beside; ``path`` is that one then. Raises ``DiskFault``
+        if the physical values cannot be written, with the counts in the file, and if the finished
+        file is not what was written; ``LostFile`` if ``look`` has not told of it.
         """
         if self._closed:
             return
         self._closed = True
         with self._lock:
+            with self._writing():
+                lost = self._newly_lost()
+                if lost is not None and not lost.intact:
+                    raise lost
             self._finish(outcome)
+        if lost is not None:
+            raise LostFile(f"{lost}; it is saved as {self._path}")
 
     def _finish(self, outcome: str) -> None:
         moment = self._now()
@@ -394,22 +492,34 @@ class RecordingWriter:
             self._flush()
             self._file.close()
         self._all_safe()
+        lock = self._lock
+        if self._lost is not None:
+            try:
+                self._path, lock = rescued(self._lock, self._path)
+            except (OSError, InputError) as error:
+                raise DiskFault(
+                    f"{self._lost}; it could not be saved beside ({in_words(error)}), and what was "
+                    f"recorded is lost"
+                ) from error
         try:
-            finish(
-                self._path,
-                lock=self._lock,
-                identifier=self._identifier,
-                complete=True,
-                outcome=outcome,
-                ended=moment,
-                fsync=self._fsync,
-            )
+            with lock:
+                finish(
+                    self._path,
+                    lock=lock,
+                    identifier=self._identifier,
+                    complete=True,
+                    outcome=outcome,
+                    ended=moment,
+                    fsync=self._fsync,
+                )
         except ReplacedError as error:
             raise DiskFault(str(error)) from error
         except InputError as error:
             raise DiskFault(
                 f"{error}; the whole run is in the file, as counts: free some space and recover it"
             ) from error
+        with _disk_errors(self._path):
+            check_written(self._path, self._identifier, self._written, self._checksums.values())
 
     def discard(self) -> None:
         """Delete the file of a run without samples, and restore the one that it would replace."""
@@ -417,6 +527,8 @@ class RecordingWriter:
             self._closed = True
             if self._failure is None:
                 self._let_go()
+            if isinstance(self._failure, LostFile):
+                return  # what is there is another program's
             self._remove_own()
             if not put_back(self._old, self._path):
                 log.warning(
@@ -457,36 +569,9 @@ def _disk_errors(path: Path, kind: type[DearigError] = DiskFault) -> Iterator[No
         raise kind(f"{path} cannot be written: {in_words(error)}; {advice(error)}") from error
 
 
-def _check_channels(channels: tuple[Channel, ...]) -> None:
-    names = [c.name for c in channels]
-    for needed in ("displacement", "voltage_command"):
-        if needed not in names:
-            raise ValueError(f"a run is recorded with a channel {needed}; there are {names}")
-    if len(set(names)) != len(names):
-        raise ValueError(f"two channels have the same name: {names}")
-    known = [name for name in names if name in CHANNEL_NAMES]
-    if known != [n for n in CHANNEL_NAMES if n in names] or names[: len(known)] != known:
-        raise ValueError(f"channels come as {', '.join(CHANNEL_NAMES)}, then others, not {names}")
-    for channel in channels:
-        if channel.name not in CHANNEL_NAMES:
-            if channel.name in RESERVED_NAMES:
-                raise ValueError(f"channel {channel.name!r}: recordings use this name themselves")
-            continue
-        units = TEMPERATURE_UNITS if channel.name == "temperature" else (UNITS[channel.name],)
-        if channel.unit not in units:
-            raise ValueError(f"channel {channel.name} is in {channel.unit!r}, not in {units[0]}")
-
-
 def _sequence_name(sequence_toml: str) -> str:
     try:
         sequence = tomllib.loads(sequence_toml)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"the sequence is not TOML: {error}") from error
     return str(sequence.get("name", "run"))
-
-
-def _group_name(role: str, taken: h5py.Group) -> str:
-    name = re.sub(r"\W+", "_", role).strip("_") or "instrument"
-    while name in taken:
-        name += "_"
-    return name

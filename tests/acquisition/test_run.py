@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -304,7 +305,7 @@ def test_a_disk_that_gets_full_ends_the_run_before_it_is(
 ) -> None:
     ticks = iter(np.arange(0.0, 100.0, 0.15))
     monkeypatch.setattr(
-        "dearig.recording.recorder.shutil.disk_usage", lambda _: SimpleNamespace(free=80_000_000)
+        "dearig.recording.writer.shutil.disk_usage", lambda _: SimpleNamespace(free=80_000_000)
     )
     rig = Troubled("", lambda: None)
     monkeypatch.setattr("dearig.acquisition.run.open_rig", lambda *_, **__: rig)
@@ -506,6 +507,40 @@ def test_ctrl_c_twice_stops_waiting_for_a_disk(
     disk.open.set()
     next(thread for thread in threading.enumerate() if thread.name == "recording").join()
     assert open_recording(tmp_path / "run.h5").samples == 1501
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="an open file cannot be deleted there")
+@pytest.mark.usefixtures("in_step")
+@pytest.mark.parametrize("goes_on", [False, True])
+def test_a_run_whose_file_is_deleted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, goes_on: bool
+) -> None:
+    path = tmp_path / "run.h5"
+    rig = Troubled("read", path.unlink)
+    monkeypatch.setattr("dearig.acquisition.run.open_rig", lambda *_, **__: rig)
+    ticks = iter(np.arange(0.0, 100.0, 0.3))
+    mode = {"recording": {"lost_file": "new_file" if goes_on else "ramp"}}
+    said = f"{path} was deleted by another program during the run"
+    run = lambda: record(  # noqa: E731
+        LOADED, "sim", RigFile.model_validate(mode), path, clock=lambda: next(ticks)
+    )
+    if goes_on:
+        result = run()
+        assert result.path == tmp_path / "run-continued.h5"
+        assert result.samples == 1501
+        assert any(said in event for event in result.events)
+        parts = [open_recording(tmp_path / f"run-{n}.h5") for n in ("saved", "continued")]
+        assert sum(part.samples for part in parts) == 1501
+    else:
+        with pytest.raises(DiskFault, match=f"{said}; the rig was made safe, and what was") as end:
+            run()
+        saved = open_recording(tmp_path / "run-saved.h5")
+        assert f"is in {saved.path} ({saved.samples} samples)" in str(end.value)
+        assert saved.voltage_command is not None
+        assert saved.voltage_command[-1] == pytest.approx(0.0, abs=0.2)
+        assert any(line.startswith("stop at") for line in rig.diary)
+    assert closed_at_zero(rig)
+    assert not path.exists()
 
 
 def test_a_disk_that_is_full_to_the_end_keeps_the_counts(

@@ -184,7 +184,7 @@ def test_the_disk_is_looked_at_every_second(
     after(1.0)
     assert recorder.fault is None
     after(1.0)
-    with pytest.raises(DiskFault, match=r"is gone \(No such file.*check that the drive is"):
+    with pytest.raises(DiskFault, match=r"disk of .* does not answer \(No such file"):
         recorder.check()
     recorder.close("ended early")
     assert open_recording(tmp_path / "run.h5").samples == 700
