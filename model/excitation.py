@@ -165,10 +165,18 @@ class Lobes(_FromZero):
     def voltage(self, t: np.ndarray) -> np.ndarray:
         within = np.mod(t, self.period)
         edges = np.concatenate(([0.0], np.cumsum([1.0 / f for f in self.frequencies])))
-        i = np.clip(np.searchsorted(edges, within, side="right") - 1, 0, len(self.frequencies) - 1)
-        a, f = np.array(self.amplitudes)[i], np.array(self.frequencies)[i]
-        v = a * np.maximum(np.sin(np.pi * f * (within - edges[i])), 0.0)
-        return np.where(t >= self.duration, 0.0, v)
+        v = np.empty_like(within)
+        # times in order meet one lobe after another, and each lobe once in a period
+        order = None if (np.diff(within) >= 0.0).all() else np.argsort(within, kind="stable")
+        ticks = within if order is None else within[order]
+        cuts = np.searchsorted(ticks, edges)
+        cuts[0], cuts[-1] = 0, ticks.size
+        for i, (a, f) in enumerate(zip(self.amplitudes, self.frequencies, strict=True)):
+            inside = slice(cuts[i], cuts[i + 1])
+            lobe = a * np.maximum(np.sin(np.pi * f * (ticks[inside] - edges[i])), 0.0)
+            v[inside if order is None else order[inside]] = lobe
+        v[t >= self.duration] = 0.0
+        return v
 
 
 @dataclass(frozen=True)
@@ -559,7 +567,7 @@ class Sequence:
 
     def window(self, rate: float, start: int, stop: int) -> np.ndarray:
         """Return the samples ``start`` to ``stop`` of ``sample(rate)``, without the others."""
-        v = self._voltage_at(np.arange(start, stop) / rate)
+        v = self._voltage_at(np.arange(start, stop, dtype=np.float64) / rate)
         if stop >= self.ticks(rate) and v.size:
             v[-1] = 0.0
         return v
@@ -572,7 +580,7 @@ class Sequence:
                 f"the sequence lasts {self.duration:.4g} s, {count:.3g} samples at {rate:g} Hz; "
                 f"at most {_SAMPLES_MAX:.0g} can be played: shorten it or lower the rate"
             )
-        return np.arange(count) / rate, self.window(rate, 0, count)
+        return np.arange(count, dtype=np.float64) / rate, self.window(rate, 0, count)
 
     def _voltage_at(self, ticks: np.ndarray) -> np.ndarray:
         """Voltage in V at times ``ticks`` (N,) s that do not decrease."""
@@ -587,6 +595,6 @@ class Sequence:
         for i, segment in enumerate(self.segments[first:last]):
             inside = slice(cuts[i], cuts[i + 1])
             if inside.start < inside.stop:
-                local = np.minimum(ticks[inside] - edges[i], segment.duration)
-                v[inside] = segment.voltage(local)
+                local = ticks[inside] - edges[i]
+                v[inside] = segment.voltage(np.minimum(local, segment.duration, out=local))
         return v
