@@ -142,7 +142,7 @@ class PredictedFilm:
         reading, velocity = (stretch - self._rest) * self._length, speed * self._length
         kernel.read_sensor(c, time, reading, velocity, self._memory)
         ends = self._thinned(stretch)
-        thin = np.maximum(ends[:-1], ends[1:])
+        thin: np.ndarray = np.maximum(ends[:-1], ends[1:])
         self._thin = float(ends[-1])
         predicted = peaks.size
         if status != kernel.OK:
@@ -159,7 +159,7 @@ class PredictedFilm:
         return thin
 
     def _thinned(self, stretch: np.ndarray) -> np.ndarray:
-        return np.asarray(thinning(self._held, stretch) / self._thickness)
+        return thinning(self._held, stretch) / self._thickness
 
 
 def peaks_of(voltage: Samples, stride: int) -> np.ndarray:
