@@ -29,8 +29,20 @@ RESERVED = -50103  #: another task holds the card
 TIMEOUT = -200284  #: samples did not arrive in time
 INPUT_OVERWRITTEN = -200279  #: the reader was too late
 
-#: gRPC's words on a peer that answers in another protocol
-_NOT_GRPC = r"(?i)http/?2|http status|unexpected content-type"
+#: gRPC's words on a peer that answers -> what it is, and what to do
+_ANSWERS = {
+    r"(?i)wrong_version_number": "answers a server without TLS: set up TLS there, or remove "
+    "card.tls_ca",
+    r"(?i)certificate_verify_failed": "answers a server whose certificate is not trusted: compare "
+    "card.tls_ca with the authority that signed it, and its date",
+    r"(?i)hostname verification|peer name": "answers a server whose certificate is for another "
+    "name: use a name that it has, in the rig's address",
+    r"(?i)failed to connect.*(socket closed|connection reset)": "the connection is closed by what "
+    "answers: if it is a server with TLS, set card.tls_ca, and card.tls_cert and card.tls_key if "
+    "it asks for them",
+    r"(?i)http/?2|http status|unexpected content-type": "answers a program that does not speak "
+    "gRPC; it is not a DAQmx server: check the port",
+}
 
 #: code -> (what happened and why, what to do)
 _KNOWN: dict[int, tuple[str, str]] = {
@@ -143,11 +155,10 @@ def _server_fault(server: str | None, error: RpcError) -> str:
             f"gRPC device server with NI-DAQmx, or an older one: check the port, update the server"
         )
     details = getattr(error.__context__, "details", None)  # nidaqmx replaces gRPC's own words
-    if details is not None and re.search(_NOT_GRPC, details() or ""):
-        return (
-            f"at {server} answers a program that does not speak gRPC ({code}); it is not a DAQmx "
-            f"server: check the port"
-        )
+    words = "" if details is None else details() or ""
+    for pattern, sentence in _ANSWERS.items():
+        if re.search(pattern, words):
+            return f"at {server} {sentence} ({code})"
     return (
         f"its server {server} does not answer ({code}); check that it runs and that the network "
         f"works"

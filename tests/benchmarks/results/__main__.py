@@ -55,6 +55,9 @@ MEASUREMENTS = {
             "tests.benchmarks.bench_daqmx hour",
         ),
     ),
+    "soak": Measurement(
+        "What a server and a program that runs for long keep", ("tests.benchmarks.bench_soak",)
+    ),
     "recordings": Measurement(
         "Cost of recording, and of reading recordings",
         (
