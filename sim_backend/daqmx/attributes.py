@@ -15,7 +15,7 @@ from dearig.sim_backend.daqmx.card_properties import (
 from dearig.sim_backend.daqmx.channel_properties import CHANNEL, kinds_of
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.properties import Asked, Property, name_of
-from dearig.sim_backend.daqmx.scale_properties import SCALE
+from dearig.sim_backend.daqmx.scale_properties import SAVED_SCALE, SCALE
 from dearig.sim_backend.daqmx.task_properties import BUFFER, READ, TASK, WATCHDOG, WRITE
 from dearig.sim_backend.daqmx.timing_properties import EXPORTED, TIMING, TRIGGER, WITH_DEVICE
 
@@ -28,6 +28,7 @@ TABLES: Mapping[str, Mapping[str, Property]] = {
     "Chan": CHANNEL,
     "Device": DEVICE,
     "ExportedSignal": EXPORTED,
+    "PersistedScale": SAVED_SCALE,
     "PhysicalChan": PHYSICAL_CHANNEL,
     "Read": READ,
     "Scale": SCALE,

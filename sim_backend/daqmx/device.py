@@ -299,14 +299,22 @@ class Device(TimingEngine):
 
     # events
 
-    def listen(self, task: Task, every: int | None, owner: object, direction: int = 0) -> Listener:
+    def listen(
+        self,
+        task: Task,
+        every: int | None,
+        owner: object,
+        direction: int = 0,
+        signal: int | None = None,
+    ) -> Listener:
         """Return a new listener to ``task``: every ``every`` samples, or None for its end.
 
-        ``owner`` is the call that listens, ``direction`` DAQmx's type of an event by samples.
+        ``owner`` is the call that listens, ``direction`` DAQmx's type of an event by samples,
+        ``signal`` that of an event by a signal.
         """
         with self._lock:
-            events.check_registration(task, every, direction)
-            listener = Listener(every, owner)
+            events.check_registration(task, every, direction, signal)
+            listener = Listener(every, owner, signal)
             task.listeners.append(listener)
             return listener
 

@@ -59,6 +59,8 @@ class Code(IntEnum):
     WRITE_WITHOUT_START = -200846
     READ_WITHOUT_START = -200834
     DONE_EVENT_REGISTERED = -200950
+    SIGNAL_EVENT_REGISTERED = -200949
+    SIGNAL_NOT_SUPPORTED = -200987
     ACQUIRED_EVENT_REGISTERED = -200966
     TRANSFERRED_EVENT_REGISTERED = -200967
     TRANSFERRED_NOT_FOR_INPUT = -200980
@@ -153,6 +155,9 @@ WORDS: dict[int, str] = {
     Code.READ_WITHOUT_START: "Read cannot be performed when the auto start property is false and "
     "the task is not running.",
     Code.DONE_EVENT_REGISTERED: "Done event is already registered within this task.",
+    Code.SIGNAL_EVENT_REGISTERED: "Signal event is already registered within this task.",
+    Code.SIGNAL_NOT_SUPPORTED: "Signal event of this type is not supported by the channels or "
+    "devices in the task.",
     Code.ACQUIRED_EVENT_REGISTERED: "Every N Samples Acquired Into Buffer event is already "
     "registered within this task.",
     Code.TRANSFERRED_EVENT_REGISTERED: "Every N Samples Transferred From Buffer event is already "

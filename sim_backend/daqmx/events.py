@@ -9,16 +9,25 @@ from dearig.sim_backend.daqmx.tasks import Kind, Listener, Task
 
 __all__ = ["check_intervals", "check_registration", "collect", "observe", "restart"]
 
+_SIGNALS = (12487, 12530)  # DAQmx: sample clock, sample complete: one with every sample
 _ACQUIRED, _TRANSFERRED = 1, 2  # DAQmx: samples acquired into, or transferred from, the buffer
 
 # events that wait for a program to hear them; more become due once it has heard some
 _DUE_MAX = 10_000
 
 
-def check_registration(task: Task, every: int | None, direction: int) -> None:
+def check_registration(
+    task: Task, every: int | None, direction: int, signal: int | None = None
+) -> None:
     """Refuse an event that ``task`` cannot have; ``every`` is None for the done event."""
     if task.running:
         raise DaqmxError(Code.EVENT_WHILE_RUNNING, f"Task Name: {task.name}")
+    if signal is not None:
+        if signal not in _SIGNALS:
+            raise DaqmxError(Code.SIGNAL_NOT_SUPPORTED, f"Signal: {signal}; Task: {task.name}")
+        if any(listener.signal is not None for listener in task.listeners):
+            raise DaqmxError(Code.SIGNAL_EVENT_REGISTERED, f"Task Name: {task.name}")
+        return
     if every is None:
         if any(listener.every is None for listener in task.listeners):
             raise DaqmxError(Code.DONE_EVENT_REGISTERED, f"Task Name: {task.name}")
@@ -30,7 +39,7 @@ def check_registration(task: Task, every: int | None, direction: int) -> None:
         raise DaqmxError(Code.TRANSFERRED_NOT_FOR_INPUT, f"Task Name: {task.name}")
     if every < 1:
         raise DaqmxError(Code.EVENT_INTERVAL_ZERO, f"N Samples: {every}; Task Name: {task.name}")
-    if any(listener.every is not None for listener in task.listeners):
+    if any(one.every is not None and one.signal is None for one in task.listeners):
         raise DaqmxError(
             Code.ACQUIRED_EVENT_REGISTERED if is_input else Code.TRANSFERRED_EVENT_REGISTERED,
             f"Task Name: {task.name}",
@@ -40,7 +49,7 @@ def check_registration(task: Task, every: int | None, direction: int) -> None:
 def check_intervals(task: Task, buffer: int) -> None:
     """Refuse the start of ``task`` if its ``buffer`` is no multiple of an event's interval."""
     for listener in task.listeners:
-        if listener.every is None:
+        if listener.every is None or listener.signal is not None:
             continue
         if task.clock is None:
             raise DaqmxError(Code.EVENT_WITHOUT_BUFFER, f"Task Name: {task.name}")

@@ -9,7 +9,7 @@ from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.properties import Asked, Property, changed, given
 from dearig.sim_backend.daqmx.scales import LINEAR, MAP, POLYNOMIAL, TABLE, Scale
 
-__all__ = ["SCALE"]
+__all__ = ["SAVED_SCALE", "SCALE"]
 
 
 def _scale(asked: Asked, kind: int | None) -> Scale:
@@ -44,6 +44,20 @@ def _field(name: str, kind: int | None = None, place: int | None = None) -> Prop
 
     return changed(get, set_)
 
+
+def _saved(asked: Asked) -> Scale:
+    """Return the asked scale; raises an error unless it is saved."""
+    scale = _scale(asked, None)
+    if not scale.saved:
+        raise DaqmxError(Code.UNKNOWN_SCALE, f"Custom Scale Name: {scale.name}")
+    return scale
+
+
+SAVED_SCALE = {
+    "AUTHOR": given(lambda a: _saved(a).author),
+    "ALLOW_INTERACTIVE_EDITING": given(lambda a: _saved(a).saved),
+    "ALLOW_INTERACTIVE_DELETION": given(lambda a: _saved(a).saved),
+}
 
 SCALE = {
     "TYPE": given(lambda a: _scale(a, None).kind),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,7 +32,8 @@ class Scale:
     pre_scaled_units: int = _VOLTS
     scaled_units: str = ""
     description: str = ""
-    saved: bool = field(default=False)
+    saved: bool = False
+    author: str = ""
 
     def scaled(self, values: np.ndarray) -> np.ndarray:
         """Return what a program reads for ``values`` (n,) in the unit before scaling."""

@@ -201,7 +201,9 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer)
     def SaveScale(self, request: Any, context: grpc.ServicerContext) -> Any:
         """Keep a scale in the list of saved ones, until the server ends."""
         scale = self._device.scale(request.scale_name)
-        self._device.add_scale(replace(scale, name=request.save_as or scale.name, saved=True))
+        self._device.add_scale(
+            replace(scale, name=request.save_as or scale.name, saved=True, author=request.author)
+        )
         return pb.SaveScaleResponse()
 
     def DeleteSavedScale(self, request: Any, context: grpc.ServicerContext) -> Any:
@@ -371,6 +373,15 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer)
         self._close_stream("samples", self._task(request))
         return pb.UnregisterEveryNSamplesEventResponse()
 
+    def RegisterSignalEvent(self, request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
+        signal = request.signal_id_raw or request.signal_id
+        for _ in self._events("signal", request, context, 1, signal=signal):
+            yield pb.RegisterSignalEventResponse(signal_id=signal)
+
+    def UnregisterSignalEvent(self, request: Any, context: grpc.ServicerContext) -> Any:
+        self._close_stream("signal", self._task(request))
+        return pb.UnregisterSignalEventResponse()
+
     def _events(
         self,
         what: str,
@@ -378,10 +389,11 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer)
         context: grpc.ServicerContext,
         every: int | None,
         direction: int = 0,
+        signal: int | None = None,
     ) -> Iterator[int]:
         """Yield the status of each event of a task until the client has heard enough."""
         task = self._task(request)
-        listener = self._device.listen(task, every, context, direction)
+        listener = self._device.listen(task, every, context, direction, signal)
         key = f"{what} {task.name}"
         self._streams[key] = listener
 

@@ -156,12 +156,15 @@ class Watchdog:
 class Listener:
     """Program that listens to an event of a task: each ``every`` samples, or None for its end.
 
+    ``signal`` is DAQmx's signal of an event by a signal, which comes with every sample.
+
     ``owner`` is the call that listens. ``told`` counts the events of the present start; ``due``
     has the status of each unsent one.
     """
 
     every: int | None
     owner: object
+    signal: int | None = None
     told: int = 0
     due: list[int] = field(default_factory=list)
 

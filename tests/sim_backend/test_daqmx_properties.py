@@ -193,9 +193,11 @@ def test_the_properties_of_a_scale_can_be_set(session):
 
 
 def test_a_saved_scale_is_listed(session):
-    SCALES["map"](session).save("kept")
+    SCALES["map"](session).save("kept", author="the operator")
     system = System.remote(session)
     assert list(system.scales.scale_names) == ["kept"]
+    assert system.scales["kept"].author == "the operator"
+    assert system.scales["kept"].load().map_scaled_max == 11.0
     system.scales["kept"].delete()
     assert list(system.scales.scale_names) == []
 

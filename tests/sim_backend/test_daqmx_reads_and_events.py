@@ -5,7 +5,7 @@ import threading
 import nidaqmx
 import numpy as np
 import pytest
-from nidaqmx.constants import READ_ALL_AVAILABLE, AcquisitionType, Edge
+from nidaqmx.constants import READ_ALL_AVAILABLE, AcquisitionType, Edge, Signal
 from nidaqmx.errors import DaqError, RpcError
 from nidaqmx.task.channels import AIChannel
 
@@ -212,6 +212,17 @@ def test_every_start_has_its_events_also_when_it_follows_at_once():
         assert chunks.calls == [10] * 50
 
 
+def test_a_signal_comes_with_every_sample():
+    with served(clock=PacedClock()) as card, task(card.session) as ai:
+        add_inputs(ai, "ai0")
+        ai.timing.cfg_samp_clk_timing(1000, samps_per_chan=20)
+        samples = Counted(1)
+        ai.register_signal_event(Signal.SAMPLE_COMPLETE, samples)
+        ai.start()
+        samples.wait_for(20)
+        assert samples.calls == [Signal.SAMPLE_COMPLETE.value] * 20
+
+
 def test_a_task_that_is_stopped_before_its_end_is_not_done():
     with served(clock=PacedClock()) as card, task(card.session) as ai:
         add_inputs(ai, "ai0")
@@ -234,6 +245,10 @@ def _acquired(made, every):
     made.register_every_n_samples_acquired_into_buffer_event(every, _nothing)
 
 
+def _signalled(made, signal):
+    made.register_signal_event(signal, _nothing)
+
+
 def _transferred(made, every):
     made.register_every_n_samples_transferred_from_buffer_event(every, _nothing)
 
@@ -244,6 +259,8 @@ def _transferred(made, every):
         ("ai", _acquired, (100, 100), -200966),
         ("ao", _transferred, (100, 100), -200967),
         ("ai", lambda made, _: made.register_done_event(_nothing), (0, 0), -200950),
+        ("ai", _signalled, (Signal.SAMPLE_COMPLETE, Signal.SAMPLE_CLOCK), -200949),
+        ("ai", _signalled, (Signal.CHANGE_DETECTION_EVENT,), -200987),
         ("ai", _transferred, (100,), -200980),
         ("ao", _acquired, (100,), -200981),
         ("ai", _acquired, (0,), -200880),
