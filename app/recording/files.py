@@ -136,7 +136,7 @@ def replaced_when_done(path: Path, overwrite: bool) -> Iterator[Path]:
     finally:
         # what cannot be removed now is removed with the next output in this folder
         with suppress(OSError):
-            lock.path.unlink(missing_ok=True)
+            lock.remove()
         lock.release()
 
 
@@ -169,12 +169,8 @@ def _remove_abandoned(folder: Path) -> None:
             lock = lock_or_none(fd, path)
             if lock is None:
                 continue
-            age = time.time() - lock.status.st_mtime
-            held = lock.held
-            if sys.platform == "win32":
-                lock.release()  # an open file cannot be removed there
-            if held or age > ABANDONED:
-                path.unlink()
+            if lock.held or time.time() - lock.status.st_mtime > ABANDONED:
+                lock.remove()
             lock.release()
 
 

@@ -99,6 +99,15 @@ class FileLock:
         """Release the lock; calling it again is fine."""
         self._close()
 
+    def remove(self) -> None:
+        """Delete the file, unless another one has its name by now, and release the lock."""
+        own = self.is_at(self.path)
+        if sys.platform == "win32":
+            self.release()  # an open file cannot be deleted there
+        if own:
+            self.path.unlink(missing_ok=True)
+        self.release()
+
     def __enter__(self) -> FileLock:
         """Return the lock."""
         return self
@@ -129,16 +138,16 @@ def create_locked(path: Path) -> FileLock:
             _check_whole_file_lock(fd)
     except _NoLocksError as error:
         if wanted:
-            _remove(lock)
+            lock.remove()
             raise InputError(
                 f"{path} cannot be written: its folder has no file locks, which keep other "
                 f"programs from changing the recording during the run; {NO_LOCKS}"
             ) from error
     except BaseException:
-        _remove(lock)
+        lock.remove()
         raise
     if taken:
-        _remove(lock)
+        lock.remove()
         raise InputError(f"{path} was taken by another program; choose another name")
     return lock
 
@@ -206,13 +215,6 @@ def _in_use(path: Path) -> str:
         f"{path} is in use: a run records to it, or another program changes it; wait until that "
         f"has ended, or choose another name"
     )
-
-
-def _remove(lock: FileLock) -> None:
-    """Remove the file of ``lock``, if it still has its name."""
-    if lock.is_at(lock.path):
-        lock.path.unlink(missing_ok=True)
-    lock.release()
 
 
 def _open_any(path: Path) -> tuple[int, bool]:

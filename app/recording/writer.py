@@ -144,7 +144,7 @@ class RecordingWriter:
                     # the lock replaces that of HDF5, which ends with the start of SWMR mode
                     self._file = h5py.File(self._path, "w", libver=LIBVER, locking=False)
             except BaseException:
-                self._remove_own()
+                self._lock.remove()
                 raise
             try:
                 with _disk_errors(self._path, InputError):
@@ -166,7 +166,7 @@ class RecordingWriter:
                     self._flush()
             except BaseException:
                 self._let_go()
-                self._remove_own()
+                self._lock.remove()
                 raise
         except BaseException as error:
             if not put_back(self._old, self._path):
@@ -249,12 +249,6 @@ class RecordingWriter:
     def closed(self) -> bool:
         """True after ``close``."""
         return self._closed
-
-    def _remove_own(self) -> None:
-        """Delete the file, unless another one has its name by now, and release the lock."""
-        if self._lock.is_at(self._path):
-            self._path.unlink(missing_ok=True)
-        self._lock.release()
 
     def append(self, block: Block, modelled: np.ndarray | None = None) -> None:
         """Write the next block and its events, with the displacement ``modelled`` (n,) m.
@@ -529,7 +523,7 @@ class RecordingWriter:
                 self._let_go()
             if isinstance(self._failure, LostFile):
                 return  # what is there is another program's
-            self._remove_own()
+            self._lock.remove()
             if not put_back(self._old, self._path):
                 log.warning(
                     "%s was taken by another program; the recording that had this name is %s",

@@ -5,6 +5,7 @@ The parent has imported everything and compiled the kernels; a fork of it starts
 
 from __future__ import annotations
 
+import gc
 import heapq
 import json
 import os
@@ -91,6 +92,8 @@ def prepare(folder: Path) -> None:
         answer = dearig(*arguments)
         if answer.code:
             raise RuntimeError(answer.err)
+    # a collection in a fork would copy every page of the parent
+    gc.freeze()
 
 
 def plan(rng: random.Random, given: Path, paced: bool) -> list[Command]:
