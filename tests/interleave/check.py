@@ -17,6 +17,8 @@ from tests.interleave.commands import Ended
 
 __all__ = ["check"]
 
+#: What is said of the file of a run that was killed before its samples.
+BEFORE_SAMPLES = ("killed before its first sample", "ended before its first block")
 #: Exit codes of commands that did their work or were refused, of a verification that failed, and
 #: the commands that put another recording in the place of one.
 ALLOWED, FAILED = (0, 2), 4
@@ -35,8 +37,8 @@ def _outputs(folder: Path, ended: list[Ended]) -> Iterator[str]:
     for one in ended:
         who = f"{one.command.kind} {one.command.name}"
         killed = one.code == -9
-        if one.code == FAILED and "killed before its first sample" in one.said:
-            # true of a run that was killed as it created the file
+        if one.code == FAILED and any(words in one.said for words in BEFORE_SAMPLES):
+            # true of a run that was killed before it had samples
             if not _killed_run(ended, folder / one.command.name):
                 yield f"{who}: {one.said[-300:]}"
             continue
