@@ -106,10 +106,11 @@ def test_a_file_that_replaced_the_run_is_not_written_to(tmp_path: Path) -> None:
     recorder = writer(path)
     recorder.append(Block(0, run_counts(3000)))
     other.replace(path)
-    with pytest.raises(DiskFault, match="is another file by now"):
+    with pytest.raises(DiskFault, match="another file has taken the place of"):
         recorder.close()
     assert path.read_bytes() == content
-    assert names(tmp_path) == {"run.h5"}
+    assert names(tmp_path) == {"run.h5", "run-saved.h5"}
+    assert verify(tmp_path / "run-saved.h5").sound
 
 
 def test_a_run_without_samples_removes_only_its_own_file(tmp_path: Path) -> None:
