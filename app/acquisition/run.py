@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import math
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -240,7 +241,7 @@ def record(
             recorder.path, recorder.samples, rate, "finished", events, waveform.margins
         )
     finally:
-        _close(rig)
+        _close(rig, sys.exc_info()[1])
 
 
 class _Run:
@@ -279,7 +280,10 @@ class _Run:
             finally:
                 # 0 V first: a disk that is slow or full must not keep the voltage up
                 self._interrupts.close()
-                _make_safe(self._rig)
+                try:
+                    _make_safe(self._rig)
+                finally:
+                    self._note_guardian()
             if self._trip is not None:
                 kept = self._end(f"stopped by an interlock: {self._trip.message}")
                 raise SafetyStop(
@@ -427,6 +431,12 @@ class _Run:
             )  # fmt: skip
         return asked - self._asked_before >= _GIVE_UP
 
+    def _note_guardian(self) -> None:
+        """Record what the guardian did, if the rig has one and it acted."""
+        acted = getattr(self._rig, "taken_over", None)
+        if acted is not None:
+            self._note(max(self._recorder.received - 1, 0), "fault", acted.sentence)
+
     def _tell_notices(self) -> None:
         for event in self._recorder.notices():
             self._tell(event)
@@ -451,19 +461,20 @@ def _make_safe(rig: Rig) -> None:
     try:
         rig.make_safe()
     except RigError as error:
-        raise NotSafe(
-            f"THE RIG COULD NOT BE MADE SAFE ({error}): switch the amplifier's high voltage off "
-            f"by hand"
-        ) from error
+        raise NotSafe(f"THE RIG COULD NOT BE MADE SAFE ({error}): {_NOT_CONFIRMED}") from error
 
 
-def _close(rig: Rig) -> None:
+def _close(rig: Rig, ended_by: BaseException | None) -> None:
+    """Close the rig after a run that ended by an error, or by none."""
     try:
         rig.close()
     except RigError as error:
-        raise NotSafe(
-            f"THE RIG COULD NOT BE CLOSED ({error}): check that the amplifier is at 0 V"
-        ) from error
+        if isinstance(ended_by, NotSafe):
+            log.warning("the rig could not be closed either: %s", error)
+            return
+        also = f"; {ended_by}" if isinstance(ended_by, DearigError) else ""
+        raise NotSafe(f"THE RIG COULD NOT BE CLOSED ({error}): {_NOT_CONFIRMED}{also}") from error
 
 
+_NOT_CONFIRMED = "0 V IS NOT CONFIRMED, switch the amplifier's high voltage off by hand"
 _DONE = {"ramp": "the voltage was ramped down", "at once": "the output was taken at once"}

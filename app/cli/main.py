@@ -25,6 +25,7 @@ from typer.exceptions import TyperException
 
 from dearig import log_file
 from dearig.cli import files, fit, run, tools
+from dearig.cli.last_words import LastingStream, leave, silence_libraries
 from dearig.cli.output import version
 from dearig.errors import DearigError, DiskFault, InputError, Interrupted
 from dearig.printable import MESSAGE_MAX, PrintableStream, printable
@@ -84,8 +85,9 @@ class _Terminal(logging.StreamHandler[TextIO]):
         self.setLevel((logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)])
 
     def filter(self, record: logging.LogRecord) -> bool:
-        # a traceback is for the log file
-        wanted = record.exc_info is None or self.level < logging.WARNING
+        # tracebacks, and Python's warnings of libraries, are for the log file
+        told = record.exc_info is None and record.name != "py.warnings"
+        wanted = told or self.level < logging.WARNING
         return wanted and bool(super().filter(record))
 
 
@@ -95,6 +97,7 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):
             # characters that the terminal's encoding lacks are escaped; they raise nothing
             stream.reconfigure(errors="backslashreplace")
+    silence_libraries()
     _give_matplotlib_a_folder()
     with (
         _printable_output(), log_file.attached() as written, _terminal(),
@@ -103,7 +106,7 @@ def main() -> None:
         status = _run(written)
         if written.stream is not None:  # a command has started, not only --help
             log.info("ended with exit code %d", status)
-    sys.exit(status)
+    leave(status)
 
 
 @contextmanager
@@ -111,7 +114,7 @@ def _printable_output() -> Iterator[None]:
     """Let only printable characters through to the terminal, whoever writes them."""
     raw = sys.stdout, sys.stderr
     sys.stdout = cast(TextIO, PrintableStream(raw[0]))
-    sys.stderr = cast(TextIO, PrintableStream(raw[1]))
+    sys.stderr = cast(TextIO, PrintableStream(cast(TextIO, LastingStream(raw[1]))))
     try:
         yield
     finally:
@@ -143,9 +146,11 @@ def _terminal() -> Iterator[None]:
     for name in ("numba", "matplotlib"):
         logging.getLogger(name).setLevel(logging.WARNING)
     logging.getLogger().addHandler(handler)
+    logging.captureWarnings(capture=True)
     try:
         yield
     finally:
+        logging.captureWarnings(capture=False)
         logging.getLogger().removeHandler(handler)
 
 
@@ -265,7 +270,7 @@ def _tell_unexpected(error: BaseException, written: log_file.LogFile) -> None:
 @contextmanager
 def _unexpected_errors_told(written: log_file.LogFile) -> Iterator[None]:
     """Tell errors in threads and in Qt's slots too, which no ``except`` reaches."""
-    in_main, in_threads = sys.excepthook, threading.excepthook
+    before = sys.excepthook, threading.excepthook, sys.unraisablehook
 
     def thread_ended(args: threading.ExceptHookArgs) -> None:
         if args.exc_value is not None:
@@ -273,10 +278,14 @@ def _unexpected_errors_told(written: log_file.LogFile) -> Iterator[None]:
 
     sys.excepthook = lambda _, error, __: _tell_unexpected(error, written)
     threading.excepthook = thread_ended
+    # such as a library's object that cannot let go of an instrument whose link is lost
+    sys.unraisablehook = lambda args: log.error(
+        "error while an object was deleted: %r", args.object, exc_info=args.exc_value
+    )
     try:
         yield
     finally:
-        sys.excepthook, threading.excepthook = in_main, in_threads
+        sys.excepthook, threading.excepthook, sys.unraisablehook = before
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import signal
 import sys
 import threading
@@ -17,6 +18,7 @@ from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.plan import Plan, plan
 from dearig.acquisition.run import RunObserver, RunOptions, open_rig, record
+from dearig.cli.last_words import LastingStream
 from dearig.config.modelfile import save_model
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
@@ -178,6 +180,46 @@ def test_the_first_ctrl_c_ramps_down(command, tmp_path: Path) -> None:
     assert f"({run.samples} samples)" in answer.err
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no such signal there")
+def test_a_closed_terminal_ramps_down_and_says_so_in_the_recording(command, tmp_path: Path) -> None:
+    def hang_up() -> None:
+        # the shell sends it, and the system too
+        for _ in range(3):
+            signal.raise_signal(signal.SIGHUP)
+
+    rig = Troubled("read", hang_up)
+    answer = command(rig)
+    assert answer.code == 130
+    assert "interrupted because the terminal was closed: the voltage was ramped" in answer.err
+    assert any(line.startswith("stop at 2") for line in rig.diary)
+    assert closed_at_zero(rig)
+    run = open_recording(tmp_path / "run.h5")
+    assert run.complete
+    assert run.outcome == "interrupted because the terminal was closed; ramped down to 0 V"
+    assert any("because the terminal was closed: ramping down" in e.message for e in run.events)
+
+
+def test_a_standard_error_without_a_reader_counts_as_a_closed_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Broken(io.StringIO):
+        def write(self, text: str) -> int:  # noqa: ARG002
+            raise BrokenPipeError(32, "Broken pipe")
+
+    stream = LastingStream(Broken())
+    rig = Troubled("read", lambda: print("a warning", file=stream))  # type: ignore[call-overload]
+    monkeypatch.setattr("dearig.acquisition.run.open_rig", lambda *_, **__: rig)
+    with pytest.raises(Interrupted, match="because the terminal was closed: the voltage was ramp"):
+        record(LOADED, "sim", RIG_FILE, tmp_path / "run.h5")
+    print("nobody sees it, and it is no error", file=stream)  # type: ignore[call-overload]
+    assert closed_at_zero(rig)
+    # under nohup a run goes on
+    monkeypatch.setattr("dearig.acquisition.interrupts.signal.getsignal", lambda _: signal.SIG_IGN)
+    stream = LastingStream(Broken())
+    rig = Troubled("read", lambda: print("a warning", file=stream))  # type: ignore[call-overload]
+    assert record(LOADED, "sim", RIG_FILE, tmp_path / "on.h5").outcome == "finished"
+
+
 def test_the_second_ctrl_c_is_0_volts_at_once(command, tmp_path: Path) -> None:
     rig = Troubled("read", lambda: keys(2))
     answer = command(rig)
@@ -269,6 +311,37 @@ def test_a_rig_that_cannot_be_made_safe_is_shouted_about(command, tmp_path: Path
     assert "switch the amplifier's high voltage off by hand" in answer.err
     assert "was made safe" not in answer.err
     assert open_recording(tmp_path / "run.h5").samples == 1501
+
+
+def test_a_rig_that_can_neither_be_made_safe_nor_closed(command, tmp_path: Path) -> None:
+    rig = Troubled("make safe", fault)
+    rig.close = fault  # type: ignore[method-assign]
+    answer = command(rig)
+    assert answer.code == 4
+    last = answer.err.splitlines()[-1]
+    assert last.startswith("dearig: THE RIG COULD NOT BE MADE SAFE")
+    assert "0 V IS NOT CONFIRMED, switch the amplifier" in last
+    assert f"what was recorded is in {tmp_path / 'run.h5'} (1501 samples)" in last
+
+
+def test_a_rig_that_cannot_be_closed_is_not_confirmed_either(command) -> None:
+    rig = Troubled("read", key)
+    rig.close = fault  # type: ignore[method-assign]
+    answer = command(rig)
+    assert answer.code == 4
+    last = answer.err.splitlines()[-1]
+    assert last.startswith("dearig: THE RIG COULD NOT BE CLOSED")
+    assert "0 V IS NOT CONFIRMED" in last
+    assert "interrupted: the voltage was ramped down to 0 V" in last
+
+
+def test_what_the_guardian_did_is_in_the_recording(command, tmp_path: Path) -> None:
+    rig = Troubled("read", fault)
+    acted = SimpleNamespace(sentence="the guardian acted: the output was taken to 0 V")
+    rig.taken_over = acted  # type: ignore[attr-defined]
+    assert command(rig).code == 4
+    messages = [e.message for e in open_recording(tmp_path / "run.h5").events]
+    assert acted.sentence in messages
 
 
 @pytest.mark.parametrize(
