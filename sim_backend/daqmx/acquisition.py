@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dearig.sim_backend.daqmx.output import TICK_TOLERANCE, Generation, Track
+from dearig.sim_backend.daqmx.triggers import SampleTicks
 from dearig.sim_backend.signal_path import CHUNK, PathState, SignalPath
 
 __all__ = ["OwnTicks", "Run", "SharedTicks", "Ticks"]
@@ -129,7 +130,7 @@ class SharedTicks:
         return parts
 
 
-Ticks = OwnTicks | SharedTicks
+Ticks = OwnTicks | SharedTicks | SampleTicks
 
 
 class Run:

@@ -13,11 +13,13 @@ from dearig.sim_backend.daqmx.card_properties import (
     SYSTEM,
 )
 from dearig.sim_backend.daqmx.channel_properties import CHANNEL, kinds_of
+from dearig.sim_backend.daqmx.counter_properties import COUNTER_CHANNEL
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.properties import Asked, Property, name_of
 from dearig.sim_backend.daqmx.scale_properties import SAVED_SCALE, SCALE
 from dearig.sim_backend.daqmx.task_properties import BUFFER, READ, TASK, WATCHDOG, WRITE
 from dearig.sim_backend.daqmx.timing_properties import EXPORTED, TIMING, TRIGGER, WITH_DEVICE
+from dearig.sim_backend.daqmx.trigger_properties import MORE_TRIGGERS
 
 __all__ = ["SERIAL", "TABLES", "Asked", "check_device_context", "get", "reset", "set_"]
 
@@ -25,7 +27,7 @@ __all__ = ["SERIAL", "TABLES", "Asked", "check_device_context", "get", "reset", 
 TABLES: Mapping[str, Mapping[str, Property]] = {
     "Buffer": BUFFER,
     "CalInfo": CALIBRATION,
-    "Chan": CHANNEL,
+    "Chan": {**CHANNEL, **COUNTER_CHANNEL},
     "Device": DEVICE,
     "ExportedSignal": EXPORTED,
     "PersistedScale": SAVED_SCALE,
@@ -35,7 +37,7 @@ TABLES: Mapping[str, Mapping[str, Property]] = {
     "SystemInfo": SYSTEM,
     "Task": TASK,
     "Timing": TIMING,
-    "Trig": TRIGGER,
+    "Trig": {**TRIGGER, **MORE_TRIGGERS},
     "Watchdog": WATCHDOG,
     "Write": WRITE,
 }

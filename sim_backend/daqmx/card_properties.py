@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from dearig.sim_backend.daqmx.counters import Measure
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.properties import Asked, changed, given
 from dearig.sim_backend.daqmx.sensors import Usage
 from dearig.sim_backend.daqmx.setup import INPUT_RANGES, INPUTS, LINES, OUTPUTS
+from dearig.sim_backend.daqmx.tasks import TIMEBASE
+from dearig.sim_backend.daqmx.terminals import COUNTERS
 
 __all__ = ["CALIBRATION", "DEVICE", "PHYSICAL_CHANNEL", "SERIAL", "SYSTEM"]
 
@@ -28,6 +31,9 @@ _MEASURED = (
 _START, _REFERENCE, _PAUSE, _ARM_START = 1 << 2, 1 << 3, 1 << 1, 1 << 5
 _NOTE, _NOTE_CHARACTERS = "calibration note", 4
 _DC = 1 << 1  # bit of the coupling
+_LINES_RATE = 10e6  # Hz, of the sample clocks of port 0
+_COUNTER_BITS = 32
+_PULSES = [10269, 10119, 10268]  # DAQmx: kinds of a counter output: times, frequency, ticks
 _SAMPLE_CLOCK, _ON_DEMAND, _CHANGE_DETECTION = 10388, 10390, 12504
 
 
@@ -41,13 +47,6 @@ def _ranges(limits: Sequence[float]) -> list[float]:
 
 def _ports() -> list[str]:
     return sorted({line.partition("/")[0] for line in LINES})
-
-
-def _terminals(asked: Asked) -> str:
-    inside = [f"{s}/{t}" for s in ("ai", "ao") for t in ("SampleClock", "StartTrigger")]
-    inside += [f"{s}/SampleClockTimebase" for s in ("ai", "ao")]
-    names = [f"PFI{i}" for i in range(16)] + inside
-    return ", ".join(f"/{asked.device.name}/{name}" for name in names)
 
 
 SYSTEM = {
@@ -73,9 +72,9 @@ DEVICE = {
     "ACCESSORY_PRODUCT_NUMS": given(()),
     "ACCESSORY_SERIAL_NUMS": given(()),
     "NUM_DMA_CHANS": given(8),
-    "TERMINALS": given(_terminals),
+    "TERMINALS": given(lambda a: ", ".join(a.device.terminals.names())),
     "DIG_TRIG_SUPPORTED": given(True),
-    "ANLG_TRIG_SUPPORTED": given(False),
+    "ANLG_TRIG_SUPPORTED": given(True),
     "AI_PHYSICAL_CHANS": given(lambda a: _names(a, [f"ai{i}" for i in range(INPUTS)])),
     "AI_SUPPORTED_MEAS_TYPES": given(_MEASURED),
     "AI_VOLTAGE_RNGS": given(lambda _: _ranges(INPUT_RANGES)),
@@ -88,7 +87,7 @@ DEVICE = {
     "AI_SIMULTANEOUS_SAMPLING_SUPPORTED": given(False),
     "AI_NUM_SAMP_TIMING_ENGINES": given(1),
     "AI_SAMP_MODES": given([10178, 10123]),
-    "AI_TRIG_USAGE": given(_START | _REFERENCE),
+    "AI_TRIG_USAGE": given(_START | _REFERENCE | _PAUSE),
     "AO_PHYSICAL_CHANS": given(lambda a: _names(a, OUTPUTS)),
     "AO_SUPPORTED_OUTPUT_TYPES": given([_VOLTAGE]),
     "AO_VOLTAGE_RNGS": given(lambda a: _ranges([a.device.settings.card.ao_range_V])),
@@ -98,12 +97,30 @@ DEVICE = {
     "AO_MAX_RATE": given(lambda a: 1e3 * a.device.settings.card.ao_rate_max_kHz),
     "AO_MIN_RATE": given(lambda a: a.device.slowest),
     "AO_TRIG_USAGE": given(_START),
-    "DI_LINES": given(""),
-    "DI_PORTS": given(""),
+    "DI_LINES": given(lambda a: _names(a, LINES)),
+    "DI_PORTS": given(lambda a: _names(a, _ports())),
+    "DI_MAX_RATE": given(_LINES_RATE),
+    "DI_NUM_SAMP_TIMING_ENGINES": given(1),
+    "DI_TRIG_USAGE": given(_START | _PAUSE),
     "DO_LINES": given(lambda a: _names(a, LINES)),
     "DO_PORTS": given(lambda a: _names(a, _ports())),
-    "CI_PHYSICAL_CHANS": given(""),
-    "CO_PHYSICAL_CHANS": given(""),
+    "DO_MAX_RATE": given(_LINES_RATE),
+    "DO_NUM_SAMP_TIMING_ENGINES": given(1),
+    "DO_TRIG_USAGE": given(_START),
+    "CI_PHYSICAL_CHANS": given(lambda a: _names(a, COUNTERS)),
+    "CI_SUPPORTED_MEAS_TYPES": given([int(measure) for measure in Measure]),
+    "CI_SAMP_CLK_SUPPORTED": given(True),
+    "CI_SAMP_MODES": given([10178, 10123]),
+    "CI_MAX_SIZE": given(_COUNTER_BITS),
+    "CI_MAX_TIMEBASE": given(TIMEBASE),
+    "CI_TRIG_USAGE": given(_PAUSE | _ARM_START),
+    "CO_PHYSICAL_CHANS": given(lambda a: _names(a, COUNTERS)),
+    "CO_SUPPORTED_OUTPUT_TYPES": given(_PULSES),
+    "CO_SAMP_CLK_SUPPORTED": given(True),
+    "CO_SAMP_MODES": given([10178, 10123]),
+    "CO_MAX_SIZE": given(_COUNTER_BITS),
+    "CO_MAX_TIMEBASE": given(TIMEBASE),
+    "CO_TRIG_USAGE": given(_START),
 }
 
 
@@ -147,13 +164,20 @@ def _port_lines(asked: Asked) -> int:
     return len(asked.device.lines_of(asked.channel))
 
 
+def _has_sample_clock(asked: Asked) -> bool:
+    return all(line.startswith("port0") for line in asked.device.lines_of(asked.channel))
+
+
 PHYSICAL_CHANNEL = {
     "PHYSICAL_CHAN_AI_TERM_CFGS": given(_wirings),
     "PHYSICAL_CHAN_AI_SUPPORTED_MEAS_TYPES": given(lambda a: _MEASURED if _input(a) + 1 else []),
     "PHYSICAL_CHAN_AO_TERM_CFGS": given(lambda a: 0b001 if _output(a) else 0),
     "PHYSICAL_CHAN_AO_SUPPORTED_OUTPUT_TYPES": given(lambda a: [_VOLTAGE] if _output(a) else []),
+    "PHYSICAL_CHAN_DI_PORT_WIDTH": given(_port_lines),
+    "PHYSICAL_CHAN_DI_SAMP_CLK_SUPPORTED": given(_has_sample_clock),
+    "PHYSICAL_CHAN_DI_CHANGE_DETECT_SUPPORTED": given(lambda a: bool(_port_lines(a)) and False),
+    "PHYSICAL_CHAN_CI_SUPPORTED_MEAS_TYPES": given([int(measure) for measure in Measure]),
+    "PHYSICAL_CHAN_CO_SUPPORTED_OUTPUT_TYPES": given(_PULSES),
     "PHYSICAL_CHAN_DO_PORT_WIDTH": given(_port_lines),
-    "PHYSICAL_CHAN_DO_SAMP_CLK_SUPPORTED": given(
-        lambda a: all(line.startswith("port0") for line in a.device.lines_of(a.channel))
-    ),
+    "PHYSICAL_CHAN_DO_SAMP_CLK_SUPPORTED": given(_has_sample_clock),
 }

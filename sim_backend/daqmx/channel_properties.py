@@ -195,6 +195,14 @@ CHANNEL = {
     "AO_DEV_SCALING_COEFF": given(lambda a: a.device.scaling(a.own, a.output().name)),
     "AO_RESOLUTION": given(16.0),
     "AO_RESOLUTION_UNITS": fixed(_BITS),
+    # digital input
+    "DI_NUM_LINES": given(lambda a: len(a.digital().lines)),
+    "DI_INVERT_LINES": changed(lambda _: False, _invert, False),
+    # a line that a program drives is read back by an input too
+    "DI_TRISTATE": accepted(True),
+    "DI_DATA_XFER_MECH": accepted(_DMA, _DMA, _INTERRUPT, _POLLED),
+    "DI_DATA_XFER_REQ_COND": accepted(_NOT_EMPTY, _NOT_EMPTY, _HALF_FULL),
+    "DI_MEM_MAP_ENABLE": accepted(False),
     # digital output
     "DO_NUM_LINES": given(lambda a: len(a.digital().lines)),
     "DO_INVERT_LINES": changed(lambda _: False, _invert, False),

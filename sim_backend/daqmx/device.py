@@ -173,7 +173,7 @@ class Device(TimingEngine):
             for terminal in OUTPUTS:
                 self._set_output(terminal, 0, now)
             for line in LINES:
-                self._wire.set_line(line, False, now)
+                self._put_line(line, False, now)
             self._notify()
 
     def make_safe(self, client: str | None = None, why: str = "The card was made safe.") -> None:
@@ -287,15 +287,17 @@ class Device(TimingEngine):
                 return True, None
             if last:
                 raise DaqmxError(Code.NOT_DONE_IN_TIME, f"Task Name: {task.name}")
-            due = None
-            wanted = task.wanted
-            if wanted is not None and task.generation is not None:
-                due = task.generation.due(wanted)
-            elif wanted is not None and task.ticks is not None:
-                due = task.ticks.due(wanted, now)
-            return None, due
+            return None, self._ahead(task, task.wanted, now)
 
         self._wait(timeout, attempt)
+
+    def _ahead(self, task: Task, samples: int | None, now: float) -> float | None:
+        """Return when ``task`` may have ``samples``, or None where it is unknown."""
+        if samples is None:
+            return None
+        if task.generation is not None:
+            return task.generation.due(samples)
+        return None if task.ticks is None else task.ticks.due(samples, now)
 
     # events
 
@@ -402,7 +404,7 @@ class Device(TimingEngine):
                 if wanted > 1 and self.fires(FaultKind.SHORT_READ) is not None:
                     short = wanted // 2
                 return self._deliver(task, min(short, waiting), waiting >= wanted), None
-            return None, task.ticks.due(task.delivered + wanted, now)
+            return None, self._ahead(task, task.delivered + wanted, now)
 
         reading = self._wait(timeout, attempt)
         with self._lock:
@@ -461,6 +463,13 @@ class Device(TimingEngine):
                 return 0
             if task.clock is None:
                 return self._write_still(task, counts, auto_start, now)
+        return self._write_buffered(task, counts, auto_start, timeout)
+
+    def _write_buffered(
+        self, task: Task, counts: np.ndarray, auto_start: bool, timeout: float
+    ) -> int:
+        """Write ``counts`` (channels, n) to the buffer of a task with a sample clock."""
+        with self._lock:
             if not task.running:
                 self._verify(task)
                 self._reserve(task)
@@ -499,7 +508,7 @@ class Device(TimingEngine):
                 raise DaqmxError(Code.WRITE_AFTER_WATCHDOG, f"Task Name: {task.name}", written=0)
             self._check_free(task)
             for line, level in zip(task.line_names, levels, strict=True):
-                self._wire.set_line(line, bool(level), now)
+                self._put_line(line, bool(level), now)
             self._notify()
 
     # the watchdog

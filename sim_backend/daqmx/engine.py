@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -65,8 +65,9 @@ class TimingEngine(Setup):
         noise_seed: tuple[int, ...] = (0,),
         faults: FaultPlan | None = None,
         sine: bool = False,
+        signals: Mapping[str, str] | None = None,
     ) -> None:
-        super().__init__(settings)
+        super().__init__(settings, signals)
         self._clock = clock
         self._born = clock.now()
         self._born_at = time.time()  # s since 1970, for the time stamps of waveforms
@@ -93,6 +94,7 @@ class TimingEngine(Setup):
     def _settle(self) -> float:
         """Compute everything up to now; returns the present time."""
         now = self._now()
+        self._settle_before(now)
         for task in list(self._tasks.values()):
             watchdog = task.watchdog
             if watchdog is not None and watchdog.deadline is not None and now >= watchdog.deadline:
@@ -102,13 +104,24 @@ class TimingEngine(Setup):
                 for line, level in watchdog.states.items():
                     if level != NO_CHANGE:
                         # a line that nobody drives is pulled down by the card
-                        self._wire.set_line(line, level == HIGH, at)
+                        self._put_line(line, level == HIGH, at)
         for task in self._tasks.values():
             generation = task.generation
             if generation is not None and generation.settle(now) is not None:
                 task.failed = Code.OUTPUT_STARVED
         self._wire.follow(now, self._oldest)
+        self._settle_after(now)
         return now
+
+    def _settle_before(self, now: float) -> None:
+        """Do what is due in a part of the card that knows more, before the analog part."""
+
+    def _settle_after(self, now: float) -> None:
+        """Do what is due there after the analog part."""
+
+    def _put_line(self, line: str, level: bool, now: float) -> None:
+        """Set a digital line."""
+        self._wire.set_line(line, level, now)
 
     def _wait(
         self,
@@ -156,7 +169,7 @@ class TimingEngine(Setup):
                 if needed is not None:
                     oldest = min(oldest, needed)
             elif task.ticks.start is not None:
-                time = task.ticks.start + keeps / task.ticks.rate
+                time = float(task.ticks.times(keeps, keeps + 1)[0])
                 oldest = min(oldest, math.floor((time - generation.start) * generation.rate) - 1)
         return oldest
 
@@ -239,11 +252,11 @@ class TimingEngine(Setup):
             (
                 t.generation
                 for t in self._tasks.values()
-                if t.generation is not None and not t.generation.finished(now)
+                if t.kind is Kind.AO and t.generation and not t.generation.finished(now)
             ),
             None,
         )
-        if self.clock_source(task):
+        if self.clock_source(task) == "ao/sampleclock":
             task.ticks = SharedTicks()
             if generation is not None:
                 self._share(task, generation, generation.ticks(now) + 1, now)
@@ -252,6 +265,10 @@ class TimingEngine(Setup):
             task.ticks = OwnTicks(clock.rate, None if waits else now)
             if not waits:
                 self._run_start = now
+        self._start_outputs(task, now)
+
+    def _start_outputs(self, task: Task, now: float) -> None:  # noqa: ARG002
+        """Start the outputs that wait for the start of the inputs of ``task``."""
         for output in self._tasks.values():
             if (
                 output.kind is Kind.AO
@@ -267,7 +284,8 @@ class TimingEngine(Setup):
         waveform = task.waveform
         if waveform is None:
             raise DaqmxError(Code.OUTPUT_BUFFER_EMPTY, f"Task Name: {task.name}")
-        generation = Generation(waveform, clock.rate, now, task.wanted)
+        total = clock.samples if clock.finite else None
+        generation = Generation(waveform, clock.rate, now, total)
         task.generation = generation
         self._wire.begin(generation, [c.terminal for c in task.outputs], task.client)
         for reader in self._tasks.values():
@@ -416,7 +434,7 @@ class TimingEngine(Setup):
         """Write before the start, up to the room in the buffer."""
         samples = counts.shape[1]
         if task.waveform is None:
-            task.waveform = Waveform(len(task.outputs), task.regenerates)
+            task.waveform = Waveform(task.rows, task.regenerates)
             task.first_write = samples
         waveform = task.waveform
         self._within_finite(task, samples)

@@ -86,6 +86,15 @@ class Code(IntEnum):
     TABLE_TOO_SHORT = -200434
     NO_COEFFICIENTS = -200404
     NO_BUFFER_ON_DEMAND = -200217
+    NOT_MEASURED_BY_CHANNEL = -200431
+    NOT_PUT_OUT_BY_CHANNEL = -200432
+    SEVERAL_COUNTERS = -200147
+    REFERENCE_WHEN_CONTINUOUS = -200358
+    NOT_SUPPORTED_BY_DEVICE = -201380
+    TERMINAL_NOT_VALID = -200354
+    DIGITAL_LINES_MISMATCH = -200463
+    OPERATION_TIMED_OUT = -200474
+    SIGNAL_NOT_EXPORTED = -200375
 
 
 WORDS: dict[int, str] = {
@@ -191,6 +200,19 @@ WORDS: dict[int, str] = {
     Code.TABLE_SIZES_DIFFER: "Scaled and pre-scaled values of a table differ in number.",
     Code.TABLE_TOO_SHORT: "A table needs two or more values.",
     Code.NO_COEFFICIENTS: "A polynomial scale needs forward and reverse coefficients.",
+    Code.NOT_MEASURED_BY_CHANNEL: "Selected physical channel does not support the measurement type "
+    "required by the virtual channel you are creating.",
+    Code.NOT_PUT_OUT_BY_CHANNEL: "Selected physical channel does not support the output type "
+    "required by the virtual channel you are creating.",
+    Code.SEVERAL_COUNTERS: "Task contains several counter input channels; one is allowed.",
+    Code.REFERENCE_WHEN_CONTINUOUS: "Reference trigger cannot be used in a continuous acquisition.",
+    Code.NOT_SUPPORTED_BY_DEVICE: "Device does not support this operation.",
+    Code.TERMINAL_NOT_VALID: "Specified property value is not the name of a valid terminal.",
+    Code.DIGITAL_LINES_MISMATCH: "Number of lines in the data does not match the number of lines "
+    "in the channel.",
+    Code.SIGNAL_NOT_EXPORTED: "Specified signal cannot be exported by this task.",
+    Code.OPERATION_TIMED_OUT: "Specified operation did not complete, because the specified timeout "
+    "expired.",
     Code.NO_BUFFER_ON_DEMAND: "Buffered operations cannot use On Demand for the sample timing.",
 }
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from dearig.drivers.settings import RigSettings
 from dearig.model.material import Film, Load
 from dearig.sim_backend.clock import Clock, ManualClock, PacedClock
-from dearig.sim_backend.daqmx.device import Device
+from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 from dearig.sim_backend.factory import plant_of
 from dearig.sim_backend.faults import FaultPlan
 
@@ -23,17 +25,20 @@ def open_device(
     clock: Clock | None = None,
     faults: FaultPlan | None = None,
     sine: bool = False,
-) -> Device:
+    signals: Mapping[str, str] | None = None,
+) -> SimulatedCard:
     """Return the card of the rig at ``address``; see ``factory.open_simulated_rig``.
 
-    With ``sine`` the inputs read a sine instead of the rig, see ``TimingEngine``.
+    With ``sine`` the inputs read a sine instead of the rig, see ``TimingEngine``. ``signals`` are
+    at the card's digital terminals, see ``terminals``.
     """
     plant, hidden = plant_of(address, film, load)
-    return Device(
+    return SimulatedCard(
         settings,
         plant,
         clock or (PacedClock() if paced else ManualClock()),
         noise_seed=(seed,) if hidden is None else (seed, hidden),
         faults=faults,
         sine=sine,
+        signals=signals,
     )

@@ -13,8 +13,8 @@ from typing import Any
 
 from nidaqmx._stubs import nidaqmx_pb2 as pb
 
-from dearig.sim_backend.daqmx.device import Device
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 from dearig.sim_backend.daqmx.tasks import (
     AnalogInput,
     AnalogOutput,
@@ -25,7 +25,7 @@ from dearig.sim_backend.daqmx.tasks import (
     expanded,
 )
 
-__all__ = ["Asked", "Property", "accepted", "changed", "fixed", "given", "name_of"]
+__all__ = ["Asked", "Getter", "Property", "accepted", "changed", "fixed", "given", "name_of"]
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Asked:
     ``channel`` names channels in the task, channels of the device, lines, or a scale, by the group.
     """
 
-    device: Device
+    device: SimulatedCard
     task: Task | None = None
     channel: str = ""
 

@@ -13,7 +13,6 @@ from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.sensors import CUSTOM_RTD, RTD_COEFFICIENTS, Sensor, Usage
 
 if TYPE_CHECKING:
-    from dearig.sim_backend.daqmx.device import Device
     from dearig.sim_backend.daqmx.tasks import Task
 
 __all__ = ["SensorCalls"]

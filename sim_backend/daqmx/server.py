@@ -12,9 +12,9 @@ from nidaqmx._stubs import nidaqmx_pb2_grpc as pb_grpc
 from dearig.drivers.daqmx.certificates import Certificates
 from dearig.sim_backend.clock import Clock, PacedClock
 from dearig.sim_backend.daqmx.clients import Clients
-from dearig.sim_backend.daqmx.device import Device
 from dearig.sim_backend.daqmx.interceptor import THREADS, Interceptor
 from dearig.sim_backend.daqmx.servicer import Servicer
+from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 from dearig.sim_backend.faults import FaultKind
 
 __all__ = ["DaqmxServer"]
@@ -52,7 +52,7 @@ class DaqmxServer:
 
     def __init__(
         self,
-        device: Device,
+        device: SimulatedCard,
         *,
         host: str = "127.0.0.1",
         port: int = 0,

@@ -20,8 +20,11 @@ from session_pb2 import Session
 from dearig.drivers.channels import COUNT_MAX, COUNT_MIN
 from dearig.sim_backend.daqmx import attributes
 from dearig.sim_backend.daqmx.attributes import Asked
+from dearig.sim_backend.daqmx.calls import BY_CHANNEL, is_finite, laid_out, number, status
 from dearig.sim_backend.daqmx.channel_properties import FROM_CUSTOM_SCALE, VOLTS
-from dearig.sim_backend.daqmx.device import Device, Reading
+from dearig.sim_backend.daqmx.counter_calls import CounterCalls
+from dearig.sim_backend.daqmx.device import Reading
+from dearig.sim_backend.daqmx.digital_calls import DigitalCalls
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.properties import name_of
 from dearig.sim_backend.daqmx.scales import (
@@ -33,8 +36,10 @@ from dearig.sim_backend.daqmx.scales import (
     reverse_coefficients,
 )
 from dearig.sim_backend.daqmx.sensor_calls import SensorCalls
+from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 from dearig.sim_backend.daqmx.system_calls import SystemCalls
 from dearig.sim_backend.daqmx.tasks import Kind, Listener, Task
+from dearig.sim_backend.daqmx.trigger_calls import TriggerCalls
 from dearig.sim_backend.daqmx.waveform_calls import WaveformCalls
 
 __all__ = ["Servicer", "refuse"]
@@ -43,8 +48,6 @@ log = logging.getLogger(__name__)
 
 _ACTIVE_EDGE = 0x1301  # SAMP_CLK_ACTIVE_EDGE
 _ERROR_TEXT = 1000  # characters
-_BY_CHANNEL = 0  # DAQmx: group by channel
-_FINITE, _CONTINUOUS = 10178, 10123
 _POLL_S = 0.02  # period at which an event's stream checks whether it is due
 
 
@@ -61,15 +64,14 @@ def refuse(context: grpc.ServicerContext, error: DaqmxError) -> NoReturn:
     raise error  # not reached: abort raises
 
 
-class Servicer(SensorCalls, SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer):
+class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCalls, TriggerCalls):
     """Service of the calls; the caller handles ``DaqmxError`` with ``refuse``.
 
     All other calls are answered with UNIMPLEMENTED, and one line in the log.
     """
 
-    def __init__(self, device: Device, closing: threading.Event) -> None:
-        self._device = device
-        self._closing = closing
+    def __init__(self, device: SimulatedCard, closing: threading.Event) -> None:
+        super().__init__(device, closing)
         self._streams: dict[str, Listener] = {}
 
     # tasks
@@ -133,26 +135,12 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer)
         )
         return pb.CreateAOVoltageChanResponse()
 
-    def CreateDOChan(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._device.add_lines(
-            self._task(request),
-            request.lines,
-            request.name_to_assign_to_lines,
-            together=(request.line_grouping_raw or request.line_grouping) == 1,
-        )
-        return pb.CreateDOChanResponse()
-
     def CfgSampClkTiming(self, request: Any, context: grpc.ServicerContext) -> Any:
-        mode = request.sample_mode_raw or request.sample_mode
-        edge = request.active_edge_raw or request.active_edge
-        if mode not in (_FINITE, _CONTINUOUS):
-            raise DaqmxError(
-                Code.INVALID_VALUE, f"Property: SAMP_QUANT_SAMP_MODE; Requested Value: {mode}"
-            )
         task = self._task(request)
         self._device.set_clock(
-            task, request.rate, request.source, mode == _FINITE, request.samps_per_chan
+            task, request.rate, request.source, is_finite(request), request.samps_per_chan
         )
+        edge = number(request, "active_edge")
         attributes.set_("Timing", _ACTIVE_EDGE, Asked(self._device, task), edge)
         return pb.CfgSampClkTimingResponse()
 
@@ -240,8 +228,8 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer)
         reading = self._read(task, request, request.array_size_in_samps)
         values = self._device.scaled(task, reading.counts)
         return pb.ReadAnalogF64Response(
-            status=_status(reading),
-            read_array=_laid_out(values, request),
+            status=status(reading.complete),
+            read_array=laid_out(values, request),
             samps_per_chan_read=values.shape[1],
         )
 
@@ -257,8 +245,8 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer)
     def ReadBinaryI16(self, request: Any, context: grpc.ServicerContext) -> Any:
         reading = self._read(self._task(request), request, request.array_size_in_samps)
         return pb.ReadBinaryI16Response(
-            status=_status(reading),
-            read_array=_laid_out(reading.counts, request),
+            status=status(reading.complete),
+            read_array=laid_out(reading.counts, request),
             samps_per_chan_read=reading.counts.shape[1],
         )
 
@@ -268,7 +256,7 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer)
         # the card delivers scan after scan
         scans = np.ascontiguousarray(reading.counts.T).tobytes()
         return pb.ReadRawResponse(
-            status=_status(reading),
+            status=status(reading.complete),
             read_array=scans.ljust(request.array_size_in_bytes, b"\0"),
             samps_read=reading.counts.shape[1],
             num_bytes_per_samp=2,
@@ -311,23 +299,6 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer)
         counts = scans[: request.num_samps * rows].reshape(-1, rows).T
         return pb.WriteRawResponse(samps_per_chan_written=self._write(task, counts, request))
 
-    def WriteDigitalLines(self, request: Any, context: grpc.ServicerContext) -> Any:
-        task = self._task(request)
-        values = np.frombuffer(request.write_array, dtype=np.uint8)
-        return pb.WriteDigitalLinesResponse(
-            samps_per_chan_written=self._write_lines(task, values, request)
-        )
-
-    def WriteDigitalU32(self, request: Any, context: grpc.ServicerContext) -> Any:
-        task = self._task(request)
-        return pb.WriteDigitalU32Response(
-            samps_per_chan_written=self._write_words(task, request.write_array, request)
-        )
-
-    def WriteDigitalScalarU32(self, request: Any, context: grpc.ServicerContext) -> Any:
-        self._write_words(self._task(request), [request.value], request)
-        return pb.WriteDigitalScalarU32Response()
-
     # the watchdog
 
     def CreateWatchdogTimerTaskEx(self, request: Any, context: grpc.ServicerContext) -> Any:
@@ -353,8 +324,8 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer)
     # events: each occupies a thread while a client listens
 
     def RegisterDoneEvent(self, request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
-        for status in self._events("done", request, context, None):
-            yield pb.RegisterDoneEventResponse(status=status)
+        for outcome in self._events("done", request, context, None):
+            yield pb.RegisterDoneEventResponse(status=outcome)
 
     def UnregisterDoneEvent(self, request: Any, context: grpc.ServicerContext) -> Any:
         self._close_stream("done", self._task(request))
@@ -418,9 +389,6 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer)
 
     # shared by the calls
 
-    def _task(self, request: Any) -> Task:
-        return self._device.task(request.task.name)
-
     def _asked(self, request: Any) -> Asked:
         """Return the target of a property's request."""
         fields = request.DESCRIPTOR.fields_by_name
@@ -463,56 +431,10 @@ class Servicer(SensorCalls, SystemCalls, WaveformCalls, pb_grpc.NiDAQmxServicer)
             raise DaqmxError(Code.WRITE_BUFFER_TOO_SMALL, f"Task Name: {task.name}", written=0)
         values = values[: rows * samples]
         layout = request.data_layout_raw or request.data_layout
-        return values.reshape(rows, -1) if layout == _BY_CHANNEL else values.reshape(-1, rows).T
+        return values.reshape(rows, -1) if layout == BY_CHANNEL else values.reshape(-1, rows).T
 
     def _write(self, task: Task, counts: np.ndarray, request: Any) -> int:
         return self._device.write(task, counts, request.auto_start, request.timeout)
-
-    def _write_lines(self, task: Task, values: np.ndarray, request: Any) -> int:
-        lines = len(task.line_names)
-        if task.kind is not Kind.DO:
-            raise DaqmxError(Code.NOT_AN_OUTPUT, f"Task Name: {task.name}", written=0)
-        if values.size < lines * request.num_samps_per_chan or not lines:
-            raise DaqmxError(Code.WRITE_BUFFER_TOO_SMALL, f"Task Name: {task.name}", written=0)
-        layout = request.data_layout_raw or request.data_layout
-        samples = request.num_samps_per_chan
-        values = values[: lines * samples]
-        rows = (
-            values.reshape(lines, samples)
-            if layout == _BY_CHANNEL
-            else (values.reshape(samples, lines).T)
-        )
-        self._device.write_lines(task, [bool(v) for v in rows[:, -1]], request.auto_start)
-        return int(samples)
-
-    def _write_words(self, task: Task, words: Any, request: Any) -> int:
-        if task.kind is not Kind.DO:
-            raise DaqmxError(Code.NOT_AN_OUTPUT, f"Task Name: {task.name}", written=0)
-        if len(words) < len(task.lines):
-            raise DaqmxError(Code.WRITE_BUFFER_TOO_SMALL, f"Task Name: {task.name}", written=0)
-        samples = len(words) // len(task.lines)
-        layout = getattr(request, "data_layout_raw", 0) or getattr(request, "data_layout", 0)
-        levels = []
-        for place, channel in enumerate(task.lines):
-            at = (place + 1) * samples - 1 if layout == _BY_CHANNEL else place - len(task.lines)
-            word = int(words[at])
-            levels += [bool(word >> int(line.rpartition("line")[2]) & 1) for line in channel.lines]
-        self._device.write_lines(task, levels, request.auto_start)
-        return samples
-
-
-def _status(reading: Reading) -> int:
-    """Return the status of a read; one that timed out is a reply with the samples so far."""
-    return 0 if reading.complete else int(Code.SAMPLES_NOT_YET_AVAILABLE)
-
-
-def _laid_out(values: np.ndarray, request: Any) -> np.ndarray:
-    """Return ``values`` (channels, n) as (channels * n,), by channel or by scan.
-
-    The client's array is as large as it asked for; only what was read is sent.
-    """
-    by_channel = (request.fill_mode_raw or request.fill_mode) == _BY_CHANNEL
-    return values.ravel() if by_channel else values.T.ravel()
 
 
 def _attribute_call(name: str, response: Any) -> Callable[[Servicer, Any, Any], Any] | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,40 +27,44 @@ from dearig.sim_backend.daqmx.tasks import (
     expanded,
     physical_names,
 )
+from dearig.sim_backend.daqmx.terminals import LINES, Terminals
 from dearig.sim_backend.daqmx.wiring import OUTPUT_MONITOR
 
 __all__ = [
     "CLOCKED_KINDS",
+    "CLOCK_OF",
     "INPUTS",
     "INPUT_RANGES",
     "LINES",
     "OUTPUTS",
     "PINS",
-    "SOURCES",
     "Setup",
 ]
 
 INPUT_RANGES = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1)  #: V, plus and minus, as the PCIe-6361 has them
 INPUTS = 16
 OUTPUTS = ("ao0", "ao1")
-LINES = tuple(f"port{port}/line{line}" for port in range(3) for line in range(8))
 #: Terminals on the connector and the bus, in lower case.
 PINS = {f"pfi{i}": f"PFI{i}" for i in range(16)} | {f"rtsi{i}": f"RTSI{i}" for i in range(8)}
-#: Sources of clocks and triggers, by their names in lower case.
-SOURCES = PINS | {
-    name.lower(): name
-    for name in (
-        "ai/SampleClock",
-        "ai/StartTrigger",
-        "ao/SampleClock",
-        "ao/StartTrigger",
-        "OnboardClock",
-    )
+#: Terminal of the sample clock of each kind of task.
+CLOCK_OF = {
+    Kind.AI: "ai/sampleclock",
+    Kind.AO: "ao/sampleclock",
+    Kind.DI: "di/sampleclock",
+    Kind.DO: "do/sampleclock",
 }
-CLOCKED_KINDS = (Kind.AI, Kind.AO)  #: kinds of tasks with a sample clock
+CLOCKED_KINDS = (
+    Kind.AI,
+    Kind.AO,
+    Kind.DI,
+    Kind.DO,
+    Kind.CI,
+    Kind.CO,
+)  #: kinds of tasks with a sample clock
 DIFFERENTIAL, SINGLE, SINGLE_OWN_SENSE = 10106, 10083, 10078  #: DAQmx: DIFF, RSE, NRSE
 SECONDS, TICKS, PERIODS = 10364, 10304, 10286  #: DAQmx: units of the delay
 
+_ON_BOARD = "onboardclock"
 _MOST_SAMPLES = 2**32 - 1  # per channel, in a buffer
 _SLOWEST = 2**32  # ticks of the timebase between two samples
 _SETTLE_US = 10.0  # extra settling time that the driver gives an input where there is time
@@ -75,9 +79,10 @@ class Setup:
     All methods are thread-safe, and all may raise ``DaqmxError``.
     """
 
-    def __init__(self, settings: RigSettings) -> None:
+    def __init__(self, settings: RigSettings, signals: Mapping[str, str] | None = None) -> None:
         self.settings = settings
         self.name = settings.card.device
+        self.terminals = Terminals(self.name, signals)
         self._card = settings.card
         self._lock = threading.RLock()
         self.scales: dict[str, Scale] = {}  # by name in lower case
@@ -219,23 +224,36 @@ class Setup:
             task.kind = Kind.AO
             task.outputs += made
 
-    def add_lines(self, task: Task, physical: str, name: str, *, together: bool) -> None:
-        """Add digital output lines, a channel each or all ``together`` in one."""
+    def add_lines(
+        self, task: Task, physical: str, name: str, *, together: bool, kind: Kind = Kind.DO
+    ) -> None:
+        """Add digital lines, a channel each or all ``together`` in one; ``kind`` is DI or DO."""
         with self._lock:
-            self._may_add(task, Kind.DO)
+            self._may_add(task, kind)
             lines = self.lines_of(physical)
             if together:
                 # the driver's name for several lines is that of the first one and three dots
                 whole = [p for p in physical_names(physical, self.name) if "/" not in p]
                 more = "..." if len(lines) > 1 else ""
                 given = name or f"{self.name}/{whole[0] if whole else lines[0] + more}"
-                groups = [(given, tuple(lines))]
+                groups = [Lines(given, tuple(lines), tuple(self._columns(physical)))]
             else:
-                groups = [(called, (line,)) for line, called in self._named(task, lines, name)]
-            if {called for called, _ in groups} & set(task.channel_names):
-                raise DaqmxError(Code.CHANNEL_ALREADY_IN_TASK, f"Channel Name: {groups[0][0]}")
-            task.kind = Kind.DO
-            task.lines += [Lines(called, group) for called, group in groups]
+                groups = [
+                    Lines(called, (line,), (line,))
+                    for line, called in self._named(task, lines, name)
+                ]
+            if {group.name for group in groups} & set(task.channel_names):
+                raise DaqmxError(Code.CHANNEL_ALREADY_IN_TASK, f"Channel Name: {groups[0].name}")
+            task.kind = kind
+            task.lines += groups
+
+    def _columns(self, physical: str) -> list[str]:
+        """Return the lines in ``physical``, those of a whole port from the highest down."""
+        columns = []
+        for name in physical_names(physical, self.name):
+            lines = self.lines_of(f"{self.name}/{name}")
+            columns += lines if "/" in name else lines[::-1]
+        return columns
 
     def lines_of(self, physical: str) -> list[str]:
         """Return the digital lines in ``physical``: ``Dev1/port0/line0:3``, or a whole port."""
@@ -270,7 +288,9 @@ class Setup:
             clocked = task.clocked
             fields = ("rate", "source", "finite", "samples")
             wanted = {name: getattr(task.timing, name) for name in fields} | changes
+            edge, implicit = task.timing.edge, task.timing.implicit
             self.set_clock(task, **wanted)
+            task.timing.edge, task.timing.implicit = edge, implicit
             task.clocked = clocked
 
     def set_clocked(self, task: Task, clocked: bool) -> None:
@@ -445,10 +465,11 @@ class Setup:
                     f"Name: {channel.name}; Task Name: {task.name}",
                 )
         if task.clock is None:
-            if task.trigger_type != NO_TRIGGER:
+            if task.trigger_type != NO_TRIGGER and task.kind is not Kind.CO:
                 raise DaqmxError(Code.TRIGGER_ON_DEMAND, f"Task Name: {task.name}")
             return
-        if task.trigger_type not in (NO_TRIGGER, DIGITAL_EDGE):
+        analog_start = task.reference is not None and task.reference.starts
+        if task.trigger_type not in (NO_TRIGGER, DIGITAL_EDGE) and not analog_start:
             raise DaqmxError(
                 Code.INVALID_VALUE,
                 f"Property: START_TRIG_TYPE; Requested Value: {task.trigger_type}; You Can Select: "
@@ -513,30 +534,31 @@ class Setup:
         return text
 
     def _terminal(self, source: str) -> str:
-        """Return the source ``/Dev1/ao/SampleClock`` without its device, in lower case."""
-        text = self._pin(source)
-        if text not in SOURCES:
-            raise DaqmxError(Code.INVALID_ROUTE_SOURCE, f"Source Terminal: {source}")
-        return text
+        """Return a terminal such as ``/Dev1/ao/SampleClock`` without its device, in lower case."""
+        if self._pin(source) == _ON_BOARD:
+            return _ON_BOARD
+        return self.terminals.name(source)
 
     def full_terminal(self, source: str) -> str:
         """Return the full name of a source, such as ``/Dev1/PFI0`` for ``pfi0``."""
-        return f"/{self.name}/{SOURCES[self._terminal(source)]}"
+        short = self._terminal(source)
+        return f"/{self.name}/OnboardClock" if short == _ON_BOARD else self.terminals.full(short)
 
     def clock_source(self, task: Task) -> str:
         """Return the terminal that clocks ``task``; empty for its own clock."""
         source = task.timing.source
-        if not source or self._terminal(source) == "onboardclock":
+        if not source or self._terminal(source) == _ON_BOARD:
             return ""
         terminal = self._terminal(source)
-        own = "ai/sampleclock" if task.kind is Kind.AI else "ao/sampleclock"
-        if terminal == own:
+        if terminal == CLOCK_OF.get(task.kind):
             return ""
-        if task.kind is Kind.AI and terminal == "ao/sampleclock":
-            return terminal
-        raise DaqmxError(
-            Code.ROUTE_NOT_SUPPORTED, f"Source Terminal: {source}; Task Name: {task.name}"
-        )
+        if task.kind in (Kind.AO, Kind.DO):
+            raise DaqmxError(
+                Code.ROUTE_NOT_SUPPORTED,
+                f"Source Terminal: {source}; outputs on a clock from elsewhere are not simulated. "
+                f"Task Name: {task.name}",
+            )
+        return terminal
 
     def _may_add(self, task: Task, kind: Kind) -> None:
         self._not_running(task)

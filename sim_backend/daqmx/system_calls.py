@@ -14,7 +14,7 @@ from dearig.sim_backend.daqmx.setup import LINES
 from dearig.sim_backend.daqmx.tasks import HIGH, LOW, TRISTATE
 
 if TYPE_CHECKING:
-    from dearig.sim_backend.daqmx.device import Device
+    pass
 
 __all__ = ["SystemCalls"]
 

@@ -82,6 +82,9 @@ def _set_read_available(asked: Asked, value: bool) -> None:
 READ: dict[str, Property] = {
     "CHANNELS_TO_READ": fixed(lambda a: ", ".join(a.own.channel_names), ""),
     "NUM_CHANS": given(lambda a: len(a.own.channel_names)),
+    "DIGITAL_LINES_BYTES_PER_CHAN": given(
+        lambda a: max((len(channel.lines) for channel in a.own.lines), default=0)
+    ),
     "RAW_DATA_WIDTH": given(lambda a: 2 * len(a.own.inputs)),
     "AVAIL_SAMP_PER_CHAN": given(lambda a: a.device.available(a.own)),
     "CURR_READ_POS": given(lambda a: a.own.delivered),

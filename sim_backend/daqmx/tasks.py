@@ -12,8 +12,11 @@ from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.output import Generation, Waveform
 from dearig.sim_backend.daqmx.scales import Scale
 from dearig.sim_backend.daqmx.sensors import Sensor
+from dearig.sim_backend.daqmx.triggers import Reference
+from dearig.sim_backend.daqmx.work import Work
 
 __all__ = [
+    "ANALOG_EDGE",
     "CURRENT_READ",
     "CURRENT_WRITE",
     "DIGITAL_EDGE",
@@ -25,15 +28,19 @@ __all__ = [
     "READ_OFFSET",
     "READ_RELATIVE_TO",
     "RISING",
+    "TIMEBASE",
     "TRISTATE",
     "WRITE_OFFSET",
     "WRITE_RELATIVE_TO",
     "AnalogInput",
     "AnalogOutput",
     "Channel",
+    "CounterChannel",
     "Kind",
     "Lines",
     "Listener",
+    "Pulse",
+    "PulseChannel",
     "SampleClock",
     "State",
     "Task",
@@ -45,11 +52,12 @@ __all__ = [
 
 RISING, FALLING = 10280, 10171  #: DAQmx: edges
 HIGH, LOW, TRISTATE, NO_CHANGE = 10192, 10214, 10310, 10160  #: DAQmx: levels of a line
-NO_TRIGGER, DIGITAL_EDGE = 10230, 10150  #: DAQmx: types of a trigger
+NO_TRIGGER, DIGITAL_EDGE, ANALOG_EDGE = 10230, 10150, 10099  #: DAQmx: types of a trigger
 CURRENT_READ, CURRENT_WRITE = 10425, 10430  #: DAQmx: reads and writes go on where they were
 #: Keys of properties that are kept, and refused when they would take effect.
 READ_RELATIVE_TO, READ_OFFSET = "read relative to", "read offset"
 WRITE_RELATIVE_TO, WRITE_OFFSET = "write relative to", "write offset"
+TIMEBASE = 1e8  #: Hz; the counters' timebase of 100 MHz
 
 
 class Kind(Enum):
@@ -58,13 +66,16 @@ class Kind(Enum):
     EMPTY = 0
     AI = 10100
     AO = 10102
+    DI = 10151
     DO = 10153
+    CI = 10131
+    CO = 10132
     WATCHDOG = -1
 
     @property
     def is_input(self) -> bool:
         """Return True if tasks of this kind are read."""
-        return self is Kind.AI
+        return self in (Kind.AI, Kind.DI, Kind.CI)
 
 
 class State(Enum):
@@ -117,14 +128,97 @@ class AnalogOutput:
 
 @dataclass
 class Lines:
-    """Channel of digital lines, such as ``port0/line0``."""
+    """Channel of digital lines, such as ``port0/line0``.
+
+    ``columns`` are the same in the order of a waveform's data, which has the highest line of a
+    whole port first.
+    """
 
     name: str
     lines: tuple[str, ...]
+    columns: tuple[str, ...] = ()
     kept: dict[object, Any] = field(default_factory=dict)
 
 
-Channel = AnalogInput | AnalogOutput | Lines
+@dataclass
+class CounterChannel:
+    """Channel of a counter input with its settings; those that it does not use are ignored.
+
+    ``terminals`` are by role: ``input`` and for some ``second``, ``direction``, ``a``, ``b``,
+    ``z``. ``limits`` are in ``units``, in which the values are too. ``measure`` and the other
+    numbers are DAQmx's.
+    """
+
+    name: str
+    terminal: str
+    measure: int
+    limits: tuple[float, float] = (0.0, 0.0)
+    units: int = 10364
+    edge: int = RISING
+    second_edge: int = RISING
+    initial: float = 0.0
+    direction: int = 10128
+    method: int = 10105
+    decoding: int = 10092
+    index: bool = False
+    index_value: float = 0.0
+    index_phase: int = 10040
+    distance: float = 1.0  # units of position for each period of the encoder
+    pulses: int = 24
+    terminals: dict[str, str] = field(default_factory=dict)
+    kept: dict[object, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """Pulse of ``high`` and ``low`` s."""
+
+    high: float
+    low: float
+
+    @classmethod
+    def of_frequency(cls, frequency: float, duty: float) -> Pulse:
+        """Return the pulse of a train of ``frequency`` Hz."""
+        if not (frequency > 0.0 and 0.0 < duty < 1.0):
+            raise DaqmxError(
+                Code.INVALID_VALUE,
+                f"Property: CO.Pulse.Freq or CO.Pulse.DutyCyc; Requested Values: {frequency:g}, "
+                f"{duty:g}",
+            )
+        return cls(duty / frequency, (1.0 - duty) / frequency)
+
+    @classmethod
+    def of_times(cls, high: float, low: float) -> Pulse:
+        """Return the pulse of ``high`` and ``low`` s; both are at least two ticks long."""
+        if not min(high, low) * TIMEBASE >= 2.0 - 1e-6:
+            raise DaqmxError(
+                Code.INVALID_VALUE,
+                f"Property: CO.Pulse.HighTime or CO.Pulse.LowTime; Requested Values: {high:g}, "
+                f"{low:g}; Minimum Value: {2.0 / TIMEBASE:g}",
+            )
+        return cls(high, low)
+
+    @classmethod
+    def of_ticks(cls, high: int, low: int) -> Pulse:
+        """Return the pulse of ``high`` and ``low`` ticks of the counters' timebase."""
+        return cls.of_times(high / TIMEBASE, low / TIMEBASE)
+
+
+@dataclass
+class PulseChannel:
+    """Channel of a counter output; ``delay`` s before the first pulse, in the idle state.
+
+    ``kind`` is DAQmx's number of how its pulses are given.
+    """
+
+    name: str
+    terminal: str
+    kind: int
+    pulse: Pulse
+    delay: float
+    idle_high: bool
+    output: str
+    kept: dict[object, Any] = field(default_factory=dict)
 
 
 @dataclass
@@ -140,6 +234,8 @@ class SampleClock:
     source: str
     finite: bool
     samples: int
+    edge: int = RISING
+    implicit: bool = False  # True where each edge of the measured or made signal is a sample
 
 
 @dataclass
@@ -169,6 +265,9 @@ class Listener:
     due: list[int] = field(default_factory=list)
 
 
+Channel = AnalogInput | AnalogOutput | Lines | CounterChannel | PulseChannel
+
+
 @dataclass(eq=False)
 class Task:
     """Task with its settings and its present state."""
@@ -179,6 +278,8 @@ class Task:
     inputs: list[AnalogInput] = field(default_factory=list)
     outputs: list[AnalogOutput] = field(default_factory=list)
     lines: list[Lines] = field(default_factory=list)
+    counters: list[CounterChannel | PulseChannel] = field(default_factory=list)
+    work: Work | None = None  # what it does, unless it is analog
     watchdog: Watchdog | None = None
     timing: SampleClock = field(default_factory=lambda: SampleClock(1000.0, "", False, 1000))
     clocked: bool = False  # False: samples on demand
@@ -186,6 +287,11 @@ class Task:
     trigger_edge: int = RISING
     trigger_type: int = NO_TRIGGER
     exports: dict[str, str] = field(default_factory=dict)  # terminals by signal
+    retriggers: bool = False  # True if each further edge starts it again
+    armed: float = 0.0  # s; edges after this may start it
+    reference: Reference | None = None
+    pause: tuple[str, bool] | None = None  # terminal, and True if it pauses while that is high
+    arm: tuple[str, bool] | None = None  # terminal that arms a counter, and True if by rising
     convert_ticks: int | None = None  # of the timebase, between two conversions
     delay_ticks: int | None = None  # from the sample clock to the first conversion
     delay_units: int = 10304
@@ -221,7 +327,12 @@ class Task:
     @property
     def channels(self) -> list[Channel]:
         """Return the task's channels, which are of one kind."""
-        return [*self.inputs, *self.outputs, *self.lines]
+        return [*self.inputs, *self.outputs, *self.lines, *self.counters]
+
+    @property
+    def rows(self) -> int:
+        """Return the rows of a written sample: outputs, or digital lines."""
+        return len(self.outputs) or len(self.line_names)
 
     @property
     def channel_names(self) -> list[str]:
@@ -241,6 +352,8 @@ class Task:
     @property
     def wanted(self) -> int | None:
         """Return the samples after which a finite task is done; None for a continuous one."""
+        if self.retriggers:
+            return None
         return self.clock.samples if self.clock and self.clock.finite else None
 
 

@@ -9,7 +9,7 @@ from dearig.sim_backend.daqmx.tasks import FALLING, RISING, Kind
 __all__ = ["EXPORTED", "TIMING", "TRIGGER", "WITH_DEVICE"]
 
 _FINITE, _CONTINUOUS = 10178, 10123
-_SAMPLE_CLOCK, _ON_DEMAND = 10388, 10390
+_SAMPLE_CLOCK, _ON_DEMAND, _IMPLICIT = 10388, 10390, 10451
 _DIGITAL_EDGE, _NO_TRIGGER = 10150, 10230
 _TICKS = 10304
 _PULSE, _TOGGLE, _LEVEL, _INTERLOCKED = 10265, 10307, 10210, 12549
@@ -18,7 +18,8 @@ _RATE, _SAMPLES = 1000.0, 1000  # defaults of a sample clock
 
 
 def _side(asked: Asked) -> str:
-    return "ai" if asked.own.kind is Kind.AI else "ao"
+    task = asked.own
+    return f"Ctr{task.counters[0].terminal[3:]}" if task.counters else task.kind.name.lower()
 
 
 def _clock_source(asked: Asked) -> str:
@@ -34,16 +35,24 @@ def _clock_terminal(asked: Asked) -> str:
 
 
 def _type(asked: Asked) -> int:
-    return _SAMPLE_CLOCK if asked.own.clocked else _ON_DEMAND
+    clock = asked.own.clock
+    if clock is None:
+        return _ON_DEMAND
+    return _IMPLICIT if clock.implicit else _SAMPLE_CLOCK
 
 
 def _set_type(asked: Asked, value: int) -> None:
+    if value == _IMPLICIT:
+        timing = asked.own.timing
+        asked.device.set_implicit(asked.own, timing.finite, timing.samples)
+        return
     if value not in (_SAMPLE_CLOCK, _ON_DEMAND):
         raise DaqmxError(
             Code.INVALID_VALUE,
             f"Requested Value: {value}; You Can Select: {_SAMPLE_CLOCK}, {_ON_DEMAND}; "
             f"{asked.where}",
         )
+    asked.own.timing.implicit = False
     asked.device.set_clocked(asked.own, value == _SAMPLE_CLOCK)
 
 
@@ -54,6 +63,15 @@ def _set_mode(asked: Asked, value: int) -> None:
             f"Requested Value: {value}; You Can Select: {_FINITE}, {_CONTINUOUS}; {asked.where}",
         )
     asked.device.change_clock(asked.own, finite=value == _FINITE)
+
+
+def _set_clock_edge(asked: Asked, value: int) -> None:
+    if value not in (RISING, FALLING):
+        raise DaqmxError(
+            Code.INVALID_VALUE,
+            f"Requested Value: {value}; You Can Select: {RISING}, {FALLING}; {asked.where}",
+        )
+    asked.device.timing_of(asked.own).edge = value
 
 
 def _timebase(asked: Asked) -> float:
@@ -93,7 +111,9 @@ TIMING: dict[str, Property] = {
     "SAMP_CLK_MAX_RATE": given(lambda a: a.device.fastest(a.own)),
     "SAMP_CLK_SRC": changed(_clock_source, lambda a, v: a.device.change_clock(a.own, source=v), ""),
     "SAMP_CLK_TERM": given(_clock_terminal),
-    "SAMP_CLK_ACTIVE_EDGE": accepted(RISING, RISING, FALLING),
+    "SAMP_CLK_ACTIVE_EDGE": changed(
+        lambda a: a.device.timing_of(a.own).edge, _set_clock_edge, RISING
+    ),
     "SAMP_CLK_TIMEBASE_RATE": fixed(_timebase),
     "SAMP_CLK_TIMEBASE_DIV": changed(_divisor, _set_divisor, lambda a: round(_timebase(a) / _RATE)),
     "SAMP_CLK_TIMEBASE_SRC": fixed(lambda a: f"/{a.device.name}/100MHzTimebase"),
@@ -137,17 +157,12 @@ def _trigger_source(asked: Asked) -> str:
     return asked.device.full_terminal(asked.own.trigger) if asked.own.trigger else ""
 
 
-def _trigger_terminal(asked: Asked) -> str:
-    return f"/{asked.device.name}/{_side(asked)}/StartTrigger"
-
-
 TRIGGER: dict[str, Property] = {
     "START_TRIG_TYPE": changed(
         lambda a: a.own.trigger_type,
         lambda a, v: a.device.set_trigger_type(a.own, v),
         _NO_TRIGGER,
     ),
-    "START_TRIG_TERM": given(_trigger_terminal),
     "DIG_EDGE_START_TRIG_SRC": changed(
         _trigger_source,
         lambda a, v: a.device.set_trigger(a.own, v, a.own.trigger_edge),
@@ -164,10 +179,6 @@ TRIGGER: dict[str, Property] = {
     "DIG_EDGE_START_TRIG_DIG_FLTR_TIMEBASE_RATE": accepted(0.0),
     "DIG_EDGE_START_TRIG_DIG_FLTR_TIMEBASE_SRC": accepted(""),
     "DIG_EDGE_START_TRIG_DIG_SYNC_ENABLE": accepted(False),
-    "REF_TRIG_TYPE": fixed(_NO_TRIGGER),
-    "PAUSE_TRIG_TYPE": fixed(_NO_TRIGGER),
-    "ARM_START_TRIG_TYPE": fixed(_NO_TRIGGER),
-    "START_TRIG_RETRIGGERABLE": fixed(False),
 }
 
 
@@ -180,7 +191,7 @@ def _exported(name: str) -> Property:
     return changed(lambda a: a.own.exports.get(name, ""), set_, "")
 
 
-#: Exported signals: the terminals have nothing attached, so that only their names are checked.
+#: Exported signals: those that the simulation has are put out at the start of the task.
 EXPORTED: dict[str, Property] = {
     "SAMP_CLK_OUTPUT_TERM": _exported("SAMP_CLK"),
     "SAMP_CLK_OUTPUT_BEHAVIOR": accepted(_PULSE, _PULSE, _TOGGLE, _LEVEL, _INTERLOCKED),

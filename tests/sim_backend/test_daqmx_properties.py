@@ -7,6 +7,7 @@ from nidaqmx.constants import (
     Edge,
     Level,
     SampleTimingType,
+    TaskMode,
     TerminalConfiguration,
     TriggerType,
     UnitsPreScaled,
@@ -110,9 +111,10 @@ def test_the_source_of_a_clock_is_checked_with_the_task(session):
         ai.timing.cfg_samp_clk_timing(1000, source="pfi3", active_edge=Edge.FALLING)
         assert ai.timing.samp_clk_src == "/Dev1/PFI3"
         assert ai.timing.samp_clk_active_edge is Edge.FALLING
+        ai.timing.samp_clk_src = "/Dev1/PFI77"
         with pytest.raises(DaqError) as caught:
             ai.start()
-        assert caught.value.error_code == -89136
+        assert caught.value.error_code == -89120
 
 
 def test_the_type_of_a_trigger_follows_its_source(session):
@@ -133,10 +135,17 @@ def test_the_type_of_a_trigger_follows_its_source(session):
 def test_the_card_lists_only_what_a_program_can_have(session):
     card = Device("Dev1", grpc_options=session)
     assert card.do_lines.channel_names
-    for names, add in ((card.di_lines, "di"), (card.ci_physical_chans, "ci")):
-        for name in names.channel_names[:1]:
+    assert card.terminals
+    for names, channels, add in (
+        (card.di_lines, "di_channels", "add_di_chan"),
+        (card.di_ports, "di_channels", "add_di_chan"),
+        (card.ci_physical_chans, "ci_channels", "add_ci_count_edges_chan"),
+        (card.co_physical_chans, "co_channels", "add_co_pulse_chan_freq"),
+    ):
+        for name in names.channel_names:
             with task(session) as made:
-                getattr(made, f"{add}_channels").add_di_chan(name)
+                getattr(getattr(made, channels), add)(name)
+                made.control(TaskMode.TASK_VERIFY)
 
 
 # scales

@@ -165,9 +165,9 @@ def test_the_edge_of_a_trigger_is_given_back(session):
 
 def test_what_is_not_simulated_is_one_line_in_the_log(session, caplog):
     with task(session) as made, pytest.raises(RpcError, match="not supported"):
-        made.ai_channels.add_ai_bridge_chan("Dev1/ai0")
+        made.timing.cfg_handshaking_timing()
     told = [r.getMessage() for r in caplog.records]
-    assert told == ["CreateAIBridgeChan is not simulated; the client is told so"]
+    assert told == ["CfgHandshakingTiming is not simulated; the client is told so"]
 
 
 # events

@@ -90,6 +90,11 @@ def _ai_clock(rate, samples=100, inputs=("ai0", "ai1", "ai2"), **more):
     return attempt
 
 
+def _output_on_a_clock_from_outside(ao):
+    ao.timing.cfg_samp_clk_timing(1000.0, source="/Dev1/PFI0")
+    ao.control(TaskMode.TASK_VERIFY)
+
+
 def _with_output(act):
     def attempt(session):
         with task(session) as ao:
@@ -263,7 +268,7 @@ RULES = {
     "no samples": (_ai_clock(1000.0, samples=1), -200077),
     "a clock from nowhere": (_ai_clock(1000.0, source="/Dev1/ao/Nothing"), -89120),
     "a clock of another card": (_ai_clock(1000.0, source="/Dev3/ao/SampleClock"), -89120),
-    "a clock that it cannot take": (_ai_clock(1000.0, source="/Dev1/PFI0"), -89136),
+    "a clock that it cannot take": (_with_output(_output_on_a_clock_from_outside), -89136),
     "a clock without channels": (
         _with_nothing(lambda made: made.timing.cfg_samp_clk_timing(1000.0)),
         -200478,
@@ -351,7 +356,7 @@ def test_after_a_refusal_nothing_is_reserved(card, session):
 
 def test_what_is_not_simulated_is_said_to_be_so(session):
     with task(session) as made, pytest.raises(RpcError, match="not supported"):
-        made.ci_channels.add_ci_count_edges_chan("Dev1/ctr0")
+        made.timing.cfg_change_detection_timing("Dev1/port0/line0")
 
 
 def test_a_task_that_another_client_has_cleared_is_refused(card, session):

@@ -25,9 +25,9 @@ from dearig.config.rigfile import RigFile
 from dearig.drivers.daqmx.certificates import Certificates
 from dearig.drivers.gate import GatedWaveform
 from dearig.sim_backend.clock import Clock, ManualClock
-from dearig.sim_backend.daqmx.device import Device
 from dearig.sim_backend.daqmx.opening import open_device
 from dearig.sim_backend.daqmx.server import DaqmxServer
+from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 from dearig.sim_backend.factory import open_simulated_rig
 from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.rig import SimulatedRig
@@ -72,7 +72,7 @@ class Served:
     """A server with the card behind it, and the session of one client."""
 
     server: DaqmxServer
-    device: Device
+    device: SimulatedCard
     session: GrpcSessionOptions
 
 
@@ -115,6 +115,7 @@ def served(
     link: Clock | None = None,
     certificates: Certificates | None = None,
     sine: bool = False,
+    signals: dict[str, str] | None = None,
 ) -> Iterator[Served]:
     """A server in this process, as fast as it can be, and a client of it without TLS."""
     settings = settings or RigFile()
@@ -127,6 +128,7 @@ def served(
         clock=clock or ManualClock(),
         faults=FaultPlan.parse(faults),
         sine=sine,
+        signals=signals,
     )
     with (
         DaqmxServer(

@@ -1,0 +1,115 @@
+"""Example programs of nidaqmx-python on the simulated card: which run, and which are refused.
+
+Run as ``python -m tests.benchmarks.bench_ni_examples --source FOLDER``; ``FOLDER`` is ``examples``
+of a checkout of https://github.com/ni/nidaqmx-python. The programs run unchanged, each in a process
+of its own, against the card of a rig at rest in this process. "ran" means that the program came to
+its end, and that what it read or wrote is what the card's terminals had.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from dearig.config.rigfile import RigFile
+from dearig.sim_backend.clock import PacedClock
+from dearig.sim_backend.daqmx.device import Device
+from dearig.sim_backend.daqmx.opening import open_device
+from dearig.sim_backend.daqmx.server import DaqmxServer
+from tests.benchmarks.ni_example_checks import CHECKS, Played
+
+_LONGEST = 60.0  # s for one example
+_DEVICE = re.compile(r"[\"']/?([A-Za-z][A-Za-z0-9]*)/(?:ai|ao|port|ctr|power)")
+
+
+@dataclass
+class Row:
+    """Line of the table."""
+
+    example: str
+    outcome: str
+    detail: str
+    printed: str = field(default="", repr=False)
+
+
+def card(name: str) -> Device:
+    """Return a card called ``name`` in real time, with the rig at rest behind it."""
+    settings = RigFile.model_validate({"card": {"device": name}})
+    return open_device("sim", settings, settings.as_film(), settings.as_load(), clock=PacedClock())
+
+
+def play(example: Path, seconds: float) -> Played:
+    """Run ``example`` against a card of its own, with Enter pressed after ``seconds``."""
+    found = _DEVICE.search(example.read_text(encoding="utf-8-sig"))
+    device = card(found[1] if found else "Dev1")
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        DaqmxServer(device, client_timeout=None) as server,
+    ):
+        out = Path(folder) / "log.json"
+        command = [
+            sys.executable, "-m", "tests.benchmarks.ni_example_child",
+            str(example), str(server.port), str(out), str(seconds),
+        ]  # fmt: skip
+        try:
+            ended = subprocess.run(
+                command, capture_output=True, text=True, timeout=_LONGEST, check=False
+            )
+        except subprocess.TimeoutExpired:
+            return Played(device, [], "", {"error": "timeout", "text": f"no end in {_LONGEST:g} s"})
+        if not out.is_file():
+            text = ended.stderr.strip().rpartition("\n")[2]
+            return Played(device, [], ended.stdout, {"error": "crash", "text": text})
+        log: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))
+        return Played(device, log.pop("calls"), ended.stdout, log)
+
+
+def row(example: Path, name: str, seconds: float) -> Row:
+    """Return the line of ``example``, called ``name``."""
+    played = play(example, seconds)
+    if played.failure:
+        text = " ".join(str(played.failure["text"]).split())
+        code = played.failure["error"]
+        kind = "refused" if isinstance(code, int) else "failed"
+        return Row(name, kind, f"{code}: {text[:140]}", played.printed)
+    check = CHECKS.get(name)
+    if check is None:
+        return Row(name, "ran, not checked", "", played.printed)
+    try:
+        return Row(name, "ran", check(played), played.printed)
+    except AssertionError as wrong:
+        return Row(name, "ran, wrong", str(wrong)[:140], played.printed)
+
+
+def main() -> None:
+    """Print the table, and how many ran."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--source", type=Path, required=True)
+    parser.add_argument("--only", default="", help="part of the examples' paths")
+    parser.add_argument("--seconds", type=float, default=2.5, help="until Enter is pressed")
+    parser.add_argument("--output", action="store_true", help="also what each printed")
+    options = parser.parse_args()
+    rows = []
+    print("| example | outcome | what was checked, or why not |\n|---|---|---|")
+    for example in sorted(options.source.rglob("*.py")):
+        name = example.relative_to(options.source).as_posix()
+        if options.only in name:
+            rows.append(row(example, name, options.seconds))
+            print(f"| {name} | {rows[-1].outcome} | {rows[-1].detail} |", flush=True)
+            if options.output:
+                print(rows[-1].printed)
+    ran = sum(r.outcome == "ran" for r in rows)
+    print(f"\n{ran} of {len(rows)} ran.")
+
+
+if __name__ == "__main__":
+    main()
