@@ -13,6 +13,7 @@ from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.sensors import CUSTOM_RTD, RTD_COEFFICIENTS, Sensor, Usage
 
 if TYPE_CHECKING:
+    from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
     from dearig.sim_backend.daqmx.tasks import Task
 
 __all__ = ["SensorCalls"]
@@ -29,7 +30,7 @@ def _number(request: Any, field: str) -> int:
 class SensorCalls:
     """Calls that add an input channel with a sensor."""
 
-    _device: Device
+    _device: SimulatedCard
 
     if TYPE_CHECKING:
 

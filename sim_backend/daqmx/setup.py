@@ -89,8 +89,8 @@ class Setup:
         self.kept: dict[object, object] = {}  # properties of the device without effect
 
     def check_device(self, name: str) -> None:
-        """Refuse a device that is not this one."""
-        if name.lower() != self.name.lower():
+        """Refuse a device that is not this one; a channel of it stands for it too."""
+        if name.partition("/")[0].lower() != self.name.lower():
             raise DaqmxError(Code.UNKNOWN_DEVICE, f"Device Specified: {name}")
 
     def add_scale(self, scale: Scale) -> None:

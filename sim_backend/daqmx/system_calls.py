@@ -14,7 +14,7 @@ from dearig.sim_backend.daqmx.setup import LINES
 from dearig.sim_backend.daqmx.tasks import HIGH, LOW, TRISTATE
 
 if TYPE_CHECKING:
-    pass
+    from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 
 __all__ = ["SystemCalls"]
 
@@ -25,7 +25,7 @@ _CALIBRATED = {"year": 2020, "month": 1, "day": 1, "hour": 0, "minute": 0}
 class SystemCalls:
     """Calls about the card, without a task."""
 
-    _device: Device
+    _device: SimulatedCard
 
     def GetErrorString(self, request: Any, context: grpc.ServicerContext) -> Any:
         return pb.GetErrorStringResponse(error_string=message_of(request.error_code))

@@ -17,7 +17,8 @@ from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.tasks import Kind, Task
 
 if TYPE_CHECKING:
-    from dearig.sim_backend.daqmx.device import Device, Reading
+    from dearig.sim_backend.daqmx.device import Reading
+    from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 
 __all__ = ["WaveformCalls", "check_channels"]
 
@@ -36,7 +37,7 @@ def _time_stamp(seconds: float) -> PrecisionTimestamp:
 class WaveformCalls:
     """Calls with waveforms, and with raw numbers other than int16."""
 
-    _device: Device
+    _device: SimulatedCard
 
     if TYPE_CHECKING:
 

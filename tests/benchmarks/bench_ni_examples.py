@@ -20,9 +20,9 @@ from typing import Any
 
 from dearig.config.rigfile import RigFile
 from dearig.sim_backend.clock import PacedClock
-from dearig.sim_backend.daqmx.device import Device
 from dearig.sim_backend.daqmx.opening import open_device
 from dearig.sim_backend.daqmx.server import DaqmxServer
+from dearig.sim_backend.daqmx.simulated_card import SimulatedCard
 from tests.benchmarks.ni_example_checks import CHECKS, Played
 
 _LONGEST = 60.0  # s for one example
@@ -39,16 +39,30 @@ class Row:
     printed: str = field(default="", repr=False)
 
 
-def card(name: str) -> Device:
+def card(name: str) -> SimulatedCard:
     """Return a card called ``name`` in real time, with the rig at rest behind it."""
     settings = RigFile.model_validate({"card": {"device": name}})
     return open_device("sim", settings, settings.as_film(), settings.as_load(), clock=PacedClock())
+
+
+def watch_lines(device: SimulatedCard) -> list[tuple[str, bool, float]]:
+    """Return a list that gets every change of a digital line of ``device``."""
+    changes: list[tuple[str, bool, float]] = []
+    put = device._wire.set_line
+
+    def put_and_note(line: str, level: bool, now: float) -> None:
+        changes.append((line, level, now))
+        put(line, level, now)
+
+    device._wire.set_line = put_and_note  # type: ignore[method-assign]
+    return changes
 
 
 def play(example: Path, seconds: float) -> Played:
     """Run ``example`` against a card of its own, with Enter pressed after ``seconds``."""
     found = _DEVICE.search(example.read_text(encoding="utf-8-sig"))
     device = card(found[1] if found else "Dev1")
+    lines = watch_lines(device)
     with (
         tempfile.TemporaryDirectory() as folder,
         DaqmxServer(device, client_timeout=None) as server,
@@ -63,12 +77,14 @@ def play(example: Path, seconds: float) -> Played:
                 command, capture_output=True, text=True, timeout=_LONGEST, check=False
             )
         except subprocess.TimeoutExpired:
-            return Played(device, [], "", {"error": "timeout", "text": f"no end in {_LONGEST:g} s"})
+            return Played(
+                device, [], "", {"error": "timeout", "text": f"no end in {_LONGEST:g} s"}, lines
+            )
         if not out.is_file():
             text = ended.stderr.strip().rpartition("\n")[2]
-            return Played(device, [], ended.stdout, {"error": "crash", "text": text})
+            return Played(device, [], ended.stdout, {"error": "crash", "text": text}, lines)
         log: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))
-        return Played(device, log.pop("calls"), ended.stdout, log)
+        return Played(device, log.pop("calls"), ended.stdout, log, lines)
 
 
 def row(example: Path, name: str, seconds: float) -> Row:

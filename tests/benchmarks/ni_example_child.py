@@ -73,19 +73,28 @@ def watched(log: list[Any], of: type, name: str, *, gives: bool) -> None:
     setattr(of, name, call)
 
 
-def at_the_keyboard(seconds: float) -> None:
-    """Press Enter ``seconds`` after a question, and ctrl-C where none was asked."""
+def at_the_keyboard(seconds: float) -> Callable[[], None]:
+    """Press Enter ``seconds`` after a question, and ctrl-C where none was asked.
+
+    ctrl-C is pressed again until the returned function is called, because a library may lose one.
+    """
+    over = threading.Event()
 
     def enter(question: str = "") -> str:
-        pressed.cancel()
+        over.set()
         sys.stdout.write(question)
         time.sleep(seconds)
         return ""
 
-    pressed = threading.Timer(2.0 * seconds, _thread.interrupt_main)
-    pressed.daemon = True
-    pressed.start()
+    def press() -> None:
+        pressed = 0
+        while not over.wait(2.0 * seconds if not pressed else 3.0):
+            pressed += 1
+            _thread.interrupt_main()
+
     builtins.input = enter
+    threading.Thread(target=press, daemon=True).start()
+    return over.set
 
 
 def main() -> None:
@@ -97,7 +106,7 @@ def main() -> None:
     watched(log, nidaqmx.Task, "read", gives=False)
     watched(log, nidaqmx.Task, "read_waveform", gives=False)
     watched(log, nidaqmx.Task, "write", gives=True)
-    at_the_keyboard(float(seconds))
+    done = at_the_keyboard(float(seconds))
     failure: dict[str, Any] = {}
     path = Path(example).resolve()
     with tempfile.TemporaryDirectory() as folder:
@@ -112,6 +121,7 @@ def main() -> None:
         except Exception as error:  # noqa: BLE001  (the program's own fault, which is the result)
             failure = {"error": type(error).__name__, "text": str(error)}
             traceback.print_exc()
+        done()
         os.chdir(Path(folder).parent)
     Path(out).write_text(json.dumps({"calls": log, **failure}), encoding="utf-8")
     sys.stdout.flush()

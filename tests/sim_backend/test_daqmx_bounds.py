@@ -336,7 +336,7 @@ def test_nothing_that_a_client_does_writes_a_traceback_to_the_terminal(tmp_path:
         )
         with grpc.secure_channel(f"127.0.0.1:{port}", credentials) as channel:
             for name, data in (
-                ("CreateAIAccelChan", b""), ("CreateTask", b"\xff" * 9), ("ReadRaw", b""),
+                ("CfgHandshakingTiming", b""), ("CreateTask", b"\xff" * 9), ("ReadRaw", b""),
                 ("RegisterDoneEvent", b""), ("WriteRaw", b"\x0a\x02\x0a\x00"), ("NoSuchCall", b""),
             ):  # fmt: skip
                 assert _outcome(channel, name, data)[0] is not grpc.StatusCode.OK
@@ -348,7 +348,7 @@ def test_nothing_that_a_client_does_writes_a_traceback_to_the_terminal(tmp_path:
     assert process.returncode == 0
     lines = said.splitlines()
     assert len(lines) == 1, said
-    assert "CreateAIAccelChan is not simulated" in lines[0]
+    assert "CfgHandshakingTiming is not simulated" in lines[0]
 
 
 # connections
