@@ -17,9 +17,9 @@ __all__ = ["MESSAGE_MAX", "PrintableStream", "printable"]
 _ESCAPED = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
 #: Zero-width joiners: without them Persian and Indian words and some emoji are spelled wrong.
 _JOINERS = "\u200c\u200d"
-#: Longest text of one message in characters: some 40 lines of a terminal. Longer ones are cut in
-#: the middle.
-MESSAGE_MAX = 3000
+#: Longest text of one message or line in characters: more than a path has on Linux (4096). Longer
+#: ones are cut in the middle.
+MESSAGE_MAX = 5000
 
 
 def printable(text: str, keep: str = "", most: int | None = None) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -69,7 +70,7 @@ def open_all(sources: Sequence[Source]) -> list[Recording]:
     named: set[Path] = set()
     for source in sources:
         path = _path(source)
-        where = path.resolve()
+        where = Path(os.path.realpath(path))
         if where in named:
             raise InputError(f"{path} is named twice; each recording counts once")
         named.add(where)
@@ -91,9 +92,9 @@ def open_all(sources: Sequence[Source]) -> list[Recording]:
 
 def check_named_once(train: Sequence[Source], validation: Sequence[Source]) -> None:
     """Refuse a file that is given both to fit and to validate."""
-    named = {_path(source).resolve() for source in train}
+    named = {os.path.realpath(_path(source)) for source in train}
     for source in validation:
-        if _path(source).resolve() in named:
+        if os.path.realpath(_path(source)) in named:
             raise InputError(
                 f"{_path(source)} is given both to fit and to validate: an error on fitted data "
                 f"proves nothing; leave it out of one of them"

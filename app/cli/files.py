@@ -27,7 +27,7 @@ from dearig.cli.output import (
     write_result,
 )
 from dearig.errors import InputError
-from dearig.printable import printable
+from dearig.printable import MESSAGE_MAX, printable
 
 __all__ = ["commands"]
 
@@ -164,7 +164,9 @@ def info(
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for name, value in describe_rows(recording):
-        table.add_row(Text(printable(name)), Text(printable(value)))
+        table.add_row(
+            Text(printable(name, most=MESSAGE_MAX)), Text(printable(value, most=MESSAGE_MAX))
+        )
     if json != "-":
         console_for().print(table, highlight=False)
     write_result(describe(recording), json)

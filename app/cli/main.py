@@ -15,6 +15,7 @@ import re
 import shlex
 import sys
 import threading
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -101,12 +102,29 @@ def main() -> None:
     _give_matplotlib_a_folder()
     with (
         _printable_output(), log_file.attached() as written, _terminal(),
-        _unexpected_errors_told(written),
+        _unexpected_errors_told(written), _library_warnings_logged(),
     ):  # fmt: skip
         status = _run(written)
         if written.stream is not None:  # a command has started, not only --help
             log.info("ended with exit code %d", status)
     leave(status)
+
+
+@contextmanager
+def _library_warnings_logged() -> Iterator[None]:
+    """Write warnings of libraries to the log; on the terminal they do not help an operator."""
+    shown = warnings.showwarning
+
+    def to_log(
+        message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: object
+    ) -> None:
+        log.info("%s at %s:%d: %s", category.__name__, filename, lineno, message)
+
+    warnings.showwarning = to_log
+    try:
+        yield
+    finally:
+        warnings.showwarning = shown
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -9,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dearig.errors import InputError
-from dearig.printable import printable
+from dearig.printable import MESSAGE_MAX, printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -62,7 +63,7 @@ def check_files(
     written = [*outputs, *([] if json in (None, "-") else [Path(str(json))])]
     for i, path in enumerate(written):
         check_output(path, force, *read)
-        if any(path.resolve() == other.resolve() for other in written[:i]):
+        if any(os.path.realpath(path) == os.path.realpath(other) for other in written[:i]):
             raise InputError(f"{path} is named for two outputs; give each output its own name")
     if recording is not None and recording.suffix.lower() not in (".h5", ".hdf5", ".nxs"):
         raise InputError(
@@ -86,7 +87,7 @@ def print_line(console: Console, text: str, style: str | None = None) -> None:
 def print_lines(console: Console, texts: Iterable[str], style: str | None = None) -> None:
     """Print each of ``texts`` as one line."""
     # at once: rich takes a tenth of a millisecond for each call, and there may be 10,000 lines
-    text = "\n".join(map(printable, texts))
+    text = "\n".join(printable(text, most=MESSAGE_MAX) for text in texts)
     console.print(text, style=style, markup=False, highlight=False, emoji=False, soft_wrap=True)
 
 

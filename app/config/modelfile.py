@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 import tomli_w
 from pydantic import Field, ValidationError
 
-from dearig.config.toml_input import Table, allowed, meant, parse_toml, read_text, shown
+from dearig.config.toml_input import NAME_MAX, Table, allowed, meant, parse_toml, read_text, shown
 from dearig.errors import InputError
 from dearig.model.actuator import Actuator
 from dearig.model.effects import EFFECTS
@@ -23,6 +23,10 @@ from dearig.recording.files import check_output, replaced_when_done
 __all__ = ["FORMAT", "ModelFile", "load_actuator", "load_model", "model_toml", "save_model"]
 
 FORMAT = "dearig-model/1"
+
+#: Branches, and effects, of a model at most. Fits have up to 6 branches; three for each decade of
+#: time from microseconds to decades of years are 45. The time of a simulation grows with them.
+PARTS_MAX = 100
 
 _Positive = Annotated[float, Field(gt=0.0)]
 _Kind = Literal["neo-hookean", "gent", "arruda-boyce"]
@@ -108,13 +112,13 @@ class _Effect(Table):
 
 class _File(Table):
     format: str
-    name: str = Field(min_length=1)
+    name: str = Field(min_length=1, max_length=NAME_MAX)
     kinematics: Literal["constrained-width", "uniaxial", "equibiaxial"]
     film: _Film | None = None
     load: _Load | None = None
     equilibrium: _Spring
-    branch: list[_Branch] = Field(default=[])
-    effect: list[_Effect] = Field(default=[])
+    branch: list[_Branch] = Field(default=[], max_length=PARTS_MAX)
+    effect: list[_Effect] = Field(default=[], max_length=PARTS_MAX)
     history: dict[str, Any] = Field(default={})
 
 
@@ -283,6 +287,9 @@ def _sentence(error: ValidationError) -> str:
         info = table.model_fields.get(str(last))
         return f"{key} is missing" + (f": it takes {allowed(info)}" if info is not None else "")
     info = table.model_fields.get(str(last))
+    if fault["type"] == "too_long":
+        most = fault["ctx"]["max_length"]
+        return f"{key} = {shown(fault['input'])} is too long: {most:,} are read at most"
     if str(last) in _LISTS:
         return f"{key} = {shown(fault['input'])} is no list of tables: write [[{last}]] above each"
     words = "a number" if info is None else allowed(info)

@@ -19,7 +19,7 @@ from pydantic_core import ErrorDetails
 from dearig.config.presets import PRESETS
 from dearig.config.segments import SEGMENT_KINDS, SegmentTable
 from dearig.config.segments.base import SEGMENTS_MAX
-from dearig.config.toml_input import Table, allowed, meant, parse_toml, read_text, shown
+from dearig.config.toml_input import NAME_MAX, Table, allowed, meant, parse_toml, read_text, shown
 from dearig.drivers.samples import Computed, Samples
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
@@ -102,7 +102,7 @@ class LoadedSequence:
 
 
 class _Head(Table):
-    name: str = Field(min_length=1, description="title of the recording")
+    name: str = Field(min_length=1, max_length=NAME_MAX, description="title of the recording")
     lead_in_s: float = Field(
         default=2.0, ge=0.0, le=3600.0, description="time at 0 V before the segments"
     )

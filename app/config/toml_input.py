@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 import json
 import re
 import tomllib
@@ -15,9 +16,37 @@ from pydantic import BaseModel, ConfigDict
 from pydantic.fields import FieldInfo
 
 from dearig.errors import InputError
+from dearig.input_file import read_input
 
-__all__ = ["Table", "allowed", "meant", "parse_toml", "read_text", "shown"]
+__all__ = ["NAME_MAX", "Table", "allowed", "meant", "parse_toml", "read_text", "shown"]
 
+#: Bytes of a file, at most: three times a sequence of 10,000 segments of some 70 bytes, which is
+#: the largest that is played. Python's parser takes about a second for so much.
+BYTES_MAX = 2**21
+#: Tables and headers of tables, at most: twice the 10,000 segments of a sequence.
+TABLES_MAX = 20_000
+#: Keys of a table and values of a list, at most: as many as a sequence has segments. Each may be
+#: wrong, and a kilobyte is kept of each fault.
+ITEMS_MAX = 10_000
+#: Depth of tables and lists in each other, at most. The files that are read have 4, and the history
+#: of a model is free; the parser's time grows as the square of the parts of a key.
+DEPTH_MAX = 32
+#: Characters of a key, at most; the longest known one has 40.
+KEY_MAX = 200
+#: Bits of a whole number beside its sign, as TOML has it.
+INTEGER_BITS = 63
+#: Characters of a name or title, at most: more than fits into a heading or on a terminal's screen.
+NAME_MAX = 1000
+
+_TABLE = re.compile(r"^[ \t]*\[", re.MULTILINE)
+_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
+# begins where a part begins: searched from each character of a long word, the time would be square
+_DEEP_KEY = re.compile(rf"(?<![A-Za-z0-9_.-])(?:{_PART}){{{DEPTH_MAX}}}")
+
+#: Characters of a value in a message.
+_SHOWN = 40
+#: Characters of a line of a file in a message.
+_LINE = 120
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 # what a key can end in: used to tell a wrong unit from a wrong name
 _UNITS = frozenset(
@@ -34,10 +63,7 @@ class Table(BaseModel):
 
 def read_text(path: Path, what: str) -> str:
     """Return the text of the ``what`` (rig file, sequence) at ``path``. Raises ``InputError``."""
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{what} {path} cannot be read: {error.strerror or error}") from error
+    raw = read_input(path, what, BYTES_MAX)
     if raw.startswith(_HDF5):
         raise InputError(f"{path} is a recording (HDF5) where a {what} (TOML) should be")
     try:
@@ -50,9 +76,14 @@ def read_text(path: Path, what: str) -> str:
 
 
 def parse_toml(text: str, name: str) -> dict[str, Any]:
-    """Return the tables of the TOML ``text`` called ``name``; ``InputError`` with the line."""
+    """Return the tables of the TOML ``text`` called ``name``.
+
+    Raises ``InputError``: with the line of what is not TOML, and for a text that goes beyond the
+    limits of this module, whose reading might take minutes.
+    """
+    _check_text(text, name)
     try:
-        return tomllib.loads(text)
+        data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{name}{_toml_fault(str(error), text)}") from error
     except (RecursionError, ValueError) as error:
@@ -61,6 +92,50 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
             f"{name}: it cannot be read as TOML: brackets are nested too deeply, or a number has "
             f"thousands of digits"
         ) from error
+    _check_values(data, name)
+    return data
+
+
+def _check_text(text: str, name: str) -> None:
+    """Refuse what the parser would read slowly: its time grows as the square of some counts."""
+    if len(text) > BYTES_MAX:
+        raise InputError(f"{name} has {len(text):,} characters; {BYTES_MAX:,} are read at most")
+    tables = len(_TABLE.findall(text))
+    if tables > TABLES_MAX:
+        raise InputError(f"{name} has {tables:,} tables; {TABLES_MAX:,} are read at most")
+    if deep := _DEEP_KEY.search(text):
+        line = text.count("\n", 0, deep.start()) + 1
+        raise InputError(
+            f"{name}, line {line}: a key has more than {DEPTH_MAX} parts; tables are nested "
+            f"{DEPTH_MAX} deep at most"
+        )
+
+
+def _check_values(data: dict[str, Any], name: str) -> None:
+    """Refuse values that are too deep, too long or too many for what follows."""
+    waiting: list[tuple[Any, int]] = [(data, 1)]
+    while waiting:
+        value, depth = waiting.pop()
+        if isinstance(value, int) and value.bit_length() > INTEGER_BITS:
+            raise InputError(f"{name}: a whole number does not fit into {INTEGER_BITS + 1} bits")
+        if not isinstance(value, dict | list):
+            continue
+        if depth > DEPTH_MAX:
+            raise InputError(f"{name}: tables and lists are nested more than {DEPTH_MAX} deep")
+        if len(value) > ITEMS_MAX:
+            what = "keys" if isinstance(value, dict) else "values"
+            raise InputError(
+                f"{name}: a {'table' if isinstance(value, dict) else 'list'} has {len(value):,} "
+                f"{what}; {ITEMS_MAX:,} are read at most"
+            )
+        if isinstance(value, dict):
+            longest = max(map(len, value), default=0)
+            if longest > KEY_MAX:
+                raise InputError(
+                    f"{name}: a key has {longest:,} characters; {KEY_MAX} are read at most"
+                )
+        inside = value.values() if isinstance(value, dict) else value
+        waiting += [(inner, depth + 1) for inner in inside]
 
 
 def allowed(info: FieldInfo, item: bool = False) -> str:
@@ -96,7 +171,7 @@ def _bare(kind: Any, metadata: list[Any]) -> tuple[Any, list[Any]]:
 def _bounded(text: str, metadata: list[Any], examples: list[Any] | None = None) -> str:
     bounds: dict[str, Any] = {}
     for constraint in metadata:
-        for name in ("gt", "ge", "lt", "le", "pattern", "min_length"):
+        for name in ("gt", "ge", "lt", "le", "pattern", "min_length", "max_length"):
             value = getattr(constraint, name, None)
             if value is not None:
                 bounds[name] = value
@@ -111,6 +186,9 @@ def _bounded(text: str, metadata: list[Any], examples: list[Any] | None = None) 
         text += f" such as {examples[0] if examples else usual}"
     if "min_length" in bounds:
         text += " that is not empty"
+    if "max_length" in bounds:
+        what = "characters" if text.startswith("a text") else "tables"
+        text += f" of at most {bounds['max_length']} {what}"
     return text
 
 
@@ -120,19 +198,36 @@ def _toml_fault(message: str, text: str) -> str:
     if not found:
         return f": not TOML: {message}"
     what, line, column = found.groups()
+    what = what if len(what) <= _LINE else f"{what[: _LINE - 3]}..."  # it quotes keys
     if what == r"Illegal character '\n'":
         what = "a text is not closed by a quotation mark"
     lines = text.splitlines()
     if line is None:
         return f", line {max(len(lines), 1)}: {what} at the end of the file"
-    shown = lines[int(line) - 1].strip() if int(line) <= len(lines) else ""
-    return f", line {line}, column {column}: {what}" + (f" in `{shown}`" if shown else "")
+    here = lines[int(line) - 1].strip() if int(line) <= len(lines) else ""
+    if len(here) > _LINE:
+        here = f"{here[: _LINE - 3]}..."
+    return f", line {line}, column {column}: {what}" + (f" in `{here}`" if here else "")
 
 
 def shown(value: object) -> str:
     """Return a value for a message, shortened."""
-    text = json.dumps(value, default=str, ensure_ascii=False)
-    return text if len(text) <= 40 else f"{text[:37]}..."
+    text = json.dumps(_beginning(value), default=str, ensure_ascii=False)
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."
+
+
+def _beginning(value: object, depth: int = 0) -> object:
+    """Return what is shown of ``value``: of a long one the beginning, before it becomes text."""
+    if depth > DEPTH_MAX:
+        return "..."
+    if isinstance(value, str):
+        return value[: _SHOWN + 1]
+    if isinstance(value, list | tuple):
+        return [_beginning(part, depth + 1) for part in value[: _SHOWN + 1]]
+    if isinstance(value, dict):
+        some = itertools.islice(value.items(), _SHOWN + 1)
+        return {_beginning(str(k)): _beginning(v, depth + 1) for k, v in some}
+    return value
 
 
 def meant(key: str, known: Mapping[str, FieldInfo], parents: str = "") -> str | None:
@@ -142,7 +237,7 @@ def meant(key: str, known: Mapping[str, FieldInfo], parents: str = "") -> str | 
             unit = name.removeprefix(_stem(name)).strip("_")
             if unit:
                 return f"this value is given in {unit.replace('_', ' ')}, as {parents}{name}"
-    near = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
+    near = difflib.get_close_matches(key[:KEY_MAX], known, n=1, cutoff=0.6)
     return f"did you mean {parents}{near[0]}?" if near else None
 
 

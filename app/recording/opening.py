@@ -10,6 +10,7 @@ from typing import TypeVar
 import h5py
 
 from dearig.errors import InputError
+from dearig.input_file import why_no_file
 from dearig.recording.files import in_words, journal_of, one_line
 from dearig.recording.journal import Patched, whole_journal
 from dearig.recording.layout import IDENTIFIER
@@ -111,8 +112,8 @@ def opened(path: Path) -> Iterator[h5py.File]:
     with ExitStack() as stack:
         flags: int | None = 0
         try:
-            if not path.is_file():
-                raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")
+            if reason := why_no_file(path):
+                raise InputError(f"{path} {reason}")
             journal = whole_journal(path)
             raw = stack.enter_context(path.open("rb", buffering=0))
             before, after, pages = journal or (raw.seek(0, 2), raw.tell(), {})

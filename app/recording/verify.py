@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 
 from dearig.errors import InputError
+from dearig.input_file import why_no_file
 from dearig.recording.checksums import wrong_blocks
 from dearig.recording.finish import OVERVIEW
 from dearig.recording.flushes import flush_notes
@@ -65,8 +66,8 @@ def verify(path: str | Path) -> Verification:
     if a run that still records to it leaves it in a state that cannot be judged.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")
+    if reason := why_no_file(path):
+        raise InputError(f"{path} {reason}")
     for _ in range(LOOKS):
         before = file_state(path)
         found = _look(path)

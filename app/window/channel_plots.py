@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from html import escape
 
 import numpy as np
 import pyqtgraph as pg
@@ -42,7 +43,7 @@ class ChannelPlots(pg.GraphicsLayoutWidget):
             self.plots, self.curves = [], []
             for row, (label, unit) in enumerate(channels):
                 plot = self.addPlot(row=row, col=0)
-                plot.setLabel("left", f"{label} ({unit})")
+                plot.setLabel("left", escape(f"{label} ({unit})"))  # it is HTML
                 plot.getAxis("bottom").setStyle(showValues=False)
                 curve = pg.PlotCurveItem(skipFiniteCheck=True, connect="all")
                 plot.addItem(curve)

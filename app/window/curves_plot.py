@@ -15,7 +15,7 @@ from dearig.window.channel_plots import ChannelPlots
 from dearig.window.plotting import add_curve, clear_plot, legend_html, stacked_plots
 from dearig.window.session import Session
 from dearig.window.theme import pen
-from dearig.window.widgets import label
+from dearig.window.widgets import label, plain_tip
 
 __all__ = ["CurvesPlot"]
 
@@ -36,7 +36,7 @@ class CurvesPlot(QWidget):
         self._area.setAccessibleName("Curves of the selected recordings")
         # above the plots and wrapped: the names of six recordings would cover half of a plot
         self.key = label("")
-        self.key.setTextFormat(Qt.TextFormat.RichText)
+        self.key.setTextFormat(Qt.TextFormat.RichText)  # legend_html escapes the names
         self.key.setWordWrap(True)
         self.key.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         outer = QVBoxLayout(self)
@@ -124,6 +124,6 @@ class CurvesPlot(QWidget):
                 continue
             colour = theme.bad if event.level == "fault" else theme.warn
             line = pg.InfiniteLine(event.time, angle=90, pen=pen(colour, dashed=True))
-            line.setToolTip(f"{event.time:.4g} s, {event.level}: {event.message}")
+            line.setToolTip(plain_tip(f"{event.time:.4g} s, {event.level}: {event.message}"))
             line.setCursor(Qt.CursorShape.WhatsThisCursor)
             self.plots[1].addItem(line, ignoreBounds=True)

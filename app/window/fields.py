@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import types
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,6 +23,10 @@ _UNITS = {
     "um": "µm", "us": "µs", "ms": "ms", "s": "s", "mA": "mA", "mV": "mV", "mK": "mK", "V": "V",
     "g": "g", "J": "J", "MB": "MB", "ppm": "ppm", "celsius": "°C",
 }  # fmt: skip
+
+
+#: Between the numbers of a list: semicolons, spaces, and commas that are not between digits.
+_SEPARATOR = re.compile(r"[;\s]|(?<![0-9]),|,(?![0-9])")
 
 
 @dataclass(frozen=True)
@@ -95,7 +100,8 @@ def shown_value(value: Any) -> str:
 def typed_value(field: FormField, text: str) -> Any:
     """Return the value of the typed ``text``; None for an empty field.
 
-    Text that is not a number stays text; the check of the file refuses it with a sentence.
+    Text that is not a number stays text; the check of the file refuses it with a sentence. A comma
+    between two digits is a decimal comma, which no number has, and does not separate a list.
     """
     text = text.strip()
     if not text:
@@ -106,7 +112,7 @@ def typed_value(field: FormField, text: str) -> Any:
         number = _number(text)
         return int(number) if isinstance(number, float) and number.is_integer() else number
     if field.kind == "numbers":
-        return [_number(part) for part in text.replace(";", ",").replace(",", " ").split()]
+        return [_number(part) for part in _SEPARATOR.split(text) if part]
     if field.kind == "choice":
         return next((choice for choice in field.choices if str(choice) == text), text)
     return text

@@ -26,6 +26,7 @@ from dearig.recording.timestamps import local_time
 from dearig.report.numbers import NO_VALUE, significant
 from dearig.units import SHOWN
 from dearig.window.session import Session
+from dearig.window.widgets import plain_tip
 
 __all__ = ["COLUMNS", "PATH", "SORT", "SUMMARY", "FolderModel", "ThumbnailDelegate"]
 
@@ -135,7 +136,7 @@ class FolderModel(QAbstractTableModel):
         if role == Qt.ItemDataRole.DisplayRole:
             return self._text(path, summary, column)
         if role == Qt.ItemDataRole.ToolTipRole:
-            return _tip(path, summary, column)
+            return plain_tip(_tip(path, summary, column))
         if role == Qt.ItemDataRole.TextAlignmentRole and _DURATION <= column <= _NOISE:
             return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         if role == Qt.ItemDataRole.ForegroundRole and column == _STATE and summary is not None:

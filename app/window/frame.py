@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QListWidget,
     QMainWindow,
@@ -37,6 +36,7 @@ from dearig.window.session import Session
 from dearig.window.settings import kept_bytes, kept_number, kept_text
 from dearig.window.study_page import StudyPage
 from dearig.window.theme import DARK, LIGHT, apply, system_theme
+from dearig.window.widgets import label, plain_tip
 
 __all__ = ["MainWindow"]
 
@@ -196,10 +196,9 @@ class MainWindow(QMainWindow):
         self.badge = HighVoltageBadge(self.session, large=False)
         self.badge.setFixedWidth(270)
         bar.addWidget(self.badge)
-        self.status = QLabel()
+        self.status = label("")
         bar.addWidget(self.status, 1)
-        self.rig_and_folder = QLabel()
-        self.rig_and_folder.setProperty("role", "muted")
+        self.rig_and_folder = label("", "muted")
         bar.addPermanentWidget(self.rig_and_folder)
 
     def _menu_button(self) -> QToolButton:
@@ -263,7 +262,7 @@ class MainWindow(QMainWindow):
     def _rig_or_folder_changed(self) -> None:
         folder = self.session.folder
         self.rig_and_folder.setText(f"rig {self.session.address}   ·   {folder.name or folder}  ")
-        self.rig_and_folder.setToolTip(f"Folder of the recordings: {folder}")
+        self.rig_and_folder.setToolTip(plain_tip(f"Folder of the recordings: {folder}"))
         self._state_changed(self.run_page.runner.state)
 
     @Slot(int)

@@ -12,7 +12,7 @@ from dearig.config.modelfile import load_actuator, load_model
 from dearig.config.toml_input import read_text
 from dearig.window.background import Background
 from dearig.window.session import Session
-from dearig.window.widgets import Message, label
+from dearig.window.widgets import Message, label, plain_tip
 
 __all__ = ["OverlayChooser"]
 
@@ -80,7 +80,7 @@ class OverlayChooser(QWidget):
                 choice.addItem(model.name, model)
                 if model.path is not None:
                     choice.setItemData(
-                        choice.count() - 1, str(model.path), Qt.ItemDataRole.ToolTipRole
+                        choice.count() - 1, plain_tip(str(model.path)), Qt.ItemDataRole.ToolTipRole
                     )
             choice.addItem(_OPEN, _OPEN)
             chosen = session.overlays[place] if place < len(session.overlays) else None

@@ -51,7 +51,7 @@ from dearig.window.library import shared_library
 from dearig.window.report_table import ReportTable, two_columns
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
-from dearig.window.widgets import Message, button, label
+from dearig.window.widgets import Message, button, label, plain_tip
 from dearig.window.worker import Job
 
 __all__ = ["RecordingsPage"]
@@ -392,7 +392,7 @@ class RecordingsPage(QWidget):
     def _name_folder(self) -> None:
         folder = self._session.folder
         self.folder_button.setText(f"Folder: {folder.name or folder}")
-        self.folder_button.setToolTip(f"{folder}; click to choose another folder")
+        self.folder_button.setToolTip(plain_tip(f"{folder}; click to choose another folder"))
 
     @Slot()
     def _list_models(self) -> None:

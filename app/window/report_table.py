@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from dearig.report.tables import Row, Table
+from dearig.window.widgets import plain_tip
 
 __all__ = ["ReportTable", "two_columns"]
 
@@ -73,7 +74,7 @@ class ReportTable(QTableWidget):
                 right = k > 0 and not self._words and _NUMBER.match(text) is not None
                 side = Qt.AlignmentFlag.AlignRight if right else Qt.AlignmentFlag.AlignLeft
                 item.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
-                item.setToolTip(row.detail or text)
+                item.setToolTip(plain_tip(row.detail or text))
                 if row.mark:
                     item.setFont(bold)
                 self.setItem(i, k, item)

@@ -37,7 +37,7 @@ from dearig.window.fields import form_fields
 from dearig.window.form import Form
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
-from dearig.window.widgets import Message, button, card, label
+from dearig.window.widgets import Message, button, card, label, plain_tip
 
 __all__ = ["RigPage"]
 
@@ -205,7 +205,7 @@ class RigPage(QWidget):
         path = self.session.rig_path
         unsaved = " (not saved)" if self.text != self._saved else ""
         self.file_name.setText(f"{path.name if path else 'rig of the thesis, not saved'}{unsaved}")
-        self.file_name.setToolTip("" if path is None else str(path))
+        self.file_name.setToolTip("" if path is None else plain_tip(str(path)))
         self.save_button.setEnabled(not faults)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802
@@ -243,7 +243,7 @@ class RigPage(QWidget):
                 found += f"; {finding.advice}"
             for column, text in enumerate((verdict, finding.instrument, finding.item, found)):
                 item = QTableWidgetItem(text)
-                item.setToolTip(finding.sentence)
+                item.setToolTip(plain_tip(finding.sentence))
                 item.setFlags(Qt.ItemFlag.ItemIsSelectable | Qt.ItemFlag.ItemIsEnabled)
                 if column == 0:
                     item.setForeground(QColor(colours[finding.verdict]))

@@ -27,7 +27,7 @@ from dearig.window.draft import Draft, Place
 from dearig.window.fields import FormField, form_fields, shown_value
 from dearig.window.form import Form
 from dearig.window.theme import SPACE
-from dearig.window.widgets import button, label, menu_button, set_wrong
+from dearig.window.widgets import button, label, menu_button, plain_tip, set_wrong
 
 __all__ = ["SequenceEditor"]
 
@@ -230,7 +230,7 @@ class SequenceEditor(QWidget):
         ):
             item = QTableWidgetItem(text)
             item.setFlags(Qt.ItemFlag.ItemIsSelectable | Qt.ItemFlag.ItemIsEnabled)
-            item.setToolTip(settings)
+            item.setToolTip(plain_tip(settings))
             if column == _DURATION:
                 item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             self.table.setItem(row, column, item)

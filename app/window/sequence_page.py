@@ -19,7 +19,7 @@ from dearig.window.preview_panel import PreviewPanel
 from dearig.window.sequence_editor import SequenceEditor
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
-from dearig.window.widgets import Message, button, label, menu_button
+from dearig.window.widgets import Message, button, label, menu_button, plain_tip
 
 __all__ = ["SequencePage"]
 
@@ -208,7 +208,7 @@ class SequencePage(QWidget):
     def _show_file_name(self) -> None:
         path = self.session.sequence_path
         self.file_name.setText(path.name if path is not None else "not saved")
-        self.file_name.setToolTip("" if path is None else str(path))
+        self.file_name.setToolTip("" if path is None else plain_tip(str(path)))
 
     @Slot()
     def _recent_changed(self) -> None:

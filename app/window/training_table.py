@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 from dearig.analysis.summary import RecordingSummary
 from dearig.report.numbers import seconds
 from dearig.window.library import Library
+from dearig.window.widgets import plain_tip
 
 __all__ = ["TrainingTable"]
 
@@ -109,7 +110,7 @@ class TrainingTable(QTableWidget):
         item = self._item(row, _NAME)
         film = f", {summary.film}" if summary.film else ""
         about = f"{summary.path}\n{summary.title}, {seconds(summary.duration)}{film}"
-        item.setToolTip(summary.trouble or about)
+        item.setToolTip(plain_tip(summary.trouble or about))
         if not summary.trouble:
             return
         self.blockSignals(True)
@@ -118,7 +119,7 @@ class TrainingTable(QTableWidget):
             box = self._item(row, column)
             box.setFlags(Qt.ItemFlag.NoItemFlags)
             box.setCheckState(Qt.CheckState.Unchecked)
-            box.setToolTip(summary.trouble)
+            box.setToolTip(plain_tip(summary.trouble))
         self.blockSignals(False)
 
     @Slot(QTableWidgetItem)

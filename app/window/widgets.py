@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from html import escape
 
+from PySide6 import QtGui
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QFrame,
@@ -26,6 +28,7 @@ __all__ = [
     "card",
     "label",
     "menu_button",
+    "plain_tip",
     "set_role",
     "set_wrong",
 ]
@@ -34,11 +37,18 @@ __all__ = [
 def label(text: str, role: str = "", tip: str = "") -> QLabel:
     """Make a label; ``role`` is one of the theme's: title, heading, muted, good, warn, bad."""
     made = QLabel(text)
+    # by default Qt takes what looks like HTML for it, and loads the pictures that it names
+    made.setTextFormat(Qt.TextFormat.PlainText)
     if role:
         made.setProperty("role", role)
     if tip:
-        made.setToolTip(tip)
+        made.setToolTip(plain_tip(tip))
     return made
+
+
+def plain_tip(text: str) -> str:
+    """Return a tooltip that shows ``text`` as it is; Qt has no plain ones."""
+    return escape(text) if QtGui.Qt.mightBeRichText(text) else text
 
 
 def set_role(widget: QWidget, role: str) -> None:
@@ -94,6 +104,7 @@ class Message(QLabel):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self.setTextFormat(Qt.TextFormat.PlainText)
         self.setWordWrap(True)
         self.setTextInteractionFlags(
             Qt.TextInteractionFlag.TextSelectableByMouse
@@ -114,7 +125,7 @@ class Readout(QWidget):
 
     def __init__(self, name: str, unit: str, tip: str, points: int = 17) -> None:
         super().__init__()
-        self._value = QLabel("—")
+        self._value = label("—")
         self._value.setFont(digits(points))
         self._value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self._name = label(name, "muted")

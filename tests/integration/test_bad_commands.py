@@ -28,9 +28,9 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
         "record thesys --out o.h5",
         ["neither a file nor a preset", "mean thesis?"],
     ),
-    "no sequence there": ("record no.toml --out o.h5", ["no.toml cannot be read: No such file"]),
+    "no sequence there": ("record no.toml --out o.h5", ["no.toml is not there"]),
     "a recording for a sequence": ("record {s}/run.h5 --out o.h5", ["is a recording (HDF5)"]),
-    "a folder for a sequence": ("record {s} --out o.h5", ["Is a directory"]),
+    "a folder for a sequence": ("record {s} --out o.h5", ["is a folder"]),
     "a name too long": ("record " + "x" * 300 + " --out o.h5", ["neither a file nor a preset"]),
     "an output name too long": ("record thesis --out " + "x" * 300 + ".h5", ["File name too long"]),
     "a folder for the output": (
@@ -173,7 +173,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     "a stress that stands still": ("identify {s}/still-film.h5 --out m.toml", ["never changes"]),
     "no monitor": ("identify {s}/few.h5 --drive monitor --out m.toml", ["no voltage monitor"]),
     # validate
-    "no model there": ("validate no.toml {s}/run.h5", ["model file no.toml cannot be read"]),
+    "no model there": ("validate no.toml {s}/run.h5", ["model file no.toml is not there"]),
     "files in the wrong order": (
         "validate {s}/run.h5 {s}/actuator.toml",
         ["run.h5 is a recording (HDF5) where a model file (TOML) should be"],

@@ -143,10 +143,10 @@ SEQUENCES = {
         HEAD + segment("csv", file='"a\\u0000b.csv"'),
         ["segment 1", "cannot be read"],
     ),
-    "a folder for a waveform": (HEAD + segment("csv", file='"."'), ["Is a directory"]),
+    "a folder for a waveform": (HEAD + segment("csv", file='"."'), ["is a folder"]),
     "no waveform there": (
         HEAD + segment("csv", file='"no.csv"'),
-        ["s.toml: segment 1", "no.csv cannot be read: No such file or directory"],
+        ["s.toml: segment 1", "no.csv is not there"],
     ),
 }
 

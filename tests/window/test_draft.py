@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import tomli_w
 
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
@@ -161,7 +162,21 @@ def test_what_is_typed_is_taken_as_it_is_meant(key: str, text: str, value: objec
 def test_a_list_is_typed_with_commas_or_blanks() -> None:
     field = next(f for f in form_fields(SEGMENT_KINDS["steps"]) if f.key == "levels_kV")
     assert typed_value(field, "3, 7;5 8") == [3.0, 7.0, 5.0, 8.0]
+    assert typed_value(field, ".5,-1 ,2; 3 ;, 4") == [0.5, -1.0, 2.0, 3.0, 4.0]
     assert shown_value([3.0, 0.1]) == "3, 0.1"
+
+
+@pytest.mark.parametrize("text", ["4,5; 7,5; 0", "4,5 7,5 0", "4,5", "4,5, 7,5, 0", "1,2,3"])
+def test_decimal_commas_in_a_list_are_refused_as_in_one_number(text: str) -> None:
+    """Half of Europe writes them; as separators they would make other voltages."""
+    field = next(f for f in form_fields(SEGMENT_KINDS["steps"]) if f.key == "levels_kV")
+    levels = typed_value(field, text)
+    assert levels[0] in ("4,5", "1,2,3")
+    toml = tomli_w.dumps(
+        {"name": "x", "segment": [{"kind": "steps", "dwell_s": 1.0, "levels_kV": levels}]}
+    )
+    with pytest.raises(InputError, match=r'levels_kV\[1\] = "(4,5|1,2,3)" is not allowed'):
+        parse_sequence(toml, "the form", Path())
 
 
 def test_what_breaks_a_limit_is_marked_where_it_does() -> None:

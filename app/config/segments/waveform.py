@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path, PurePath
 from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
 from dearig.config.segments.base import KV, SegmentTable
-from dearig.config.toml_input import shown
+from dearig.config.toml_input import NAME_MAX, shown
 from dearig.errors import InputError
 from dearig.model import excitation
 from dearig.model.excitation import Segment
@@ -26,7 +27,9 @@ class Csv(SegmentTable):
 
     kind: Literal["csv"]
     file: str = Field(
-        min_length=1, description="name of the file, with the columns time_s and voltage_kV"
+        min_length=1,
+        max_length=NAME_MAX,
+        description="name of the file, with the columns time_s and voltage_kV",
     )
 
     @property
@@ -42,6 +45,14 @@ class Csv(SegmentTable):
             raise InputError(
                 f"file = {shown(self.file)} leads out of the sequence's folder; put the waveform "
                 f"beside the sequence, and name it without a path"
+            )
+        # a name with a zero byte has no real path; its reading says what is wrong with it
+        if "\0" not in self.file and not Path(os.path.realpath(folder / place)).is_relative_to(
+            os.path.realpath(folder)
+        ):
+            raise InputError(
+                f"file = {shown(self.file)} is a link that leads out of the sequence's folder; "
+                f"put the waveform itself beside the sequence"
             )
         source = CsvFile(folder / place)
         scale = next((k for k in ("voltage_kV", "voltage_V") if k in source.names), None)

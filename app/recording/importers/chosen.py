@@ -60,7 +60,7 @@ class Chosen:
             if len(found) > 1:
                 raise InputError(
                     f"{source.path}: {quantity} is there {len(found)} times "
-                    f"({', '.join(column for _, column in found)}); choose one with "
+                    f"({listing([column for _, column in found])}); choose one with "
                     f"--column {found[0][0]}={found[0][1]}, or rename the others"
                 )
             if found:

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from dearig.errors import InputError
+from dearig.input_file import open_input
 from dearig.recording.files import in_words
 from dearig.recording.importers.columns import TARGETS
 from dearig.recording.importers.importer import Importer
@@ -26,6 +27,8 @@ __all__ = ["IMPORTER", "CsvFile"]
 DELIMITERS = (";", "\t", ",")
 #: A line without data: blank, or a comment. A plain first character makes the search fast.
 NO_DATA = re.compile(r"\n[^\S\n]*[#\n]")
+#: Columns, at most. Data loggers write some hundred; each name is compared with those known.
+COLUMNS_MAX = 2000
 #: A cell is quoted in messages up to this length.
 SHOWN = 30
 
@@ -53,6 +56,12 @@ class CsvFile:
         self._delimiter = max(DELIMITERS, key=header.count)
         if header.count(self._delimiter) == 0:
             self._delimiter = ","
+        columns = header.count(self._delimiter) + 1
+        if columns > COLUMNS_MAX:
+            raise InputError(
+                f"{path} has {columns:,} columns; {COLUMNS_MAX:,} are read at most: see that it is "
+                f"the right file"
+            )
         self.names = [name.strip() for name in self._cells(self._numbers[0], header)]
         if all(_number(name, False) is not None for name in self.names):
             raise InputError(
@@ -180,11 +189,9 @@ def _complaint(cell: str, decimal_comma: bool) -> str:
 
 def _decoded(path: Path) -> str:
     try:
-        if path.exists() and not (path.is_file() or path.is_dir()):
-            # a device may have no end
-            raise InputError(f"{path} cannot be read: it is not a regular file")
-        raw = path.read_bytes()
-    except (OSError, ValueError) as error:  # a name with a zero byte is a ValueError
+        with open_input(path) as file:
+            raw = file.read()
+    except OSError as error:
         raise InputError(f"{path} cannot be read: {in_words(error)}") from error
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
         try:

@@ -35,6 +35,8 @@ COMPLEX = 0x08
 DEEPEST = 8
 #: Bytes that are unpacked at most: the first plus the second times the size of the file.
 UNPACKED_MAX, PACKED_MAX = 2**28, 100
+#: Bytes that are unpacked at once to count them.
+COUNTED_AT_ONCE = 2**20
 #: Largest number of fields, cells or columns, and of items in all; measurements have fewer.
 FIELDS_MAX, ITEMS_MAX = 4096, 200_000
 
@@ -125,18 +127,22 @@ def variables(raw: bytes) -> dict[str, Value]:
 
 
 def _unpacked(body: memoryview, room: int, where: str) -> bytes:
-    unpacking = zlib.decompressobj()
+    # unpacked twice: the first time only to count, so that a bomb takes no memory
     try:
-        unpacked = unpacking.decompress(body, max(room, 1))
+        counting, size, left = zlib.decompressobj(), 0, bytes(body)
+        while not counting.eof and size <= room:
+            piece = counting.decompress(left, COUNTED_AT_ONCE)
+            if not piece and not left:
+                break
+            size, left = size + len(piece), counting.unconsumed_tail
+        if size > room:
+            raise Damaged(f"is not read: the variable {where} unpacks to more than {room} bytes")
         # only the end of the stream checks its checksum
-        whole = unpacking.eof or not unpacking.decompress(unpacking.unconsumed_tail, 1)
+        if not counting.eof:
+            raise Damaged(f"is truncated: the variable {where} is incomplete")
+        return zlib.decompressobj().decompress(body, max(size, 1))
     except zlib.error as error:
         raise Damaged(f"is damaged: the variable {where}: {error}") from error
-    if not whole:
-        raise Damaged(f"is not read: the variable {where} unpacks to more than {room} bytes")
-    if not unpacking.eof:
-        raise Damaged(f"is truncated: the variable {where} is incomplete")
-    return unpacked
 
 
 def _matrix(items: _Bytes, depth: int) -> tuple[str, Value]:

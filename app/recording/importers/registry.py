@@ -8,6 +8,7 @@ from typing import Any
 
 from dearig.drivers.registry import Registry
 from dearig.errors import InputError
+from dearig.input_file import open_input
 from dearig.recording.files import in_words
 from dearig.recording.importers.importer import HEAD_BYTES, Importer
 from dearig.recording.importers.source import Source
@@ -44,9 +45,7 @@ def source_at(path: Path) -> Source:
     the first bytes is used.
     """
     try:
-        if not path.is_file():
-            raise InputError(f"{path} is {'a folder' if path.is_dir() else 'not there'}")
-        with path.open("rb") as stream:
+        with open_input(path) as stream:
             head = stream.read(HEAD_BYTES)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {in_words(error)}") from error

@@ -1,0 +1,144 @@
+"""What commands cost in time and memory, each in a process of its own, which may crash or hang.
+
+``python -m tests.security.cost`` imports the commands once and forks for each line of JSON on its
+standard input. Linux only: elsewhere a process cannot limit its memory.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["Cost", "Measured", "measuring"]
+
+#: s after which a command counts as one that hangs: far more than any takes on a busy machine.
+PATIENCE = 120
+#: Bytes of address space that a command gets beside what the interpreter has.
+MEMORY = 2**31
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Exit code (negative: the signal that ended it), texts, s, and bytes beside an idle one."""
+
+    code: int
+    out: bytes
+    err: bytes
+    seconds: float
+    bytes: int
+
+
+class Measured:
+    """Runs commands in forks of one process; ``idle`` is the memory of a command with no work."""
+
+    def __init__(self, server: subprocess.Popen[str]) -> None:
+        self._server = server
+        self._idle = 0
+        self._idle = self.run(["presets"]).bytes
+
+    def run(self, argv: Sequence[str], cwd: Path | None = None) -> Cost:
+        """Return what ``dearig`` costs with ``argv``."""
+        assert self._server.stdin is not None
+        assert self._server.stdout is not None
+        with tempfile.TemporaryDirectory() as made:
+            asked = {"argv": list(argv), "cwd": str(cwd or made), "texts": made}
+            self._server.stdin.write(json.dumps(asked) + "\n")
+            self._server.stdin.flush()
+            answer = json.loads(self._server.stdout.readline())
+            out, err = ((Path(made) / name).read_bytes() for name in ("out", "err"))
+        used = max(answer["bytes"] - self._idle, 0)
+        return Cost(answer["code"], out, err, answer["seconds"], used)
+
+
+@contextmanager
+def measuring() -> Iterator[Measured]:
+    """Give a runner of commands while the body runs."""
+    server = subprocess.Popen(
+        [sys.executable, "-m", "tests.security.cost"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[2],
+    )  # fmt: skip
+    try:
+        yield Measured(server)
+    finally:
+        assert server.stdin is not None
+        server.stdin.close()
+        assert server.stdout is not None
+        server.stdout.close()
+        server.wait()
+
+
+def _serve() -> None:
+    _import_commands()
+    for line in sys.stdin:
+        asked = json.loads(line)
+        began = time.monotonic()
+        child = os.fork()
+        if not child:
+            _run(asked)
+        _, status, usage = os.wait4(child, 0)
+        print(
+            json.dumps(
+                {
+                    "code": os.waitstatus_to_exitcode(status),
+                    "seconds": time.monotonic() - began,
+                    "bytes": usage.ru_maxrss * 1024,
+                }
+            ),
+            flush=True,
+        )
+
+
+def _import_commands() -> None:
+    """Import what commands import when they run, so that a fork costs only its own work."""
+    import rich.table  # noqa: F401
+
+    import dearig.acquisition.check
+    import dearig.acquisition.run
+    import dearig.analysis.diagnose
+    import dearig.analysis.simulate
+    import dearig.api
+    import dearig.cli.main
+    import dearig.recording.importers.csv_file
+    import dearig.recording.importers.mat_file
+    import dearig.recording.importers.tdms_file
+    import dearig.recording.verify
+    import dearig.report.html  # noqa: F401
+
+
+def _run(asked: dict[str, str]) -> None:
+    """Run one command in this fork, which does not return."""
+    os.chdir(asked["cwd"])
+    for name, number in (("out", 1), ("err", 2)):
+        file = os.open(f"{asked['texts']}/{name}", os.O_WRONLY | os.O_CREAT, 0o600)
+        os.dup2(file, number)
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    pages = int(Path("/proc/self/statm").read_text("ascii").split()[0])
+    limit = pages * resource.getpagesize() + MEMORY
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    signal.alarm(PATIENCE)
+    sys.argv = ["dearig", *asked["argv"]]
+    from dearig.cli.main import main
+
+    code = 99  # no command ends with it
+    try:
+        main()
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else 98
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+
+if __name__ == "__main__":
+    _serve()

@@ -1,0 +1,118 @@
+"""Hostile input: refused in words, at once, at no more memory than a small multiple of its size."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from dearig.printable import printable
+from tests.security.cases import CASES, INPUTS, SPECIAL_FILES
+from tests.security.cost import Cost, Measured, measuring
+from tests.tools.command import LOBE, thesis_model
+from tests.tools.recordings import write_run
+
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="memory is limited as on Linux"),
+    pytest.mark.timeout(600),
+]
+
+#: Bytes that a command may take beside its input: what a simulated run, libraries that it loads
+#: and their compiled code take.
+BASE = 250_000_000
+#: Bytes that a command may take for each byte of its input.
+FACTOR = 100
+
+
+@pytest.fixture(scope="module")
+def measured() -> Iterator[Measured]:
+    with measuring() as runner:
+        yield runner
+
+
+@pytest.fixture
+def short() -> Iterator[Path]:
+    """A folder with a short name: it is part of messages that are cut."""
+    with tempfile.TemporaryDirectory(prefix="h") as made:
+        yield Path(made)
+
+
+def answered(cost: Cost, code: int | None, *words: str) -> None:
+    """Check that a command ended by itself, with ``code`` and in words."""
+    told = cost.err.decode("utf-8")
+    assert cost.code >= 0, f"ended by signal {-cost.code}"
+    assert cost.code in ((0, 2, 3, 4) if code is None else (code,)), (cost.code, told)
+    for foreign in ("Traceback", "Warning:", "unexpected error"):
+        assert foreign not in told
+    if cost.code == 2:
+        assert told.startswith("dearig: ")
+        assert told.count("\n") == 1
+    assert len(told) < 6000
+    assert all(word in told for word in words), (words, told)
+    for stream in (cost.out, cost.err):
+        text = stream.decode("utf-8")
+        assert printable(text, "\n\t") == text
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_it_costs_little_and_is_answered_in_words(
+    measured: Measured, short: Path, name: str
+) -> None:
+    case = CASES[name]
+    argv = case.make(short)
+    size = sum(path.stat().st_size for path in short.rglob("*") if path.is_file())
+    cost = measured.run(argv)
+    answered(cost, case.code, *case.words)
+    assert cost.bytes <= BASE + FACTOR * size
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    folder = tmp_path_factory.mktemp("good")
+    write_run(folder / "run.h5")
+    thesis_model(folder / "model.toml")
+    (folder / "sequence.toml").write_text(LOBE, encoding="utf-8")
+    return {path.stem: str(path) for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize("kind", SPECIAL_FILES)
+def test_what_is_no_file_is_refused_by_every_input_without_waiting(
+    measured: Measured, short: Path, good: dict[str, str], kind: str
+) -> None:
+    it = str(SPECIAL_FILES[kind](short))
+    before = sorted(short.iterdir())
+    for given in INPUTS.values():
+        places = {**good, "it": it, "out": str(short / "new")}
+        cost = measured.run([word.format(**places) for word in given.split()])
+        assert cost.code == 2, (given, cost)
+        answered(cost, 2)
+        assert sorted(short.iterdir()) == before, given
+
+
+@pytest.mark.parametrize("place", ["/etc/hostname", "../secret.csv", "link.csv", "inside/../../x"])
+def test_a_sequence_reads_only_files_of_its_own_folder(
+    measured: Measured, short: Path, place: str
+) -> None:
+    (short / "secret.csv").write_text("time_s,voltage_kV\n0,0\n1,0\n", encoding="utf-8")
+    own = short / "own"
+    own.mkdir()
+    (own / "link.csv").symlink_to(short / "secret.csv")
+    text = f'name = "x"\n[[segment]]\nkind = "csv"\nfile = "{place}"\n'
+    (own / "s.toml").write_text(text, encoding="utf-8")
+    out = str(short / "out.h5")
+    answered(
+        measured.run(["record", str(own / "s.toml"), "--out", out]), 2, "out of the sequence's"
+    )
+    assert not Path(out).exists()
+
+
+def test_a_link_to_a_file_of_the_same_folder_is_followed(measured: Measured, short: Path) -> None:
+    (short / "wave.csv").write_text("time_s,voltage_kV\n0,0\n1,0\n", encoding="utf-8")
+    (short / "link.csv").symlink_to("wave.csv")
+    text = 'name = "x"\n[[segment]]\nkind = "csv"\nfile = "link.csv"\n'
+    (short / "s.toml").write_text(text, encoding="utf-8")
+    out = str(short / "out.h5")
+    answered(measured.run(["record", str(short / "s.toml"), "--out", out]), 0)
