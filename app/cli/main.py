@@ -116,7 +116,12 @@ def _library_warnings_logged() -> Iterator[None]:
     shown = warnings.showwarning
 
     def to_log(
-        message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: object
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,  # noqa: ARG001
+        line: str | None = None,  # noqa: ARG001
     ) -> None:
         log.info("%s at %s:%d: %s", category.__name__, filename, lineno, message)
 

@@ -152,4 +152,12 @@ def _say(word: str) -> None:
 
 def _tell(sentence: str) -> None:
     with contextlib.suppress(OSError):  # the terminal is closed
-        print(sentence, flush=True)
+        print(_printable(sentence), flush=True)
+
+
+def _printable(text: str) -> str:
+    """Return ``text`` with control characters, which a terminal obeys, as escapes.
+
+    A server's sentences are another program's. No codec is used: that would import a module.
+    """
+    return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in text)

@@ -292,6 +292,31 @@ def test_good_data_raise_no_doubts(tmp_path: Path) -> None:
     assert import_file(path, tmp_path / "out.h5", metadata=metadata, now=Clock()) == []
 
 
+@pytest.mark.parametrize("volts", [4000.0, -4000.0])
+def test_a_displacement_with_the_other_sign_raises_a_doubt(tmp_path: Path, volts: float) -> None:
+    """As of a laser that is mounted the other way round."""
+    lobes = np.maximum(0.0, np.sin(0.02 * np.arange(1500))) ** 2
+    noise = np.random.default_rng(0).normal(0.0, 2e-6, 1500)
+    for sign, doubtful in ((1.0, False), (-1.0, True)):
+        rows = np.column_stack([0.01 * np.arange(1500), volts * lobes, sign * 1e-4 * lobes + noise])
+        path = tmp_path / "in.csv"
+        np.savetxt(path, rows, delimiter=",", comments="", header="time_s,voltage_V,displacement_m")
+        found = import_file(path, tmp_path / f"{sign:g}.h5", now=Clock())
+        said = [s for s in found if "falls where the voltage rises: is its sign right?" in s]
+        assert bool(said) is doubtful
+
+
+def test_noise_alone_raises_no_doubt_about_its_sign(tmp_path: Path) -> None:
+    lobes = np.maximum(0.0, np.sin(0.02 * np.arange(1500))) ** 2
+    for seed in range(10):
+        noise = np.random.default_rng(seed).normal(0.0, 1e-5, 1500)
+        rows = np.column_stack([0.01 * np.arange(1500), 4000.0 * lobes, noise])
+        path = tmp_path / "in.csv"
+        np.savetxt(path, rows, delimiter=",", comments="", header="time_s,voltage_V,displacement_m")
+        found = import_file(path, tmp_path / f"{seed}.h5", now=Clock())
+        assert not any("sign" in sentence for sentence in found)
+
+
 def test_mat_variables_fields_and_columns(tmp_path: Path) -> None:
     t = np.arange(5.0)
     path = tmp_path / "in.mat"
