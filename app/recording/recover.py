@@ -27,10 +27,10 @@ def recover(path: str | Path, now: Callable[[], float] = time.time) -> bool:
     without locks, it changed within the last ten seconds (``now`` is Unix time in s).
     """
     path = Path(path)
+    open_recording(path)
     if path.is_symlink():
         # the journal is beside the file itself
         path = path.resolve()
-    open_recording(path)
     try:
         if _is_whole(path):
             return False

@@ -30,7 +30,7 @@ def tips(widget: QWidget) -> list[str]:
         models.append(widget.model())
     for model in models:
         for row in range(model.rowCount()):
-            for column in range(model.columnCount()):
+            for column in range(20):  # an index beyond the last column has no data
                 tip = model.index(row, column).data(Qt.ItemDataRole.ToolTipRole)
                 found.append(str(tip or ""))
     return found
