@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from dearig.errors import InputError
+from dearig.input_file import why_no_file
 from dearig.recording.files import in_words
 from dearig.recording.finish import finish
 from dearig.recording.journal import carry_out, whole_journal
@@ -27,10 +28,12 @@ def recover(path: str | Path, now: Callable[[], float] = time.time) -> bool:
     without locks, it changed within the last ten seconds (``now`` is Unix time in s).
     """
     path = Path(path)
-    open_recording(path)
+    if reason := why_no_file(path):
+        raise InputError(f"{path} {reason}")
     if path.is_symlink():
         # the journal is beside the file itself
         path = path.resolve()
+    open_recording(path)
     try:
         if _is_whole(path):
             return False
