@@ -10,14 +10,17 @@ from collections.abc import Callable, Iterator, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, cast
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
+from dearig.drivers import gate
 from dearig.drivers.channels import CHANNEL_NAMES
-from dearig.drivers.errors import RigError, RigStateError
+from dearig.drivers.errors import ChangedWaveform, RigError, RigStateError
 from dearig.drivers.gate import GatedWaveform, Limits, Prediction, admit
 from dearig.drivers.rig import Block, Event, Rig, RigState
+from dearig.drivers.samples import Computed
 from dearig.drivers.settings import LimitsSettings
 
 __all__ = [
@@ -284,6 +287,41 @@ class RigContract:
         if command[at - 1] > 1.0:
             expected = LimitsSettings().ramp_down_s * RATE
             assert command.size - at == pytest.approx(expected, abs=2.0)
+
+    def test_samples_that_have_changed_since_the_gate_are_never_output(self) -> None:
+        checked = lobes(peaks=(8000.0,) * 8).window()
+        factor = 1.0
+
+        def window(start: int, stop: int) -> np.ndarray:
+            values = checked[start:stop].copy()
+            return factor * values if start >= 640 else values
+
+        # pieces so short that the waveform is computed again while it is played
+        with patch.multiple(gate, _PIECE=64, _KEPT=2), self.opened(block_samples=50) as rig:
+            waveform = admit(Computed(checked.size, window), RATE, LIMITS, foreseen(checked.size))
+            factor = 0.5  # within all limits, and yet not what was checked
+            counts = [np.empty(0, dtype=np.int16)]
+
+            def run() -> None:
+                begin(rig, waveform)
+                while (block := rig.read()) is not None:
+                    counts.append(block.counts[0])
+
+            with pytest.raises(ChangedWaveform, match="not those that passed the gate"):
+                run()
+            rig.make_safe()
+            assert rig.state is RigState.SAFE
+            command = rig.identify().channels[0].scaling.physical(np.concatenate(counts))
+        assert command.size <= 640
+        assert np.abs(command - checked[: command.size]).max(initial=0.0) < 1.0
+
+    def test_a_waveform_computed_again_plays_as_one_that_is_held(self) -> None:
+        checked = lobes(peaks=(8000.0,) * 8).window()
+        source = Computed(checked.size, lambda start, stop: checked[start:stop])
+        with patch.multiple(gate, _PIECE=64, _KEPT=2), self.opened(block_samples=50) as rig:
+            record = play(rig, admit(source, RATE, LIMITS, foreseen(checked.size)))
+            command = record.physical(rig, "voltage_command")
+        assert np.abs(command - checked).max() < 1.0
 
     def test_stop_after_the_end_changes_nothing(self, rig: Rig) -> None:
         play(rig, lobes())

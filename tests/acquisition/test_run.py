@@ -22,6 +22,7 @@ from dearig.cli.last_words import LastingStream
 from dearig.config.modelfile import save_model
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
+from dearig.drivers import gate
 from dearig.drivers.errors import RigError
 from dearig.drivers.gate import GatedWaveform
 from dearig.drivers.rig import Block, Event, RigIdentity, RigState
@@ -35,6 +36,7 @@ from dearig.errors import (
     SafetyStop,
 )
 from dearig.model.actuator import Actuator
+from dearig.model.excitation import Sampled
 from dearig.model.material import TABLE_3
 from dearig.recording import open_recording
 from dearig.recording.recorder import Recorder, is_writing
@@ -644,6 +646,36 @@ def test_a_fault_of_the_program_itself_ends_at_0_volts_too(
     assert closed_at_zero(rig)
     assert any(line.startswith("stop at") for line in rig.diary)
     assert open_recording(tmp_path / "run.h5").outcome == "ended early by a fault of the program"
+
+
+def test_a_segment_that_changes_during_a_run_ends_it_at_0_volts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # pieces so short that the waveform is computed again while it is played
+    monkeypatch.setattr(gate, "_PIECE", 64)
+    monkeypatch.setattr(gate, "_KEPT", 2)
+    write(tmp_path / "w.csv", "time_s,voltage_kV\n0,0\n1,5\n2,0\n")
+    loaded = parse_sequence('name = "x"\n[[segment]]\nkind = "csv"\nfile = "w.csv"', "x", tmp_path)
+    points = loaded.sequence.segments[0]
+    assert isinstance(points, Sampled)
+
+    class Meddler(RunObserver):
+        def block(self, block: Block) -> None:
+            if block.start > 2500:
+                points.voltages[1] = 5001.0
+
+    rig = Troubled("never", key)
+    monkeypatch.setattr("dearig.acquisition.run.open_rig", lambda *_, **__: rig)
+    with pytest.raises(InstrumentFault, match="not those that passed the gate"):
+        record(loaded, "sim", RIG_FILE, tmp_path / "run.h5", observer=Meddler())
+    assert closed_at_zero(rig)
+    run = open_recording(tmp_path / "run.h5")
+    assert "not those that passed the gate" in run.outcome
+    assert run.voltage_command is not None
+    points.voltages[1] = 5000.0
+    np.testing.assert_allclose(
+        run.voltage_command, loaded.sample(1000.0)[1][: run.samples], atol=0.2
+    )
 
 
 def test_errors_carry_the_codes_of_the_contract() -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import cast
 
+import numpy as np
 import pytest
 
 from dearig.acquisition.plan import plan
@@ -42,6 +44,25 @@ class Jumping(Hold):
         return Wrong()
 
 
+class Noisy(Hold):
+    """A hold with noise that is drawn anew whenever it is computed."""
+
+    def build(self, folder: Path) -> Segment:
+        built = super().build(folder)
+        generator = np.random.default_rng(0)
+
+        class Wrong:
+            duration, start, end = built.duration, built.start, built.end
+
+            def after(self, end: float) -> Segment:  # noqa: ARG002
+                return cast("Segment", self)
+
+            def voltage(self, t: np.ndarray) -> np.ndarray:
+                return built.voltage(t) + 1e-6 * generator.standard_normal(t.size)
+
+        return cast("Segment", Wrong())
+
+
 class Undescribed(Hold):
     """A kind with a key that nobody explains."""
 
@@ -58,6 +79,7 @@ class Refused(Hold):
     ("kind", "match"),
     [
         (Jumping, "0 V at the end, and end is 1000 V"),
+        (Noisy, "other values when it is asked again"),
         (Undescribed, "the key level_kV has no description"),
         (Refused, "its example is refused"),
     ],
@@ -118,6 +140,7 @@ def test_a_kind_of_another_distribution_is_found_everywhere(tmp_path: Path) -> N
         {"dearig.segments": {"sawtooth": "sawtooth:Sawtooth"}},
         """
         from pathlib import Path
+from typing import cast
         import sawtooth  # whoever imports the kind first must not break the registry
         from dearig.config.segments import SEGMENT_KINDS
         from dearig.config.segments.contract import check_segment

@@ -7,6 +7,7 @@ import pytest
 
 from dearig.drivers.interlocks import Interlocks, would_trip
 from dearig.drivers.rig import Block
+from dearig.drivers.samples import Computed, Repeated
 from dearig.drivers.settings import AmplifierSettings, LaserSettings
 from tests.tools.interlock_signals import (
     NAMES,
@@ -355,6 +356,18 @@ def test_following_is_not_judged_without_a_prediction():
     assert signals.trips() == []
     interlocks = Interlocks(signals.settings, signals.channels, RATE, None, signals.planned)
     assert watch(interlocks, signals.counts()) == []
+
+
+@pytest.mark.parametrize("cuts", [(), range(7, 2000, 7)])
+def test_a_plan_that_is_computed_window_by_window_is_judged_as_one_that_is_held(cuts):
+    signals = Signals()
+    signals.displacement[PEAK:] = REST + 1e-6 * np.random.default_rng(0).standard_normal(1650)
+    expected = signals.trips(cuts=cuts)
+    assert expected
+    planned = Computed(2000, lambda start, stop: signals.planned[start:stop])
+    predicted = Repeated(signals.predicted, 1, 2000)
+    computed = Interlocks(signals.settings, signals.channels, RATE, predicted, planned)
+    assert watch(computed, signals.counts(), cuts) == expected
 
 
 def test_a_film_that_should_get_shorter_follows_downwards():

@@ -15,7 +15,9 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 import dearig.window.planner as planner_module
+from dearig.acquisition.plan import Plan
 from dearig.config.presets import PRESETS
+from dearig.progress import Progress
 from dearig.window.planner import Planner
 from dearig.window.sequence_page import SequencePage
 from dearig.window.session import Preview, Session
@@ -107,6 +109,26 @@ def test_what_is_long_in_planning_is_not_shown_as_planned(
     qtbot.waitUntil(lambda: page.preview.plots.drawn == ())
     assert page.preview.state.text() == "Planning …"
     resume.set()
+    settled(qtbot, page.session)
+    assert page.preview.plots.drawn == ("voltage", "displacement", "field")
+
+
+def test_a_plan_that_is_no_longer_wanted_ends(
+    qtbot: QtBot, page: SequencePage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, begun = planner_module.plan, threading.Event()
+
+    def endless(*given: Any, progress: Progress, **more: Any) -> Plan:
+        if given[0].sequence.name != "too high":
+            return real(*given, progress=progress, **more)
+        while True:
+            begun.set()
+            progress("planning", 0.5)
+
+    monkeypatch.setattr(planner_module, "plan", endless)
+    page.session.set_sequence(TOO_HIGH, Path())
+    assert begun.wait(60.0)
+    page.preset("rich")
     settled(qtbot, page.session)
     assert page.preview.plots.drawn == ("voltage", "displacement", "field")
 

@@ -71,6 +71,11 @@ def _check_segment(what: str, segment: Segment) -> None:
             raise ContractError(
                 f"{what}: voltage() is {value:.6g} V at the {where}, and {where} is {stated:.6g} V"
             )
+    if not np.array_equal(segment.voltage(time.copy()), voltage):
+        raise ContractError(
+            f"{what}: voltage() gives other values when it is asked again; a run that computes it "
+            f"again would end at the first difference"
+        )
     # the run is sampled in one piece, the preview in another
     parts = np.concatenate([segment.voltage(part) for part in np.array_split(time, 7)])
     if not np.allclose(parts, voltage, rtol=0.0, atol=1e-9 * np.abs(voltage).max(initial=1.0)):
