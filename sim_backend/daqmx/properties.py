@@ -122,13 +122,15 @@ Setter = Callable[[Asked, Any], None]
 class Property:
     """One property: how it is read and, where it can be, how it is set and what a reset sets.
 
-    ``running`` is True if it may also be set while the task runs.
+    ``running`` is True if it may also be set while the task runs, ``effect`` False if its value is
+    only kept.
     """
 
     get: Getter
     set: Setter | None = None
     default: Getter | None = None
     running: bool = False
+    effect: bool = True
 
 
 def _getter(value: Any) -> Getter:
@@ -196,7 +198,7 @@ def accepted(
         _kept(asked).pop(key, None)
         return default(asked)
 
-    return Property(get, set_, reset)
+    return Property(get, set_, reset, effect=False)
 
 
 def _kept(asked: Asked) -> dict[object, Any]:

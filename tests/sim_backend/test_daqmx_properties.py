@@ -1,5 +1,8 @@
 """Properties of the simulated card: set later, given back, reset, or refused."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from nidaqmx.constants import (
@@ -17,6 +20,9 @@ from nidaqmx.errors import DaqError
 from nidaqmx.scale import Scale
 from nidaqmx.system import Device, System, WatchdogTask
 
+from dearig.sim_backend.daqmx import attributes
+from dearig.sim_backend.daqmx.attributes import TABLES
+from dearig.sim_backend.daqmx.properties import NAMES
 from tests.tools.daqmx import ENABLE, add_inputs, add_output, clock_inputs, read, task
 
 # of a channel
@@ -271,3 +277,20 @@ def test_a_waveform_is_scaled_row_by_row(session):
         ao.write(2.0)
         assert np.array(ai.read(3)) == pytest.approx(np.array([[2.0] * 3, [1.0] * 3]), abs=2e-3)
         ao.write(0.0)
+
+
+# of the tables
+
+
+def test_every_name_in_a_table_is_one_of_the_protocol():
+    for group, table in TABLES.items():
+        known = {name for (of, _), name in NAMES.items() if of == group}
+        assert set(table) <= known, group
+
+
+def test_every_property_without_effect_is_named_in_the_readme():
+    words = (Path(attributes.__file__).parent / "README.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`([A-Z_]+)`", words))
+    for table in TABLES.values():
+        for name, entry in table.items():
+            assert entry.effect or any(part in name for part in named), name
