@@ -99,7 +99,7 @@ def _lock_memory() -> None:
 
 
 def _may_lock_beyond_limit() -> bool:
-    found = re.search(r"^CapEff:\s*([0-9a-f]+)", Path("/proc/self/status").read_text("ascii"), re.M)
+    found = re.search(rb"^CapEff:\s*([0-9a-f]+)", Path("/proc/self/status").read_bytes(), re.M)
     return found is not None and bool(int(found[1], 16) >> _CAP_IPC_LOCK & 1)
 
 

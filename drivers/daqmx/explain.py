@@ -20,6 +20,7 @@ __all__ = [
     "INPUT_OVERWRITTEN",
     "RESERVED",
     "TIMEOUT",
+    "WATCHDOG_EXPIRED",
     "explained",
     "instrument_errors",
 ]
@@ -27,6 +28,7 @@ __all__ = [
 ABORTED = (-88708, -88709, -200088)  #: a reset ended the task, or somebody cleared it
 RESERVED = -50103  #: another task holds the card
 TIMEOUT = -200284  #: samples did not arrive in time
+WATCHDOG_EXPIRED = -200644  #: the card's watchdog has acted
 INPUT_OVERWRITTEN = -200279  #: the reader was too late
 
 #: gRPC's words on a peer that answers -> what it is, and what to do
@@ -101,6 +103,14 @@ _KNOWN: dict[int, tuple[str, str]] = {
     -200088: (
         "its task is gone: the card was reset, or another program took it over",
         "check what else uses the card; the output is at 0 V if the guardian took over",
+    ),
+    -200644: (
+        "its watchdog has taken the enable line low, because the program was silent for too long",
+        "find out what kept the program from running; close other programs",
+    ),
+    -200678: (
+        "its watchdog has expired and holds the enable line low",
+        "start the run again, which ends the watchdog",
     ),
     -201003: (
         "it does not answer: unplugged, without power, or lost its bus",

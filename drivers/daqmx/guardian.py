@@ -141,6 +141,7 @@ class GuardianProcess:
         self._guards = self._trying = False
         self._news = threading.Condition()  # guards what the listener changes, down to _ended
         self._unheard: deque[float] = deque()  # times of the words that are not acknowledged
+        self._overdue = False  # True after a word was not acknowledged in time
         self._ready: dict[str, Any] | None = None
         self._refusal = ""  # sentence of a guardian that cannot start
         self._reports = 0
@@ -210,12 +211,14 @@ class GuardianProcess:
         if self._process.poll() is not None:
             return False
         with self._news:
-            if self._unheard and self._clock() - self._unheard[0] > _HEARS_WITHIN:
+            if self._unheard and self._clock() - self._unheard[0] <= _HEARS_WITHIN:
+                return True
+            if self._unheard and not self._overdue:
                 # this process may itself have been frozen, and its listener with it
                 self._news.wait_for(lambda: not self._unheard, _LATE)
-                return not self._unheard
-            if self._unheard:
-                return True
+            self._overdue = bool(self._unheard)
+            if self._overdue:
+                return False
         return self._send("beat")
 
     def fault(self) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ipaddress
-import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dearig.drivers.daqmx.certificates import read_certificates
@@ -48,13 +47,11 @@ class Link:
             _check_security(server, settings.card)
         self.security = None if server is None else _security(server, settings.card)
         try:
-            import nidaqmx.errors
+            import nidaqmx  # noqa: F401
         except ImportError as error:
             raise RigError(
                 f'the Python package nidaqmx is not installed ({error}): pip install "dearig[rig]"'
             ) from error
-        # a task that could not be cleared is reported as an error of its own
-        warnings.filterwarnings("ignore", category=nidaqmx.errors.DaqResourceWarning)
         if server is not None:
             self._channel = _channel_with_deadline(
                 server, settings.guardian.link_timeout_s, settings.card

@@ -18,9 +18,9 @@ from dearig.drivers.settings import RigSettings
 
 if TYPE_CHECKING:
     import nidaqmx
-    from nidaqmx.system import Device
+    from nidaqmx.system import Device, WatchdogTask
 
-__all__ = ["Outputs"]
+__all__ = ["Outputs", "clear"]
 
 T = TypeVar("T")
 
@@ -169,11 +169,10 @@ class Outputs:
         A task may have been aborted or cleared by a reset, or by a new start of the server: then
         it is made again.
         """
-        kept = key in self._tasks
         try:
             return self._used(key, add, use)
         except RigError as error:
-            if not kept or error.code in (None, RESERVED):
+            if error.code in (None, RESERVED):
                 raise
             return self._used(key, add, use)
 
@@ -192,18 +191,27 @@ class Outputs:
                 result = use(task)
                 task.control(TaskMode.TASK_UNRESERVE)
                 return result
-        except RigError:
-            self._drop(key)
+        except RigError as error:
+            if error.code != RESERVED:
+                self._drop(key)
             raise
 
     def _drop(self, key: str) -> None:
         task = self._tasks.pop(key, None)
         if task is not None:
             with contextlib.suppress(RigError), self._errors():
-                task.close()
+                clear(task)
 
     def _errors(self) -> contextlib.AbstractContextManager[None]:
         return instrument_errors(self._device, self._link.server)
+
+
+def clear(task: nidaqmx.Task | WatchdogTask) -> None:
+    """Clear ``task``; one that cannot be cleared raises here, and not as a warning at the end."""
+    try:
+        task.close()
+    finally:
+        task._handle = None
 
 
 def _write_volts(task: nidaqmx.Task, volts: float) -> None:

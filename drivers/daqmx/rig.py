@@ -12,7 +12,7 @@ import numpy as np
 
 from dearig.drivers.command import Command
 from dearig.drivers.daqmx.address import Address
-from dearig.drivers.daqmx.explain import ABORTED, TIMEOUT, explained
+from dearig.drivers.daqmx.explain import ABORTED, TIMEOUT, WATCHDOG_EXPIRED, explained
 from dearig.drivers.daqmx.guardian import Guardian, GuardianProcess, TakeOver
 from dearig.drivers.daqmx.link import Link
 from dearig.drivers.daqmx.outputs import Outputs
@@ -30,7 +30,11 @@ log = logging.getLogger(__name__)
 _BLOCK = 0.1  # s; the library's users recommend ten reads a second
 _WAIT = 0.25  # s for samples, between two beats of the guardian
 _OVERDUE = 2.0  # s without a sample while the clock should run
-_REPORT_WITHIN = 0.5  # s from the end of a task by the guardian to the guardian's report
+_UNGUARDED = "no answer from the guardian process"
+# errors of a run whose tasks the guardian is about to end, or has just ended
+_TAKEN = (*ABORTED, WATCHDOG_EXPIRED)
+_REPORT_WITHIN = 0.5  # s from such an error to the guardian's report
+_REPORTED_WITHIN = 0.05  # s, after any other error, for a report that has arrived
 
 
 def open_daqmx_rig(
@@ -96,7 +100,7 @@ class DaqmxRig:
     @property
     def waiting(self) -> float:
         """Return the reader's delay in s: samples that were acquired and not read."""
-        with self._lock:
+        with self._lock, self._guardian_named():
             if self._state is not RigState.RUNNING or self._run is None or self._tasks is None:
                 return 0.0
             return self._tasks.waiting() / self._run.rate
@@ -183,11 +187,7 @@ class DaqmxRig:
                 if not guarded and not run.unguarded:
                     run.unguarded = True
                     run.events.append(
-                        Event(
-                            run.delivered,
-                            "fault",
-                            "no answer from the guardian process: ramping to 0 V",
-                        )
+                        Event(run.delivered, "fault", f"{_UNGUARDED}: ramping to 0 V")
                     )
                     self._stop(tasks, run)
                 if run.delivered == run.total:
@@ -292,17 +292,19 @@ class DaqmxRig:
 
     @contextmanager
     def _guardian_named(self) -> Iterator[None]:
-        """Add to an error of the card what the guardian did, where it has taken over."""
+        """Add to an error of the card what the guardian did, or that it gives no answer."""
         try:
             yield
         except RigStateError:
             raise
         except RigError as error:
-            # a task that was ended from elsewhere: the guardian is about to say that it did so
-            acted = self._guardian.report(_REPORT_WITHIN if error.code in ABORTED else 0.0)
-            if acted is None:
-                raise
-            raise RigError(f"{error}; {acted.sentence}", error.code) from error
+            late = _REPORT_WITHIN if error.code in _TAKEN else _REPORTED_WITHIN
+            acted = self._guardian.report(late)
+            if acted is not None:
+                raise RigError(f"{error}; {acted.sentence}", error.code) from error
+            if self._run is not None and self._run.unguarded and error.code is not None:
+                raise RigError(f"{error}; {_UNGUARDED}", error.code) from error
+            raise
 
     def _loaded(self) -> tuple[ClockedTasks, _Run]:
         if self._tasks is None or self._run is None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,7 @@ from dearig.drivers.channels import Channel
 from dearig.drivers.command import Command
 from dearig.drivers.daqmx.explain import TIMEOUT, instrument_errors
 from dearig.drivers.daqmx.link import Link
+from dearig.drivers.daqmx.outputs import clear
 from dearig.drivers.errors import RigError
 from dearig.drivers.settings import RigSettings
 
@@ -211,7 +213,7 @@ class ClockedTasks:
         """Clear output and inputs; the output keeps its last value. Raises as ``close``."""
         ao, ai = self._ao, self._ai
         self._ao = self._ai = None
-        self._all([task.close for task in (ao, ai) if task is not None])
+        self._all([partial(clear, task) for task in (ao, ai) if task is not None])
 
     def disable(self) -> None:
         """Set the enable line low and end its watchdog. Raises as ``close``."""
@@ -220,7 +222,7 @@ class ClockedTasks:
         calls: list[Callable[[], object]] = []
         if enable is not None:
             calls.append(lambda: enable.write(False, auto_start=True))
-        calls.extend(task.close for task in (enable, watchdog) if task is not None)
+        calls.extend(partial(clear, task) for task in (enable, watchdog) if task is not None)
         self._all(calls)
 
     def close(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -13,7 +14,7 @@ from nidaqmx import GrpcSessionOptions
 
 from dearig.config.rigfile import RigFile
 from dearig.drivers.contract.rig import RigContract, begin, drain, lobes, play
-from dearig.drivers.daqmx import inspect
+from dearig.drivers.daqmx import inspect, link
 from dearig.drivers.daqmx.address import Address
 from dearig.drivers.daqmx.guardian import TakeOver
 from dearig.drivers.daqmx.rig import DaqmxRig
@@ -73,6 +74,7 @@ class Bench:
         there: RigFile | None = None,
         seed: int = 0,
         faults=(),
+        client_timeout: float | None = None,
         **options,
     ) -> None:
         """``there`` is what is really there, where it is not what ``settings`` say."""
@@ -83,7 +85,7 @@ class Bench:
             "sim", there, there.as_film(), there.as_load(), seed=seed, clock=self.clock,
             faults=FaultPlan.parse(faults),
         )  # fmt: skip
-        self.server = DaqmxServer(self.device, client_timeout=None)
+        self.server = DaqmxServer(self.device, client_timeout=client_timeout)
         self.address = Address("Dev1", f"127.0.0.1:{self.server.start()}")
         self.guardian = Watcher()
         try:
@@ -231,6 +233,90 @@ def test_a_dead_guardian_ramps_the_run_down(bench):
     events = [event for block in blocks for event in block.events]
     assert "no answer from the guardian process" in events[0].message
     assert bench.device.wire_voltage() == 0.0
+
+
+def test_fault_of_an_unguarded_run_names_the_guardian_too():
+    with Bench(faults=["ai-overflow@0.3"]) as bench:
+        begin(bench.rig, LONG)
+        bench.rig.read()
+        bench.guardian.dead = True
+        with pytest.raises(RigError, match=r"read too late.*no answer from the guardian process"):
+            drain(bench.rig)
+
+
+REPORT = TakeOver("the run is frozen", 0.0, 0.06)
+
+
+@pytest.mark.parametrize("call", ["read", "stop", "waiting"])
+def test_run_that_the_guardian_ended_says_so(bench, call):
+    begin(bench.rig, LONG)
+    bench.rig.read()
+    bench.device.reset("Dev1")
+    bench.guardian.reported = REPORT
+    calls = {
+        "read": lambda: drain(bench.rig),
+        "stop": bench.rig.stop,
+        "waiting": lambda: bench.rig.waiting,
+    }
+    with pytest.raises(RigError, match=r"the guardian acted at .* .the run is frozen.: the output"):
+        calls[call]()
+    assert bench.rig.taken_over == REPORT
+
+
+def test_what_the_system_refused_the_guardian_is_an_event_of_the_run(bench):
+    bench.guardian.refused = ("locked memory (the limit memlock is not unlimited)",)
+    events = [e for block in play(bench.rig, lobes()).blocks for e in block.events]
+    assert [(e.sample, e.level) for e in events] == [(0, "info")]
+    assert "refused the guardian: locked memory (the limit" in events[0].message
+
+
+class Striker(grpc.UnaryUnaryClientInterceptor):
+    """Does ``act`` before the call number ``number`` from now on."""
+
+    def __init__(self) -> None:
+        self.number = 0
+        self.act = lambda: None
+
+    def intercept_unary_unary(self, call, details, request):
+        self.number -= 1
+        if self.number == 0:
+            self.act()
+        return call(details, request)
+
+
+STRUCK_CALLS = 24  # of a stop or a read, and of the way to 0 V after it
+
+
+@pytest.mark.parametrize("act", ["reset", "clear"])
+@pytest.mark.parametrize("way", ["read", "stop", "make_safe"])
+def test_run_and_guardian_that_act_at_once_end_safe_with_sentences(monkeypatch, act, way):
+    striker, make = Striker(), link._channel_with_deadline
+    monkeypatch.setattr(
+        link, "_channel_with_deadline", lambda *a: grpc.intercept_channel(make(*a), striker)
+    )
+    with Bench(WIRED, client_timeout=1e9) as bench:
+
+        def strike() -> None:
+            bench.device.reset("Dev1")  # as the guardian does
+            if act == "clear":  # as a server does with the tasks of a client that it lost
+                bench.server.clients.all_gone()
+
+        striker.act = strike
+        for number in range(1, STRUCK_CALLS):
+            begin(bench.rig, LONG)
+            bench.rig.read()
+            striker.number = number
+            with contextlib.suppress(RigError):
+                if way == "stop":
+                    bench.rig.stop()
+                if way != "make_safe":
+                    while striker.number > 0 and bench.rig.read() is not None:
+                        pass
+                    bench.rig.read()
+            bench.rig.make_safe()
+            assert bench.device.wire_voltage() == 0.0
+            assert not bench.device.line("port0/line0")
+            assert "take over" not in bench.guardian.words
 
 
 def test_nothing_starts_without_a_guardian(bench):

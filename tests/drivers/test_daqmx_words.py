@@ -1,8 +1,18 @@
 """Addresses of cards, and what DAQmx's codes become in words."""
 
+import socket
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import grpc
 import nidaqmx.errors
 import pytest
 from grpc import StatusCode
+from nidaqmx import GrpcSessionOptions
+from nidaqmx.system import Device
 
 from dearig.drivers.daqmx.address import Address
 from dearig.drivers.daqmx.explain import _KNOWN, explained, instrument_errors
@@ -66,3 +76,54 @@ def test_whatever_the_library_raises_becomes_a_sentence(raised, code, said):
 def test_other_errors_are_not_the_instruments():
     with pytest.raises(ZeroDivisionError), instrument_errors("Dev1", None):
         raise ZeroDivisionError
+
+
+@contextmanager
+def grpc_server() -> Iterator[int]:
+    server = grpc.server(ThreadPoolExecutor(1))
+    port = server.add_insecure_port("127.0.0.1:0")
+    server.start()
+    yield port
+    server.stop(0).wait()
+
+
+@contextmanager
+def web_server() -> Iterator[int]:
+    handler = type("Quiet", (BaseHTTPRequestHandler,), {"log_message": lambda *_: None})
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield server.server_port
+        server.shutdown()
+        thread.join()
+
+
+@contextmanager
+def nobody() -> Iterator[int]:
+    with socket.create_server(("127.0.0.1", 0)) as port:
+        number = port.getsockname()[1]
+    yield number
+
+
+@pytest.mark.parametrize(
+    ("peer", "said"),
+    [
+        (grpc_server, "a server that does not know this call .UNIMPLEMENTED.; it is not NI's"),
+        (web_server, "a program that does not speak gRPC"),
+        (nobody, "does not answer .UNAVAILABLE."),
+    ],
+)
+def test_peer_that_is_no_daqmx_server_is_said_to_be_none(peer, said):
+    with peer() as port, grpc.insecure_channel(f"127.0.0.1:{port}") as channel:
+        device = Device("Dev1", grpc_options=GrpcSessionOptions(channel, ""))
+        where = f"127.0.0.1:{port}"
+        with pytest.raises(RigError, match=said) as caught, instrument_errors("Dev1", where):
+            device.self_test_device()
+    assert where in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("code", "cause"), [(-200561, "beyond the range of its channel"), (-200081, "do not fit")]
+)
+def test_cause_is_that_of_the_librarys_table(code, cause):
+    assert cause in explained("Dev1", code, "")

@@ -74,6 +74,72 @@ def test_guardian_starts_beside_decoys(decoys, monkeypatch, listed):
         guardian.close()
 
 
+@pytest.fixture
+def hostile(tmp_path, monkeypatch):
+    """A working folder that has everything a process might import from it; each leaves a mark."""
+    mark = tmp_path / "imported"
+    code = f"import pathlib; pathlib.Path({str(mark)!r}).touch()\n"
+    packages = ("dearig", "dearig/drivers", "dearig/drivers/daqmx", "drivers", "drivers/daqmx")
+    modules = ("queue", "sitecustomize", "usercustomize", "startup", "grpc", "nidaqmx", "isolated")
+    files = [f"{name}.py" for name in (*NAMES, *modules)]
+    for folder in ("", "relative"):
+        for file in files:
+            path = tmp_path / folder / file
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(code)
+    for package in packages:
+        for name in ("__init__.py", "guardian_process.py", "sources.py"):
+            path = tmp_path / package / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(code)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(("", ".", "relative")))
+    monkeypatch.setenv("PYTHONSTARTUP", "startup.py")
+    monkeypatch.setattr(
+        sys, "path", ["", str(tmp_path), str(tmp_path / "relative"), "relative", *sys.path]
+    )
+    return mark
+
+
+def test_guardian_imports_nothing_from_a_hostile_folder(hostile):
+    with served() as bench:
+        guardian = GuardianProcess(Address("Dev1", f"127.0.0.1:{bench.server.port}"), RigFile())
+        guardian.arm()
+        guardian.disarm()
+        guardian.close()
+    assert not hostile.exists()
+
+
+def test_guardian_starts_in_a_deleted_folder(tmp_path, monkeypatch):
+    folder = tmp_path / "deleted"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    try:
+        folder.rmdir()
+    except OSError:
+        pytest.skip("this system keeps a folder in which somebody works")
+    with served() as bench:
+        guardian = GuardianProcess(Address("Dev1", f"127.0.0.1:{bench.server.port}"), RigFile())
+        guardian.arm()
+        guardian.disarm()
+        guardian.close()
+
+
+def test_guardian_starts_from_the_folder_that_holds_the_program(tmp_path, monkeypatch):
+    try:
+        (tmp_path / "dearig").symlink_to(dearig.__path__[0], target_is_directory=True)
+    except OSError:
+        pytest.skip("this account may not make links")
+    (tmp_path / "queue.py").write_text('raise ImportError("the decoy queue")\n')
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    with served() as bench:
+        guardian = GuardianProcess(Address("Dev1", f"127.0.0.1:{bench.server.port}"), RigFile())
+        guardian.arm()
+        guardian.disarm()
+        guardian.close()
+
+
 def test_spawned_worker_starts_beside_decoys(decoys, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(decoys))
     before = sys.path.copy(), dict(os.environ)
