@@ -8,17 +8,25 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
+from typing import IO
 
 import dearig
 import dearig.drivers
 from dearig.drivers import isolated
 
-__all__ = ["child_environment", "child_path", "isolated_command", "isolated_spawn"]
+__all__ = [
+    "child_environment",
+    "child_path",
+    "has_unread",
+    "isolated_command",
+    "isolated_spawn",
+]
 
 
 def child_path() -> list[str]:
@@ -61,6 +69,27 @@ def isolated_command(module: str, *arguments: str) -> list[str]:
     script = str(Path(isolated.__file__).resolve())
     command = [sys.executable, "-I", "-X", "utf8", script, module, json.dumps(places)]
     return [*command, *arguments]
+
+
+def has_unread(pipe: IO[str] | None) -> bool:
+    """Return True if ``pipe`` holds data that nobody has read yet; it never waits."""
+    if pipe is None or pipe.closed:
+        return False
+    if sys.platform == "win32":
+        import ctypes
+        import msvcrt
+
+        waiting = ctypes.c_ulong(0)
+        handle = ctypes.c_void_p(msvcrt.get_osfhandle(pipe.fileno()))
+        peek = ctypes.WinDLL("kernel32").PeekNamedPipe
+        return bool(peek(handle, None, 0, None, ctypes.byref(waiting), None) and waiting.value)
+    try:
+        # not select(), which fails for files numbered 1024 and above
+        poll = select.poll()
+        poll.register(pipe, select.POLLIN)
+        return any(event & select.POLLIN for _, event in poll.poll(0))
+    except ValueError:  # closed by the thread that reads it
+        return False
 
 
 @contextmanager

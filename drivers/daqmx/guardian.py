@@ -22,7 +22,7 @@ from typing import Any, Protocol
 from dearig.drivers import sources
 from dearig.drivers.daqmx.address import Address
 from dearig.drivers.errors import RigError
-from dearig.drivers.processes import isolated_command
+from dearig.drivers.processes import has_unread, isolated_command
 from dearig.drivers.settings import RigSettings
 
 __all__ = ["WORD", "Guardian", "GuardianProcess", "TakeOver"]
@@ -35,7 +35,7 @@ _STARTS_WITHIN = 60.0  # s: an interpreter, the driver's library, a connection
 # s from a beat to its acknowledgement. With ten beats a second, a guardian that stops is noticed
 # within 0.5 s: up to 0.1 s to the next beat, this time, and up to 0.1 s to the read after it.
 _HEARS_WITHIN = 0.3
-_LATE = 0.05  # s of wall time for an acknowledgement that has arrived and was not read yet
+_LATE = 0.05  # s for an acknowledgement that the listener has read at this moment
 _ANSWERS_WITHIN = 0.5  # s from a word other than a beat to its acknowledgement
 _TAKES_OVER_WITHIN = 5.0  # s; it keeps trying after that, but the operator must be told
 _ENDS_WITHIN = 5.0  # s
@@ -211,15 +211,23 @@ class GuardianProcess:
         if self._process.poll() is not None:
             return False
         with self._news:
-            if self._unheard and self._clock() - self._unheard[0] <= _HEARS_WITHIN:
+            waits = bool(self._unheard)
+            if waits and self._clock() - self._unheard[0] <= _HEARS_WITHIN:
                 return True
-            if self._unheard and not self._overdue:
-                # this process may itself have been frozen, and its listener with it
-                self._news.wait_for(lambda: not self._unheard, _LATE)
-            self._overdue = bool(self._unheard)
-            if self._overdue:
-                return False
+        if waits and not self._overdue:
+            # the answer may be there, and the thread that reads it late on a busy computer
+            self._overdue = not (has_unread(self._process.stderr) or self.answered(_LATE))
+        elif not waits:
+            self._overdue = False
+        if waits:
+            return not self._overdue
         return self._send("beat")
+
+    def answered(self, within: float = 0.0) -> bool:
+        """Return True once all words are acknowledged, False if not within ``within`` s."""
+        with self._news:
+            self._news.wait_for(lambda: not self._unheard or self._ended, within)
+            return not (self._unheard or self._ended)
 
     def fault(self) -> str:
         """Return why the guardian gives no answer, as far as that is known."""
@@ -272,12 +280,10 @@ class GuardianProcess:
                 self._process.stdin.close()
         if self._trying:
             return
-        with self._news:
-            # one that does not answer is stopped; it must not wake up in a later run
-            self._news.wait_for(lambda: self._ended or not self._unheard, _ANSWERS_WITHIN)
-            answers = self._ended or not self._unheard
+        # one that does not answer is stopped; it must not wake up in a later run
+        ends = self.answered(_ANSWERS_WITHIN) or self._ended
         try:
-            self._process.wait(_ENDS_WITHIN if answers else 0.0)
+            self._process.wait(_ENDS_WITHIN if ends else 0.0)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
@@ -309,11 +315,7 @@ class GuardianProcess:
 
     def _ask(self, word: str) -> bool:
         """Send ``word``; returns True once the guardian has acknowledged all words."""
-        if not self._send(word):
-            return False
-        with self._news:
-            self._news.wait_for(lambda: not self._unheard or self._ended, _ANSWERS_WITHIN)
-            return not self._unheard and not self._ended
+        return self._send(word) and self.answered(_ANSWERS_WITHIN)
 
     def _send(self, word: str) -> bool:
         if self._process.poll() is not None or self._process.stdin is None:
