@@ -55,6 +55,9 @@ MEASUREMENTS = {
             "tests.benchmarks.bench_daqmx hour",
         ),
     ),
+    "plan": Measurement(
+        "Processor time and memory of long runs", ("tests.benchmarks.bench_plan --full",)
+    ),
     "soak": Measurement(
         "What a server and a program that runs for long keep", ("tests.benchmarks.bench_soak",)
     ),
