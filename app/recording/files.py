@@ -135,9 +135,7 @@ def replaced_when_done(path: Path, overwrite: bool) -> Iterator[Path]:
         raise InputError(f"{path} cannot be written: {in_words(error)}") from error
     finally:
         # what cannot be removed now is removed with the next output in this folder
-        with suppress(OSError):
-            lock.remove()
-        lock.release()
+        lock.remove()
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -152,7 +150,12 @@ def _create_partial(folder: Path) -> FileLock:
     while True:
         path = folder / f"{PARTIAL}{secrets.token_hex(8)}.partial"
         flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
-        lock = lock_or_none(os.open(path, flags | getattr(os, "O_BINARY", 0), 0o666), path)
+        fd = os.open(path, flags | getattr(os, "O_BINARY", 0), 0o666)
+        try:
+            lock = lock_or_none(fd, path)
+        except OSError:
+            path.unlink(missing_ok=True)
+            raise
         # None if another program took the file for an abandoned one before it was locked
         if lock is not None:
             return lock

@@ -18,6 +18,7 @@ import sys
 import time
 import weakref
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -100,12 +101,16 @@ class FileLock:
         self._close()
 
     def remove(self) -> None:
-        """Delete the file, unless another one has its name by now, and release the lock."""
-        own = self.is_at(self.path)
-        if sys.platform == "win32":
-            self.release()  # an open file cannot be deleted there
-        if own:
-            self.path.unlink(missing_ok=True)
+        """Delete the file, unless another one has its name by now, and release the lock.
+
+        A file that cannot be deleted stays: an error that led here is not hidden by another one.
+        """
+        with suppress(OSError):
+            own = self.is_at(self.path)
+            if sys.platform == "win32":
+                self.release()  # an open file cannot be deleted there
+            if own:
+                self.path.unlink(missing_ok=True)
         self.release()
 
     def __enter__(self) -> FileLock:
@@ -195,19 +200,18 @@ def lock_or_none(fd: int, path: Path) -> FileLock | None:
 def refuse_in_use(path: Path) -> None:
     """Raise ``InputError`` if a run, or another program, has locked the existing file ``path``.
 
-    Nothing is locked. A file that cannot be opened counts as not in use.
+    Nothing is locked. A file whose lock cannot be looked at counts as not in use.
     """
     try:
         fd, _ = _open_any(path)
+        try:
+            locked = _is_locked(fd)
+        finally:
+            os.close(fd)
     except OSError:
         return
-    try:
-        if _is_locked(fd):
-            raise InputError(_in_use(path))
-    except _NoLocksError:
-        return
-    finally:
-        os.close(fd)
+    if locked:
+        raise InputError(_in_use(path))
 
 
 def _in_use(path: Path) -> str:

@@ -204,3 +204,29 @@ def test_a_file_that_a_run_creates_is_not_judged(tmp_path: Path) -> None:
     with create_locked(path), pytest.raises(InputError, match="is in use"):
         verify(path)
     assert not verify(path).sound
+
+
+@posix
+@pytest.mark.parametrize("which", ["fcntl.flock", "fcntl.fcntl"])
+def test_a_lock_that_fails_is_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, which: str
+) -> None:
+    path, other = killed_run(tmp_path), tmp_path / "other.h5"
+    before = path.read_bytes()
+
+    def fail(*_: object) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(which, fail)
+        with pytest.raises(InputError, match="Input/output error"):
+            writer(other)
+        assert not other.exists()
+        if which == "fcntl.fcntl":
+            for change in ("recover", "record --force", "import --force"):
+                with pytest.raises(InputError, match="Input/output error"):
+                    CHANGES[change](path, other)
+        assert open_recording(path).samples == 3000
+        assert verify(path).sound
+    assert path.read_bytes() == before
+    assert names(tmp_path) == {"live.h5", "killed.h5"}
