@@ -325,8 +325,8 @@ def serve_daqmx(
         bool,
         typer.Option(
             "--sine",
-            help="Let the inputs read a sine within their limits, as NI's own simulated devices "
-            "give one, instead of the rig.",
+            help="Let the inputs read a sine within their limits and the digital lines a count, as "
+            "NI's own simulated devices do, instead of the rig.",
         ),
     ] = False,
     seed: Seed = 0,

@@ -29,7 +29,11 @@ def check_clocked_lines(task: Task) -> None:
 
 
 class DigitalInput(InputWork):
-    """Lines of ``task`` as they are at ``terminals``; ``timing(now)`` makes the clock."""
+    """Lines of ``task`` as they are at ``terminals``; ``timing(now)`` makes the clock.
+
+    With ``counts`` a line for which it is True reads one bit of the number of the sample, as
+    those of NI's simulated devices do: bit n for line n of a group of eight.
+    """
 
     def __init__(
         self,
@@ -37,10 +41,13 @@ class DigitalInput(InputWork):
         terminals: Terminals,
         timing: Callable[[Task, float], SampleTicks],
         room: Callable[[Task], int],
+        counts: Callable[[str], bool] | None = None,
     ) -> None:
         super().__init__(task)
         self._terminals = terminals
         self._timing = timing
+        self._counts = counts
+        self._reads = 0  # samples that were read without a clock
         self._room = room
 
     def resources(self) -> list[str]:
@@ -56,15 +63,23 @@ class DigitalInput(InputWork):
 
     def _take(self, first: int, last: int) -> np.ndarray:
         if self.ticks is None:
-            return self._levels(np.empty(0))
-        return self._levels(self.ticks.times(first, last))
+            return self._levels(np.empty(0), 0)
+        return self._levels(self.ticks.times(first, last), first)
 
-    def _levels(self, times: np.ndarray) -> np.ndarray:
-        signals = [self._terminals.signal(line) for line in self.task.line_names]
-        return np.array([signal.level(times) for signal in signals], dtype=np.uint8)
+    def _levels(self, times: np.ndarray, first: int) -> np.ndarray:
+        """Return the levels (lines, n) at ``times`` (n,); ``first`` is the first one's number."""
+        numbers = first + np.arange(times.size)
+        levels = [
+            (numbers >> int(line.rpartition("line")[2]) % 8) & 1
+            if self._counts is not None and self._counts(line)
+            else self._terminals.signal(line).level(times)
+            for line in self.task.line_names
+        ]
+        return np.array(levels, dtype=np.uint8)
 
     def still(self, now: float) -> np.ndarray:
-        return self._levels(np.array([now]))
+        self._reads += 1
+        return self._levels(np.array([now]), self._reads - 1)
 
     def still_due(self, now: float) -> float:
         return now

@@ -52,9 +52,14 @@ class SimulatedCard(TriggeredDevice):
         **others: Any,
     ) -> None:
         super().__init__(settings, plant, clock, signals=signals, **others)
+        self._sine = bool(others.get("sine"))
         self._pulses = {counter: PulseSignal(idle_high=False) for counter in COUNTERS}
         for counter, signal in self._pulses.items():
             self.terminals.provide(f"{counter}internaloutput", signal)
+
+    def _counts(self, line: str) -> bool:
+        """Return True if no task puts a level on ``line``."""
+        return not any(t.kind is Kind.DO and line in t.line_names for t in self._tasks.values())
 
     # channels
 
@@ -67,7 +72,13 @@ class SimulatedCard(TriggeredDevice):
             if task.work is not None:
                 return
             if kind is Kind.DI:
-                task.work = DigitalInput(task, self.terminals, self.sample_ticks, self.buffer_size)
+                task.work = DigitalInput(
+                    task,
+                    self.terminals,
+                    self.sample_ticks,
+                    self.buffer_size,
+                    self._counts if self._sine else None,
+                )
             else:
                 task.work = DigitalOutput(task, self.terminals, self._put_line, self.start_edge)
 

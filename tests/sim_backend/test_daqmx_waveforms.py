@@ -4,7 +4,7 @@ import nidaqmx
 import numpy as np
 import pytest
 from hightime import timedelta
-from nidaqmx.constants import PowerUpStates, WaveformAttributeMode
+from nidaqmx.constants import LineGrouping, PowerUpStates, WaveformAttributeMode
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError
 from nidaqmx.stream_readers import AnalogUnscaledReader
@@ -93,6 +93,16 @@ def test_a_card_with_a_sine_has_no_rig_at_its_inputs():
     phase = 2.0 * np.pi * np.arange(200) / 100
     assert whole[0] == pytest.approx(1.5 + 0.3 * np.sin(phase), abs=1e-3)
     assert whole[1] == pytest.approx(2.4 * np.sin(phase), abs=1e-3)
+
+
+def test_the_lines_of_a_card_with_a_sine_count_its_samples():
+    with served(sine=True) as card, task(card.session) as di, task(card.session) as do:
+        di.di_channels.add_di_chan("Dev1/port0/line0:3", line_grouping=LineGrouping.CHAN_PER_LINE)
+        assert [di.read() for _ in range(3)] == [[False] * 4, [True, False, False, False],
+                                                 [False, True, False, False]]  # fmt: skip
+        do.do_channels.add_do_chan("Dev1/port0/line2")
+        do.write(True)
+        assert di.read() == [True, True, True, False]
 
 
 def test_the_card_is_calibrated_and_keeps_a_note(session):
