@@ -48,6 +48,10 @@ class ChecksumWriter:
         """Return the checksums of all blocks so far, channel by channel; the last may be short."""
         return self._full + array("I", self._running if self._filled else ())
 
+    def move_to(self, entry: h5py.Group) -> None:
+        """Write to the same dataset of another file from now on."""
+        self._dataset = entry[NAME]
+
     def add(self, counts: np.ndarray) -> None:
         """Take the next ``counts`` (channels, n)."""
         start, n = 0, counts.shape[1]

@@ -28,6 +28,10 @@ class ModelledWriter:
         )
         describe_field(self._dataset, FIELD)
 
+    def move_to(self, entry: h5py.Group) -> None:
+        """Write to the same dataset of another file from now on."""
+        self._dataset = entry[NAME]
+
     def append(self, displacement: np.ndarray) -> None:
         """Append the next ``displacement`` (n,) m, NaN where the model has failed."""
         first = self._dataset.shape[0]

@@ -45,6 +45,10 @@ class PyramidWriter:
         self._high = [np.empty((channels, 0), dtype=np.int16) for _ in BINS]
         self._pending: list[list[np.ndarray]] = [[] for _ in BINS]
 
+    def move_to(self, entry: h5py.Group) -> None:
+        """Write to the same datasets of another file from now on."""
+        self._datasets = [entry["pyramid"][_name(size)] for size in BINS]
+
     def add(self, counts: np.ndarray) -> None:
         """Take the next ``counts`` (channels, n)."""
         low = high = counts

@@ -14,11 +14,12 @@ import os
 import shutil
 import time
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 import h5py
 import numpy as np
@@ -141,31 +142,8 @@ class RecordingWriter:
                     keep_permissions(self._old, self._path)
             try:
                 with _disk_errors(self._path, InputError):
-                    # the lock replaces that of HDF5, which ends with the start of SWMR mode
-                    self._file = h5py.File(self._path, "w", libver=LIBVER, locking=False)
+                    self._write_layout(self._laid_out(metadata, name, provenance, started))
             except BaseException:
-                self._lock.remove()
-                raise
-            try:
-                with _disk_errors(self._path, InputError):
-                    entry = lay_out(self._file, "actuator", metadata.title or name, started)
-                    self._identifier = text_of(entry[IDENTIFIER][()])
-                    put_text(entry, "sequence", metadata.sequence_toml)
-                    write_sample(entry, metadata)
-                    write_provenance(entry, provenance)
-                    self._lay_out_run(entry)
-                    self._modelled = ModelledWriter(entry, self._chunk) if overlay else None
-                    if metadata.model_toml:
-                        put_text(entry, "model", metadata.model_toml)
-                    self._note_wall_clock(started)
-                    self._file.flush()
-                    self._file.swmr_mode = True
-                    # no later write changes these bytes
-                    at = entry[IDENTIFIER].id.get_offset()
-                    self._mark = (at, self._identifier.encode())
-                    self._flush()
-            except BaseException:
-                self._let_go()
                 self._lock.remove()
                 raise
         except BaseException as error:
@@ -176,6 +154,52 @@ class RecordingWriter:
                 ) from error
             raise
         self._last_flush = now()
+
+    def _laid_out(
+        self, metadata: RunMetadata, name: str, provenance: Mapping[str, Any], started: float
+    ) -> bytes:
+        """Return the content of the file before its first sample.
+
+        It is made in memory. HDF5 crashes when a disk refuses some of its writes, and of others it
+        says nothing: the run would go on into a file that nothing can read.
+        """
+        with h5py.File("layout", "w", libver=LIBVER, driver="core", backing_store=False) as file:
+            entry = lay_out(file, "actuator", metadata.title or name, started)
+            self._identifier = text_of(entry[IDENTIFIER][()])
+            put_text(entry, "sequence", metadata.sequence_toml)
+            write_sample(entry, metadata)
+            write_provenance(entry, provenance)
+            self._lay_out_run(entry)
+            self._modelled = ModelledWriter(entry, self._chunk) if self._overlay else None
+            if metadata.model_toml:
+                put_text(entry, "model", metadata.model_toml)
+            self._note_wall_clock(started)
+            file.flush()
+            return bytes(file.id.get_file_image())
+
+    def _write_layout(self, content: bytes) -> None:
+        """Write ``content`` to the new file, and go on in it with HDF5."""
+        rest = memoryview(content)
+        while rest:
+            rest = rest[os.write(self._lock.fd, rest) :]
+        # the lock replaces that of HDF5, which ends with the start of SWMR mode
+        self._file = h5py.File(self._path, "r+", libver=LIBVER, locking=False)
+        self._descriptor = self._file.id.get_vfd_handle()
+        self._closes = False
+        try:
+            entry = self._file["entry"]
+            self._counts = [entry["data"][counts_name(c.name)] for c in self._channels]
+            self._events, self._wall_clock = entry["events"], entry["wall_clock"]
+            for part in (self._pyramid, self._checksums, self._modelled):
+                if part is not None:
+                    part.move_to(entry)
+            self._file.swmr_mode = True
+            # no later write changes these bytes
+            self._mark = (entry[IDENTIFIER].id.get_offset(), self._identifier.encode())
+            self._flush()
+        except BaseException:
+            self._let_go()
+            raise
 
     def _lay_out_run(self, entry: h5py.Group) -> None:
         data = entry["data"]
@@ -389,15 +413,22 @@ class RecordingWriter:
         """Close the file as a kill would: not another byte is written to it.
 
         HDF5 cannot close a file that it cannot write, and crashes the program when it exits. So its
-        last writes go to the null device.
+        last writes go to the null device. A file whose close has failed is not closed again: that
+        crashes the program at once.
         """
         # not to another file: the same disk or the same limit could refuse that too
         with Path(os.devnull).open("r+b") as null:
-            os.dup2(null.fileno(), self._file.id.get_vfd_handle())
+            os.dup2(null.fileno(), self._descriptor)
+            if self._closes:
+                return
             try:
-                self._file.close()
+                self._close_file()
             except (OSError, RuntimeError):
                 log.debug("%s could not be closed in order", self._path)
+
+    def _close_file(self) -> None:
+        self._closes = True
+        self._file.close()
 
     def _append_events(self, events: tuple[Event, ...]) -> None:
         if not events:
@@ -484,7 +515,7 @@ class RecordingWriter:
         with self._writing():
             self._write_pending(moment)
             self._flush()
-            self._file.close()
+            self._close_file()
         self._all_safe()
         lock = self._lock
         if self._lost is not None:
