@@ -141,6 +141,8 @@ class Interceptor(grpc.ServerInterceptor):
             if frozen:
                 self._freeze()
             refuse(context, error)
+        except NotImplementedError as error:
+            _abort(context, grpc.StatusCode.UNIMPLEMENTED, str(error))
         except Exception as error:
             # the protocol's own way to end a call with a status raises a bare exception
             if type(error) is Exception:

@@ -65,7 +65,7 @@ def refuse(context: grpc.ServicerContext, error: DaqmxError) -> NoReturn:
 
 
 class Servicer(SensorCalls, SystemCalls, WaveformCalls, DigitalCalls, CounterCalls, TriggerCalls):
-    """Service of the calls; the caller handles ``DaqmxError`` with ``refuse``.
+    """Service of the calls; the caller handles ``DaqmxError`` and ``NotImplementedError``.
 
     All other calls are answered with UNIMPLEMENTED, and one line in the log.
     """
@@ -484,7 +484,7 @@ def _unimplemented(name: str) -> Callable[[Servicer, Any, Any], Any]:
 
     def answer(self: Servicer, request: Any, context: grpc.ServicerContext) -> Any:  # noqa: ARG001
         log.warning("%s is not simulated; the client is told so", name)
-        context.abort(grpc.StatusCode.UNIMPLEMENTED, f"{name} is not simulated")
+        raise NotImplementedError(f"{name} is not simulated")
 
     return answer
 

@@ -244,6 +244,16 @@ def test_samples_that_a_request_does_not_hold(card: Served, output: nidaqmx.Task
             assert _ni_error(caught.value) is not None
 
 
+def test_a_call_that_is_not_simulated_is_no_death_of_its_client(card: Served) -> None:
+    with task(card.session) as ao:
+        add_output(ao)
+        ao.write(5.0)
+        for _ in range(50):
+            with pytest.raises(RpcError, match="not supported"):
+                Device("Dev1", grpc_options=card.session).delete_network_device()
+        assert card.device.wire_voltage() == pytest.approx(5000.0, abs=1.0)
+
+
 # what grows
 
 
