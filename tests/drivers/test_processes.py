@@ -17,7 +17,12 @@ from dearig.drivers import isolated
 from dearig.drivers.daqmx.address import Address
 from dearig.drivers.daqmx.guardian import GuardianProcess
 from dearig.drivers.errors import RigError
-from dearig.drivers.processes import child_environment, child_path, isolated_spawn
+from dearig.drivers.processes import (
+    child_environment,
+    child_path,
+    has_unread,
+    isolated_spawn,
+)
 from tests.tools.daqmx import served
 
 NAMES = ("queue", "numbers", "struct", "selectors", "socket", "drivers", "app", "model", "pydantic")
@@ -138,6 +143,19 @@ def test_guardian_starts_from_the_folder_that_holds_the_program(tmp_path, monkey
         guardian.arm()
         guardian.disarm()
         guardian.close()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="it is not known there")
+def test_pipe_with_unread_data_is_told_from_an_empty_and_a_closed_one():
+    ours, theirs = os.pipe()
+    with os.fdopen(ours, encoding="utf-8") as pipe:
+        assert not has_unread(pipe)
+        os.write(theirs, b"heard\n")
+        assert has_unread(pipe)
+        pipe.readline()
+        assert not has_unread(pipe)
+        os.close(theirs)
+    assert not has_unread(pipe)
 
 
 def test_spawned_worker_starts_beside_decoys(decoys, monkeypatch):
