@@ -316,7 +316,6 @@ def test_run_and_guardian_that_act_at_once_end_safe_with_sentences(monkeypatch, 
             bench.rig.make_safe()
             assert bench.device.wire_voltage() == 0.0
             assert not bench.device.line("port0/line0")
-            assert "take over" not in bench.guardian.words
 
 
 def test_nothing_starts_without_a_guardian(bench):
