@@ -68,7 +68,8 @@ def run(source: Path, more: Path | None, folders: list[str]) -> list[dict[str, s
     with tempfile.TemporaryDirectory() as folder, served() as port:
         save_scales(port)
         out = Path(folder) / "tests.jsonl"
-        paths = [str(HERE)] + ([str(more)] if more is not None else [])
+        paths = [str(HERE), *([str(more)] if more is not None else [])]
+        paths += [p for p in (os.environ.get("PYTHONPATH"),) if p]
         subprocess.run(
             [
                 sys.executable, "-m", "pytest", "-p", "ni_component_plugin", "-p",

@@ -23,7 +23,16 @@ from pathlib import Path
 FOLDER = Path(__file__).parent
 ROOT = FOLDER.parents[2]
 #: Distributions whose versions change figures.
-DISTRIBUTIONS = ("dearig", "numpy", "scipy", "numba", "h5py", "pyside6-essentials", "pyqtgraph")
+DISTRIBUTIONS = (
+    "dearig",
+    "nidaqmx",
+    "numpy",
+    "scipy",
+    "numba",
+    "h5py",
+    "pyside6-essentials",
+    "pyqtgraph",
+)
 
 
 #: In a command: a folder that is removed afterwards.
@@ -72,6 +81,10 @@ MEASUREMENTS = {
         ),
     ),
     "window": Measurement("Drawing speed of the window", ("tests.benchmarks.bench_window",)),
+    "ni-component-tests": Measurement(
+        "NI's own tests of its library, against the simulated card",
+        ("tests.benchmarks.bench_ni_component_tests --source nidaqmx-python",),
+    ),
     "campaign": Measurement(
         "Runs that are made to fail", (f"tests.campaign --seeds 20 --out {SCRATCH}",)
     ),
