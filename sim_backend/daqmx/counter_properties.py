@@ -106,7 +106,7 @@ _INPUTS: dict[str, Property] = {
     "CI_MIN": _limit(0),
     "CI_COUNT": given(_count),
     "CI_TC_REACHED": given(False),
-    "CI_CTR_TIMEBASE_SRC": given("100MHzTimebase"),
+    "CI_CTR_TIMEBASE_SRC": fixed("100MHzTimebase"),
     "CI_CTR_TIMEBASE_RATE": fixed(TIMEBASE),
     "CI_DUP_COUNT_PREVENT": fixed(True, False),
     "CI_PRESCALER": fixed(1),
@@ -260,7 +260,7 @@ _OUTPUTS: dict[str, Property] = {
     "CO_PULSE_DONE": given(_pulse_done),
     "CO_RDY_FOR_NEW_VAL": given(lambda a: _pulses(a) and a.own.running),
     "CO_OUTPUT_STATE": given(lambda a: HIGH if a.device.output_level(_pulses(a)) else LOW),
-    "CO_CTR_TIMEBASE_SRC": given("100MHzTimebase"),
+    "CO_CTR_TIMEBASE_SRC": fixed("100MHzTimebase"),
     "CO_CTR_TIMEBASE_RATE": fixed(TIMEBASE),
     "CO_ENABLE_INITIAL_DELAY_ON_RETRIGGER": fixed(False),
 }

@@ -98,7 +98,7 @@ class DigitalCalls(Calls):
 
     def ReadDigitalScalarU32(self, request: Any, context: grpc.ServicerContext) -> Any:
         task = self._of_lines(request)
-        levels, complete = self._device.read_samples(task, 1, request.timeout)
+        levels, complete = self._levels(task, 1, request.timeout)
         if not complete:
             raise DaqmxError(Code.SAMPLES_NOT_YET_AVAILABLE, read=0)
         return pb.ReadDigitalScalarU32Response(value=int(_words(task, levels)[0, 0]))
@@ -129,11 +129,22 @@ class DigitalCalls(Calls):
         samples = request.num_samps_per_chan
         if samples > most:
             raise DaqmxError(Code.READ_BUFFER_TOO_SMALL, f"Task Name: {task.name}", read=0)
-        return self._device.read_samples(task, samples, request.timeout, most)
+        return self._levels(task, samples, request.timeout, most)
+
+    def _levels(
+        self, task: Task, samples: int, timeout: float, most: int | None = None
+    ) -> tuple[np.ndarray, bool]:
+        """Return the next levels (lines, n) of a task; of one that puts them out, the present."""
+        if task.kind is Kind.DO:
+            held = [[self._device.line(line)] for line in task.line_names]
+            return np.repeat(np.array(held, dtype=np.uint8), max(1, samples), axis=1), True
+        return self._device.read_samples(task, samples, timeout, most)
 
     def _of_lines(self, request: Any, kind: Kind = Kind.DI) -> Task:
         task = self._task(request)
-        if task.kind is not kind:
+        # lines that are put out on demand can be read back
+        read_back = task.kind is Kind.DO and task.clock is None
+        if task.kind is not kind and not (kind is Kind.DI and read_back):
             if kind is Kind.DO:
                 raise DaqmxError(Code.NOT_AN_OUTPUT, f"Task Name: {task.name}", written=0)
             raise DaqmxError(Code.NOT_AN_INPUT, f"Task Name: {task.name}", read=0)
@@ -198,9 +209,7 @@ class DigitalCalls(Calls):
 
     def ReadDigitalWaveforms(self, request: Any, context: grpc.ServicerContext) -> Any:
         task = self._of_lines(request)
-        levels, complete = self._device.read_samples(
-            task, request.num_samps_per_chan, request.timeout
-        )
+        levels, complete = self._levels(task, request.num_samps_per_chan, request.timeout)
         by_line = dict(zip(task.line_names, levels, strict=True))
         waveforms = [
             self._digital_waveform(task, c, np.array([by_line[line] for line in c.columns]))

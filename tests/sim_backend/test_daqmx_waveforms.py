@@ -105,6 +105,13 @@ def test_the_lines_of_a_card_with_a_sine_count_its_samples():
         assert di.read() == [True, True, True, False]
 
 
+def test_lines_that_are_put_out_can_be_read_back(session):
+    with task(session) as do:
+        do.do_channels.add_do_chan("Dev1/port0/line0:2", line_grouping=LineGrouping.CHAN_PER_LINE)
+        do.write([True, False, True])
+        assert do.read() == [True, False, True]
+
+
 def test_the_card_is_calibrated_and_keeps_a_note(session):
     card = Device("Dev1", grpc_options=session)
     assert card.device_supports_cal
