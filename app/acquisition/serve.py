@@ -75,6 +75,7 @@ def serve(
     seed: int = 0,
     laser: bool = False,
     sine: bool = False,
+    signals: Sequence[str] | None = None,
 ) -> None:
     """Serve the card of the simulated rig at ``address`` until ctrl-C.
 
@@ -82,7 +83,8 @@ def serve(
     other computers can reach; all files of ``tls`` must then be given. A client may be silent with
     a voltage at the film for ``client_timeout`` s, without limit if None, and its link may be dead
     for ``link_timeout`` s. With ``sine`` the card's inputs read a sine within their limits, as
-    NI's own simulated devices give one, and not the rig.
+    NI's own simulated devices give one, and not the rig. ``signals`` at its digital terminals are
+    texts such as ``PFI8=1 kHz, 25 %``; None: the default ones.
     Raises ``InputError`` for an address, host or port that cannot be used, and ``InstrumentFault``
     where the libraries are missing.
     """
@@ -101,11 +103,11 @@ def serve(
         plan = FaultPlan.parse(faults)
         device = open_device(
             address, rig_file, rig_file.as_film(), rig_file.as_load(), seed=seed, paced=paced,
-            faults=plan, sine=sine,
+            faults=plan, sine=sine, signals=_signals(signals),
         )  # fmt: skip
     except AddressError as error:
         raise InputError(str(error)) from error
-    except ValueError as error:  # an unknown fault, or a film without a rest state
+    except ValueError as error:  # an unknown fault or signal, or a film without a rest state
         raise InputError(f"rig {address!r}: {error}") from error
     server = DaqmxServer(
         device, host=host, port=port, client_timeout=client_timeout, link_timeout=link_timeout,
@@ -130,6 +132,19 @@ def serve(
             interrupts.close()
         finally:
             server.close()
+
+
+def _signals(texts: Sequence[str] | None) -> dict[str, str] | None:
+    """Return the signals by terminal; raises ``ValueError`` for a text without ``=``."""
+    if texts is None:
+        return None
+    signals = {}
+    for text in texts:
+        terminal, equals, signal = text.partition("=")
+        if not equals:
+            raise ValueError(f"--signal {text!r}: write it as PFI8='1 kHz, 25 %'")
+        signals[terminal] = signal
+    return signals
 
 
 def _controller(

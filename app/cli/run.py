@@ -329,6 +329,15 @@ def serve_daqmx(
             "NI's own simulated devices do, instead of the rig.",
         ),
     ] = False,
+    signal: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--signal",
+            metavar="TERMINAL=SIGNAL",
+            help="Put a signal on a digital terminal, several times: PFI8='1 kHz, 25 %' or "
+            "PFI3=PFI12. Without any the card has its default signals.",
+        ),
+    ] = None,
     seed: Seed = 0,
 ) -> None:
     """Serve a simulated card over NI's network protocol until ctrl-C.
@@ -344,7 +353,7 @@ def serve_daqmx(
         tls=TlsFiles(tls_cert, tls_key, tls_client_ca),
         paced=paced, faults=fault or (),
         client_timeout=client_timeout if client_tracking else None, link_timeout=link_timeout,
-        seed=seed, laser=laser, sine=sine,
+        seed=seed, laser=laser, sine=sine, signals=signal,
     )  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -80,7 +81,9 @@ class SimulatedCard(TriggeredDevice):
                     self._counts if self._sine else None,
                 )
             else:
-                task.work = DigitalOutput(task, self.terminals, self._put_line, self.start_edge)
+                task.work = DigitalOutput(
+                    task, self.terminals, self._put_generated, self.start_edge
+                )
 
     def add_counter_input(self, task: Task, counter: str, name: str, **settings: Any) -> None:
         """Add the counter ``counter`` as an input; ``settings`` are of a ``CounterChannel``."""
@@ -232,18 +235,28 @@ class SimulatedCard(TriggeredDevice):
 
     def _settle_before(self, now: float) -> None:
         """Let the outputs of lines do what is due, until a watchdog takes them."""
-        expires = [
-            t.watchdog.deadline
-            for t in self._tasks.values()
-            if t.watchdog is not None and t.watchdog.deadline is not None
-        ]
-        end = min([now, *expires])
+        expires = min(
+            (
+                t.watchdog.deadline
+                for t in self._tasks.values()
+                if t.watchdog is not None and t.watchdog.deadline is not None
+            ),
+            default=math.inf,
+        )
         for task in list(self._tasks.values()):
             if isinstance(task.work, DigitalOutput) and task.running:
-                task.work.settle(end)
-                if end < now:
-                    task.work.end(end)
+                task.work.settle(min(now, expires))
+                if expires <= now and task.clock is not None:
+                    task.work.end(expires)
                     task.failed = Code.WRITE_AFTER_WATCHDOG
+
+    def _expired_watchdog(self) -> bool:
+        return any(t.watchdog is not None and t.watchdog.expired for t in self._tasks.values())
+
+    def _put_generated(self, line: str, level: bool, now: float) -> None:
+        """Set a line from a generation; one that a watchdog has taken keeps its level."""
+        if not self._expired_watchdog():
+            self._put_line(line, level, now)
 
     def _settle_after(self, now: float) -> None:
         """Make the pulses, find triggers that have come, and take the samples of lines."""
@@ -266,6 +279,7 @@ class SimulatedCard(TriggeredDevice):
             if task.running:
                 return
             if task.kind is Kind.DO and task.clock is not None:
+                self._check_watchdog(task)
                 self._may_generate(task)
             if task.pause is not None and not task.pause[0]:
                 raise DaqmxError(
@@ -447,7 +461,7 @@ class SimulatedCard(TriggeredDevice):
         return self._write_buffered(task, levels.astype(np.int16), auto_start, timeout)
 
     def _check_watchdog(self, task: Task) -> None:
-        if any(t.watchdog is not None and t.watchdog.expired for t in self._tasks.values()):
+        if self._expired_watchdog():
             raise DaqmxError(Code.WRITE_AFTER_WATCHDOG, f"Task Name: {task.name}", written=0)
 
     def write_pulses(self, task: Task, pulses: list[Pulse], auto_start: bool) -> int:

@@ -14,6 +14,8 @@ import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -58,8 +60,12 @@ def watch_lines(device: SimulatedCard) -> list[tuple[str, bool, float]]:
     return changes
 
 
-def play(example: Path, seconds: float) -> Played:
-    """Run ``example`` against a card of its own, with Enter pressed after ``seconds``."""
+@contextmanager
+def played(example: Path, seconds: float) -> Iterator[Played]:
+    """Run ``example`` against a card of its own, with Enter pressed after ``seconds``.
+
+    The card is served until the result was looked at.
+    """
     found = _DEVICE.search(example.read_text(encoding="utf-8-sig"))
     device = card(found[1] if found else "Dev1")
     lines = watch_lines(device)
@@ -72,36 +78,37 @@ def play(example: Path, seconds: float) -> Played:
             sys.executable, "-m", "tests.benchmarks.ni_example_child",
             str(example), str(server.port), str(out), str(seconds),
         ]  # fmt: skip
+        printed, log = "", {"error": "timeout", "text": f"no end in {_LONGEST:g} s"}
         try:
             ended = subprocess.run(
                 command, capture_output=True, text=True, timeout=_LONGEST, check=False
             )
         except subprocess.TimeoutExpired:
-            return Played(
-                device, [], "", {"error": "timeout", "text": f"no end in {_LONGEST:g} s"}, lines
-            )
-        if not out.is_file():
-            text = ended.stderr.strip().rpartition("\n")[2]
-            return Played(device, [], ended.stdout, {"error": "crash", "text": text}, lines)
-        log: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))
-        return Played(device, log.pop("calls"), ended.stdout, log, lines)
+            yield Played(device, [], printed, log, lines)
+            return
+        if out.is_file():
+            log = json.loads(out.read_text(encoding="utf-8"))
+        else:
+            log = {"error": "crash", "text": ended.stderr.strip().rpartition("\n")[2]}
+        calls: Any = log.pop("calls", [])
+        yield Played(device, calls, ended.stdout, log, lines)
 
 
 def row(example: Path, name: str, seconds: float) -> Row:
     """Return the line of ``example``, called ``name``."""
-    played = play(example, seconds)
-    if played.failure:
-        text = " ".join(str(played.failure["text"]).split())
-        code = played.failure["error"]
-        kind = "refused" if isinstance(code, int) else "failed"
-        return Row(name, kind, f"{code}: {text[:140]}", played.printed)
-    check = CHECKS.get(name)
-    if check is None:
-        return Row(name, "ran, not checked", "", played.printed)
-    try:
-        return Row(name, "ran", check(played), played.printed)
-    except AssertionError as wrong:
-        return Row(name, "ran, wrong", str(wrong)[:140], played.printed)
+    with played(example, seconds) as result:
+        if result.failure:
+            text = " ".join(str(result.failure["text"]).split())
+            code = result.failure["error"]
+            kind = "refused" if isinstance(code, int) else "failed"
+            return Row(name, kind, f"{code}: {text[:140]}", result.printed)
+        check = CHECKS.get(name)
+        if check is None:
+            return Row(name, "ran, not checked", "", result.printed)
+        try:
+            return Row(name, "ran", check(result), result.printed)
+        except (AssertionError, IndexError, ValueError) as wrong:
+            return Row(name, "ran, wrong", str(wrong)[:140], result.printed)
 
 
 def main() -> None:

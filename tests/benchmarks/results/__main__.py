@@ -100,6 +100,10 @@ MEASUREMENTS = {
         "The diagnosis beside general methods",
         ("tests.benchmarks.bench_diagnosis --train thesis --seeds 2003,79,225",),
     ),
+    "ni-examples": Measurement(
+        "Example programs of nidaqmx-python on the simulated card",
+        ("tests.benchmarks.bench_ni_examples --source FOLDER",),
+    ),
     "film": Measurement("Diagnosis of a measured film", ("tests.benchmarks.bench_film",)),
 }
 
