@@ -44,6 +44,9 @@ _SIGNALS = {
     12486: "20_MHZ_TIMEBASE",
     12536: "10_MHZ_REF_CLK",
 }
+#: Delay in s of clocks and triggers inside the card. Without it a start would come at the time up
+#: to which the tasks that wait for it have looked already.
+_INSIDE_S = 2e-9
 _CHECKED = 100_000  # samples that are compared with a level at a time
 _TIMEBASES = {"20_MHZ_TIMEBASE": "20mhztimebase", "10_MHZ_REF_CLK": "10mhzrefclk"}
 _START_OF = {kind: name.replace("sampleclock", "starttrigger") for kind, name in CLOCK_OF.items()}
@@ -88,11 +91,11 @@ class TriggeredDevice(Device):
         if task.generation is not None:
             generation = task.generation
             total = generation.total if generation.ended is None else generation.ended
-            return Series(generation.start, np.zeros(1), 1.0 / generation.rate, total)
+            return Series(generation.start + _INSIDE_S, np.zeros(1), 1.0 / generation.rate, total)
         ticks = task.ticks if task.work is None else getattr(task.work, "ticks", None)
         if isinstance(ticks, EdgeTicks | SharedTicks) or ticks is None or ticks.start is None:
             return None
-        return Series(ticks.start, np.zeros(1), 1.0 / ticks.rate, task.wanted)
+        return Series(ticks.start + _INSIDE_S, np.zeros(1), 1.0 / ticks.rate, task.wanted)
 
     def _starts(self, kind: Kind) -> Callable[[], Sequence[float]]:
         def times() -> Sequence[float]:
@@ -100,10 +103,10 @@ class TriggeredDevice(Device):
             if task is None:
                 return ()
             if task.generation is not None:
-                return (task.generation.start,)
+                return (task.generation.start + _INSIDE_S,)
             ticks = task.ticks if task.work is None else getattr(task.work, "ticks", None)
             start = getattr(ticks, "start", None)
-            return () if start is None else (start,)
+            return () if start is None else (start + _INSIDE_S,)
 
         return times
 

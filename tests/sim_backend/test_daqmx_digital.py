@@ -77,6 +77,23 @@ def test_inputs_share_the_clock_of_the_analog_inputs(session):
         assert len(ai.read(500)) == len(di.read(500)) == 500
 
 
+def test_the_first_sample_of_a_shared_clock_is_at_the_start():
+    signals = {"port0/line0": "50 Hz, 10 %"}
+    with (
+        served(signals=signals) as card,
+        task(card.session) as ai,
+        task(card.session) as di,
+    ):
+        ai.ai_channels.add_ai_voltage_chan("Dev1/ai0")
+        ai.timing.cfg_samp_clk_timing(1000.0, samps_per_chan=40)
+        di.di_channels.add_di_chan("Dev1/port0/line0")
+        di.timing.cfg_samp_clk_timing(1000.0, "/Dev1/ai/SampleClock", samps_per_chan=40)
+        di.start()
+        ai.start()
+        levels = di.read(40)
+    assert levels == ([True] * 2 + [False] * 18) * 2
+
+
 def test_a_finite_generation_shows_each_sample(hand, clock):
     with task(hand.session) as out:
         out.do_channels.add_do_chan("Dev1/port0/line0:2", line_grouping=TOGETHER)
