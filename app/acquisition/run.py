@@ -411,7 +411,8 @@ class _Run:
         except DearigError as error:
             trouble = error
         if recorder.samples == 0:
-            where = "nothing of it is left" if recorder.received else "nothing was recorded"
+            none = f"none of the samples is in {recorder.path}"
+            where = none if recorder.received else "nothing was recorded"
         else:
             where = f"what was recorded is in {recorder.path} ({recorder.samples} samples)"
         return where if trouble is None or trouble is said else f"{where}; {trouble}"

@@ -115,9 +115,13 @@ class Recorder:
 
     @property
     def samples(self) -> int:
-        """Samples of the run up to which they are written."""
+        """Samples of the run up to which they are written.
+
+        After the end of the wait for a disk only those count that survive the end of the program.
+        """
         writer = self._writer
-        return writer.first_sample + writer.samples
+        safe = writer.samples if self._given_up is None else writer.samples_flushed
+        return writer.first_sample + safe
 
     def notices(self) -> list[Event]:
         """Return the events of the recording itself since the last call; it has them already."""
@@ -247,11 +251,12 @@ class Recorder:
                     return
             progress("writing", self.samples / max(self._received, 1))
             if given_up():
+                writer = self._writer
+                safe = writer.first_sample + writer.samples_flushed
                 self._given_up = DiskFault(
-                    f"the disk of {self._writer.path.absolute().parent} had not taken the last "
-                    f"{self._received - self.samples} of {self._received} samples when the "
-                    f"operator stopped waiting for it; finish the file with dearig recover "
-                    f"{self._writer.path}"
+                    f"the disk of {writer.path.absolute().parent} had not taken the last "
+                    f"{self._received - safe} of {self._received} samples when the operator "
+                    f"stopped waiting for it; finish the file with dearig recover {writer.path}"
                 )
                 raise self._given_up
 

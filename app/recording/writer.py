@@ -115,6 +115,9 @@ class RecordingWriter:
         self._overlay = overlay
         self._first = first_sample
         self._rest = rest
+        self._command = [c.name for c in identity.channels].index("voltage_command")
+        self._at_rest: np.int16 | None = None  # count of the command at the first sample
+        self._driven = False  # True once the lead-in at 0 V has ended
         self._lost: LostFile | None = None
         self._size = 0  # bytes after the last flush
         self._rate = float(rate_Hz)
@@ -296,6 +299,11 @@ class RecordingWriter:
             for dataset, row in zip(self._counts, counts, strict=True):
                 dataset.resize((end,))
                 dataset[self._written : end] = row
+            if not self._driven and counts.size:
+                # a run begins at 0 V; its count is not 0 where the amplifier has an offset
+                command = counts[self._command]
+                first = command[0] if self._at_rest is None else self._at_rest
+                self._at_rest, self._driven = first, bool((command != first).any())
             self._pyramid.add(counts)
             self._checksums.add(counts)
             if self._modelled is not None and modelled is not None:
@@ -369,10 +377,8 @@ class RecordingWriter:
 
     def _find_rest(self) -> None:
         """Measure the rest for a file that has to continue this one, while this can be read."""
-        if self._rest is None and self._failure is None:
-            rest = Counts(self._file["entry"], self._written).measured_rest()
-            if rest.samples < self._written:  # the lead-in has ended
-                self._rest = rest
+        if self._rest is None and self._failure is None and self._driven:
+            self._rest = Counts(self._file["entry"], self._written).measured_rest()
 
     def _newly_lost(self) -> LostFile | None:
         if self._lost is not None:

@@ -575,7 +575,9 @@ def test_ctrl_c_twice_stops_waiting_for_a_disk(
             assert rig.diary[-1] == "make safe"
             key()
 
-    with pytest.raises(DiskFault, match=r"not taken the last 1501 of 1501 .* made safe, and noth"):
+    with pytest.raises(
+        DiskFault, match=r"not taken the last 1501 of 1501 .* made safe, and none of"
+    ):
         record(LOADED, "sim", RIG_FILE, tmp_path / "run.h5", disk.options, progress=pressing)
     assert closed_at_zero(rig)
     assert is_writing()

@@ -107,9 +107,40 @@ def test_the_operator_stops_waiting(tmp_path: Path, gate: threading.Event) -> No
     with pytest.raises(DiskFault, match="stopped waiting"):
         recorder.close("ended early")
     assert is_writing()
+    assert recorder.samples == 0
     gate.set()
     recorder._thread.join()
     assert open_recording(tmp_path / "run.h5").outcome == "ended early"
+
+
+def test_what_is_written_and_not_flushed_does_not_count_then(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, stalled, opened = writer(tmp_path / "run.h5"), threading.Event(), threading.Event()
+    made._now = clock = Clock()  # type: ignore[assignment]
+    recorder = Recorder(made)
+    recorder.append(Block(0, run_counts(100)))
+    recorder.drain()
+    flush = RecordingWriter._flush
+
+    def stall(recorder: RecordingWriter) -> None:
+        stalled.set()
+        opened.wait()
+        flush(recorder)
+
+    monkeypatch.setattr(RecordingWriter, "_flush", stall)
+    clock.moment += 1.0
+    recorder.append(Block(100, run_counts(100)))
+    stalled.wait()
+    assert recorder.samples == 200
+    with pytest.raises(DiskFault, match="had not taken the last 200 of 200 samples"):
+        recorder.drain(lambda: True)
+    assert recorder.samples == 0
+    opened.set()
+    recorder._thread.join(0.0)
+    with pytest.raises(DiskFault):
+        recorder.close("ended early")
+    recorder._thread.join()
 
 
 def test_missing_samples_are_a_fault(tmp_path: Path) -> None:
