@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from dearig.progress import Progress
 
 __all__ = [
+    "announce_compilation",
     "check_files",
     "console_for",
     "optional",
@@ -103,7 +104,7 @@ def working(
     from dearig.cli.progress_bar import progress
 
     if computes:
-        _announce_compilation()
+        announce_compilation()
     with progress("dearig", whole=whole) as report:
         yield console_for(json), report
 
@@ -116,17 +117,18 @@ def write_result(result: dict[str, Any], json: str | None) -> None:
         write_json(result, json)
 
 
-def _announce_compilation() -> None:
+def announce_compilation() -> None:
+    """Say on standard error that the kernels are compiled first, unless they are."""
     from dearig.model.jit import cache_folder, cache_note, is_compiled
 
     folder, note = cache_folder(), cache_note()
     if folder is None:
         sys.stderr.write(
-            f"Compiling the numerical kernels: this takes about 20 seconds with every command, as "
+            f"Compiling the numerical kernels: this takes about a minute with every command, as "
             f"there is no folder to keep them in ({note}); set NUMBA_CACHE_DIR to one.\n"
         )
         return
     if note:
         sys.stderr.write(f"The compiled kernels are kept in {folder}: {note}.\n")
     if not is_compiled():
-        sys.stderr.write("Compiling the numerical kernels, once: this takes about 20 seconds.\n")
+        sys.stderr.write("Compiling the numerical kernels, once: this takes about a minute.\n")

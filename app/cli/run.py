@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dearig.cli.options import Faults, FilmName, Force, Json, Notes, Rig, RigFileOption, Seed
-from dearig.cli.output import check_files, print_line, working, write_result
+from dearig.cli.output import announce_compilation, check_files, print_line, working, write_result
 from dearig.errors import InputError
 
 if TYPE_CHECKING:
@@ -348,8 +348,10 @@ def serve_daqmx(
     from dearig.acquisition.serve import TlsFiles, serve
     from dearig.config.rigfile import load_rig_file
 
+    settings = load_rig_file(rig_file)
+    announce_compilation()
     serve(
-        rig, load_rig_file(rig_file), told=_announce, host=host, port=port, anywhere=anywhere,
+        rig, settings, told=_announce, host=host, port=port, anywhere=anywhere,
         tls=TlsFiles(tls_cert, tls_key, tls_client_ca),
         paced=paced, faults=fault or (),
         client_timeout=client_timeout if client_tracking else None, link_timeout=link_timeout,
