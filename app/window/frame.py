@@ -236,6 +236,7 @@ class MainWindow(QMainWindow):
         session.rig_changed.connect(self._rig_or_folder_changed)
         session.folder_changed.connect(self._rig_or_folder_changed)
         session.message.connect(self.status.setText)
+        self.planner.progressed.connect(self.sequence_page.preview.show_progress)
         self.sequence_page.show_run.connect(lambda: self.show_page(run))
         self.recordings_page.open_sequence.connect(self._read_sequence)
         self.study_page.open_sequence.connect(self._play_sequence)

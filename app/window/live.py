@@ -33,6 +33,13 @@ _SIGNALS = {
 }
 _READOUT = 0.01  # s, averaging time of a readout, so that it can be read
 _RECENT = 1.0  # s, window of the recent RMS error
+# Samples of a run that are kept, so that another model can be simulated from its start: 4.6 h at
+# 1 kHz, and 130 MB of four channels
+_KEPT_MAX = 2**24
+_TOO_LONG = (
+    "the run is too long to simulate another model from its start; choose the models before a run"
+)
+_GAP = 2**16  # samples, pushed together for a model that has no past
 
 
 def _signal(channel: str) -> str:
@@ -179,8 +186,10 @@ class _Run:
         self.rate = rate
         self._signals = {c.name: signal for c in channels if (signal := _signal(c.name))}
         self.curves = {signal: Pyramid(total) for signal in self._signals.values()}
-        self._blocks: list[Block] = []
+        self._blocks: list[Block] | None = []  # None once there are too many to keep
+        self._kept = 0  # samples
         self._models: tuple[_Model, ...] = ()
+        self._followed: tuple[tuple[OverlayModel, ...], str] = ((), "")
         self._rest = _RestReference()
         self._newest: dict[str, float] = {}
         self.revision = 0
@@ -197,19 +206,54 @@ class _Run:
             for name in ("model", "residual", "rms"):
                 self.curves[f"{name} {i}"] = Pyramid(self.total)
         self._models = tuple(models)
+        self._followed = (overlays, drive)
 
     def with_models(self, overlays: tuple[OverlayModel, ...], drive: str) -> _Run:
-        """Return the same run so far with other models."""
+        """Return the same run so far with other models.
+
+        In a run of which the first blocks are no longer kept, only models that are simulated
+        already go on.
+        """
         fresh = _Run(self.total, self.channels, self.rate)
-        fresh.follow(overlays, drive)
         fresh.revision = self.revision + 1
-        for block in self._blocks:
-            fresh.show(fresh.convert(block))
+        if self._blocks is not None:
+            fresh.follow(overlays, drive)
+            for block in self._blocks:
+                fresh.show(fresh.convert(block))
+            return fresh
+        for signal in self._signals.values():
+            fresh.curves[signal] = self.curves[signal]
+        fresh._blocks, fresh._rest, fresh._newest = None, self._rest, self._newest
+        fresh._go_on(self, overlays, drive)
         return fresh
+
+    def _go_on(self, before: _Run, overlays: tuple[OverlayModel, ...], drive: str) -> None:
+        """Use the models that ``before`` has already; others have no values."""
+        past = self.curves["command"].samples
+        self._followed = (overlays, drive)
+        known = before._followed[0] if before._followed[1] == drive else ()
+        models = []
+        for i, chosen in enumerate(overlays):
+            there = known.index(chosen) if chosen in known else None
+            models.append(
+                _Model(None, _TOO_LONG, self.rate) if there is None else before._models[there]
+            )
+            for name in ("model", "residual", "rms"):
+                if there is not None:
+                    self.curves[f"{name} {i}"] = before.curves[f"{name} {there}"]
+                    continue
+                curve = self.curves[f"{name} {i}"] = Pyramid(self.total)
+                for start in range(0, past, _GAP):
+                    curve.push(np.full(min(_GAP, past - start), np.nan))
+        self._models = tuple(models)
 
     def convert(self, block: Block) -> _Converted:
         """Convert a block to SI units and advance the models; the slow part."""
-        self._blocks.append(block)
+        self._kept += block.counts.shape[1]
+        if self._kept > _KEPT_MAX:
+            self._blocks = None
+        if self._blocks is not None:
+            self._blocks.append(block)
         values = {
             self._signals[c.name]: c.scaling.physical(block.counts[i])
             for i, c in enumerate(self.channels)

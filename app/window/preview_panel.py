@@ -42,6 +42,12 @@ class PreviewPanel(QWidget):
         self.state.show_text("Planning …", "muted")
         self._clear.start()
 
+    @Slot(float)
+    def show_progress(self, part: float) -> None:
+        """Say how much of a plan is made, once it takes so long that the last one is removed."""
+        if not self._clear.isActive():
+            self.state.show_text(f"Planning … {part:.0%}", "muted")
+
     def show_preview(self, preview: Preview) -> None:
         """Show a plan, or why there is none."""
         self._clear.stop()

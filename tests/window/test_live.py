@@ -18,6 +18,7 @@ from dearig.drivers.rig import Block, RigIdentity
 from dearig.model.actuator import Actuator, Drive
 from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.recording import open_recording
+from dearig.window import live as live_module
 from dearig.window.live import Live
 from tests.window.conftest import SHORT
 
@@ -90,6 +91,36 @@ def test_a_model_that_comes_late_runs_through_what_it_has_missed() -> None:
     early.close()
     for name in ("model 0", "residual 0", "rms 0"):
         np.testing.assert_array_equal(live.view(name, 0.0, 9.0), early.view(name, 0.0, 9.0))
+
+
+def test_a_run_too_long_to_be_kept_goes_on_with_the_models_that_it_has(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(live_module, "_KEPT_MAX", 300)
+    live, voltage = started(THESIS)
+    parts = blocks(voltage, 50)
+    for part in parts[:7]:
+        live.block(part)
+    other = replace(THESIS, name="other")
+    live.follow((other, THESIS), "command")
+    for part in parts[7:]:
+        live.block(part)
+    live.close()
+    early, _ = started(THESIS)
+    for part in parts:
+        early.block(part)
+    early.close()
+    for late, name in (
+        ("model 1", "model 0"), ("rms 1", "rms 0"), ("command", "command"),
+        ("displacement", "displacement"),
+    ):  # fmt: skip
+        np.testing.assert_array_equal(live.view(late, 0.0, 9.0), early.view(name, 0.0, 9.0))
+    now = live.now()
+    assert now is not None
+    assert "too long to simulate another model" in now.words[0]
+    assert now.words[1] == ""
+    assert np.isnan(live.view("model 0", 0.0, 9.0)[1]).all()
+    assert now.samples == voltage.size
 
 
 def test_a_model_without_a_rest_state_is_said_and_the_others_go_on() -> None:

@@ -133,6 +133,15 @@ def test_a_plan_that_is_no_longer_wanted_ends(
     assert page.preview.plots.drawn == ("voltage", "displacement", "field")
 
 
+def test_a_long_plan_says_how_much_of_it_is_made(qtbot: QtBot, page: SequencePage) -> None:
+    page.preview.show_planning()
+    page.preview.show_progress(0.1)
+    assert page.preview.state.text() == "Planning …"  # a short one ends before it is read
+    qtbot.waitUntil(lambda: page.preview.plots.drawn == ())
+    page.preview.show_progress(0.4)
+    assert page.preview.state.text() == "Planning … 40%"
+
+
 def test_segments_are_added_moved_and_taken_back_by_keys(qtbot: QtBot, page: SequencePage) -> None:
     page.preset("rich")
     before = kinds(page)
