@@ -158,7 +158,8 @@ def _widths(low: float, high: float) -> Check:
     def check(played: Played) -> str:
         rises, falls = played.edges("pfi12"), played.edges("pfi12", rising=False)
         ends = np.searchsorted(falls, rises[:-1])
-        duty = (falls[ends] - rises[:-1]) / np.diff(rises)
+        # the first one is what the channel was created with, until the first clock edge
+        duty = ((falls[ends] - rises[:-1]) / np.diff(rises))[1:]
         _expect(duty.size > 100, f"{duty.size} pulses")
         inside = (duty > low - 1e-3) & (duty < high + 1e-3)
         _expect(bool(inside.all()), f"duty cycles {duty.min():g} to {duty.max():g}")
@@ -214,7 +215,7 @@ def _print(pattern: str, words: str) -> Check:
 
 def _records_of(played: Played) -> str:
     reads = [len(v) for v in played.values("read")]
-    _expect(len(reads) >= 2 and set(reads) == {1000}, f"reads of {reads}")
+    _expect(len(reads) >= 1 and set(reads) == {1000}, f"reads of {reads}")
     return _at_rest()(played) + ", 1000 for each trigger"
 
 
@@ -253,7 +254,8 @@ CHECKS: dict[str, Check] = {
     "analog_out/gen_voltage_wfm_int_clk.py": _stands_at(4.995, "ends at the last of 1000 samples"),
     "analog_out/voltage_update.py": _stands_at(1.1, "ao0 at 1.1 V"),
     "channel_properties.py": _print(
-        r"0.1\n-0.1\n5.0\n-0.1\n10.0\n-10.0\n5.0\n-0.1\nDev1/ai2", "the limits that it set"
+        r"0\.1\n-0\.1\n5\.0\n-5\.0\n10\.0\n-10\.0\n5\.0\n-5\.0\n.*Dev1/ai2",
+        "the limits that it set, as the card's ranges",
     ),
     "counter_in/cnt_dig_event.py": _counted,
     "counter_in/cont_cnt_buff_event_ext_clk.py": _counted_on_a_clock,
@@ -261,7 +263,7 @@ CHECKS: dict[str, Check] = {
     "counter_in/read_freq.py": _frequency(1),
     "counter_in/read_pulse_freq.py": _pulse_frequency,
     "counter_out/cont_gen_dig_pulse_train.py": _pulses(1.0, 2, "pulses 1 s apart"),
-    "counter_out/cont_gen_dig_pulse_train_buff_ext_clk.py": _pulses(1.0, 1, "pulses"),
+    "counter_out/cont_gen_dig_pulse_train_buff_ext_clk.py": _widths(0.5, 0.8),
     "counter_out/cont_gen_dig_pulse_train_buff_implicit.py": _widths(0.5, 0.8),
     "counter_out/write_single_dig_pulse.py": _one_pulse,
     "digital_in/acq_dig_port_int_clk.py": _lines_at_rest(50),

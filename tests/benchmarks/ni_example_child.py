@@ -73,10 +73,10 @@ def watched(log: list[Any], of: type, name: str, *, gives: bool) -> None:
     setattr(of, name, call)
 
 
-def at_the_keyboard(seconds: float) -> Callable[[], None]:
-    """Press Enter ``seconds`` after a question, and ctrl-C where none was asked.
+def at_the_keyboard(seconds: float, *, ctrl_c: bool) -> Callable[[], None]:
+    """Press Enter ``seconds`` after a question, and ``ctrl_c`` where none was asked.
 
-    ctrl-C is pressed again until the returned function is called, because a library may lose one.
+    It is pressed again until the returned function is called, because a library may lose one.
     """
     over = threading.Event()
 
@@ -93,7 +93,8 @@ def at_the_keyboard(seconds: float) -> Callable[[], None]:
             _thread.interrupt_main()
 
     builtins.input = enter
-    threading.Thread(target=press, daemon=True).start()
+    if ctrl_c:
+        threading.Thread(target=press, daemon=True).start()
     return over.set
 
 
@@ -106,7 +107,8 @@ def main() -> None:
     watched(log, nidaqmx.Task, "read", gives=False)
     watched(log, nidaqmx.Task, "read_waveform", gives=False)
     watched(log, nidaqmx.Task, "write", gives=True)
-    done = at_the_keyboard(float(seconds))
+    loops = "KeyboardInterrupt" in Path(example).read_text(encoding="utf-8-sig")
+    done = at_the_keyboard(float(seconds), ctrl_c=loops)
     failure: dict[str, Any] = {}
     path = Path(example).resolve()
     with tempfile.TemporaryDirectory() as folder:
