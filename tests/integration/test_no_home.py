@@ -1,0 +1,89 @@
+"""A home that cannot be written: commands go on without it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dearig.model.jit import cache_folder
+from tests.tools.command import LOBE, thesis_model, write
+from tests.tools.recordings import write_run
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="the folders of a user are elsewhere")
+
+HOMES = {
+    "a home in which nothing can be made": {"HOME": "/proc/home"},
+    "a home that is no folder": {"HOME": "/dev/null"},
+    "folders of the desktop that are none": {
+        f"XDG_{name}_HOME": "/dev/null/x" for name in ("CACHE", "CONFIG", "STATE", "DATA")
+    },
+}
+
+
+def run(home: dict[str, str], folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    clean = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith(("XDG_", "MPL", "NUMBA_", "DEARIG_"))
+    }
+    kernels = cache_folder()
+    assert kernels is not None
+    # compiled kernels are given, so that the test does not wait for a compilation
+    given = {"NUMBA_CACHE_DIR": str(kernels.parent), "TMPDIR": str(folder.parent / "tmp"), **home}
+    return subprocess.run(
+        [sys.executable, "-m", "dearig", *arguments], cwd=folder, env={**clean, **given},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", HOMES)
+def test_every_command_goes_on(tmp_path: Path, name: str) -> None:
+    home = HOMES[name]
+    (tmp_path / "tmp").mkdir()
+    work = tmp_path / "work"
+    work.mkdir()
+    write_run(work / "run.h5")
+    thesis_model(work / "model.toml")
+    write(work / "lobe.toml", LOBE)
+    for command in (
+        "index .",
+        "info run.h5",
+        "docs --no-browser",
+        "doctor",
+        "record lobe.toml --rig sim --out lobe.h5",
+        "validate model.toml lobe.h5 --report report.html",
+    ):
+        ended = run(home, work, *command.split())
+        assert ended.returncode == 0, (command, ended.stderr)
+        assert "Traceback" not in ended.stderr
+        assert ended.stderr.count("\n") <= 1, ended.stderr
+    assert (work / "report.html").stat().st_size > 10_000
+    doctor = run(home, work, "doctor").stdout
+    assert "instead of the usual folder" in " ".join(doctor.split())
+    assert not (work / "~").exists()
+
+
+def test_without_any_place_for_a_cache_one_sentence_says_so(tmp_path: Path) -> None:
+    """The kernels are then compiled in every command; here none is needed."""
+    code = (
+        "import dearig.model.trusted_folder as t; t._temporary = lambda: iter(());"
+        "import sys; sys.argv = ['dearig', *sys.argv[1:]];"
+        "from dearig.cli.main import main; main()"
+    )
+    environment = {**os.environ, "XDG_CACHE_HOME": "/dev/null/x", "NUMBA_CACHE_DIR": "/dev/null/x"}
+    for command in (["index", "."], ["doctor"], ["docs", "--no-browser"]):
+        ended = subprocess.run(
+            [sys.executable, "-c", code, *command], cwd=tmp_path, env=environment,
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert "Traceback" not in ended.stderr
+        assert ended.returncode == (2 if command[0] == "docs" else 0), ended.stderr
+        if command[0] == "docs":
+            assert "there is no folder for the pages" in ended.stderr
+            assert "--out" in ended.stderr
+        if command[0] == "doctor":
+            assert "none, so every command is slower" in " ".join(ended.stdout.split())
