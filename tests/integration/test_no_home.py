@@ -13,7 +13,11 @@ from dearig.model.jit import cache_folder
 from tests.tools.command import LOBE, thesis_model, write
 from tests.tools.recordings import write_run
 
-pytestmark = pytest.mark.skipif(os.name == "nt", reason="the folders of a user are elsewhere")
+pytestmark = [
+    pytest.mark.skipif(os.name == "nt", reason="the folders of a user are elsewhere"),
+    # 20 commands in processes of their own
+    pytest.mark.timeout(1200),
+]
 
 HOMES = {
     "a home in which nothing can be made": {"HOME": "/proc/home"},
