@@ -154,6 +154,7 @@ class DaqmxRig:
             expect(self._state, "arm", RigState.LOADED)
             self._guardian.arm()
             self._loaded()[0].arm()
+            self._guardian.beat()  # arming the card takes a while on a busy computer
             self._state = RigState.ARMED
 
     def start(self) -> None:
