@@ -10,6 +10,7 @@ from typing import Any
 
 from dearig.drivers.settings import RigSettings
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.ranges import check_order, fitting_range, smallest_range
 from dearig.sim_backend.daqmx.scales import Scale
 from dearig.sim_backend.daqmx.sensors import Sensor
 from dearig.sim_backend.daqmx.tasks import (
@@ -126,7 +127,7 @@ class Setup:
         """
         with self._lock:
             self._may_add(task, Kind.AI)
-            taken = _range(limits if scale is None else scale.limits(limits), INPUT_RANGES)
+            taken = smallest_range(limits if scale is None else scale.limits(limits), INPUT_RANGES)
             made: list[AnalogInput] = []
             terminals = physical_names(physical, self.name)
             for terminal, called in self._named(task, terminals, name):
@@ -179,14 +180,14 @@ class Setup:
             present = channel.limits
             limits = (present[0] if low is None else low, present[1] if high is None else high)
             volts = limits if channel.scale is None else channel.scale.limits(limits)
-            channel.range = _fitting(volts, self._offered(channel))
+            channel.range = fitting_range(volts, self._offered(channel))
             channel.limits = limits
 
     def set_range(self, task: Task, channel: AnalogInput | AnalogOutput, limit: float) -> None:
         """Set the range of a channel to the smallest one that includes ``limit`` V."""
         with self._lock:
             self._not_set_while_running(task)
-            channel.range = _fitting((-limit, limit), self._offered(channel))
+            channel.range = fitting_range((-limit, limit), self._offered(channel))
 
     def set_scale(self, task: Task, channel: AnalogInput | AnalogOutput, name: str) -> None:
         """Set the custom scale of a channel; an empty ``name`` removes it."""
@@ -194,7 +195,7 @@ class Setup:
             self._not_set_while_running(task)
             scale = self.scale(name) if name else None
             volts = channel.limits if scale is None else scale.limits(channel.limits)
-            channel.range = _fitting(volts, self._offered(channel))
+            channel.range = fitting_range(volts, self._offered(channel))
             channel.scale = scale
 
     def _offered(self, channel: AnalogInput | AnalogOutput) -> Sequence[float]:
@@ -212,7 +213,7 @@ class Setup:
         with self._lock:
             self._may_add(task, Kind.AO)
             volts = limits if scale is None else scale.limits(limits)
-            taken = _range(volts, (self._card.ao_range_V,))
+            taken = smallest_range(volts, (self._card.ao_range_V,))
             made = []
             terminals = physical_names(physical, self.name)
             for terminal, called in self._named(task, terminals, name):
@@ -455,7 +456,7 @@ class Setup:
                 )
         analog: list[AnalogInput | AnalogOutput] = [*task.inputs, *task.outputs]
         for channel in analog:
-            _in_order(channel.limits)
+            check_order(channel.limits)
             if channel.scale is not None:
                 channel.scale.check()
             if max(abs(v) for v in channel.volts) > channel.range * (1.0 + 1e-9):
@@ -597,29 +598,3 @@ class Setup:
         if task.watchdog is None:
             raise DaqmxError(Code.WATCHDOG_ONLY, f"Task Name: {task.name}")
         return task.watchdog
-
-
-def _range(limits: tuple[float, float], offered: Sequence[float]) -> float:
-    """Return the smallest of the ranges ``offered`` in V that includes ``limits``."""
-    _in_order(limits)
-    return _fitting(limits, offered)
-
-
-def _in_order(limits: tuple[float, float]) -> None:
-    low, high = limits
-    if not low < high:
-        raise DaqmxError(
-            Code.MIN_NOT_LESS_THAN_MAX, f"Minimum Value: {low:g}; Maximum Value: {high:g}"
-        )
-
-
-def _fitting(limits: tuple[float, float], offered: Sequence[float]) -> float:
-    low, high = limits
-    fitting = [r for r in offered if max(abs(low), abs(high)) <= r * (1.0 + 1e-9)]
-    if not fitting:
-        raise DaqmxError(
-            Code.INVALID_VALUE,
-            f"Property: Max or Min; Requested Values: {low:g}, {high:g}; Largest Range: "
-            f"+-{max(offered):g} V",
-        )
-    return min(fitting)
