@@ -1,18 +1,20 @@
-"""The channels and instruments of a run in its file."""
+"""The name, channels and instruments of a run in its file."""
 
 from __future__ import annotations
 
 import re
+import tomllib
 
 import h5py
 
 from dearig.drivers.channels import CHANNEL_NAMES, RESERVED_NAMES, Channel
 from dearig.drivers.rig import RigIdentity
+from dearig.errors import InputError
 from dearig.recording.layout import UNITS, counts_name
 from dearig.recording.physical import TEMPERATURE_UNITS
 from dearig.recording.text import fixed
 
-__all__ = ["check_channels", "write_instruments"]
+__all__ = ["check_channels", "sequence_name", "write_instruments"]
 
 
 def write_instruments(entry: h5py.Group, identity: RigIdentity) -> None:
@@ -52,6 +54,15 @@ def check_channels(channels: tuple[Channel, ...]) -> None:
         units = TEMPERATURE_UNITS if channel.name == "temperature" else (UNITS[channel.name],)
         if channel.unit not in units:
             raise ValueError(f"channel {channel.name} is in {channel.unit!r}, not in {units[0]}")
+
+
+def sequence_name(sequence_toml: str) -> str:
+    """Return the name of a sequence. Raises ``InputError`` for what is not TOML."""
+    try:
+        sequence = tomllib.loads(sequence_toml)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"the sequence is not TOML: {error}") from error
+    return str(sequence.get("name", "run"))
 
 
 def _group_name(role: str, taken: h5py.Group) -> str:

@@ -13,7 +13,6 @@ import math
 import os
 import shutil
 import time
-import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -57,7 +56,7 @@ from dearig.recording.opening import UNREADABLE, opened
 from dearig.recording.physical import Counts, Rest, write_channel
 from dearig.recording.provenance import CONTINUES, gather, write_provenance
 from dearig.recording.pyramid import PyramidWriter
-from dearig.recording.run_layout import check_channels, write_instruments
+from dearig.recording.run_layout import check_channels, sequence_name, write_instruments
 from dearig.recording.safe import Refused
 from dearig.recording.sample import write_sample
 from dearig.recording.text import clip_text, fixed, put_text, text_of
@@ -106,7 +105,7 @@ class RecordingWriter:
         if not (math.isfinite(rate_Hz) and rate_Hz > 0.0):
             raise ValueError(f"rate_Hz = {rate_Hz!r} must be a finite number above 0")
         check_channels(identity.channels)
-        name = _sequence_name(metadata.sequence_toml)
+        name = sequence_name(metadata.sequence_toml)
         self._path = check_output(path, overwrite)
         self._identity = identity
         self._channels = identity.channels
@@ -598,11 +597,3 @@ def _disk_errors(path: Path, kind: type[DearigError] = DiskFault) -> Iterator[No
         raise InputError(f"{path} exists already; choose another name") from error
     except (OSError, RuntimeError) as error:
         raise kind(f"{path} cannot be written: {in_words(error)}; {advice(error)}") from error
-
-
-def _sequence_name(sequence_toml: str) -> str:
-    try:
-        sequence = tomllib.loads(sequence_toml)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"the sequence is not TOML: {error}") from error
-    return str(sequence.get("name", "run"))
