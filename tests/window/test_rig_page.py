@@ -110,7 +110,7 @@ def test_a_file_is_read_changed_and_saved(qtbot: QtBot, page: RigPage, tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"), [("[film", "line 1"), (None, "cannot be read"), ("x = 3\n", "x is not")]
+    ("text", "words"), [("[film", "line 1"), (None, "is not there"), ("x = 3\n", "x is not")]
 )
 def test_a_file_that_is_none_is_told(
     qtbot: QtBot, page: RigPage, tmp_path: Path, text: str | None, words: str

@@ -275,7 +275,7 @@ def test_comments_are_not_lost_without_a_word(
 
 
 @pytest.mark.parametrize(
-    ("text", "words"), [(None, "cannot be read"), ("name = [", "line 1"), ("segment = 3", "[[seg")]
+    ("text", "words"), [(None, "is not there"), ("name = [", "line 1"), ("segment = 3", "[[seg")]
 )
 def test_a_file_that_is_none_is_told_and_nothing_is_lost(
     qtbot: QtBot, page: SequencePage, tmp_path: Path, text: str | None, words: str
