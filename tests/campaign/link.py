@@ -51,6 +51,8 @@ class Link:
         self._close_all()
         for thread in self._threads[1:]:
             thread.join(_DELAY + 1.0)
+        for one in self._sockets:
+            one.close()
 
     def set_mode(self, mode: str) -> None:
         """Treat what passes from now on as ``mode`` says."""
@@ -74,7 +76,11 @@ class Link:
             if self.mode == "cut":
                 here.close()
                 continue
-            there = socket.create_connection(("127.0.0.1", self._server_port))
+            try:
+                there = socket.create_connection(("127.0.0.1", self._server_port))
+            except OSError:  # the server is gone
+                here.close()
+                continue
             for one in (here, there):
                 one.settimeout(None)
                 one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
