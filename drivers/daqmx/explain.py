@@ -23,6 +23,7 @@ __all__ = [
     "WATCHDOG_EXPIRED",
     "explained",
     "instrument_errors",
+    "note_answer",
 ]
 
 ABORTED = (-88708, -88709, -200088)  #: a reset ended the task, or somebody cleared it
@@ -131,6 +132,14 @@ def explained(device: str, code: int, said: str) -> str:
     return f"card {device}: {words} (DAQmx {code}); look the code up in NI's knowledge base"
 
 
+_answered: set[str] = set()
+
+
+def note_answer(server: str) -> None:
+    """Remember that a DAQmx server answers at ``server``: what fails later is the link's fault."""
+    _answered.add(server)
+
+
 @contextmanager
 def instrument_errors(device: str, server: str | None) -> Iterator[None]:
     """Convert every error of nidaqmx into ``RigError`` with a sentence."""
@@ -166,6 +175,11 @@ def _server_fault(server: str | None, error: RpcError) -> str:
         )
     details = getattr(error.__context__, "details", None)  # nidaqmx replaces gRPC's own words
     words = "" if details is None else details() or ""
+    if server in _answered:
+        return (
+            f"its server {server} does not answer ({code}), and has answered before: the network "
+            f"between is cut or disturbed, or the server has ended"
+        )
     for pattern, sentence in _ANSWERS.items():
         if re.search(pattern, words):
             return f"at {server} {sentence} ({code})"

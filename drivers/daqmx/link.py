@@ -6,6 +6,7 @@ import ipaddress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dearig.drivers.daqmx.certificates import read_certificates
+from dearig.drivers.daqmx.explain import note_answer
 from dearig.drivers.errors import LinkRefused, RigError
 from dearig.drivers.findings import Finding
 from dearig.drivers.settings import CardSettings, RigSettings
@@ -122,6 +123,8 @@ def _channel_with_deadline(server: str, timeout: float, card: CardSettings) -> g
                 Details(details.method, within, details.metadata, details.credentials), request
             )
             self.lost = answer.code() in lost_codes
+            if answer.code() is grpc.StatusCode.OK:
+                note_answer(server)
             return answer
 
     unlimited = -1
