@@ -52,7 +52,7 @@ SEQUENCES = {
     ),
     "amplitude far beyond": (
         HEAD + segment(amplitude_kV=500.0),
-        ["voltage reaches 500 kV", "true field reaches 500 MV/m"],
+        ["voltage reaches 500 kV", "true field reaches"],
     ),
     "amplitude beyond reason": (
         HEAD + segment(amplitude_kV=5e6),
@@ -100,7 +100,7 @@ SEQUENCES = {
     ),
     "a billion seconds": (
         HEAD + segment("hold", duration_s=1e9),
-        ["lasts 1e+09 s", "1e+12 samples at 1000 Hz", "at most 250,000,000", "shorten it"],
+        ["lasts 1e+09 s", "1e+12 samples at 1000 Hz", "at most 1,000,000,000", "shorten it"],
     ),
     "nearly no frequency": (HEAD + segment(frequency_Hz=1e-300), ["lasts 1e+300 s"]),
     "repeats absurdly large": (
@@ -113,7 +113,7 @@ SEQUENCES = {
     ),
     "absurdly many periods": (
         HEAD + segment("thesis", periods=1_000_000),
-        ["at most 250,000,000 can be played"],
+        ["at most 1,000,000,000 can be played"],
     ),
     "shorter than a sample": (
         HEAD + segment(frequency_Hz=1e6),

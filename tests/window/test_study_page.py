@@ -86,7 +86,7 @@ def test_a_fit_with_its_check_from_ticks_to_files(session, keep, qtbot, tmp_path
     page.save(tmp_path / "mine.toml")
     assert load_model(tmp_path / "mine.toml").name == load_model(found.model).name
     page.save(tmp_path / "gone" / "mine.toml")
-    assert "cannot be written: No such file" in page.message.text()
+    assert "cannot be written: there is no folder" in page.message.text()
     with qtbot.waitSignal(page.show_model) as told:
         click(qtbot, page.overlay_button)
     assert told.args == [found.model]
