@@ -547,17 +547,18 @@ def test_ctrl_c_in_real_time_ramps_down(tmp_path: Path, name: str) -> None:
         finally:
             process.kill()
     assert process.returncode == 130
-    assert "interrupted: the voltage was ramped down to 0 V, and what was recorded is in" in err
+    who = "the operator" if name == "SIGINT" else "the signal SIGTERM, which asks a program to end"
+    assert "the voltage was ramped down to 0 V, and what was recorded is in" in err
     recording = open_recording(out)
     assert recording.complete
-    assert recording.outcome == "interrupted by the operator; ramped down to 0 V"
+    assert recording.outcome == f"interrupted by {who}; ramped down to 0 V"
     volts = recording.voltage_command
     assert volts.max() == pytest.approx(3000.0, abs=1.0)
     assert volts[-1] == pytest.approx(0.0, abs=0.2)
     ramp = volts[np.flatnonzero(volts > 2999.0)[-1] :]
     assert ramp.size == pytest.approx(500, abs=5)  # the set half second
     assert (np.diff(ramp) <= 0.0).all()
-    assert any("interrupted by the operator" in e.message for e in recording.events)
+    assert any(f"interrupted by {who}" in e.message for e in recording.events)
     assert names(tmp_path) == {"s.toml", "run.h5"}
 
 

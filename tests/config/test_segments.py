@@ -140,7 +140,6 @@ def test_a_kind_of_another_distribution_is_found_everywhere(tmp_path: Path) -> N
         {"dearig.segments": {"sawtooth": "sawtooth:Sawtooth"}},
         """
         from pathlib import Path
-from typing import cast
         import sawtooth  # whoever imports the kind first must not break the registry
         from dearig.config.segments import SEGMENT_KINDS
         from dearig.config.segments.contract import check_segment
