@@ -23,7 +23,6 @@ __all__ = [
     "WATCHDOG_EXPIRED",
     "explained",
     "instrument_errors",
-    "note_answer",
 ]
 
 ABORTED = (-88708, -88709, -200088)  #: a reset ended the task, or somebody cleared it
@@ -132,17 +131,12 @@ def explained(device: str, code: int, said: str) -> str:
     return f"card {device}: {words} (DAQmx {code}); look the code up in NI's knowledge base"
 
 
-_answered: set[str] = set()
-
-
-def note_answer(server: str) -> None:
-    """Remember that a DAQmx server answers at ``server``: what fails later is the link's fault."""
-    _answered.add(server)
-
-
 @contextmanager
-def instrument_errors(device: str, server: str | None) -> Iterator[None]:
-    """Convert every error of nidaqmx into ``RigError`` with a sentence."""
+def instrument_errors(device: str, server: str | None, *, answered: bool = False) -> Iterator[None]:
+    """Convert every error of nidaqmx into ``RigError`` with a sentence.
+
+    ``answered``: the ``server`` has answered on this connection, so what fails is not its set-up.
+    """
     import nidaqmx.errors
 
     try:
@@ -160,12 +154,12 @@ def instrument_errors(device: str, server: str | None) -> Iterator[None]:
     except nidaqmx.errors.DaqError as error:
         raise RigError(explained(device, error.error_code, str(error)), error.error_code) from error
     except nidaqmx.errors.RpcError as error:
-        raise RigError(f"card {device}: {_server_fault(server, error)}") from error
+        raise RigError(f"card {device}: {_server_fault(server, error, answered)}") from error
     except nidaqmx.errors.Error as error:
         raise RigError(f"card {device}: {error}") from error
 
 
-def _server_fault(server: str | None, error: RpcError) -> str:
+def _server_fault(server: str | None, error: RpcError, answered: bool) -> str:
     """Return the fault of ``server`` as a clause, with what to do."""
     code = getattr(error.rpc_code, "name", str(error.rpc_code))
     if code == "UNIMPLEMENTED":
@@ -175,7 +169,7 @@ def _server_fault(server: str | None, error: RpcError) -> str:
         )
     details = getattr(error.__context__, "details", None)  # nidaqmx replaces gRPC's own words
     words = "" if details is None else details() or ""
-    if server in _answered:
+    if answered:
         return (
             f"its server {server} does not answer ({code}), and has answered before: the network "
             f"between is cut or disturbed, or the server has ended"

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import ipaddress
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dearig.drivers.daqmx.certificates import read_certificates
-from dearig.drivers.daqmx.explain import note_answer
 from dearig.drivers.errors import LinkRefused, RigError
 from dearig.drivers.findings import Finding
 from dearig.drivers.settings import CardSettings, RigSettings
@@ -43,6 +43,8 @@ class Link:
 
     def __init__(self, server: str | None, settings: RigSettings) -> None:
         self.server = server
+        #: True once the server has answered a call.
+        self.answered = False
         self._channel: grpc.Channel | None = None
         if server is not None:
             _check_security(server, settings.card)
@@ -55,8 +57,11 @@ class Link:
             ) from error
         if server is not None:
             self._channel = _channel_with_deadline(
-                server, settings.guardian.link_timeout_s, settings.card
+                server, settings.guardian.link_timeout_s, settings.card, self._note_answer
             )
+
+    def _note_answer(self) -> None:
+        self.answered = True
 
     @property
     def session(self) -> GrpcSessionOptions | None:
@@ -106,7 +111,9 @@ class _Details(NamedTuple):
     credentials: Any
 
 
-def _channel_with_deadline(server: str, timeout: float, card: CardSettings) -> grpc.Channel:
+def _channel_with_deadline(
+    server: str, timeout: float, card: CardSettings, on_answer: Callable[[], None]
+) -> grpc.Channel:
     import grpc
 
     lost_codes = (grpc.StatusCode.DEADLINE_EXCEEDED, grpc.StatusCode.UNAVAILABLE)
@@ -124,7 +131,7 @@ def _channel_with_deadline(server: str, timeout: float, card: CardSettings) -> g
             )
             self.lost = answer.code() in lost_codes
             if answer.code() is grpc.StatusCode.OK:
-                note_answer(server)
+                on_answer()
             return answer
 
     unlimited = -1

@@ -203,7 +203,7 @@ class Outputs:
                 clear(task)
 
     def _errors(self) -> contextlib.AbstractContextManager[None]:
-        return instrument_errors(self._device, self._link.server)
+        return instrument_errors(self._device, self._link.server, answered=self._link.answered)
 
 
 def clear(task: nidaqmx.Task | WatchdogTask) -> None:

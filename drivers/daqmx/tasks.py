@@ -49,7 +49,7 @@ class Card:
 
 def identify_card(link: Link, device: str, settings: RigSettings) -> Card:
     """Query the card without output. Raises ``RigError`` where it does not fit the settings."""
-    with instrument_errors(device, link.server):
+    with instrument_errors(device, link.server, answered=link.answered):
         from nidaqmx.system import Device
 
         card = Device(device, grpc_options=link.session)
@@ -338,4 +338,4 @@ class ClockedTasks:
         return self._ai
 
     def _errors(self) -> AbstractContextManager[None]:
-        return instrument_errors(self._device, self._link.server)
+        return instrument_errors(self._device, self._link.server, answered=self._link.answered)

@@ -182,7 +182,19 @@ def test_the_first_ctrl_c_ramps_down(command, tmp_path: Path) -> None:
     assert f"({run.samples} samples)" in answer.err
 
 
+@pytest.fixture
+def hang_up_ends() -> Iterator[None]:
+    """Let SIGHUP end programs, as at a terminal, also where the tests themselves ignore it."""
+    if not hasattr(signal, "SIGHUP"):
+        yield
+        return
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="no such signal there")
+@pytest.mark.usefixtures("hang_up_ends")
 def test_a_closed_terminal_ramps_down_and_says_so_in_the_recording(command, tmp_path: Path) -> None:
     def hang_up() -> None:
         # the shell sends it, and the system too
@@ -201,6 +213,7 @@ def test_a_closed_terminal_ramps_down_and_says_so_in_the_recording(command, tmp_
     assert any("because the terminal was closed: ramping down" in e.message for e in run.events)
 
 
+@pytest.mark.usefixtures("hang_up_ends")
 def test_a_standard_error_without_a_reader_counts_as_a_closed_terminal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -357,7 +357,8 @@ def test_a_server_that_is_gone_leaves_it_to_the_guardian(bench):
     begin(bench.rig, LONG)
     bench.rig.read()
     bench.server.close()
-    with pytest.raises(RigError, match=r"server 127\.0\.0\.1:.* does not answer"):
+    # it has answered, so neither its kind nor its certificates are to blame
+    with pytest.raises(RigError, match=r"server 127\.0\.0\.1:.* does not answer .*the network"):
         drain(bench.rig)
     bench.rig.make_safe()
     assert bench.guardian.words[-2:] == ["take over", "disarm"]
