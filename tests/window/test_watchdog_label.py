@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from pytestqt.qtbot import QtBot
 
 from dearig.config.rigfile import RigFile
 from dearig.window.run_page import RunPage
@@ -19,10 +20,12 @@ from dearig.window.run_page import RunPage
     ],
 )
 def test_the_label_follows_address_and_rig_file(
-    run_page: RunPage, address: str, card: dict[str, object], said: str
+    run_page: RunPage, qtbot: QtBot, address: str, card: dict[str, object], said: str
 ) -> None:
     run_page.session.set_address(address)
     run_page.session.set_rig_file(None, "", RigFile.model_validate({"card": card}))
+    # the window is not destroyed while its plan is being made
+    qtbot.waitUntil(lambda: run_page.session.preview is not None, timeout=120_000)
     shown = run_page.watchdog.text()
     assert said in shown
     assert bool(shown) is bool(said)
