@@ -12,7 +12,7 @@ from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.signals import Signal
 from dearig.sim_backend.daqmx.tasks import RISING, TIMEBASE, CounterChannel, Task
 from dearig.sim_backend.daqmx.terminals import Terminals
-from dearig.sim_backend.daqmx.triggers import Edge, Pause, SampleTicks
+from dearig.sim_backend.daqmx.triggers import AwaitedEdge, Edge, Pause, SampleTicks
 from dearig.sim_backend.daqmx.work import InputWork, Samples
 
 __all__ = ["PULSES", "CounterInput", "Measure", "default_terminal"]
@@ -317,7 +317,7 @@ class CounterInput(InputWork):
         self._ready: list[np.ndarray] = []  # values that the buffer has not
         self._ends = np.empty(0)
         self._last: np.ndarray | None = None  # the newest value of a task without timing
-        self._waits: tuple[Edge, float] | None = None
+        self._waits = AwaitedEdge()
         self._running = False
 
     @property
@@ -333,7 +333,7 @@ class CounterInput(InputWork):
 
     def start(self, now: float) -> None:
         edge = self._armed(self.task)
-        self._waits = None if edge is None else (edge, now)
+        self._waits.begin(edge, now)
         self._last, self._ready, self._ends = None, [], np.empty(0)
         clock = self.task.clock
         if clock is not None:
@@ -352,15 +352,12 @@ class CounterInput(InputWork):
     def end(self, now: float) -> None:
         super().end(now)
         self._running = False
-        self._waits = None
+        self._waits.begin(None, now)
 
     def settle(self, now: float) -> None:
-        if self._waits is not None:
-            edge, since = self._waits
-            at = edge.until(since, now)
-            self._waits = (edge, now) if at is None else None
-            if at is not None:
-                self._begin(at)
+        at = self._waits.passed(now)
+        if at is not None:
+            self._begin(at)
         if self._running and not self.counts and self.task.failed is None:
             clock = self.task.clock
             if self.samples is not None and clock is not None and clock.implicit:
@@ -443,13 +440,13 @@ class CounterInput(InputWork):
         return None if self._last is None else self._scaled(self._last)
 
     def still_due(self, now: float) -> float | None:
-        if self._waits is not None:
-            return self._waits[0].after(self._waits[1])
+        if self._waits.edge is not None:
+            return self._waits.due()
         return now if self.counts else self._intervals.next(1)
 
     def due(self, samples: int, now: float) -> float | None:
-        if self._waits is not None:
-            return self._waits[0].after(self._waits[1])
+        if self._waits.edge is not None:
+            return self._waits.due()
         clock = self.task.clock
         if clock is not None and clock.implicit and self.samples is not None:
             return self._intervals.next(max(1, samples - self._new(now)))

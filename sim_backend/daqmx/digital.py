@@ -11,7 +11,7 @@ from dearig.sim_backend.daqmx.output import Generation
 from dearig.sim_backend.daqmx.signals import Series
 from dearig.sim_backend.daqmx.tasks import Task
 from dearig.sim_backend.daqmx.terminals import Terminals
-from dearig.sim_backend.daqmx.triggers import Edge, SampleTicks
+from dearig.sim_backend.daqmx.triggers import AwaitedEdge, Edge, SampleTicks
 from dearig.sim_backend.daqmx.work import InputWork, Samples, Work
 
 __all__ = ["DigitalInput", "DigitalOutput", "check_clocked_lines"]
@@ -106,7 +106,7 @@ class DigitalOutput(Work):
         self._terminals = terminals
         self._set_line = set_line
         self._trigger = trigger
-        self._waits: tuple[Edge, float] | None = None
+        self._waits = AwaitedEdge()
         self._told = 0  # ticks that the wire knows
 
     def resources(self) -> list[str]:
@@ -117,7 +117,7 @@ class DigitalOutput(Work):
         if self.task.clock is None:
             return
         edge = self._trigger(self.task)
-        self._waits = None if edge is None else (edge, now)
+        self._waits.begin(edge, now)
         if edge is None:
             self._generate(now)
 
@@ -132,12 +132,9 @@ class DigitalOutput(Work):
             self._terminals.drive(line).follow(task.generation, row)
 
     def settle(self, now: float) -> None:
-        if self._waits is not None:
-            edge, since = self._waits
-            at = edge.until(since, now)
-            self._waits = (edge, now) if at is None else None
-            if at is not None:
-                self._generate(at)
+        at = self._waits.passed(now)
+        if at is not None:
+            self._generate(at)
         generation = self.task.generation
         if generation is None:
             return
@@ -169,7 +166,7 @@ class DigitalOutput(Work):
         return Series(generation.start, np.zeros(1), 1.0 / generation.rate, total)
 
     def end(self, now: float) -> None:
-        self._waits = None
+        self._waits.begin(None, now)
         if self.task.generation is not None:
             self.task.generation.stop(now)
             self._tell(self.task.generation, now)
@@ -189,4 +186,4 @@ class DigitalOutput(Work):
     def due(self, samples: int, now: float) -> float | None:  # noqa: ARG002
         if self.task.generation is not None:
             return self.task.generation.due(samples)
-        return None if self._waits is None else self._waits[0].after(self._waits[1])
+        return self._waits.due()

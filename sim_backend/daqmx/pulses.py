@@ -11,7 +11,7 @@ import numpy as np
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.signals import SAME_S, Series, Signal
 from dearig.sim_backend.daqmx.tasks import TIMEBASE, Pulse, PulseChannel, Task
-from dearig.sim_backend.daqmx.triggers import Edge
+from dearig.sim_backend.daqmx.triggers import AwaitedEdge, Edge
 from dearig.sim_backend.daqmx.work import Work
 
 __all__ = ["Burst", "CounterOutput", "PulseSignal"]
@@ -131,7 +131,7 @@ class CounterOutput(Work):
         self._signals = signals
         self._trigger = trigger
         self._clock = clock
-        self._waits: tuple[Edge, float] | None = None
+        self._waits = AwaitedEdge()
         self._sampled: tuple[Edge, float] | None = None  # the sample clock, and until when
         self._samples = 0
 
@@ -150,7 +150,7 @@ class CounterOutput(Work):
             self.signal(channel).idle_high = channel.idle_high
             self.signal(channel).bursts = []
         edge = self._trigger(self.task)
-        self._waits = None if edge is None else (edge, now)
+        self._waits.begin(edge, now)
         if edge is None:
             self._begin(now)
 
@@ -194,13 +194,7 @@ class CounterOutput(Work):
         return Burst(at, active, idle, delay, total)
 
     def settle(self, now: float) -> None:
-        while self._waits is not None:
-            edge, since = self._waits
-            at = edge.until(since, now)
-            if at is None:
-                self._waits = (edge, now)
-                break
-            self._waits = None
+        while (edge := self._waits.edge) and (at := self._waits.passed(now)) is not None:
             self._begin(at)
             self._again(edge)
         if self._sampled is not None:
@@ -216,7 +210,7 @@ class CounterOutput(Work):
         """Wait for the next edge of a retriggerable start, after the pulses."""
         burst = self.signal(self.channels[0]).bursts[-1]
         if self.task.retriggers and burst.total is not None:
-            self._waits = (edge, float(burst.ends.time(burst.total - 1)))
+            self._waits.begin(edge, float(burst.ends.time(burst.total - 1)))
 
     def change(self, pulses: Mapping[str, Pulse], now: float) -> None:
         """Take ``pulses``, by counter, from the end of the present ones on."""
@@ -267,14 +261,15 @@ class CounterOutput(Work):
             signal.bursts.append(self._burst(each, [pulse], start, idle, total))
 
     def end(self, now: float) -> None:
-        self._waits, self._sampled = None, None
+        self._waits.begin(None, now)
+        self._sampled = None
         for channel in self.channels:
             signal = self.signal(channel)
             for burst in signal.bursts:
                 burst.ended = min(burst.ended, now)
 
     def done(self, now: float) -> bool:
-        if self.task.retriggers or self._waits is not None:
+        if self.task.retriggers or self._waits.edge is not None:
             return False
         clock = self.task.clock
         if clock is not None and not clock.implicit:
@@ -295,8 +290,8 @@ class CounterOutput(Work):
         return self.signal(self.channels[0]).bursts if self.task.running else []
 
     def due(self, samples: int, now: float) -> float | None:
-        if self._waits is not None:
-            return self._waits[0].after(max(now, self._waits[1]))
+        if self._waits.edge is not None:
+            return self._waits.due(now)
         if self._sampled is not None:
             return self._sampled[0].after(now)
         burst = self.signal(self.channels[0]).bursts[-1]

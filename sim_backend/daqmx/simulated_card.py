@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -48,11 +47,9 @@ class SimulatedCard(TriggeredDevice):
         settings: RigSettings,
         plant: Plant,
         clock: Clock,
-        *,
-        signals: Mapping[str, str] | None = None,
         **others: Any,
     ) -> None:
-        super().__init__(settings, plant, clock, signals=signals, **others)
+        super().__init__(settings, plant, clock, **others)
         self._sine = bool(others.get("sine"))
         self._pulses = {counter: PulseSignal(idle_high=False) for counter in COUNTERS}
         for counter, signal in self._pulses.items():

@@ -10,7 +10,15 @@ import numpy as np
 from dearig.sim_backend.daqmx.output import TICK_TOLERANCE, Track
 from dearig.sim_backend.daqmx.signals import Signal
 
-__all__ = ["Edge", "EdgeTicks", "Pause", "Reference", "SampleTicks", "TriggeredTicks"]
+__all__ = [
+    "AwaitedEdge",
+    "Edge",
+    "EdgeTicks",
+    "Pause",
+    "Reference",
+    "SampleTicks",
+    "TriggeredTicks",
+]
 
 
 @dataclass(frozen=True)
@@ -28,6 +36,33 @@ class Edge:
         """Return the time of the first one after ``first`` and until ``last``, or None."""
         edges = self.signal.edges(first, last, self.rising)
         return float(edges[0]) if edges.size else None
+
+
+class AwaitedEdge:
+    """The edge that a task waits for, if any; the signal is looked at once, up to each ``now``."""
+
+    def __init__(self) -> None:
+        self.edge: Edge | None = None
+        self._since = 0.0  # s; edges until then do not count
+
+    def begin(self, edge: Edge | None, since: float) -> None:
+        """Wait for ``edge`` after ``since``; None: wait for nothing."""
+        self.edge, self._since = edge, since
+
+    def passed(self, now: float) -> float | None:
+        """Return the time of the edge if it came until ``now``, and wait no longer; or None."""
+        if self.edge is None:
+            return None
+        at = self.edge.until(self._since, now)
+        if at is None:
+            self._since = now
+        else:
+            self.edge = None
+        return at
+
+    def due(self, now: float = -math.inf) -> float | None:
+        """Return when the edge comes, not before ``now``, or None where it is unknown."""
+        return None if self.edge is None else self.edge.after(max(now, self._since))
 
 
 @dataclass(frozen=True)
