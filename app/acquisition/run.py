@@ -47,7 +47,7 @@ __all__ = ["RunObserver", "RunOptions", "RunResult", "open_rig", "record"]
 
 log = logging.getLogger(__name__)
 
-#: s at 0 V after which the operator is told that the disk is still being waited for.
+#: s at 0 V after which the operator is told that the program still waits for the disk.
 _TELL_AFTER = 5.0
 #: Number of ctrl-C after which the run stops waiting for the disk.
 _GIVE_UP = 2

@@ -134,7 +134,7 @@ def _library_warnings_logged() -> Iterator[None]:
 
 @contextmanager
 def _printable_output() -> Iterator[None]:
-    """Let only printable characters through to the terminal, whoever writes them."""
+    """Let only printable characters through to the terminal, also those of other packages."""
     raw = sys.stdout, sys.stderr
     sys.stdout = cast(TextIO, PrintableStream(raw[0]))
     sys.stderr = cast(TextIO, PrintableStream(cast(TextIO, LastingStream(raw[1]))))
