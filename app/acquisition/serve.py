@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,7 +24,7 @@ from dearig.sim_backend.serial_port import serve_on_pty, serve_on_socket
 if TYPE_CHECKING:
     from dearig.sim_backend.daqmx.device import Device
 
-__all__ = ["Serving", "TlsFiles", "serve"]
+__all__ = ["Serving", "TlsFiles", "needs_simulated_card", "serve"]
 
 _POLL_S = 0.1  # s between two checks for ctrl-C
 
@@ -59,6 +59,18 @@ class TlsFiles:
 _NO_TLS = TlsFiles()
 
 
+@contextmanager
+def needs_simulated_card() -> Iterator[None]:
+    """Raise ``InstrumentFault`` if the body imports a library that is not installed."""
+    try:
+        yield
+    except ImportError as error:
+        raise InstrumentFault(
+            f"the simulated card is built on one version of nidaqmx, which is not installed "
+            f'({error}): pip install "dearig[simulated-card]"'
+        ) from error
+
+
 def serve(
     address: str,
     rig_file: RigFile,
@@ -91,14 +103,9 @@ def serve(
     certificates = _certificates(host, anywhere, tls)
     # the library's own lines about broken connections are no help at this terminal
     os.environ.setdefault("GRPC_VERBOSITY", "NONE")
-    try:
+    with needs_simulated_card():
         from dearig.sim_backend.daqmx.opening import open_device
         from dearig.sim_backend.daqmx.server import DaqmxServer
-    except ImportError as error:
-        raise InstrumentFault(
-            f"the simulated card is built on one version of nidaqmx, which is not installed "
-            f'({error}): pip install "dearig[simulated-card]"'
-        ) from error
     try:
         plan = FaultPlan.parse(faults)
         device = open_device(

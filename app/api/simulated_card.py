@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dearig.acquisition.serve import needs_simulated_card
 from dearig.config.rigfile import RigFile
-from dearig.errors import InstrumentFault
 
 if TYPE_CHECKING:
     from nidaqmx import GrpcSessionOptions
@@ -61,17 +61,12 @@ def simulated_daqmx_card(
     InstrumentFault
         The libraries of the extra ``simulated-card`` are not installed.
     """
-    try:
+    with needs_simulated_card():
         import grpc
         from nidaqmx import GrpcSessionOptions
 
         from dearig.sim_backend.daqmx.opening import open_device
         from dearig.sim_backend.daqmx.server import DaqmxServer
-    except ImportError as error:
-        raise InstrumentFault(
-            f"the simulated card is built on one version of nidaqmx, which is not installed "
-            f'({error}): pip install "dearig[simulated-card]"'
-        ) from error
     rig = RigFile.model_validate({"card": {"device": name}})
     device = open_device(
         "sim", rig, rig.as_film(), rig.as_load(),
