@@ -9,7 +9,7 @@ from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.properties import Asked, changed, given
 from dearig.sim_backend.daqmx.sensors import Usage
 from dearig.sim_backend.daqmx.setup import INPUT_RANGES, INPUTS, LINES, OUTPUTS
-from dearig.sim_backend.daqmx.tasks import TIMEBASE
+from dearig.sim_backend.daqmx.tasks import LINES_RATE, TIMEBASE
 from dearig.sim_backend.daqmx.terminals import COUNTERS
 
 __all__ = ["CALIBRATION", "DEVICE", "PHYSICAL_CHANNEL", "SERIAL", "SYSTEM"]
@@ -31,7 +31,6 @@ _MEASURED = (
 _START, _REFERENCE, _PAUSE, _ARM_START = 1 << 2, 1 << 3, 1 << 1, 1 << 5
 _NOTE, _NOTE_CHARACTERS = "calibration note", 4
 _DC = 1 << 1  # bit of the coupling
-_LINES_RATE = 10e6  # Hz, of the sample clocks of port 0
 _COUNTER_BITS = 32
 _PULSES = [10269, 10119, 10268]  # DAQmx: kinds of a counter output: times, frequency, ticks
 _SAMPLE_CLOCK, _ON_DEMAND, _CHANGE_DETECTION = 10388, 10390, 12504
@@ -99,12 +98,12 @@ DEVICE = {
     "AO_TRIG_USAGE": given(_START),
     "DI_LINES": given(lambda a: _names(a, LINES)),
     "DI_PORTS": given(lambda a: _names(a, _ports())),
-    "DI_MAX_RATE": given(_LINES_RATE),
+    "DI_MAX_RATE": given(LINES_RATE),
     "DI_NUM_SAMP_TIMING_ENGINES": given(1),
     "DI_TRIG_USAGE": given(_START | _PAUSE),
     "DO_LINES": given(lambda a: _names(a, LINES)),
     "DO_PORTS": given(lambda a: _names(a, _ports())),
-    "DO_MAX_RATE": given(_LINES_RATE),
+    "DO_MAX_RATE": given(LINES_RATE),
     "DO_NUM_SAMP_TIMING_ENGINES": given(1),
     "DO_TRIG_USAGE": given(_START),
     "CI_PHYSICAL_CHANS": given(lambda a: _names(a, COUNTERS)),

@@ -7,7 +7,10 @@ from enum import IntEnum
 from nidaqmx._grpc_interpreter import _ERROR_MESSAGES
 from nidaqmx.error_codes import DAQmxErrors
 
-__all__ = ["WORDS", "Code", "DaqmxError", "message_of"]
+__all__ = ["ERROR_TEXT", "WORDS", "Code", "DaqmxError", "message_of"]
+
+#: Characters of an error's text in a reply, at most: its headers hold 8 KiB.
+ERROR_TEXT = 1000
 
 
 class Code(IntEnum):

@@ -16,7 +16,7 @@ from google.protobuf.message import DecodeError
 from dearig.sim_backend.clock import Clock
 from dearig.sim_backend.daqmx.clients import Clients
 from dearig.sim_backend.daqmx.device import Device
-from dearig.sim_backend.daqmx.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.errors import ERROR_TEXT, Code, DaqmxError
 from dearig.sim_backend.daqmx.servicer import refuse
 from dearig.sim_backend.daqmx.tasks import Kind
 from dearig.sim_backend.faults import FaultKind
@@ -34,7 +34,6 @@ THREADS = _ANSWERING + _WAITING + _LISTENING
 #: Samples in one reply, over all channels: 32 MiB as float64, computed in some 2 s.
 _REPLY_SAMPLES = 2**22
 _TEXT = 4096  # characters of a text in a request
-_DETAILS = 1000  # characters of an error's text: headers hold 8 KiB
 
 _ROOMS = {"array_size_in_samps": 1, "array_size_in_bytes": 2, "array_size": 1}  # bytes a sample
 _WAITS = ("Wait", "Read", "Write")
@@ -148,7 +147,7 @@ class Interceptor(grpc.ServerInterceptor):
             if type(error) is Exception:
                 raise
             # a fault of this program is one line at the terminal; the log file has the traceback
-            words = f"{type(error).__name__}: {error}"[:_DETAILS]
+            words = f"{type(error).__name__}: {error}"[:ERROR_TEXT]
             log.warning("%s failed in the simulated card: %s", name, words)
             log.debug("%s failed", name, exc_info=True)
             _abort(context, grpc.StatusCode.INTERNAL, f"{name} failed in the simulated card")

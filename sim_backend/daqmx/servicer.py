@@ -25,7 +25,7 @@ from dearig.sim_backend.daqmx.channel_properties import FROM_CUSTOM_SCALE, VOLTS
 from dearig.sim_backend.daqmx.counter_calls import CounterCalls
 from dearig.sim_backend.daqmx.device import Reading
 from dearig.sim_backend.daqmx.digital_calls import DigitalCalls
-from dearig.sim_backend.daqmx.errors import Code, DaqmxError
+from dearig.sim_backend.daqmx.errors import ERROR_TEXT, Code, DaqmxError
 from dearig.sim_backend.daqmx.properties import name_of
 from dearig.sim_backend.daqmx.scales import (
     LINEAR,
@@ -47,7 +47,6 @@ __all__ = ["Servicer", "refuse"]
 log = logging.getLogger(__name__)
 
 _ACTIVE_EDGE = 0x1301  # SAMP_CLK_ACTIVE_EDGE
-_ERROR_TEXT = 1000  # characters
 _POLL_S = 0.02  # period at which an event's stream checks whether it is due
 
 
@@ -60,7 +59,7 @@ def refuse(context: grpc.ServicerContext, error: DaqmxError) -> NoReturn:
         trailing.append(("ni-samps-per-chan-written", str(error.written)))
     context.set_trailing_metadata(tuple(trailing))
     # the text goes into a header, which holds 8 KiB
-    context.abort(grpc.StatusCode.UNKNOWN, str(error)[:_ERROR_TEXT])
+    context.abort(grpc.StatusCode.UNKNOWN, str(error)[:ERROR_TEXT])
     raise error  # not reached: abort raises
 
 

@@ -14,6 +14,8 @@ from dearig.sim_backend.daqmx.digital import DigitalInput, DigitalOutput, check_
 from dearig.sim_backend.daqmx.errors import Code, DaqmxError
 from dearig.sim_backend.daqmx.pulses import CounterOutput, PulseSignal
 from dearig.sim_backend.daqmx.tasks import (
+    LINES_RATE,
+    TIMEBASE,
     Channel,
     CounterChannel,
     Kind,
@@ -31,9 +33,6 @@ from dearig.sim_backend.daqmx.work import InputWork
 from dearig.sim_backend.plant import Plant
 
 __all__ = ["SimulatedCard"]
-
-_FASTEST_LINES = 10e6  # Hz, of the sample clocks of port 0
-_FASTEST_COUNTER = 100e6  # Hz, of the counters' timebase
 
 
 class SimulatedCard(TriggeredDevice):
@@ -204,9 +203,9 @@ class SimulatedCard(TriggeredDevice):
     def fastest(self, task: Task) -> float:
         """Return the highest rate in Hz of the sample clock of ``task``."""
         if task.kind in (Kind.DI, Kind.DO):
-            return _FASTEST_LINES
+            return LINES_RATE
         if task.kind in (Kind.CI, Kind.CO):
-            return _FASTEST_COUNTER
+            return TIMEBASE
         return super().fastest(task)
 
     def buffer_size(self, task: Task) -> int:

@@ -22,6 +22,7 @@ __all__ = [
     "DIGITAL_EDGE",
     "FALLING",
     "HIGH",
+    "LINES_RATE",
     "LOW",
     "NO_CHANGE",
     "NO_TRIGGER",
@@ -58,6 +59,7 @@ CURRENT_READ, CURRENT_WRITE = 10425, 10430  #: DAQmx: reads and writes go on whe
 READ_RELATIVE_TO, READ_OFFSET = "read relative to", "read offset"
 WRITE_RELATIVE_TO, WRITE_OFFSET = "write relative to", "write offset"
 TIMEBASE = 1e8  #: Hz; the counters' timebase of 100 MHz
+LINES_RATE = 10e6  #: Hz; the fastest sample clock of the lines of port 0
 
 
 class Kind(Enum):
