@@ -220,7 +220,7 @@ def _exhausted(error: Exception) -> str:
     Errors of a disk reach this only from standard output and from temporary files: what writes
     results has a sentence of its own.
     """
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or _nameless(error):
         return (
             "the computer has no memory left; close other programs, or give this command less at a "
             "time; files that it had finished are whole"
@@ -231,6 +231,14 @@ def _exhausted(error: Exception) -> str:
             f"; free some space; files that the command had finished are whole"
         )
     return ""
+
+
+def _nameless(error: Exception) -> bool:
+    """Return True if native code failed without an error: no memory for the error itself."""
+    said = str(error)
+    return isinstance(error, SystemError) and (
+        "without exception set" in said or "without setting an exception" in said
+    )
 
 
 def _reader_left() -> int:

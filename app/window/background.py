@@ -2,47 +2,37 @@
 
 from __future__ import annotations
 
+import logging
+import threading
 from collections.abc import Callable
 from typing import Any
 
-from PySide6.QtCore import QObject, QThread, Signal, Slot
+from PySide6.QtCore import QObject, Signal, Slot
 
 from dearig.errors import DearigError
 
 __all__ = ["Background"]
 
-
-class _Thread(QThread):
-    def __init__(self, function: Callable[[], Any], parent: QObject) -> None:
-        super().__init__(parent)
-        self._function = function
-        self.answer: Any = None
-        self.error = "an error in the program; the terminal shows its details"
-
-    def run(self) -> None:
-        try:
-            self.answer = self._function()
-        except DearigError as error:
-            self.error = str(error)
-        else:
-            self.error = ""
+log = logging.getLogger(__name__)
 
 
 class Background(QObject):
     """Run one function at a time, then the newest of those submitted meanwhile.
 
-    ``done`` carries the function's result, ``failed`` the message of its ``DearigError``. A result
-    is dropped when a newer function waits. ``close`` waits for the thread.
+    ``done`` carries the function's result, ``failed`` the message of its error. A result is dropped
+    when a newer function waits. ``close`` waits for the thread.
     """
 
     done = Signal(object)
     failed = Signal(str)
     busy_changed = Signal(bool)
+    _ended = Signal(object, object, str)  # thread, result, message of the error
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._thread: _Thread | None = None
+        self._thread: threading.Thread | None = None
         self._next: Callable[[], Any] | None = None
+        self._ended.connect(self._finished)
 
     @property
     def busy(self) -> bool:
@@ -54,31 +44,41 @@ class Background(QObject):
         if self._thread is not None:
             self._next = function
             return
-        self._thread = _Thread(function, self)
-        self._thread.finished.connect(self._finished)
+        # no QThread: its Python object could be freed by the garbage collector while it runs
+        self._thread = threading.Thread(target=self._run, args=(function,), daemon=True)
         self._thread.start()
         self.busy_changed.emit(True)
 
     def close(self) -> None:
         """Wait for the running function, and signal nothing."""
         self._next = None
-        if self._thread is not None:
-            self._thread.finished.disconnect(self._finished)
-            self._thread.wait()
-            self._thread = None
-
-    @Slot()
-    def _finished(self) -> None:
         thread, self._thread = self._thread, None
-        if thread is None:
-            return
-        thread.deleteLater()
+        if thread is not None:
+            thread.join()
+
+    def _run(self, function: Callable[[], Any]) -> None:
+        answer, message = None, ""
+        try:
+            answer = function()
+        except DearigError as error:
+            message = str(error)
+        except Exception:
+            log.exception("a function of the window failed in the background")
+            message = "an error in the program; the log has its details"
+        self._ended.emit(threading.current_thread(), answer, message)
+
+    @Slot(object, object, str)
+    def _finished(self, thread: threading.Thread, answer: Any, message: str) -> None:
+        if thread is not self._thread:
+            return  # closed meanwhile
+        thread.join()
+        self._thread = None
         if self._next is not None:
             function, self._next = self._next, None
             self.start(function)
             return
         self.busy_changed.emit(False)
-        if thread.error:
-            self.failed.emit(thread.error)
+        if message:
+            self.failed.emit(message)
         else:
-            self.done.emit(thread.answer)
+            self.done.emit(answer)

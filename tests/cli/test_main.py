@@ -66,8 +66,12 @@ def test_an_unexpected_error_is_one_sentence_and_its_traceback_is_in_the_log(
 
 @pytest.mark.parametrize(
     ("lack", "said"),
-    [(MemoryError(), "no memory left"), (OSError(errno.ENOSPC, "full"), "free some space")],
-    ids=["memory", "disk"],
+    [
+        (MemoryError(), "no memory left"),
+        (SystemError("error return without exception set"), "no memory left"),
+        (OSError(errno.ENOSPC, "full"), "free some space"),
+    ],
+    ids=["memory", "memory for an error", "disk"],
 )
 def test_a_computer_without_memory_or_disk_is_no_mistake_of_the_program(
     lack: Exception,
