@@ -18,6 +18,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from dearig.recording import open_recording
 from tests.interleave.check import check
 from tests.interleave.commands import NAMES, Ended, plan, play, prepare
 from tests.recording.test_lock import killed_run
@@ -39,6 +40,7 @@ def case(seed: int, work: Path, given: Path, paced: bool = True) -> tuple[list[E
         source = rng.choice((None, given / "whole.h5", given / "killed.h5"))
         if source is not None:
             shutil.copyfile(source, folder / name)
+            there[name] = open_recording(source).samples
     ended = play(plan(rng, given, paced), folder, notes)
     return ended, check(folder, ended, there)
 

@@ -28,9 +28,14 @@ REPLACES = ("force", "import")
 def check(folder: Path, ended: list[Ended], given: dict[str, int]) -> list[str]:
     """Return what is wrong: a sentence each.
 
-    ``given`` are the samples of the recordings that were there before, by their identifiers.
+    ``given`` are the samples of the recordings that were there before, by their file names.
     """
-    return [*_outputs(folder, ended), *_recordings(folder, ended, given), *_others(folder, ended)]
+    return [
+        *_outputs(folder, ended),
+        *_recordings(folder, ended),
+        *_given(folder, ended, given),
+        *_others(folder, ended),
+    ]
 
 
 def _outputs(folder: Path, ended: list[Ended]) -> Iterator[str]:
@@ -50,12 +55,11 @@ def _outputs(folder: Path, ended: list[Ended]) -> Iterator[str]:
             yield f"{who} met a file that another command had harmed: {one.said[-300:]}"
 
 
-def _recordings(folder: Path, ended: list[Ended], given: dict[str, int]) -> Iterator[str]:
-    # what each run, or the one before the case, has a right to
-    due = {identifier: (samples, True, None) for identifier, samples in given.items()}
+def _recordings(folder: Path, ended: list[Ended]) -> Iterator[str]:
+    due: dict[str, tuple[int, Ended]] = {}  # samples that each run has flushed
     for one in ended:
         for identifier, (samples, closed) in one.runs.items():
-            due[identifier] = (samples, closed, one)
+            due[identifier] = (samples, one)
             if one.code == 0 and not closed:
                 yield f"{one.command.kind} {one.command.name} ended with 0 and was not closed"
     found: dict[str, Path] = {}
@@ -69,20 +73,32 @@ def _recordings(folder: Path, ended: list[Ended], given: dict[str, int]) -> Iter
             samples = open_recording(path).samples
         except InputError as error:
             # a run that was killed before its first flush of samples may leave such a file
-            if due.get(identifier, (0,))[0] or not _killed_run(ended, path):
+            if (identifier in due and due[identifier][0]) or not _killed_run(ended, path):
                 yield f"{path.name} cannot be read: {error}"
             continue
         found[identifier] = path
         if not result.sound:
             yield f"{path.name} is not sound: {result.faults}"
-        if samples < due.get(identifier, (0,))[0]:
+        if identifier in due and samples < due[identifier][0]:
             yield f"{path.name} has {samples} samples, and {due[identifier][0]} were flushed"
-    for identifier, (samples, _, one) in due.items():
-        if identifier not in found and not _replaced(one, ended):
-            who = "the recording that was there" if one is None else one.command.arguments
-            yield f"{who}: its {samples} samples are gone"
+    for identifier, (samples, one) in due.items():
+        if identifier not in found and not _replaced(one.command.name, one.ended, ended):
+            yield f"{one.command.arguments}: its {samples} samples are gone"
     for path in folder.glob("*.journal"):
         yield f"{path.name} is left after a recovery"
+
+
+def _given(folder: Path, ended: list[Ended], given: dict[str, int]) -> Iterator[str]:
+    for name, samples in given.items():
+        if _replaced(name, 0.0, ended):
+            continue
+        try:
+            left = open_recording(folder / name).samples
+        except InputError as error:
+            yield f"{name}, which was there before, cannot be read: {error}"
+            continue
+        if left != samples:
+            yield f"{name}, which was there before, had {samples} samples and has {left}"
 
 
 def _identifier(path: Path) -> str:
@@ -101,16 +117,14 @@ def _killed_run(ended: list[Ended], path: Path) -> bool:
     )
 
 
-def _replaced(run: Ended | None, ended: list[Ended]) -> bool:
-    """Return True if another command replaced the recording after its run had ended."""
-    after = 0.0 if run is None else run.ended
+def _replaced(name: str, after: float, ended: list[Ended]) -> bool:
+    """Return True if a command may have replaced the recording ``name`` after ``after`` s."""
     return any(
-        one.ended >= after
-        and one is not run
+        one.ended > after
         and one.code != 2
         and "--force" in one.command.arguments
         and one.command.kind in REPLACES
-        and (run is None or one.command.name == run.command.name)
+        and one.command.name == name
         for one in ended
     )
 
