@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Slot
+from PySide6.QtCore import QSignalBlocker, Slot
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
@@ -49,12 +49,11 @@ class BeforeAfterPlot(QWidget):
     def show_pairs(self, pairs: tuple[_Pair, ...]) -> None:
         """Show these pairs, starting with the first."""
         self._pairs = pairs
-        self.record.blockSignals(True)
-        self.record.clear()
-        for one, _ in pairs:
-            role = "training" if one.role == "train" else "validation"
-            self.record.addItem(f"{one.name} ({role})")
-        self.record.blockSignals(False)
+        with QSignalBlocker(self.record):
+            self.record.clear()
+            for one, _ in pairs:
+                role = "training" if one.role == "train" else "validation"
+                self.record.addItem(f"{one.name} ({role})")
         self._draw()
 
     @Slot()

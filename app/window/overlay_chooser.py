@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Slot
+from PySide6.QtCore import QSignalBlocker, Qt, Slot
 from PySide6.QtWidgets import QComboBox, QFileDialog, QHBoxLayout, QWidget
 
 from dearig.acquisition.overlay import OverlayModel
@@ -73,19 +73,20 @@ class OverlayChooser(QWidget):
         session = self._session
         known = [session.thesis_model, *(m for m in session.overlays if m.path is not None)]
         for place, choice in enumerate(self.models):
-            choice.blockSignals(True)
-            choice.clear()
-            choice.addItem(_NO_MODEL, None)
-            for model in known:
-                choice.addItem(model.name, model)
-                if model.path is not None:
-                    choice.setItemData(
-                        choice.count() - 1, plain_tip(str(model.path)), Qt.ItemDataRole.ToolTipRole
-                    )
-            choice.addItem(_OPEN, _OPEN)
-            chosen = session.overlays[place] if place < len(session.overlays) else None
-            choice.setCurrentIndex(0 if chosen is None else 1 + known.index(chosen))
-            choice.blockSignals(False)
+            with QSignalBlocker(choice):
+                choice.clear()
+                choice.addItem(_NO_MODEL, None)
+                for model in known:
+                    choice.addItem(model.name, model)
+                    if model.path is not None:
+                        choice.setItemData(
+                            choice.count() - 1,
+                            plain_tip(str(model.path)),
+                            Qt.ItemDataRole.ToolTipRole,
+                        )
+                choice.addItem(_OPEN, _OPEN)
+                chosen = session.overlays[place] if place < len(session.overlays) else None
+                choice.setCurrentIndex(0 if chosen is None else 1 + known.index(chosen))
 
     def _chosen(self, place: int) -> None:
         chosen = self.models[place].currentData()

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import Slot
+from PySide6.QtCore import QSignalBlocker, Slot
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
@@ -77,10 +77,9 @@ class ResidualPlots(QWidget):
     def show_residuals(self, residuals: tuple[Residual, ...]) -> None:
         """Show these residuals, starting with the first."""
         self._residuals = residuals
-        self.record.blockSignals(True)
-        self.record.clear()
-        self.record.addItems([r.name for r in residuals])
-        self.record.blockSignals(False)
+        with QSignalBlocker(self.record):
+            self.record.clear()
+            self.record.addItems([r.name for r in residuals])
         self._another_record()
 
     @Slot()
@@ -88,11 +87,10 @@ class ResidualPlots(QWidget):
         found = self._found()
         names = [d.quantity for d in found.dependences[0]] if found and found.dependences else []
         before = self.quantity.currentText()
-        self.quantity.blockSignals(True)
-        self.quantity.clear()
-        self.quantity.addItems(names)
-        self.quantity.setCurrentIndex(max(names.index(before) if before in names else 0, 0))
-        self.quantity.blockSignals(False)
+        with QSignalBlocker(self.quantity):
+            self.quantity.clear()
+            self.quantity.addItems(names)
+            self.quantity.setCurrentIndex(max(names.index(before) if before in names else 0, 0))
         self.quantity.setEnabled(bool(names))
         self.stand.setEnabled(found is not None and len(found.over_time) > 1)
         self._draw()

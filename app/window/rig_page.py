@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import Qt, Slot
+from PySide6.QtCore import QSignalBlocker, Qt, Slot
 from PySide6.QtGui import QColor, QDragEnterEvent, QDropEvent, QKeySequence, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -257,9 +257,8 @@ class RigPage(QWidget):
         kind = "remote" if "@" in body else "local" if address.startswith("daqmx:") else "sim"
         if address.startswith("sim:"):
             kind = "hidden"
-            before = self.seed.blockSignals(True)  # shown, not chosen
-            self.seed.setValue(int(body) if body.isdigit() else 0)
-            self.seed.blockSignals(before)
+            with QSignalBlocker(self.seed):  # shown, not chosen
+                self.seed.setValue(int(body) if body.isdigit() else 0)
         if kind in ("local", "remote"):
             device, _, server = body.partition("@")
             self.device.setText(device)

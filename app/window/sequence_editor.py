@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from PySide6.QtCore import Qt, Signal, Slot
+from PySide6.QtCore import QSignalBlocker, Qt, Signal, Slot
 from PySide6.QtGui import QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -138,11 +138,10 @@ class SequenceEditor(QWidget):
     def fill(self, row: int) -> None:
         """Show the draft, with the segment in ``row`` chosen."""
         self._form_of = None
-        self.table.blockSignals(True)
-        self.table.setRowCount(len(self.draft.segments))
-        for i in range(len(self.draft.segments)):
-            self._fill_row(i)
-        self.table.blockSignals(False)
+        with QSignalBlocker(self.table):
+            self.table.setRowCount(len(self.draft.segments))
+            for i in range(len(self.draft.segments)):
+                self._fill_row(i)
         self.table.setCurrentCell(min(row, len(self.draft.segments) - 1), 1)
         self._row_changed()
         for key, field in self.heads.items():

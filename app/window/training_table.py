@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal, Slot
+from PySide6.QtCore import QSignalBlocker, Qt, Signal, Slot
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -36,6 +36,7 @@ class TrainingTable(QTableWidget):
     def __init__(self, library: Library, parent: QWidget | None = None) -> None:
         super().__init__(0, len(_HEADS), parent)
         self._library = library
+        self._row: dict[Path, int] = {}
         self.setAccessibleName("Recordings for training and validation")
         for column, (name, tip) in enumerate(_HEADS):
             head = QTableWidgetItem(name)
@@ -76,33 +77,37 @@ class TrainingTable(QTableWidget):
     @Slot()
     def refresh(self) -> None:
         """List the recordings of the library; their check marks stay."""
-        train, validation, files = self.train, self.validation, self._library.files
+        train, validation = set(self.train), set(self.validation)
+        files = self._library.files
         paths = sorted(files, key=lambda path: (-files[path][0], path.name))
-        self.blockSignals(True)
-        self.setRowCount(len(paths))
-        for row, path in enumerate(paths):
-            item = QTableWidgetItem(path.stem)
-            item.setData(Qt.ItemDataRole.UserRole, path)
-            item.setFlags(Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable)
-            self.setItem(row, _NAME, item)
-            for column, checked in ((_TRAIN, path in train), (_VALIDATE, path in validation)):
-                box = QTableWidgetItem()
-                box.setFlags(
-                    Qt.ItemFlag.ItemIsEnabled
-                    | Qt.ItemFlag.ItemIsUserCheckable
-                    | Qt.ItemFlag.ItemIsSelectable
-                )
-                box.setCheckState(_state(checked))
-                self.setItem(row, column, box)
-            self._describe(row, self._library.summaries.get(path))
-        self.blockSignals(False)
+        with QSignalBlocker(self):
+            self.setRowCount(len(paths))
+            self._row = {path: row for row, path in enumerate(paths)}
+            for row, path in enumerate(paths):
+                self._fill_row(row, path, path in train, path in validation)
         self.changed.emit()
+
+    def _fill_row(self, row: int, path: Path, train: bool, validate: bool) -> None:
+        item = QTableWidgetItem(path.stem)
+        item.setData(Qt.ItemDataRole.UserRole, path)
+        item.setFlags(Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable)
+        self.setItem(row, _NAME, item)
+        for column, checked in ((_TRAIN, train), (_VALIDATE, validate)):
+            box = QTableWidgetItem()
+            box.setFlags(
+                Qt.ItemFlag.ItemIsEnabled
+                | Qt.ItemFlag.ItemIsUserCheckable
+                | Qt.ItemFlag.ItemIsSelectable
+            )
+            box.setCheckState(_state(checked))
+            self.setItem(row, column, box)
+        self._describe(row, self._library.summaries.get(path))
 
     @Slot(Path)
     def _summarised(self, path: Path) -> None:
-        paths = self._paths()
-        if path in paths:
-            self._describe(paths.index(path), self._library.summaries.get(path))
+        row = self._row.get(path)
+        if row is not None:
+            self._describe(row, self._library.summaries.get(path))
 
     def _describe(self, row: int, summary: RecordingSummary | None) -> None:
         if summary is None:
@@ -113,14 +118,14 @@ class TrainingTable(QTableWidget):
         item.setToolTip(plain_tip(summary.trouble or about))
         if not summary.trouble:
             return
-        self.blockSignals(True)
-        item.setFlags(Qt.ItemFlag.NoItemFlags)
-        for column in (_TRAIN, _VALIDATE):
-            box = self._item(row, column)
-            box.setFlags(Qt.ItemFlag.NoItemFlags)
-            box.setCheckState(Qt.CheckState.Unchecked)
-            box.setToolTip(plain_tip(summary.trouble))
-        self.blockSignals(False)
+        # signals may be blocked by the caller already: a blocker leaves them as they were
+        with QSignalBlocker(self):
+            item.setFlags(Qt.ItemFlag.NoItemFlags)
+            for column in (_TRAIN, _VALIDATE):
+                box = self._item(row, column)
+                box.setFlags(Qt.ItemFlag.NoItemFlags)
+                box.setCheckState(Qt.CheckState.Unchecked)
+                box.setToolTip(plain_tip(summary.trouble))
 
     @Slot(QTableWidgetItem)
     def _item_changed(self, item: QTableWidgetItem) -> None:
