@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from dearig.window.banners import Banners
 from dearig.window.guide import Guide
 from dearig.window.hv import HighVoltage, HighVoltageBadge
 from dearig.window.layout_state import GROUP
@@ -35,7 +36,7 @@ from dearig.window.sequence_page import SequencePage
 from dearig.window.session import Session
 from dearig.window.settings import kept_bytes, kept_number, kept_text
 from dearig.window.study_page import StudyPage
-from dearig.window.theme import DARK, LIGHT, apply, system_theme
+from dearig.window.theme import DARK, LIGHT, SPACE, apply, system_theme
 from dearig.window.widgets import label, plain_tip
 
 __all__ = ["MainWindow"]
@@ -84,6 +85,11 @@ class MainWindow(QMainWindow):
     def show_page(self, page: QWidget) -> None:
         """Bring ``page`` to the front."""
         self.list.setCurrentRow(self.pages.index(page))
+
+    def _show_page_titled(self, title: str) -> None:
+        for page in self.pages:
+            if cast(Page, page).title == title:
+                self.show_page(page)
 
     @Slot()
     def show_guide(self) -> None:
@@ -188,8 +194,14 @@ class MainWindow(QMainWindow):
         row.setSpacing(0)
         row.addWidget(column)
         row.addWidget(self.stack, 1)
+        self.banners = Banners(self._show_page_titled)
+        self._top = QVBoxLayout()
+        self._top.setContentsMargins(0, 0, 0, 0)
+        self._top.setSpacing(SPACE // 2)
+        self._top.addWidget(self.banners)
+        self._top.addLayout(row, 1)
         middle = QWidget()
-        middle.setLayout(row)
+        middle.setLayout(self._top)
         self.setCentralWidget(middle)
         bar = self.statusBar()
         bar.setSizeGripEnabled(False)
@@ -243,6 +255,7 @@ class MainWindow(QMainWindow):
         self.study_page.show_model.connect(self._show_model)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_colour_scheme)
         session.running_changed.connect(self._filter_keys)
+        session.blocks_changed.connect(lambda: self.banners.show_blocks(session.blocks))
         self._rig_or_folder_changed()
 
     @Slot(bool)

@@ -16,7 +16,7 @@ from dearig.window.hv import HighVoltage, HighVoltageBadge
 from dearig.window.live import RunSnapshot
 from dearig.window.session import Session
 from dearig.window.theme import SPACE, digits
-from dearig.window.widgets import Readout, button, card, label
+from dearig.window.widgets import Message, Readout, button, card, label
 
 __all__ = ["RunControls"]
 
@@ -65,6 +65,8 @@ class RunControls(QWidget):
             step.setMinimumHeight(40)
             steps.addWidget(step)
         column.addLayout(steps)
+        self.blocked = Message()  # why the rig cannot be armed
+        column.addWidget(self.blocked)
         column.addWidget(self.stop_button)
         for widget in (self.time_left, self.segment, self.progress):
             column.addWidget(widget)

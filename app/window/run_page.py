@@ -66,6 +66,7 @@ class RunPage(QWidget):
         self.arm_button = self.controls.arm_button
         self.start_button = self.controls.start_button
         self.stop_button = self.controls.stop_button
+        self.blocked = self.controls.blocked
         self.overlays = OverlayChooser(session)
         self.plots = RunPlots(session)
         self.channel_plots = ChannelPlots(session)
@@ -142,7 +143,8 @@ class RunPage(QWidget):
     @Slot(bool)
     def _arm(self, armed: bool) -> None:
         preview = self.session.preview
-        if self.runner.running or preview is None or not preview.playable:
+        refused = preview is None or not preview.playable or bool(self.session.blocks)
+        if self.runner.running or (armed and refused):
             self.arm_button.setChecked(False)
             return
         self.runner.arm(armed)
@@ -163,6 +165,7 @@ class RunPage(QWidget):
 
     @Slot(object)
     def _state_changed(self, state: HighVoltage) -> None:
+        self.session.set_armed(state is HighVoltage.ARMED)
         self.controls.show_state(state, self._simulated_label())
         self.controls.show_stop(ramping=state is HighVoltage.RAMPING)
 
@@ -179,7 +182,7 @@ class RunPage(QWidget):
     def _refresh(self) -> None:
         session, running = self.session, self.runner.running
         preview = session.preview
-        ready = preview is not None and preview.playable and not running
+        ready = preview is not None and preview.playable and not running and not session.blocks
         armed = self.runner.state is HighVoltage.ARMED
         if not ready and armed:
             self.runner.arm(armed=False)
@@ -190,6 +193,7 @@ class RunPage(QWidget):
         for field in (self.operator, self.film, self.notes, self.paced):
             field.setEnabled(not running)
         self.paced.setVisible(simulated(session.address))
+        self.blocked.show_text("\n".join(b.sentence for b in session.blocks.values()), "warn")
         self._describe_watchdog()
         if running:
             return
@@ -350,6 +354,7 @@ class RunPage(QWidget):
         session.sequence_changed.connect(self._sequence_changed)
         session.rig_changed.connect(self._refresh)
         session.overlays_changed.connect(self._overlays_changed)
+        session.blocks_changed.connect(self._refresh)
 
     def _metadata_row(self) -> QHBoxLayout:
         session = self.session

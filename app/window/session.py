@@ -20,10 +20,18 @@ from dearig.model.material import TABLE_3
 from dearig.window.settings import kept_text, kept_texts
 from dearig.window.theme import LIGHT, Theme
 
-__all__ = ["Breach", "Preview", "Session"]
+__all__ = ["Block", "Breach", "Preview", "Session"]
 
 _RECENT_MAX = 8
 FIRST_SEQUENCE = "thesis"
+
+
+@dataclass(frozen=True)
+class Block:
+    """Why the rig cannot be armed: a ``sentence``, and the title of the ``page`` that mends it."""
+
+    sentence: str
+    page: str = ""
 
 
 @dataclass(frozen=True)
@@ -62,7 +70,8 @@ class Session(QObject):
 
     ``rig_changed``: address or rig file; ``sequence_changed``: its text; ``preview_changed``: its
     plan is ready; ``recorded``: a new recording is in the folder; ``running_changed``: a run has
-    begun (True) or ended (False). During a run nothing that it uses may be changed.
+    begun (True) or ended (False); ``blocks_changed``: what blocks arming. During a run nothing that
+    it uses may be changed.
     """
 
     rig_changed = Signal()
@@ -75,6 +84,7 @@ class Session(QObject):
     recent_changed = Signal()
     recorded = Signal(Path)
     running_changed = Signal(bool)
+    blocks_changed = Signal()
     message = Signal(str)  #: text for the status bar
 
     def __init__(
@@ -104,6 +114,8 @@ class Session(QObject):
         self.notes = ""
         self.theme = theme
         self.running = False
+        self.armed = False
+        self._blocks: dict[str, Block] = {}
 
     def set_address(self, address: str) -> None:
         """Use the rig ``sim``, ``sim:7``, ``daqmx:Dev1`` or ``daqmx:Dev1@HOST:PORT``."""
@@ -174,6 +186,36 @@ class Session(QObject):
         if running != self.running:
             self.running = running
             self.running_changed.emit(running)
+
+    def set_armed(self, armed: bool) -> None:
+        """Say that the rig was armed or disarmed."""
+        self.armed = armed
+
+    @property
+    def busy(self) -> bool:
+        """True while the rig is armed or a run goes on: STOP must be within reach."""
+        return self.armed or self.running
+
+    @property
+    def blocks(self) -> dict[str, Block]:
+        """What blocks arming, by key; the rig is armed only while this is empty."""
+        return dict(self._blocks)
+
+    def block(self, key: str, sentence: str, page: str = "") -> None:
+        """Refuse to arm until ``unblock``; a rig that is armed is disarmed.
+
+        The ``sentence`` stands beside the Arm button, and on a banner of every page where ``page``
+        is given, the title of the page that mends it.
+        """
+        wanted = Block(sentence, page)
+        if self._blocks.get(key) != wanted:
+            self._blocks[key] = wanted
+            self.blocks_changed.emit()
+
+    def unblock(self, key: str) -> None:
+        """End the block ``key``, if there is one."""
+        if self._blocks.pop(key, None) is not None:
+            self.blocks_changed.emit()
 
     @property
     def recent(self) -> list[Path]:

@@ -161,6 +161,9 @@ def _sheet(t: Theme) -> str:
     QFrame[role="card"] {{
         background: {t.surface}; border: 1px solid {t.line}; border-radius: 6px;
     }}
+    QFrame[role="banner"] {{
+        background: {t.surface}; border: 2px solid {t.warn}; border-radius: 4px;
+    }}
     QPushButton {{
         padding: 5px 12px; border: 1px solid {t.line}; border-radius: 4px; background: {t.raised};
     }}
