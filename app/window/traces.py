@@ -1,7 +1,7 @@
 """Decimated signals of a run in progress, and running errors.
 
 Bins are fixed to sample numbers, so that a trace does not flicker while it scrolls. Each bin keeps
-its minimum and maximum, so that no spike is lost.
+its lowest and its highest sample, so that no spike is lost.
 """
 
 from __future__ import annotations
@@ -14,6 +14,75 @@ import numpy as np
 __all__ = ["ErrorsSoFar", "Pyramid", "RunningErrors"]
 
 
+@dataclass(frozen=True)
+class _Bins:
+    """Extremes of consecutive bins: their values and the numbers of their samples, (n,) each."""
+
+    low: np.ndarray
+    high: np.ndarray
+    low_at: np.ndarray
+    high_at: np.ndarray
+
+    @classmethod
+    def of_samples(cls, values: np.ndarray, first: int) -> _Bins:
+        """Return bins of one sample each; ``first`` is the number of the first sample."""
+        at = np.arange(first, first + values.size, dtype=np.int64)
+        return cls(values, values, at, at)
+
+    @classmethod
+    def none(cls) -> _Bins:
+        return cls.of_samples(np.empty(0), 0)
+
+    def __len__(self) -> int:
+        return int(self.low.size)
+
+    def __getitem__(self, part: slice) -> _Bins:
+        return _Bins(self.low[part], self.high[part], self.low_at[part], self.high_at[part])
+
+    def followed_by(self, other: _Bins) -> _Bins:
+        """Return these bins and then those of ``other``."""
+        if not len(self):
+            return other
+        return _Bins(
+            np.concatenate((self.low, other.low)),
+            np.concatenate((self.high, other.high)),
+            np.concatenate((self.low_at, other.low_at)),
+            np.concatenate((self.high_at, other.high_at)),
+        )
+
+    def paired(self) -> _Bins:
+        """Return the bins that consist of two of these each; their number must be even.
+
+        Of equal samples the first is the lowest and the last is the highest. NaN is left out where
+        the other bin has a value.
+        """
+        a, b = self[0::2], self[1::2]
+        second_low = (b.low < a.low) | np.isnan(a.low)
+        second_high = ~(b.high < a.high) & ~np.isnan(b.high)
+        return _Bins(
+            np.where(second_low, b.low, a.low),
+            np.where(second_high, b.high, a.high),
+            np.where(second_low, b.low_at, a.low_at),
+            np.where(second_high, b.high_at, a.high_at),
+        )
+
+    def points(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return sample numbers and values of both extremes of each bin, in the order of time."""
+        low_first = self.low_at <= self.high_at
+        x = np.empty(2 * len(self))
+        y = np.empty(2 * len(self))
+        x[0::2] = np.where(low_first, self.low_at, self.high_at)
+        x[1::2] = np.where(low_first, self.high_at, self.low_at)
+        y[0::2] = np.where(low_first, self.low, self.high)
+        y[1::2] = np.where(low_first, self.high, self.low)
+        once = self.low_at == self.high_at
+        if once.any():  # one sample is both
+            kept = np.ones(x.size, dtype=bool)
+            kept[1::2] = ~once
+            x, y = x[kept], y[kept]
+        return x, y
+
+
 class _Level:
     """The newest ``capacity`` complete bins of ``size`` samples each."""
 
@@ -23,22 +92,24 @@ class _Level:
         self.count = 0  # bins ever filled
         self.low = np.full(capacity, np.nan)
         self.high = np.full(capacity, np.nan)
+        self.low_at = np.zeros(capacity, dtype=np.int64)
+        self.high_at = np.zeros(capacity, dtype=np.int64)
 
     @property
     def oldest(self) -> int:
         """Number of the first bin that is still kept."""
         return max(0, self.count - self.capacity)
 
-    def push(self, low: np.ndarray, high: np.ndarray) -> None:
-        self.count += low.size
-        low, high = low[-self.capacity :], high[-self.capacity :]
-        places = np.arange(self.count - low.size, self.count) % self.capacity
-        self.low[places] = low
-        self.high[places] = high
+    def push(self, bins: _Bins) -> None:
+        self.count += len(bins)
+        bins = bins[-self.capacity :]
+        places = np.arange(self.count - len(bins), self.count) % self.capacity
+        self.low[places], self.high[places] = bins.low, bins.high
+        self.low_at[places], self.high_at[places] = bins.low_at, bins.high_at
 
-    def bins(self, first: int, last: int) -> tuple[np.ndarray, np.ndarray]:
-        places = np.arange(first, last) % self.capacity
-        return self.low[places], self.high[places]
+    def bins(self, first: int, last: int) -> _Bins:
+        places = np.arange(first, max(first, last)) % self.capacity
+        return _Bins(self.low[places], self.high[places], self.low_at[places], self.high_at[places])
 
 
 class Pyramid:
@@ -53,8 +124,8 @@ class Pyramid:
         while self._levels[-1].size * capacity < total:
             self._levels.append(_Level(self._levels[-1].size * 2, capacity))
         self._samples = 0
-        # samples that do not fill a bin of the next level yet, for each level
-        self._rest = [(np.empty(0), np.empty(0)) for _ in self._levels]
+        # bins that do not fill a bin of the next level yet, for each level
+        self._rest = [_Bins.none() for _ in self._levels]
 
     @property
     def samples(self) -> int:
@@ -63,24 +134,22 @@ class Pyramid:
 
     def push(self, values: np.ndarray) -> None:
         """Add ``values`` (n,), the next samples; NaN is not drawn."""
-        low = high = np.asarray(values, dtype=np.float64)
-        self._samples += low.size
-        self._levels[0].push(low, high)
+        bins = _Bins.of_samples(np.asarray(values, dtype=np.float64), self._samples)
+        self._samples += len(bins)
+        self._levels[0].push(bins)
         for k in range(1, len(self._levels)):
-            low = np.concatenate((self._rest[k][0], low))
-            high = np.concatenate((self._rest[k][1], high))
-            whole = low.size // 2 * 2
-            self._rest[k] = (low[whole:], high[whole:])
-            # fmin and fmax ignore NaN: a bin with a gap shows its other sample
-            low = np.fmin(low[0:whole:2], low[1:whole:2])
-            high = np.fmax(high[0:whole:2], high[1:whole:2])
-            self._levels[k].push(low, high)
+            bins = self._rest[k].followed_by(bins)
+            whole = len(bins) // 2 * 2
+            self._rest[k] = bins[whole:]
+            bins = bins[:whole].paired()
+            self._levels[k].push(bins)
 
     def view(self, first: int, last: int) -> tuple[np.ndarray, np.ndarray]:
         """Return sample numbers and values (m,) of a polyline for samples ``first`` to ``last``.
 
-        It uses the finest bins that reach back to ``first``. Each bin gives its minimum and its
-        maximum; the samples that have filled no bin yet follow one by one.
+        It uses the finest bins that reach back to ``first``. Each bin gives its lowest and its
+        highest sample, in the order of time, so that rising and falling slopes look alike; the
+        samples that have filled no bin yet follow one by one. Each point is a sample.
         """
         first, last = max(first, 0), min(last, self._samples)
         if last <= first:
@@ -90,21 +159,12 @@ class Pyramid:
         )  # fmt: skip
         begin = max(first // level.size, level.oldest)
         end = min(-(-last // level.size), level.count)
-        low, high = level.bins(begin, max(end, begin))
-        if level.size == 1:
-            return np.arange(begin, max(end, begin), dtype=np.float64), low
-        middle = (np.arange(begin, max(end, begin)) + 0.5) * level.size - 0.5
-        x = np.repeat(middle, 2)
-        x[0::2] -= 0.25 * level.size
-        x[1::2] += 0.25 * level.size
-        y = np.empty(2 * low.size)
-        y[0::2], y[1::2] = low, high
+        x, y = level.bins(begin, end).points()
         finest = self._levels[0]
         newest = max(level.count * level.size, finest.oldest)
-        if newest < last:
-            values, _ = finest.bins(newest, last)
+        if level.size > 1 and newest < last:
             x = np.concatenate((x, np.arange(newest, last, dtype=np.float64)))
-            y = np.concatenate((y, values))
+            y = np.concatenate((y, finest.bins(newest, last).low))
         return x, y
 
 

@@ -40,6 +40,36 @@ def test_no_spike_is_lost(at: int) -> None:
     assert x.size < 2 * 64 + 16
 
 
+def triangle(samples: int, period: int) -> np.ndarray:
+    return np.abs((np.arange(samples) / period) % 1.0 * 2.0 - 1.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_drawn_points_are_samples_in_the_order_of_time_at_every_zoom(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    size = int(rng.integers(300, 5000))
+    values = triangle(size, int(rng.integers(40, 900))) + (rng.standard_normal(size) * (seed % 2))
+    values[rng.integers(0, size, 20 * (seed // 3))] = np.nan
+    pyramid = pushed(values, sorted(rng.integers(0, size, 9)))
+    for first, last in np.sort(rng.integers(0, size + 1, (40, 2)), axis=1):
+        x, y = pyramid.view(int(first), int(last))
+        assert (np.diff(x) > 0).all()
+        np.testing.assert_array_equal(y[~np.isnan(y)], values[x.astype(int)][~np.isnan(y)])
+
+
+def test_rising_and_falling_slopes_of_a_triangle_are_drawn_alike() -> None:
+    # straight lines between the points lie on the triangle, except where a bin holds a corner
+    values = triangle(4096, 1024)
+    x, y = pushed(values, []).view(0, 4096)
+    between = 0.5 * (x[1:] + x[:-1])
+    on_curve = np.interp(between, np.arange(4096), values)
+    off = np.abs(0.5 * (y[1:] + y[:-1]) - on_curve) > 1e-9
+    rising = (between / 1024.0) % 1.0 > 0.5
+    assert np.count_nonzero(off & rising) <= 8
+    assert np.count_nonzero(off & ~rising) <= 8
+    assert x.size > 100
+
+
 def test_bins_stand_still_while_a_run_goes_on() -> None:
     values = np.random.default_rng(2).standard_normal(900)
     pyramid = Pyramid(10_000, 64)
