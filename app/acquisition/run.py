@@ -16,6 +16,7 @@ from pathlib import Path
 from dearig.acquisition.check import check_rig
 from dearig.acquisition.event_log import EventLog
 from dearig.acquisition.interrupts import Interrupts
+from dearig.acquisition.marks import RunMarks
 from dearig.acquisition.overlay import Overlay, OverlayModel
 from dearig.acquisition.plan import Plan, plan
 from dearig.acquisition.rigs import is_simulated, kind_of, options_of
@@ -59,7 +60,8 @@ class RunOptions:
 
     ``configuration`` is the text of the rig file, kept with the recording. ``operator``,
     ``film_id`` (by default the rig file's film) and ``notes`` are kept too. With ``overwrite`` an
-    existing file is replaced; with ``fsync`` flushed data survive a power cut.
+    existing file is replaced; with ``fsync`` flushed data survive a power cut. ``waveform_digest``
+    is that of the plan that was shown and armed: another waveform is refused; "" admits any.
 
     Only for a simulated rig: ``seed`` of its noise, ``paced`` for real time, ``actuator`` in place
     of the film that ``sim`` has by default, and the ``faults`` that occur in it.
@@ -71,6 +73,7 @@ class RunOptions:
     notes: str = ""
     overwrite: bool = False
     fsync: bool = False
+    waveform_digest: str = ""
     seed: int = 0
     paced: bool = False
     actuator: Actuator | None = None
@@ -169,13 +172,15 @@ def record(
     overlay: OverlayModel | None = None,
     observer: RunObserver | None = None,
     interrupts: Interrupts | None = None,
+    marks: RunMarks | None = None,
     progress: Progress = quiet,
     clock: Callable[[], float] = time.monotonic,
 ) -> RunResult:
     """Play ``loaded`` on the rig at ``address`` and record it to ``out``.
 
     ``overlay`` is a model that runs in step with the data and is recorded with them; ``observer``
-    receives them. ``interrupts`` lets another thread end the run; by default ctrl-C does.
+    receives them. ``interrupts`` lets another thread end the run; by default ctrl-C does. ``marks``
+    lets other threads set marks and notes, which are recorded as events.
 
     Raises ``InputError`` before anything is changed. After the rig was made safe and the recording
     was closed, it raises ``SafetyStop`` where an interlock ended the run, ``InstrumentFault`` or
@@ -186,6 +191,11 @@ def record(
     out = check_output(out, options.overwrite)
     planned = plan(loaded, rig_file, options.actuator, options.film_id, progress)
     waveform = planned.admitted()
+    if options.waveform_digest not in ("", waveform.digest):
+        raise InputError(
+            f"sequence {planned.name!r} is not the one that was armed: its voltage has changed "
+            f"since the plan was shown; look at the new plan, then arm it again"
+        )
     rig = open_rig(address, rig_file, options)
     try:
         with interrupts or Interrupts() as interrupts:
@@ -234,8 +244,9 @@ def record(
             )
             with EventLog() as event_log:
                 run = _Run(
-                    rig, recorder, interlocks, interrupts, observer, event_log, progress, clock
-                )
+                    rig, recorder, interlocks, interrupts, marks or RunMarks(), observer,
+                    event_log, progress, clock,
+                )  # fmt: skip
                 events = run.follow(waveform.samples)
         return RunResult(
             recorder.path, recorder.samples, rate, "finished", events, waveform.margins
@@ -253,6 +264,7 @@ class _Run:
         recorder: Recorder,
         interlocks: Interlocks,
         interrupts: Interrupts,
+        marks: RunMarks,
         observer: RunObserver,
         event_log: EventLog,
         progress: Progress,
@@ -262,6 +274,7 @@ class _Run:
         self._recorder = recorder
         self._interlocks = interlocks
         self._interrupts = interrupts
+        self._marks = marks
         self._observer = observer
         self._event_log = event_log
         self._progress = progress
@@ -284,6 +297,7 @@ class _Run:
                     _make_safe(self._rig)
                 finally:
                     self._note_guardian()
+                    self._note_events(self._marks.close())
             if self._trip is not None:
                 kept = self._end(f"stopped by an interlock: {self._trip.message}")
                 raise SafetyStop(
@@ -333,6 +347,7 @@ class _Run:
         if interrupts.asked():
             return
         rig.start()
+        self._marks.reach(0)
         try:
             stopping = False
             while (block := rig.read()) is not None:
@@ -368,6 +383,7 @@ class _Run:
         self._observer.block(block)
         for event in block.events:
             self._tell(event)
+        self._note_events(self._marks.reach(self._recorder.received))
 
     def _watch(self, block: Block) -> Trip | None:
         """Return the interlock that trips now, if any; every one is recorded as an event."""
@@ -389,6 +405,10 @@ class _Run:
         event = Event(sample, level, message)
         self._recorder.event(sample, level, message)
         self._tell(event)
+
+    def _note_events(self, events: list[Event]) -> None:
+        for event in events:
+            self._note(event.sample, event.level, event.message)
 
     def _end(
         self,
