@@ -24,6 +24,7 @@ from PySide6.QtWidgets import (
 )
 
 from dearig.window.banners import Banners
+from dearig.window.error_panel import ErrorPanel
 from dearig.window.guide import Guide
 from dearig.window.hv import HighVoltage, HighVoltageBadge
 from dearig.window.layout_state import GROUP
@@ -199,6 +200,8 @@ class MainWindow(QMainWindow):
         self._top.setContentsMargins(0, 0, 0, 0)
         self._top.setSpacing(SPACE // 2)
         self._top.addWidget(self.banners)
+        self.error_panel = ErrorPanel(self.session.program_errors)
+        self._top.addWidget(self.error_panel)
         self._top.addLayout(row, 1)
         middle = QWidget()
         middle.setLayout(self._top)
@@ -231,9 +234,12 @@ class MainWindow(QMainWindow):
         reset = QAction("&Reset layout", self)
         reset.triggered.connect(self.reset_layout)
         menu.addAction(reset)
+        errors = QAction("Program &errors", self)
+        errors.triggered.connect(lambda: self.error_panel.show_errors())
+        menu.addAction(errors)
         made = QToolButton()
         made.setText("≡  Window")
-        made.setToolTip("Guide (F1), colour scheme, layout")
+        made.setToolTip("Guide (F1), colour scheme, layout, errors of the program")
         made.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         made.setMenu(menu)
         made.setFixedWidth(132)

@@ -54,6 +54,7 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     application.setOrganizationName("dearig")
     prepare_plots()
     session = Session(folder.absolute(), open_settings(), address=rig, theme=system_theme())
+    session.program_errors.install()
     if rig_file is not None:
         session.set_rig_file(rig_file.absolute(), text, settings)
     window = MainWindow(session)
@@ -70,6 +71,7 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
         return application.exec()
     finally:
         collector.close()
+        session.program_errors.close()
 
 
 def _run_interpreter() -> None:

@@ -31,8 +31,8 @@ from dearig.window.live import Live
 __all__ = ["RunEnd", "RunRequest", "Runner", "next_recording_path"]
 
 _PROGRAM_FAULT = (
-    "an error in the program ended the run: check that the amplifier is at 0 V; the terminal shows "
-    "the details of the error"
+    "an error in the program ended the run: check that the amplifier is at 0 V; the log has the "
+    "details of the error"
 )
 _ENDS: dict[type[DearigError], str] = {
     Interrupted: "Stopped",

@@ -17,6 +17,7 @@ from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
 from dearig.model.actuator import Actuator
 from dearig.model.material import TABLE_3
+from dearig.window.program_errors import ProgramErrors
 from dearig.window.settings import kept_text, kept_texts
 from dearig.window.theme import LIGHT, Theme
 
@@ -98,6 +99,7 @@ class Session(QObject):
     ) -> None:
         super().__init__(parent)
         self.settings = settings
+        self.program_errors = ProgramErrors(self)
         self.address = address
         self.rig_path: Path | None = None
         self.rig_text = ""

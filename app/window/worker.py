@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import threading
 import time
@@ -14,9 +15,19 @@ from typing import Any
 from PySide6.QtCore import QObject, Qt, Signal, Slot
 
 from dearig.drivers.processes import isolated_spawn
-from dearig.window.worker_process import Request, Response, StopRequest, serve
+from dearig.window.program_errors import ErrorInProcess
+from dearig.window.worker_process import (
+    CURRENT,
+    Request,
+    Response,
+    StopRequest,
+    broken,
+    serve,
+)
 
 __all__ = ["Estimate", "Job", "Worker"]
+
+log = logging.getLogger(__name__)
 
 
 class Estimate:
@@ -178,6 +189,8 @@ class Worker(QObject):
             except (EOFError, OSError):
                 self._arrived.emit(life, None)
                 return
+            except Exception as error:  # noqa: BLE001  (a result that cannot be unpickled)
+                message = broken(CURRENT, error)
             self._arrived.emit(life, message)
 
     def _kill(self) -> None:
@@ -206,10 +219,12 @@ class Worker(QObject):
             self._current = None
             if job is not None:
                 words = f"the process of this work ended unexpectedly (exit code {code})"
-                self._end(job, "broken", f"{words}; start the work again")
+                doing = getattr(job.request.function, "__name__", "")
+                log.error("%s", words, exc_info=ErrorInProcess(f"{words} in {doing}"))
+                self._end(job, "failed", f"{words}; start the work again")
             self._next()
             return
-        if job is None or answer.number != job.request.number:
+        if job is None or answer.number not in (CURRENT, job.request.number):
             return
         if answer.kind == "progress":
             stage, fraction = answer.value
@@ -218,7 +233,12 @@ class Worker(QObject):
             job.progressed.emit(stage, fraction, float("nan") if left is None else left)
             return
         self._current = None
-        self._end(job, answer.kind, answer.value)
+        if answer.kind == "broken":
+            words, trace = answer.value
+            log.error("%s", words, exc_info=ErrorInProcess(trace))
+            self._end(job, "failed", f"{words}; the log has the details")
+        else:
+            self._end(job, answer.kind, answer.value)
         self._next()
 
     def _end(self, job: Job, kind: str, value: Any) -> None:

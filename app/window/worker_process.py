@@ -15,7 +15,10 @@ from typing import Any
 
 from dearig.errors import DearigError
 
-__all__ = ["Request", "Response", "StopRequest", "serve"]
+__all__ = ["CURRENT", "Request", "Response", "StopRequest", "broken", "serve"]
+
+#: Number in a response to a request that could not be read.
+CURRENT = -1
 
 #: Smallest progress of a stage that is reported.
 _STEP = 1.0 / 256.0
@@ -42,7 +45,8 @@ class Response:
     """Message about the job ``number``.
 
     ``kind`` is progress (``value`` is a stage and its fraction), done (``value`` is the result),
-    refused (a sentence), broken (a sentence on an error in the program) or stopped.
+    refused (a sentence), broken (a sentence on an error in the program, and its traceback) or
+    stopped.
     """
 
     number: int
@@ -62,7 +66,12 @@ def serve(connection: Connection) -> None:
         current[:] = [request.number]
         answer = _done(connection, request)
         current.clear()
-        connection.send(answer)
+        try:
+            connection.send(answer)
+        except (BrokenPipeError, ConnectionError):
+            return  # the window is gone
+        except Exception as error:  # noqa: BLE001  (a result that cannot be pickled)
+            connection.send(broken(request.number, error))
 
 
 def _listen(connection: Connection, work: queue.SimpleQueue[Request], current: list[int]) -> None:
@@ -73,6 +82,10 @@ def _listen(connection: Connection, work: queue.SimpleQueue[Request], current: l
         except (EOFError, OSError):
             # the window is gone; unfinished jobs leave no partial files
             os._exit(0)
+        except Exception as error:  # noqa: BLE001  (a request that cannot be unpickled)
+            # no job runs: the window sends the next one after the answer to the last
+            connection.send(broken(CURRENT, error))
+            continue
         if isinstance(message, Request):
             work.put(message)
         elif message.number in current:
@@ -109,7 +122,12 @@ def _done(connection: Connection, request: Request) -> Response:
     except DearigError as error:
         return Response(request.number, "refused", str(error))
     except Exception as error:  # noqa: BLE001  (an error must reach the person who waits)
-        traceback.print_exc(file=sys.stderr)
-        words = f"an error in the program ended this work ({type(error).__name__}: {error})"
-        return Response(request.number, "broken", words)
+        return broken(request.number, error)
     return Response(request.number, "done", value)
+
+
+def broken(number: int, error: Exception) -> Response:
+    """Return the response for an error in the program; the window logs its traceback."""
+    words = f"an error in the program ended this work ({type(error).__name__}: {error})"
+    trace = "".join(traceback.format_exception(error))
+    return Response(number, "broken", (words, trace))
