@@ -340,16 +340,13 @@ def _outcome(
     said = (*quality, *dict.fromkeys(failed))
     title = _title(recordings)
     effects = ", ".join(name for name, _ in finding.final.predicting.effects)
-    history = _history(finding, recordings, stands, noise, drive, said, seconds)
-    return DiagnoseOutcome(
+    name = f"{title}, with {effects}" if effects else f"{title}, nothing added"
+    compared = {c.name for c in stands[-1].validation}
+    outcome = DiagnoseOutcome(
         title=title,
         kind=recordings[0].kind,
         drive=drive,
-        model=ModelFile(
-            f"{title}, with {effects}" if effects else f"{title}, nothing added",
-            finding.final.predicting,
-            history,
-        ),
+        model=ModelFile(name, finding.final.predicting),
         finding=finding,
         stands=stands,
         noise=noise,
@@ -359,7 +356,10 @@ def _outcome(
         seconds=seconds,
         performed=tuple(performed),
         rig=rig,
+        not_compared=tuple(r.name for r in others if r.name not in compared),
     )
+    history = _history(outcome, recordings)
+    return replace(outcome, model=replace(outcome.model, history=history))
 
 
 def _title(recordings: Sequence[Recording]) -> str:
@@ -404,17 +404,10 @@ def _experiment(
     return separating_experiment(rivals, of_rig(rig_file, final.film, final.load), noise)
 
 
-def _history(
-    finding: Diagnosis,
-    recordings: Sequence[Recording],
-    stands: Sequence[Stand],
-    noise: float,
-    drive: str,
-    quality: Sequence[str],
-    seconds: float,
-) -> dict[str, Any]:
+def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[str, Any]:
     """Return the origin of the model, for its file."""
-    shown = SHOWN[recordings[0].kind]
+    finding, stands = outcome.finding, outcome.stands
+    shown = SHOWN[outcome.kind]
 
     def rms(comparisons: Sequence[Comparison]) -> float | None:
         return pooled_rms(comparisons) * shown.error_factor if comparisons else None
@@ -427,14 +420,15 @@ def _history(
 
     return {
         "method": "diagnosis",
-        "drive": drive,
-        "seconds": seconds,
+        "drive": outcome.drive,
+        "seconds": outcome.seconds,
         "simulations": finding.simulations,
-        "verdict": finding.verdict,
+        "verdict": outcome.verdict,
+        "status": outcome.status,
         "interrupted": finding.interrupted,
         "mean_square_over_noise": finding.final.cost,
-        f"noise_floor_{shown.suffix}": noise * shown.error_factor,
-        "notes": [*finding.notes, *quality],
+        f"noise_floor_{shown.suffix}": outcome.noise * shown.error_factor,
+        "notes": [*finding.notes, *outcome.quality],
         "before": errors(stands[0]),
         "after": errors(stands[-1]),
         "train": [{"name": r.name, "sha256": r.sha256} for r in recordings],

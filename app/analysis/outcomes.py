@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from dearig.errors import DearigError
+from dearig.model.verdict import BUDGET, COMPLETE, STOPPED, Judgement, judge
 
 if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
@@ -51,7 +53,8 @@ class Comparison:
     reading must not be used. ``noise`` is the noise floor in
     the measured unit, None where it could not be read. ``role`` is train or validation. ``table``
     is A, B, or "" for a run that is in neither of the thesis's validation tables, ``row`` its label
-    there (f = 0.2 Hz).
+    there (f = 0.2 Hz). ``rms_without_events`` is the error in the measured unit without the
+    recording's own drift and events, None where these were not looked for.
     """
 
     name: str
@@ -67,6 +70,21 @@ class Comparison:
     row: str = ""
     published: Published | None = None
     warnings: tuple[str, ...] = field(default=())
+    rms_without_events: float | None = None
+
+    def over_noise(self, noise: float) -> float:
+        """Return the error, without events where they are known, over the recording's noise.
+
+        ``noise`` is used for a recording whose own noise floor is not known. A film's noise
+        includes the error that its model is allowed.
+        """
+        error = self.errors.rms if self.rms_without_events is None else self.rms_without_events
+        allowed = 0.0
+        if self.kind == "film":
+            from dearig.model.diagnosis.bench import FILM_MODEL_ERROR
+
+            allowed = FILM_MODEL_ERROR * float(np.nanmax(np.abs(self.measured)))
+        return error / math.hypot(self.noise or noise, allowed)
 
 
 @dataclass(frozen=True)
@@ -162,7 +180,8 @@ class DiagnoseOutcome:
     separates explanations that the data do not separate; ``experiment_words`` describes it, or says
     why there is none. ``performed`` describes the experiments that were run on a rig, one sentence
     each. ``quality`` are sentences on recordings. ``ended`` is the error that ended the recording
-    on the rig early, None if none did. ``seconds`` is the computing time.
+    on the rig early, None if none did. ``not_compared`` names validation recordings that the final
+    model cannot follow. ``seconds`` is the computing time.
     """
 
     title: str
@@ -180,6 +199,36 @@ class DiagnoseOutcome:
     performed: tuple[str, ...] = ()
     rig: str = ""
     ended: DearigError | None = None
+    not_compared: tuple[str, ...] = ()
+
+    @property
+    def status(self) -> str:
+        """How the search ended: ``complete``, ``stopped`` or ``budget``."""
+        if self.finding.interrupted:
+            return STOPPED
+        return (
+            BUDGET if any("computing budget" in note for note in self.finding.notes) else COMPLETE
+        )
+
+    @property
+    def verdict(self) -> str:
+        """``nothing_missing``, ``explained``, ``partly_explained`` or ``unexplained``."""
+        return self.judgement.verdict
+
+    @cached_property
+    def judgement(self) -> Judgement:
+        """The verdict that all numbers support, with the reasons against a better one."""
+        finding = self.finding
+        untouched = [c.over_noise(self.noise) for c in self.after.validation]
+        # of a film with the error that its model is allowed
+        noise = math.sqrt(sum(s.noise**2 for s in finding.after) / len(finding.after))
+        return judge(
+            finding.verdict,
+            self.status,
+            [s.rms / s.noise for s in finding.after],
+            [*untouched, *(math.inf for _ in self.not_compared)],
+            (finding.baseline.selection_rms / noise, finding.final.selection_rms / noise),
+        )
 
     @property
     def before(self) -> Stand:

@@ -186,12 +186,17 @@ class DiagnoseResult:
     @property
     def verdict(self) -> str:
         """``nothing_missing``, ``explained``, ``partly_explained`` or ``unexplained``."""
-        return self.outcome.finding.verdict
+        return self.outcome.verdict
+
+    @property
+    def status(self) -> str:
+        """How the search ended: ``complete``, ``stopped`` or ``budget``."""
+        return self.outcome.status
 
     @property
     def headline(self) -> str:
         """The verdict in words."""
-        return words.headline(self.outcome.finding)
+        return words.headline(self.outcome)
 
     @property
     def model(self) -> Model:

@@ -17,7 +17,7 @@ from dearig.report.diagnosis import (
     effect_table,
     experiment_table,
     headline,
-    ranking_table,
+    rankings,
     step_table,
     summary,
     thesis_before_after_table,
@@ -96,7 +96,7 @@ _RANKED = 6  # candidates of a round that a terminal shows
 def diagnosis_tables(outcome: DiagnoseOutcome) -> RenderableType:
     """Return the verdict, errors before and after, effects found, and candidates tried."""
     finding = outcome.finding
-    pieces: list[_Piece] = [f"{headline(finding)}.", *summary(outcome)]
+    pieces: list[_Piece] = [f"{headline(outcome)}.", *summary(outcome)]
     for heading, before, after in (
         ("Validation recordings", outcome.before.validation, outcome.after.validation),
         ("Training recordings", outcome.before.train, outcome.after.train),
@@ -108,9 +108,10 @@ def diagnosis_tables(outcome: DiagnoseOutcome) -> RenderableType:
     pieces.append(step_table(outcome))
     if finding.steps:
         pieces.append(effect_table(outcome))
-    for found in finding.rounds:
-        table = ranking_table(found, _RANKED)
-        pieces.append(table if table.rows else f"{table.title}: {table.note}")
+    pieces += [
+        table if table.rows else f"{table.title}: {table.note}"
+        for table in rankings(outcome, _RANKED)
+    ]
     experiments = experiment_table(outcome)
     if experiments is not None:
         pieces.append(experiments)

@@ -176,7 +176,9 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             "signature": {s.record: _signature_json(s, outcome.kind) for s in finding.after},
         },
         "residual_before": {s.record: _signature_json(s, outcome.kind) for s in finding.before},
-        "verdict": finding.verdict,
+        "verdict": outcome.verdict,
+        "verdict_reasons": list(outcome.judgement.reasons),
+        "status": outcome.status,
         "unnamed": None
         if finding.unnamed is None
         else {
@@ -200,7 +202,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
                 "base": list(r.base),
                 "chosen": r.chosen,
                 "reason": r.reason,
-                "candidates": [_candidate_json(c, outcome.kind) for c in r.candidates],
+                "candidates": [_candidate_json(c, outcome) for c in r.candidates],
             }
             for r in finding.rounds
         ],
@@ -303,14 +305,15 @@ def _signature_json(signature: Signature, kind: str) -> dict[str, Any]:
     }
 
 
-def _candidate_json(candidate: Candidate, kind: str) -> dict[str, Any]:
-    shown = SHOWN[kind]
+def _candidate_json(candidate: Candidate, outcome: DiagnoseOutcome) -> dict[str, Any]:
+    shown = SHOWN[outcome.kind]
     stage = candidate.stage
     return {
         "effect": candidate.effect,
         "family": candidate.family,
         "acts_on": candidate.acts_on,
         "verdict": candidate.verdict,
+        "kept": any(s.effect == candidate.effect for s in outcome.finding.steps),
         f"train_rms_{shown.suffix}": _number(stage.train_rms * shown.error_factor),
         f"selection_rms_{shown.suffix}": _number(stage.selection_rms * shown.error_factor),
         "promised": _number(candidate.promised),

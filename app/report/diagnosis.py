@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dearig.analysis.outcomes import pooled_rms
+from dearig.model.verdict import TOLERANCE
 from dearig.report.numbers import NO_VALUE, interval, quoted, seconds, significant, symbol
 from dearig.report.sentences import listed
 from dearig.report.tables import Row, Table
@@ -16,7 +17,7 @@ from dearig.units import SHOWN, parameter_unit, readable
 
 if TYPE_CHECKING:
     from dearig.analysis.outcomes import Comparison, DiagnoseOutcome
-    from dearig.model.diagnosis.results import Diagnosis, Round, Step
+    from dearig.model.diagnosis.results import Round, Step
     from dearig.model.fitting import Estimate
     from dearig.model.measures import Errors
 
@@ -31,6 +32,7 @@ __all__ = [
     "headline",
     "pooled_errors",
     "ranking_table",
+    "rankings",
     "step_label",
     "step_table",
     "summary",
@@ -38,12 +40,18 @@ __all__ = [
     "warnings",
 ]
 
-#: Headline of each verdict.
+#: Headline of each verdict, and of a verdict that is less than what the search found.
 HEADLINES = {
     "nothing_missing": "No missing effect found",
     "explained": "Residual explained",
     "partly_explained": "Residual partly explained",
     "unexplained": "Residual not explained by any known effect",
+}
+_LOWERED = {
+    "validation": "Training recordings explained, validation recordings not",
+    "selection": "Residual partly explained: the cross-validation error rises",
+    "training": "Residual partly explained: one training recording keeps more than noise",
+    "stopped": "No missing effect found so far: not every effect was tried",
 }
 
 
@@ -81,12 +89,27 @@ def pooled_errors(comparisons: Sequence[Comparison]) -> Errors | None:
 # sentences
 
 
-def headline(finding: Diagnosis) -> str:
-    """Return the headline of the verdict."""
+def headline(outcome: DiagnoseOutcome) -> str:
+    """Return the headline: the verdict with the limits of what it rests on."""
+    finding, judgement = outcome.finding, outcome.judgement
     if finding.interrupted and not finding.rounds:
         tried = "all effects were" if finding.steps else "any effect was"
-        return f"Interrupted before {tried} tried"
-    return HEADLINES[finding.verdict]
+        return f"Stopped before {tried} tried"
+    said = next((_LOWERED[r] for r in _LOWERED if r in judgement.reasons), "")
+    limits = []
+    if judgement.verdict == "explained" and any(s.indistinguishable_from for s in finding.steps):
+        limits.append("by which effect these data cannot tell")
+    if judgement.verdict in ("explained", "nothing_missing") and not outcome.after.validation:
+        limits.append("no validation recording was given")
+    if outcome.status != "complete":
+        limits.append(_STATUS[outcome.status])
+    return "; ".join([said or HEADLINES[judgement.verdict], *limits])
+
+
+_STATUS = {
+    "stopped": "the search was stopped",
+    "budget": "the search ended at its computing budget",
+}
 
 
 def family_label(family: str) -> str:
@@ -103,7 +126,7 @@ def step_label(step: Step) -> str:
 def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     """Return the verdict and its evidence as sentences."""
     finding = outcome.finding
-    said = [_verdict(outcome)]
+    said = [*_doubts(outcome), _verdict(outcome)]
     for role, before, after in (
         ("the validation recordings, which no fit and no selection used,",
          outcome.before.validation, outcome.after.validation),
@@ -122,34 +145,79 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     said += outcome.performed
     if finding.rivals and outcome.experiment_words:
         said.append(_sentence(outcome.experiment_words))
-    if finding.interrupted:
+    if outcome.status == "stopped":
         said.append(
-            "The search was interrupted. These are the results so far; a complete search may find "
-            "more."
+            "The search was stopped. These are the results so far; a complete search may find more."
+        )
+    if outcome.status == "budget":
+        said.append(
+            "The search ended at its computing budget; a search with --thorough may find more."
         )
     return tuple(readable(s) for s in said)
 
 
+def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
+    """Yield a sentence for each reason for which the verdict is less than the search found."""
+    reasons, shown = outcome.judgement.reasons, SHOWN[outcome.kind]
+    baseline, final = outcome.finding.baseline, outcome.finding.final
+    if "validation" in reasons:
+        left = [
+            f"{c.name} keeps {significant(over, 2)} times its noise"
+            for c in outcome.after.validation
+            if (over := c.over_noise(outcome.noise)) > TOLERANCE
+        ]
+        left += [f"the model cannot follow {name}" for name in outcome.not_compared]
+        yield (
+            f"The model explains the training recordings, but not the validation recordings: "
+            f"{listed(left)}."
+        )
+    if "selection" in reasons:
+        before, after = (
+            significant(stage.selection_rms * shown.error_factor) for stage in (baseline, final)
+        )
+        yield (
+            f"The cross-validation error rises from {before} to {after} {shown.error_unit}: the "
+            f"effects found do not predict the time segments that they were not fitted to."
+        )
+    if "training" in reasons:
+        left = [
+            f"{s.record} keeps {significant(s.rms / s.noise, 2)} times its noise"
+            for s in outcome.finding.after
+            if s.rms / s.noise > TOLERANCE
+        ]
+        yield f"Not every training recording is explained: {listed(left)}."
+
+
 def _verdict(outcome: DiagnoseOutcome) -> str:
-    finding = outcome.finding
+    finding, judgement = outcome.finding, outcome.judgement
+    names = [step_label(s) for s in finding.steps]
+    lacks = f"The thesis model lacks {listed(names)}"
     if finding.interrupted and not finding.rounds:
         if finding.steps:
             return (
-                "The search was interrupted before all effects were tried. This effect is the best "
-                "so far; another one may be better."
+                "The search was stopped before all effects were tried. This effect is the best so "
+                "far; another one may be better."
             )
-        return "The search was interrupted before any effect was tried; there is no result yet."
-    if finding.verdict == "nothing_missing":
+        return "The search was stopped before any effect was tried; there is no result yet."
+    if "stopped" in judgement.reasons:
+        return (
+            f"The thesis model explains the training recordings down to the noise"
+            f"{_film_tolerance(outcome)}. It is not known whether an effect is missing: the search "
+            f"was stopped before every effect was tried."
+        )
+    if judgement.reasons and not names:
+        return "No effect improves the thesis model on the training recordings by more than chance."
+    if judgement.reasons:
+        return f"{lacks}, as far as the training recordings show."
+    if judgement.verdict == "nothing_missing":
         return (
             f"The thesis model explains these recordings down to the noise"
             f"{_film_tolerance(outcome) or ','} and no other effect improves it by more than "
             f"chance."
         )
-    names = [step_label(s) for s in finding.steps]
-    lacks = f"The thesis model lacks {listed(names)}"
-    if finding.verdict == "explained":
+    if judgement.verdict == "explained":
         return f"{lacks}. With {_them(names)}, only noise{_film_tolerance(outcome)} is left."
-    if finding.verdict == "partly_explained":
+    if judgement.verdict == "partly_explained":
         return (
             f"{lacks}. With {_them(names)}, part of the residual is explained; no known effect "
             f"explains the rest."
@@ -331,10 +399,11 @@ _VERDICTS = {
 }
 
 
-def ranking_table(found: Round, longest: int | None = None) -> Table:
-    """Return the candidates of one round, best first.
+def ranking_table(found: Round, kept: Collection[str], longest: int | None = None) -> Table:
+    """Return the candidates of one round, best first; ``kept`` are the effects of the final model.
 
-    With ``longest`` it has at most so many rows, and fewer columns for a terminal.
+    A candidate that was chosen and later replaced is not marked as chosen. With ``longest`` the
+    table has at most so many rows, and fewer columns for a terminal.
     """
     brief = longest is not None
     base = f"on top of {listed(found.base)}" if found.base else "on top of the thesis model"
@@ -346,9 +415,11 @@ def ranking_table(found: Round, longest: int | None = None) -> Table:
         cells.append(_share(c.gained))
         if not brief:
             cells += [_share(c.promised), significant(c.gain, 3)]
-        cells += [significant(c.behind, 3), _VERDICTS.get(c.verdict, c.verdict)]
+        chosen = c.verdict == "chosen" and c.effect in kept
+        verdict = "replaced later" if c.verdict == "chosen" and not chosen else c.verdict
+        cells += [significant(c.behind, 3), _VERDICTS.get(verdict, verdict)]
         idle = c.verdict in ("worthless", "failed")
-        rows.append(Row(tuple(cells), c.note, idle, c.verdict == "chosen"))
+        rows.append(Row(tuple(cells), c.note, idle, chosen))
     head = [("Effect", ""), ("Explains", "%"), ("Behind", "best"), ("Verdict", "")]
     if not brief:
         head[1:1] = [("Family", "")]
@@ -363,6 +434,12 @@ def ranking_table(found: Round, longest: int | None = None) -> Table:
 def _share(of_one: float) -> str:
     """Return a share in percent, with one decimal."""
     return f"{100.0 * max(of_one, 0.0):.1f}"
+
+
+def rankings(outcome: DiagnoseOutcome, longest: int | None = None) -> tuple[Table, ...]:
+    """Return the table of each round, see ``ranking_table``."""
+    kept = {s.effect for s in outcome.finding.steps}
+    return tuple(ranking_table(found, kept, longest) for found in outcome.finding.rounds)
 
 
 def dropped_effects(outcome: DiagnoseOutcome) -> str:

@@ -19,7 +19,7 @@ from dearig.report.diagnosis import (
     experiment_table,
     family_label,
     headline,
-    ranking_table,
+    rankings,
     step_label,
     step_table,
     summary,
@@ -131,7 +131,7 @@ def _page(outcome: DiagnoseOutcome, title: str, names: Iterator[str]) -> Diagnos
     worst = sorted(finding.before, key=lambda s: -s.rms / s.noise)[:_DRAWN_MAX]
     return DiagnosisPage(
         title=title,
-        headline=headline(finding),
+        headline=headline(outcome),
         summary=summary(outcome),
         warnings=warnings(outcome),
         errors=tuple(errors),
@@ -146,7 +146,7 @@ def _page(outcome: DiagnoseOutcome, title: str, names: Iterator[str]) -> Diagnos
             for m in finding.missing_before
             if any(m.record == s.record for s in worst)
         ),
-        rankings=tuple(ranking_table(r) for r in finding.rounds),
+        rankings=rankings(outcome),
         dropped_effects=_capitalised(dropped_effects(outcome)),
         pictures=_validation_pictures(outcome, changed, names),
         after=tuple(

@@ -319,10 +319,7 @@ class StudyPage(QWidget):
 
     def _show_diagnosis(self, outcome: DiagnoseOutcome) -> None:
         finding = outcome.finding
-        early = (
-            ", in a search that was ended early" if finding.interrupted and finding.rounds else ""
-        )
-        self.headline.setText(f"{diagnosis.headline(finding)}{early}")
+        self.headline.setText(diagnosis.headline(outcome))
         pieces: list[str | Table] = list(diagnosis.summary(outcome))
         for heading, before, after in (
             ("Validation recordings", outcome.before.validation, outcome.after.validation),
@@ -334,7 +331,7 @@ class StudyPage(QWidget):
         if finding.steps:
             pieces.append(diagnosis.effect_table(outcome))
         self.verdict.show_pieces(pieces, diagnosis.warnings(outcome))
-        rounds: list[str | Table] = [diagnosis.ranking_table(found) for found in finding.rounds]
+        rounds: list[str | Table] = [*diagnosis.rankings(outcome)]
         dropped = diagnosis.dropped_effects(outcome)
         self.ranking.show_pieces(
             [*(rounds or ["No round of candidates is complete."]), *([dropped] if dropped else [])]

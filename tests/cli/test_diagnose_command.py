@@ -195,7 +195,7 @@ class TestOutputs:
         instead(monkeypatch, finding())
         answer = done("diagnose", bench / "thesis.h5", "--json", "-")
         assert answer.json["format"] == "dearig-diagnosis/1"
-        assert "Residual explained." in answer.err
+        assert "Residual explained; by which effect these data cannot tell" in answer.err
 
     def test_an_interruption_keeps_what_was_found(self, bench, tmp_path, monkeypatch):
         def search(records, base, *, progress, stop, thorough):
@@ -214,7 +214,7 @@ class TestOutputs:
         assert strict_json((tmp_path / "d.json").read_text())["interrupted"] is True
         assert names(tmp_path) == {"d.json", "r.html", "m.toml"}
         assert load_model(tmp_path / "m.toml").history["interrupted"] is True
-        assert "was interrupted" in check(tmp_path / "r.html").words
+        assert "The search was stopped" in check(tmp_path / "r.html").words
 
     @pytest.mark.parametrize("words", [(), ("--thorough",)])
     def test_a_search_is_as_thorough_as_it_is_asked_to_be(self, bench, monkeypatch, words):

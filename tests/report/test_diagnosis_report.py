@@ -19,6 +19,7 @@ from dearig.report.diagnosis import (
     headline,
     pooled_errors,
     ranking_table,
+    rankings,
     summary,
     thesis_before_after_table,
     warnings,
@@ -79,7 +80,7 @@ def test_no_model_of_a_film_is_asked_to_reach_the_noise():
 class TestPage:
     def test_the_verdict_stands_on_top(self, page):
         outcome, read = page
-        top = read.words.index(HEADLINES[outcome.finding.verdict])
+        top = read.words.index(headline(outcome))
         assert top < read.words.index("Error before and after")
 
     def test_errors_before_and_after_of_every_recording(self, page):
@@ -145,15 +146,15 @@ class TestWords:
 
     def test_an_interruption_is_told(self):
         words = " ".join(summary(diagnose_outcome(finding=finding(interrupted=True))))
-        assert "was interrupted" in words
+        assert "The search was stopped" in words
 
     def test_a_search_that_ended_within_its_first_round_says_how_far_it_came(self):
         early = finding(interrupted=True, rounds=())
         assert early.steps
-        assert "all effects were tried" in headline(early)
+        assert "all effects were tried" in headline(diagnose_outcome(finding=early))
         assert "is the best so far" in " ".join(summary(diagnose_outcome(finding=early)))
         nothing = replace(early, steps=())
-        assert "any effect was tried" in headline(nothing)
+        assert "any effect was tried" in headline(diagnose_outcome(finding=nothing))
         assert "there is no result yet" in " ".join(summary(diagnose_outcome(finding=nothing)))
 
     def test_quality_and_notes_are_warnings(self):
@@ -169,6 +170,79 @@ class TestWords:
         assert said.startswith(
             "load inertia was the best single effect but is not in the final model"
         )
+
+
+def left(verdict: str, over: float, **changes):
+    """A diagnosis whose first validation recording keeps ``over`` times its noise."""
+    outcome = diagnose_outcome(finding=finding(verdict=verdict, **changes))
+    first, *others = outcome.after.validation
+    much = replace(first, errors=replace(first.errors, rms=over * first.noise))
+    after = replace(outcome.after, validation=(much, *others))
+    return replace(outcome, stands=(outcome.before, after))
+
+
+SURE = replace(STEP, indistinguishable_from=())
+
+
+class TestHeadline:
+    """The headline says no more than the numbers, in every place alike."""
+
+    def test_a_validation_error_above_the_noise_is_said_first(self):
+        for verdict, steps in (("explained", (SURE,)), ("nothing_missing", ())):
+            outcome = left(verdict, 2.7, steps=steps)
+            assert outcome.verdict == "partly_explained"
+            assert headline(outcome) == "Training recordings explained, validation recordings not"
+            said = summary(outcome)[0]
+            assert "validation-0.h5 keeps 2.7 times its noise" in said
+            assert "only noise" not in " ".join(summary(outcome))
+            assert diagnosis_json(outcome)["verdict"] == "partly_explained"
+            assert diagnosis_json(outcome)["verdict_reasons"] == ["validation"]
+        assert left("explained", 1.14, steps=(SURE,)).verdict == "explained"
+
+    def test_a_recording_that_the_model_cannot_follow_is_not_explained(self):
+        outcome = diagnose_outcome(not_compared=("fast",))
+        assert outcome.verdict == "partly_explained"
+        assert "cannot follow fast" in summary(outcome)[0]
+
+    def test_without_events_it_is_the_other_error_that_counts(self):
+        outcome = left("explained", 4.2, steps=(SURE,))
+        jumped, other = outcome.after.validation
+        steady = replace(jumped, rms_without_events=1.02 * jumped.noise)
+        after = replace(outcome.after, validation=(steady, other))
+        assert replace(outcome, stands=(outcome.before, after)).verdict == "explained"
+
+    def test_a_rising_cross_validation_error_is_said(self):
+        stage = finding().final
+        worse = replace(stage, selection_rms=72e-6)
+        outcome = diagnose_outcome(finding=finding(final=worse))
+        assert outcome.verdict == "partly_explained"
+        assert "cross-validation error rises" in headline(outcome)
+        assert "to 72.0 \N{MICRO SIGN}m" in summary(outcome)[0]
+
+    def test_it_never_contradicts_that_the_data_cannot_tell(self):
+        assert "these data cannot tell" in headline(diagnose_outcome())
+        assert headline(left("explained", 1.0, steps=(SURE,))) == "Residual explained"
+
+    def test_without_validation_it_says_so(self):
+        assert headline(nothing_missing()).endswith("; no validation recording was given")
+
+    def test_a_stopped_search_never_says_that_nothing_is_missing(self):
+        clean = nothing_missing()
+        rounds = (ROUND,)
+        stopped = replace(clean, finding=replace(clean.finding, interrupted=True, rounds=rounds))
+        assert stopped.verdict == "partly_explained"
+        assert stopped.status == "stopped"
+        told = f"{headline(stopped)} {' '.join(summary(stopped))}"
+        assert "No missing effect found so far: not every effect was tried" in told
+        assert "It is not known whether an effect is missing" in told
+        assert diagnosis_json(stopped)["status"] == "stopped"
+
+    def test_a_search_that_ended_at_its_budget_says_so(self):
+        note = "the search stopped at its computing budget; --thorough searches further"
+        clean = nothing_missing()
+        outcome = replace(clean, finding=replace(clean.finding, notes=(note,)))
+        assert outcome.status == "budget"
+        assert "computing budget" in headline(outcome)
 
 
 class TestPooled:
@@ -219,11 +293,22 @@ class TestTables:
         assert {len(r.cells) for r in (*table.rows, *theirs.rows)} == {7}
 
     def test_ranking(self):
-        whole, brief = ranking_table(ROUND), ranking_table(ROUND, 3)
+        kept = ("sensor lag",)
+        whole, brief = ranking_table(ROUND, kept), ranking_table(ROUND, kept, 3)
         assert len(whole.rows) == len(ROUND.candidates)
         assert [r.cells[-1] for r in brief.rows] == ["chosen", "not separable", "explains less"]
         assert "9 more candidates are worse" in brief.note
         assert whole.rows[0].detail == ROUND.candidates[0].note
+        assert [r.mark for r in brief.rows] == [True, False, False]
+
+    def test_an_effect_that_the_final_model_lacks_is_not_marked_as_chosen(self):
+        other = replace(STEP, effect="load inertia", family="load_inertia")
+        outcome = diagnose_outcome(finding=finding(steps=(other,)))
+        first, _ = rankings(outcome)
+        assert not any(row.mark or "chosen" in row.cells for row in first.rows)
+        assert first.rows[0].cells[-1] == "replaced later"
+        candidates = diagnosis_json(outcome)["rounds"][0]["candidates"]
+        assert not any(c["kept"] for c in candidates)
 
     @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
     @pytest.mark.parametrize("width", [100, 80, 44, 24])
@@ -231,7 +316,7 @@ class TestTables:
     def test_the_terminal_shows_it_in_any_width(self, name, width, encoding):
         text = shown(diagnosis_tables(OUTCOMES[name]), width, encoding)
         assert max(map(len, text.splitlines())) <= width
-        assert HEADLINES[OUTCOMES[name].finding.verdict].split()[0] in text
+        assert HEADLINES[OUTCOMES[name].verdict].split()[0] in text
 
     def test_nothing_is_cut_off_at_80_columns(self):
         text = shown(diagnosis_tables(diagnose_outcome()), 80)
@@ -247,7 +332,8 @@ class TestJson:
         film = outcome.kind == "film"
         measures = MEASURES_KPA if film else MEASURES_UM
         assert found["format"] == "dearig-diagnosis/1"
-        assert found["verdict"] == outcome.finding.verdict
+        assert found["verdict"] == outcome.verdict
+        assert found["status"] == "complete"
         assert found["noise_floor_kPa" if film else "noise_floor_um"] > 0.0
         assert found["baseline"]["model"] == "thesis"
         for stand in (found["baseline"], found["final"]):

@@ -1,0 +1,75 @@
+"""Verdict of a diagnosis: what its numbers allow to say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+__all__ = [
+    "BUDGET",
+    "COMPLETE",
+    "EXPLAINED",
+    "NOTHING_MISSING",
+    "PARTLY_EXPLAINED",
+    "STOPPED",
+    "TOLERANCE",
+    "UNEXPLAINED",
+    "Judgement",
+    "judge",
+]
+
+NOTHING_MISSING = "nothing_missing"
+EXPLAINED = "explained"
+PARTLY_EXPLAINED = "partly_explained"
+UNEXPLAINED = "unexplained"
+
+#: How the search ended: by itself, stopped by the operator, or at its computing budget.
+COMPLETE = "complete"
+STOPPED = "stopped"
+BUDGET = "budget"
+
+#: Error over noise up to which a recording counts as explained. The noise floor is known to some
+#: per cent, and the fitted parameters add their own error to a prediction.
+TOLERANCE = 1.15
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """A verdict, and the reasons for which it is less than what the search found.
+
+    ``reasons`` are of: ``training`` (the error of a training recording is above its noise),
+    ``selection`` (the cross-validation error rises), ``validation`` (the error of a validation
+    recording is above its noise) and ``stopped`` (nothing is missing so far, but not everything was
+    tried).
+    """
+
+    verdict: str
+    reasons: tuple[str, ...] = ()
+
+
+def judge(
+    found: str,
+    status: str,
+    training: Sequence[float],
+    validation: Sequence[float],
+    selection: tuple[float, float],
+) -> Judgement:
+    """Return the verdict that the numbers support, which is never more than ``found``.
+
+    ``found`` is the verdict of the search, which sees the training recordings only; ``status`` says
+    how the search ended. ``training`` and ``validation`` are the errors over the noise with the
+    final model, one for each recording, without the recording's own drift and events where these
+    are known; infinite where the model cannot follow the recording. ``selection`` is the
+    cross-validation error over the noise, with the baseline and with the final model.
+    """
+    if found not in (NOTHING_MISSING, EXPLAINED):
+        return Judgement(found)
+    before, after = selection
+    doubts = {
+        "training": any(error > TOLERANCE for error in training),
+        "selection": after > before and after > TOLERANCE,
+        "validation": any(error > TOLERANCE for error in validation),
+        "stopped": found == NOTHING_MISSING and status == STOPPED,
+    }
+    reasons = tuple(name for name, doubtful in doubts.items() if doubtful)
+    return Judgement(PARTLY_EXPLAINED if reasons else found, reasons)

@@ -1,0 +1,61 @@
+"""The verdict is never more than the numbers support."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from dearig.model.verdict import (
+    BUDGET,
+    COMPLETE,
+    EXPLAINED,
+    NOTHING_MISSING,
+    PARTLY_EXPLAINED,
+    STOPPED,
+    UNEXPLAINED,
+    Judgement,
+    judge,
+)
+
+BETTER = (4.4, 1.1)  # cross-validation error over the noise, before and after
+
+
+@pytest.mark.parametrize("found", [EXPLAINED, NOTHING_MISSING])
+@pytest.mark.parametrize("status", [COMPLETE, BUDGET])
+@pytest.mark.parametrize("validation", [[], [1.0], [0.97, 1.14]])
+def test_errors_at_the_noise_confirm_what_was_found(found, status, validation):
+    assert judge(found, status, [1.02], validation, BETTER) == Judgement(found)
+
+
+@pytest.mark.parametrize("found", [EXPLAINED, NOTHING_MISSING])
+@pytest.mark.parametrize("left", [1.16, 4.2, math.inf])
+def test_one_validation_recording_with_more_than_noise_makes_it_partly_explained(found, left):
+    told = judge(found, COMPLETE, [1.0, 1.0], [1.0, left, 1.0], BETTER)
+    assert told == Judgement(PARTLY_EXPLAINED, ("validation",))
+
+
+def test_one_training_recording_with_more_than_noise_is_not_hidden_by_the_others():
+    told = judge(EXPLAINED, COMPLETE, [*[1.0] * 20, 1.9], [1.0], BETTER)
+    assert told == Judgement(PARTLY_EXPLAINED, ("training",))
+
+
+def test_effects_that_raise_the_cross_validation_error_explain_nothing_for_sure():
+    told = judge(EXPLAINED, COMPLETE, [1.0], [], (4.4, 72.0))
+    assert told == Judgement(PARTLY_EXPLAINED, ("selection",))
+    # at the noise a small rise means nothing
+    assert judge(NOTHING_MISSING, COMPLETE, [1.0], [], (1.04, 1.05)).verdict == NOTHING_MISSING
+
+
+@pytest.mark.parametrize("validation", [[], [1.0], [3.0]])
+def test_a_search_that_was_stopped_never_says_that_nothing_is_missing(validation):
+    told = judge(NOTHING_MISSING, STOPPED, [1.0], validation, (1.0, 1.0))
+    assert told.verdict == PARTLY_EXPLAINED
+    assert "stopped" in told.reasons
+    # an effect that was found before the stop explains what it explains
+    assert judge(EXPLAINED, STOPPED, [1.0], [1.0], BETTER).verdict == EXPLAINED
+
+
+@pytest.mark.parametrize("found", [PARTLY_EXPLAINED, UNEXPLAINED])
+def test_what_the_search_did_not_explain_no_number_explains(found):
+    assert judge(found, COMPLETE, [1.0], [1.0], BETTER) == Judgement(found)
