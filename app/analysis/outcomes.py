@@ -75,8 +75,9 @@ class Comparison:
     def over_noise(self, noise: float) -> float:
         """Return the error, without events where they are known, over the recording's noise.
 
-        ``noise`` is used for a recording whose own noise floor is not known. A film's noise
-        includes the error that its model is allowed.
+        ``noise`` is that of the training recordings. It counts where the recording's own is not
+        known or smaller: a lead-in of 2 s gives the noise floor within some 10 % only. A film's
+        noise includes the error that its model is allowed.
         """
         error = self.errors.rms if self.rms_without_events is None else self.rms_without_events
         allowed = 0.0
@@ -84,7 +85,7 @@ class Comparison:
             from dearig.model.diagnosis.bench import FILM_MODEL_ERROR
 
             allowed = FILM_MODEL_ERROR * float(np.nanmax(np.abs(self.measured)))
-        return error / math.hypot(self.noise or noise, allowed)
+        return error / math.hypot(max(self.noise or 0.0, noise), allowed)
 
 
 @dataclass(frozen=True)
