@@ -1,0 +1,266 @@
+"""The search for what a model lacks: regression, race, evidence; grow, exchange, prune."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from dearig.model.diagnosis.evidence import Judge
+from dearig.model.diagnosis.fits import Fit, Fitter
+from dearig.model.diagnosis.race import Candidate, race
+from dearig.model.diagnosis.regression import Regression
+from dearig.model.diagnosis.settings import DiagnosisSettings
+from dearig.model.diagnosis.shapes import Extent, extent_of, strongest_line
+from dearig.model.effects import EFFECTS
+from dearig.model.records import ActuatorRecord, Record
+
+__all__ = ["Found", "Race", "Search"]
+
+_DRIFT_TURNS = 3  # of fitting the model and the drift's variance in turn
+_MUCH_LESS = 2.0  # of the cost: drift is believed before laws where it leaves so much less
+
+Progress = Callable[[str, float], None]
+
+
+class Stopped(Exception):  # noqa: N818
+    """The operator wants the end."""
+
+
+class Spent(Exception):  # noqa: N818
+    """The search has taken the work that it may."""
+
+
+@dataclass(frozen=True)
+class Race:
+    """One race: its ``parent``, the fits that came through, and the one that was taken, if any."""
+
+    parent: Fit
+    fits: tuple[Fit, ...]
+    starts: dict[str, float] = field(default_factory=dict)
+    taken: Fit | None = None
+
+
+@dataclass(frozen=True)
+class Found:
+    """End of a search: the baseline, the best fit, all others by their members, and the races.
+
+    ``status`` is ``complete``, ``stopped`` or ``budget``.
+    """
+
+    baseline: Fit
+    best: Fit
+    fits: dict[frozenset[str], Fit]
+    races: tuple[Race, ...]
+    judge: Judge
+    status: str
+
+
+class Search:
+    """A search with a ``fitter``, whose ``watched`` must be ``self.watch``."""
+
+    def __init__(
+        self, fitter: Fitter, progress: Progress, stop: Callable[[], bool], log: Callable[[str], None] = lambda _: None
+    ) -> None:
+        self.fitter, self.settings = fitter, fitter.settings
+        self.progress, self.stop, self.log = progress, stop, log
+        self.fits: dict[frozenset[str], Fit] = {}
+        self.races: list[Race] = []
+        self._searching = False
+        drive = "voltage" if fitter.of_actuator else "stretch"
+        warm = any(
+            isinstance(r, ActuatorRecord) and r.drive.warmth is not None for r in fitter.full
+        )
+        # drift of one record is noise here; a thermometer's effect needs a thermometer
+        self.effects = [
+            e
+            for e in EFFECTS.values()
+            if drive in e.drives and e.drift_basis is None and (warm or e.name != "temperature")
+        ]
+
+    def watch(self) -> None:
+        """End the search where it is asked to, or has taken the work that it may."""
+        if self._searching and self.stop():
+            raise Stopped
+        if self._searching and self.fitter.work.effort > self.settings.effort:
+            raise Spent
+
+    def run(self) -> Found:
+        """Return what the records lack, or the best of what the work or the operator allowed."""
+        baseline = self.keep(self.fitter.baseline(self.progress))
+        self.judge = Judge(self.settings, baseline)
+        self.log(f"baseline {baseline.cost:.4g}, effort {self.fitter.work.effort:.2e}")
+        self._searching, status = True, "complete"
+        try:
+            best = self._searched(baseline)
+        except Stopped:
+            best, status = self._most_probable(), "stopped"
+        except Spent:
+            best, status = self._most_probable(), "budget"
+        finally:
+            self._searching = False
+        if status == "budget" and len(best.members) > 1:
+            best = self._pruned(best)
+        return Found(baseline, best, self.fits, tuple(self.races), self.judge, status)
+
+    def keep(self, fit: Fit) -> Fit:
+        """Return the best fit with the same members, ``fit`` included, and remember it."""
+        old = self.fits.get(fit.members)
+        if old is None or fit.cost < old.cost or fit.drift != old.drift:
+            self.fits[fit.members] = fit
+        return self.fits[fit.members]
+
+    def _most_probable(self) -> Fit:
+        self.judge.see(self.fits.values())
+        return min(
+            self.fits.values(),
+            key=lambda f: self.judge.criterion(f) + self.settings.odds * len(f.members),
+        )
+
+    # -- the course
+
+    def _searched(self, baseline: Fit) -> Fit:
+        """Laws are sought in white noise and in drift, the more promising first."""
+        judge = self.judge
+        if judge.is_settled(baseline):
+            return baseline
+        drifting = self._drifting(baseline)
+        first = self._raced(baseline, pairs=True)
+        judge.see([baseline, *first, *([drifting] if drifting else [])])
+        if drifting is None or judge.gain(baseline, drifting) < self.settings.odds:
+            return self._grown(baseline, first)
+        if _MUCH_LESS * drifting.cost < first[0].cost:
+            beside = self._grown(drifting, None)
+            if judge.is_settled(beside):
+                return beside
+            lawful = self._grown(baseline, first)
+        else:
+            lawful = self._grown(baseline, first)
+            if judge.is_settled(lawful):
+                return lawful
+            beside = self._grown(drifting, None)
+        judge.see([lawful, beside])
+        return min(lawful, beside, key=judge.criterion)
+
+    def _drifting(self, parent: Fit) -> Fit | None:
+        """Return ``parent`` with drift in the noise; None where white noise is as probable."""
+        if not self.fitter.of_actuator:
+            return None
+        fit, amplitude = parent, 0.0
+        for _ in range(_DRIFT_TURNS):
+            asked = self.fitter.space().most_probable(fit.plain_residuals())
+            if asked == amplitude:
+                break
+            amplitude = asked
+            if amplitude == 0.0:
+                return None
+            problem = self.fitter.problem(fit.model, amplitude)
+            fit = self.fitter.refined(self.fitter.descend(problem, fit.x, 10))
+        return self.keep(fit) if amplitude else None
+
+    def _grown(self, best: Fit, first: list[Fit] | None) -> Fit:
+        """Return ``best`` with effects added, one by one or two at once, while that is worth it."""
+        while len(best.members) < self.settings.effects_max and not self.judge.is_settled(best):
+            fits, first = first or self._raced(best), None
+            if not fits:
+                break
+            self.judge.see([best, *fits])
+            top = fits[0]
+            worth = self.judge.is_worth(best, top)
+            self.log(
+                f"{sorted(best.members)} {best.cost:.4g} -> {sorted(top.members)} {top.cost:.4g} gain "
+                f"{self.judge.gain(best, top):.1f} {'taken' if worth else 'left'} {self.fitter.work.effort:.2e}"
+            )
+            if not worth:
+                break
+            self.races[-1] = replace(self.races[-1], taken=top)
+            best = self._pruned(top) if len(top.members) - len(best.members) > 1 else top
+            best = self._exchanged(best)
+        return self._pruned(best) if len(best.members) > 1 else best
+
+    def _exchanged(self, best: Fit) -> Fit:
+        """Return ``best`` with effects replaced, each by a race without it, where that is better."""
+        if len(best.members) < 2:
+            return best
+        for name in best.effects:
+            if self.judge.is_settled(best) or name not in best.effects:
+                break
+            fits = self._raced(self._without(best, name))
+            self.judge.see([best, *fits])
+            if fits and fits[0].members != best.members and self.judge.gain(best, fits[0]) > 1.0:
+                self.log(f"exchanged {sorted(best.members)} for {sorted(fits[0].members)} {fits[0].cost:.4g}")
+                best = fits[0]
+        return best
+
+    def _pruned(self, best: Fit) -> Fit:
+        """Return ``best`` without what the evidence, or the form of a law, does not ask for."""
+        while best.effects:
+            smaller = [self._without(best, name) for name in best.effects]
+            self.judge.see([best, *smaller])
+            least = self.judge.ranked(smaller)[0]
+            explained = self.judge.base_cost - least.cost
+            form = least.cost - best.cost < self.settings.form_share * explained
+            if not (form and self.judge.is_noise(least)) and (
+                self.judge.gain(least, best) > self.settings.odds
+            ):
+                break
+            self.log(f"pruned to {sorted(least.members)} {best.cost:.4g} -> {least.cost:.4g}")
+            best = least
+        return best
+
+    def _without(self, fit: Fit, name: str) -> Fit:
+        """Return ``fit`` refitted without one of its effects."""
+        known = dict(zip(fit.problem.layout.names, fit.x, strict=True))
+        effects = tuple(e for e in fit.model.effects if e[0] != name)
+        problem = self.fitter.problem(replace(fit.model, effects=effects), fit.drift)
+        x = np.array([known[n] for n in problem.layout.names])
+        return self.keep(self.fitter.refined(self.fitter.descend(problem, x, 20)))
+
+    # -- one race
+
+    def _raced(self, parent: Fit, pairs: bool = False) -> list[Fit]:
+        """Return the fits of one more effect each, or of two, the most probable first."""
+        regression, extent = self._regression(parent)
+        effects = [e for e in self.effects if e.name not in parent.effects]
+        starts = regression.starts(effects, extent)
+        fits = race(
+            self.fitter, self.judge, parent,
+            [Candidate((name,), tuple(some)) for name, some in starts.items()],
+        )  # fmt: skip
+        if pairs and fits and not self.judge.is_noise(fits[0]):
+            both = race(
+                self.fitter, self.judge, parent,
+                [Candidate(s.names, (s,)) for s in regression.pairs(self.settings.pairs)],
+            )  # fmt: skip
+            fits = self.judge.ranked([*fits, *both])
+        fits = [self.keep(fit) for fit in fits]
+        self.races.append(
+            Race(parent, tuple(fits), {name: some[0].misfit for name, some in starts.items()})
+        )
+        return fits
+
+    def _regression(self, parent: Fit) -> tuple[Regression, Extent]:
+        fitter, records = self.fitter, self.fitter.records
+        went: np.ndarray | None = None
+        drift = parent.problem.noise_drift
+        if drift is not None:
+            noise = np.concatenate([np.full(r.measured.size, r.noise) for r in records])
+            went = drift.mean(parent.plain_residuals()) * noise
+        times = fitter.times if fitter.of_actuator else _film_times(records)
+        regression = Regression(
+            records, parent.model, times, self.settings,
+            drift.amplitude if drift else 0.0, went,
+        )  # fmt: skip
+        longest = int(np.argmax([r.measured.size for r in records]))
+        residual = parent.by_record()[longest]
+        step = float(np.median(np.diff(records[longest].time)))
+        return regression, extent_of(
+            records, lambda low, high: strongest_line(residual, step, low, high)
+        )
+
+
+def _film_times(records: Sequence[Record]) -> tuple[float, float]:
+    """Return the relaxation times that ``records`` resolve: two samples to three durations."""
+    shortest = min(float(np.median(np.diff(r.time))) for r in records)
+    return 2.0 * shortest, 3.0 * max(float(r.time[-1] - r.time[0]) for r in records)

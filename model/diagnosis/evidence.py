@@ -1,0 +1,136 @@
+"""One criterion for every choice of a diagnosis: minus twice the logarithm of the evidence.
+
+    C = n ln(c + delta^2 (c0 - c)) + k ln n + log det(drift) + prior
+
+c is the mean square of the whitened residuals over the noise, c0 that of the baseline, k the number
+of fitted parameters. No law is true to more than delta of what it explains. n counts independent
+samples: the readings over the least correlation time of any fit so far, one n for the whole
+diagnosis. (Schwarz, Annals of Statistics 6, 461 (1978); the scale of the noise is marginalised.)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from dearig.model.diagnosis.fits import DRIFT, Fit
+from dearig.model.diagnosis.settings import DiagnosisSettings
+from dearig.model.effects import EFFECTS
+
+__all__ = ["Evidence", "Judge", "family_of"]
+
+
+def family_of(member: str) -> str:
+    """Return the family of an effect, or of ``DRIFT``."""
+    return "drift" if member == DRIFT else EFFECTS[member].family
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Value of the criterion for one fit, and its parts."""
+
+    misfit: float
+    size: float
+    prior: float
+
+    @property
+    def criterion(self) -> float:
+        """Minus twice the logarithm of the evidence, but for a constant."""
+        return self.misfit + self.size + self.prior
+
+
+class Judge:
+    """Compares fits to the same records; ``see`` it every fit that may count."""
+
+    def __init__(self, settings: DiagnosisSettings, baseline: Fit) -> None:
+        self.settings = settings
+        self.readings = baseline.problem.samples
+        self.base_cost = baseline.cost
+        self._correlation = max(1.0, baseline.correlation)
+
+    def see(self, fits: Iterable[Fit]) -> None:
+        """Take account of the correlation times of ``fits``."""
+        for fit in fits:
+            self._correlation = max(1.0, min(self._correlation, fit.correlation))
+
+    @property
+    def samples(self) -> float:
+        """Number n of independent samples."""
+        return self.readings / self._correlation
+
+    def evidence(self, fit: Fit) -> Evidence:
+        """Return the evidence for ``fit``."""
+        s, n = self.settings, self.samples
+        loss = fit.cost + s.form_error**2 * max(self.base_cost - fit.cost, 0.0)
+        drift = fit.problem.noise_drift
+        unnamed = sum(
+            EFFECTS[name].family == "unknown" or not EFFECTS[name].is_reproducible
+            for name in fit.effects
+        )
+        return Evidence(
+            n * math.log(max(loss, 1e-12)),
+            fit.free * math.log(max(n, 2.0)) + (drift.log_det if drift else 0.0),
+            s.unnamed_odds * unnamed,
+        )
+
+    def criterion(self, fit: Fit) -> float:
+        """Return C; the smallest is the most probable."""
+        return self.evidence(fit).criterion
+
+    def gain(self, over: Fit, fit: Fit) -> float:
+        """Return by how much C of ``fit`` is below that of another."""
+        return self.criterion(over) - self.criterion(fit)
+
+    def ranked(self, fits: Iterable[Fit]) -> list[Fit]:
+        """Return ``fits``, the most probable first."""
+        return sorted(fits, key=self.criterion)
+
+    def is_noise(self, fit: Fit) -> bool:
+        """Whether the residual is as small as the noise, within what the lead-in knows of it."""
+        return fit.cost < self.settings.noise_margin**2
+
+    def is_settled(self, fit: Fit) -> bool:
+        """Whether nothing is left that any effect could explain.
+
+        The residual is white, or so small a part of what is explained that it may be the form of a
+        law.
+        """
+        if not self.is_noise(fit):
+            return False
+        if not self._sensed(fit):
+            return True
+        white = fit.correlation <= self.settings.white_correlation and fit.is_flat
+        return white or fit.cost - 1.0 < self.settings.form_share * (self.base_cost - fit.cost)
+
+    @staticmethod
+    def _sensed(fit: Fit) -> bool:
+        """Whether the noise is that of a sensor: the tolerance of a film's model is not white."""
+        return hasattr(fit.problem.layout.base, "load")
+
+    def is_worth(self, parent: Fit, fit: Fit) -> bool:
+        """Whether ``fit`` explains decisively more than ``parent``, which has fewer effects."""
+        s = self.settings
+        left = max(parent.cost - 1.0, 1e-9)
+        enough = not parent.members or (parent.cost - fit.cost) / left > s.share
+        return self.gain(parent, fit) > s.odds and parent.cost - fit.cost > s.form_error and enough
+
+    def probabilities(self, fits: Sequence[Fit]) -> dict[str, float]:
+        """Return the probability of each family: that it is among what is missing.
+
+        Sums exp(-C/2t) over ``fits``, each with prior odds of e^(-odds/2) an effect, with the
+        tempering t of the settings. ``none`` is the baseline, ``unknown`` what no fit explains.
+        """
+        if not fits:
+            return {"none": 1.0}
+        s = self.settings
+        scores = [self.criterion(f) + s.odds * len(f.members) for f in fits]
+        least = min(scores)
+        weights = [math.exp(-0.5 * (score - least) / s.tempering) for score in scores]
+        total = sum(weights)
+        found: dict[str, float] = {}
+        for fit, weight in zip(fits, weights, strict=True):
+            families = {family_of(m) for m in fit.members} or {"none"}
+            for family in families:
+                found[family] = found.get(family, 0.0) + weight / total / len(families)
+        return found

@@ -1,0 +1,354 @@
+"""Output-error fits of candidates: values, and the fitter that makes them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from threading import Lock
+
+import numpy as np
+
+from dearig.model import kernel
+from dearig.model.actuator import Actuator
+from dearig.model.diagnosis.noise import Drift, DriftSpace, WhitenedProblem, drift_modes
+from dearig.model.diagnosis.settings import DiagnosisSettings
+from dearig.model.effects import EFFECTS
+from dearig.model.film import Strip
+from dearig.model.fitting.broyden import descend_broyden
+from dearig.model.fitting.coarse_drive import coarse_drive_of
+from dearig.model.fitting.identify import fit_globally, is_worth_freeing
+from dearig.model.fitting.intervals import correlation_time, is_flat
+from dearig.model.fitting.levenberg import LocalFit, descend
+from dearig.model.fitting.parallel import Job, Result, parallel_map
+from dearig.model.fitting.parameters import Layout
+from dearig.model.fitting.search import voltage_starts
+from dearig.model.records import ActuatorRecord, Record
+
+__all__ = ["DRIFT", "Fit", "Fitter", "Work", "with_effect"]
+
+#: How the marginalised drift is named among the members of a fit.
+DRIFT = "drift"
+
+_GAIN = 0.5  # of chi-square: what is left to gain changes no choice, whose odds are 12
+_GAIN_PART = 1e-4  # of chi-square: the same, where a misfit is large
+_BASELINE_STARTS = 5  # of the global search
+_BASELINE_ITERATIONS = 20
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted to the records: coordinates ``x`` (d,) in the layout of ``problem``.
+
+    ``fixed`` (d,) bool were held. ``cost`` is the mean square of the whitened residuals (N,), in
+    units of the noise; ``jacobian`` (N, f) is one near ``x``, or not finite. ``rough`` fits are of
+    a first look and are not compared closely.
+    """
+
+    problem: WhitenedProblem
+    x: np.ndarray
+    fixed: np.ndarray
+    cost: float
+    residuals: np.ndarray
+    jacobian: np.ndarray
+    converged: bool = False
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of its effects."""
+        return tuple(name for name, _ in self.problem.layout.base.effects)
+
+    @property
+    def drift(self) -> float:
+        """Variance of the drift that is part of its noise; 0 for white noise."""
+        return self.problem.noise_drift.amplitude if self.problem.noise_drift else 0.0
+
+    @property
+    def members(self) -> frozenset[str]:
+        """Its effects, and ``DRIFT`` where the noise contains drift."""
+        return frozenset(self.effects) | (frozenset([DRIFT]) if self.drift else frozenset())
+
+    @cached_property
+    def model(self) -> Actuator | Strip:
+        """The fitted model."""
+        layout = self.problem.layout
+        return layout.model(layout.values(self.x))
+
+    @property
+    def free(self) -> int:
+        """Number of fitted parameters; the drift's variance is one."""
+        return int(np.count_nonzero(~self.fixed)) + bool(self.drift)
+
+    @cached_property
+    def correlation(self) -> float:
+        """Correlation time of the residuals in samples, the mean over the records."""
+        parts = self.by_record()
+        times = [correlation_time(part) for part in parts]
+        return float(np.average(times, weights=[part.size for part in parts]))
+
+    def by_record(self) -> list[np.ndarray]:
+        """Return the residuals of each record."""
+        return [self.residuals[a:b] for a, b in pairwise(self.problem.edges)]
+
+    @cached_property
+    def is_flat(self) -> bool:
+        """Whether the spectrum of each record's residuals is that of white noise."""
+        return all(is_flat(part) for part in self.by_record())
+
+    def plain_residuals(self) -> np.ndarray:
+        """Return measured less model (N,), in noises, with the drift in it."""
+        problem = self.problem
+        if problem.noise_drift is None:
+            return -self.residuals
+        bare = WhitenedProblem(
+            problem.records, problem.layout, workers=problem.workers,
+            fidelity=problem.fidelity, on_simulations=problem.on_simulations,
+        )  # fmt: skip
+        return -bare.residuals(self.x)
+
+
+class Work:
+    """Simulations of a search, and their cost in integration steps."""
+
+    def __init__(self) -> None:
+        self.simulations = 0
+        self.effort = 0.0
+        self._counting = Lock()
+
+    def add(self, simulations: int, effort: float) -> None:
+        """Count some more, from any thread."""
+        with self._counting:
+            self.simulations += simulations
+            self.effort += effort
+
+
+def with_effect(
+    model: Actuator | Strip, name: str, values: Sequence[float]
+) -> Actuator | Strip:
+    """Return ``model`` with effect ``name`` at ``values`` in the order of its parameters."""
+    names = (p.name for p in EFFECTS[name].parameters)
+    pairs = tuple(zip(names, map(float, values), strict=True))
+    return replace(model, effects=(*model.effects, (name, pairs)))
+
+
+class Fitter:
+    """Training ``records``, ``full`` and as the search uses them, and the fits made to them.
+
+    ``watched`` is called after each population of simulations, from any thread, and may raise to
+    end the search. ``thin(record, model)`` returns a record as the search uses it.
+    """
+
+    def __init__(
+        self,
+        records: Sequence[Record],
+        base: Actuator | Strip,
+        settings: DiagnosisSettings,
+        thin: Callable[[Record, Actuator | Strip], Record],
+        workers: int = 2,
+        watched: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.base, self.settings, self.workers = base, settings, workers
+        self.full, self._thin = tuple(records), thin
+        self.records = tuple(thin(r, base) for r in records)
+        self.work, self.watched = Work(), watched
+        longest = max(float(r.time[-1] - r.time[0]) for r in records)
+        self.times = (settings.branch_time_min_s, settings.branch_time_max * longest)
+        self._coarse: dict[tuple[str, ...], np.ndarray] = {}
+        self._space: dict[bool, DriftSpace] = {}
+        self._limits = np.zeros(0, dtype=bool)
+
+    # -- problems
+
+    @property
+    def of_actuator(self) -> bool:
+        """Whether the records are driven by voltage."""
+        return isinstance(self.base, Actuator)
+
+    def space(self, full: bool = False) -> DriftSpace:
+        """Return the directions in which the records may drift."""
+        if full not in self._space:
+            records = self.full if full else self.records
+            modes = self.settings.drift_modes
+            bases = [drift_modes(r, modes) for r in records if isinstance(r, ActuatorRecord)]
+            self._space[full] = DriftSpace(bases)
+        return self._space[full]
+
+    def problem(
+        self,
+        model: Actuator | Strip,
+        drift: float = 0.0,
+        fidelity: int = kernel.QUICK,
+        full: bool = False,
+    ) -> WhitenedProblem:
+        """Return the records with the numbers of ``model`` free, under a ``drift`` in the noise."""
+        layout = Layout(model, self.times if self.of_actuator else None)
+        problem = WhitenedProblem(
+            self.full if full else self.records,
+            layout,
+            Drift(self.space(full), drift) if drift else None,
+            workers=self.workers,
+            fidelity=fidelity,
+            on_simulations=self._count,
+        )
+        if not full:
+            problem.coarse_columns = self._coarse_columns(problem)
+        return problem
+
+    def _count(self, simulations: int, effort: float) -> None:
+        self.work.add(simulations, effort)
+        self.watched()
+
+    def fixed(self, layout: Layout) -> np.ndarray:
+        """Return which parameters (d,) are held: the locking limits, unless the baseline asks."""
+        held = np.zeros(layout.size, dtype=bool)
+        held[layout.column("J")] = True
+        if self._limits.size:
+            held[: self._limits.size] = self._limits
+        return held
+
+    def _coarse_columns(self, problem: WhitenedProblem) -> np.ndarray | None:
+        """Return which derivatives coarse drives give: asked once of each set of effects."""
+        layout = problem.layout
+        if not any(isinstance(r, ActuatorRecord) and r.coarse_drive for r in problem.records):
+            return None
+        if layout.names not in self._coarse:
+            plain = problem
+            if problem.noise_drift is not None:
+                plain = WhitenedProblem(
+                    problem.records, layout, workers=self.workers, fidelity=problem.fidelity,
+                    on_simulations=self._count,
+                )  # fmt: skip
+            x = layout.coordinates(layout.initial())
+            self._coarse[layout.names] = plain.find_coarse_columns(x, ~self.fixed(layout))
+        return self._coarse[layout.names]
+
+    # -- fits
+
+    def map(self, work: Callable[[Job], Result], jobs: Sequence[Job]) -> list[Result]:
+        """Return ``work(job)`` for each of ``jobs``, which are independent fits."""
+        return parallel_map(work, jobs, self.workers, "fit")
+
+    def costs(self, problem: WhitenedProblem, rows: np.ndarray) -> np.ndarray:
+        """Return the costs (P,) of coordinates (P, d), which are clipped into the bounds."""
+        return problem.costs(np.clip(rows, problem.layout.lower, problem.layout.upper))
+
+    def descend(
+        self,
+        problem: WhitenedProblem,
+        x: np.ndarray,
+        iterations: int,
+        jacobian: np.ndarray | None = None,
+        sure: bool = False,
+    ) -> Fit:
+        """Return the fit after so many secant iterations from coordinates ``x`` (d,)."""
+        fixed = self.fixed(problem.layout)
+        found = descend_broyden(problem, x, fixed, jacobian, iterations, 1.0, sure)
+        return _fit(problem, fixed, found)
+
+    def further(self, fit: Fit, iterations: int, fidelity: int = kernel.QUICK) -> Fit:
+        """Return ``fit`` after so many further secant iterations."""
+        problem = fit.problem
+        known: np.ndarray | None = fit.jacobian
+        if problem.fidelity != fidelity:
+            problem = self.problem(problem.layout.base, fit.drift, fidelity)
+            known = None
+        return self.descend(problem, fit.x, iterations, known)
+
+    def refined(self, fit: Fit) -> Fit:
+        """Return ``fit`` at the end of its valley: secants first, then Levenberg-Marquardt."""
+        problem = fit.problem
+        if problem.fidelity == kernel.ROUGH:
+            problem = self.problem(problem.layout.base, fit.drift)
+        gain = max(_GAIN, _GAIN_PART * fit.cost * problem.samples)
+        found = descend_broyden(problem, fit.x, fit.fixed, None, 40, gain, True)
+        found = descend(problem, found.x, fit.fixed, 30, gain, 1e-3, 3, quick=True)
+        return replace(_fit(problem, fit.fixed, found), converged=True)
+
+    def careful(self, fit: Fit, iterations: int) -> Fit:
+        """Return ``fit`` on every sample, with careful steps and two-sided differences."""
+        # the drift's variance is in units of one reading's noise
+        problem = self.problem(fit.model, fit.drift, kernel.CAREFUL, full=True)
+        gain = max(_GAIN, _GAIN_PART * fit.cost * problem.samples)
+        found = descend(problem, fit.x, fit.fixed, iterations, gain, damping=1e-4)
+        return replace(_fit(problem, fit.fixed, found), converged=True)
+
+    def start_of(
+        self, problem: WhitenedProblem, fit: Fit, values: Sequence[float], springs: np.ndarray | None
+    ) -> np.ndarray:
+        """Return coordinates (d,): those of ``fit``, then effects at ``values``.
+
+        ``springs`` (s,), natural values in the order of the layout, replace those of ``fit``.
+        """
+        layout = problem.layout
+        known = fit.problem.layout.values(fit.x)
+        row = np.concatenate([known, np.asarray(values, dtype=float)])
+        if springs is not None:
+            row[: springs.size] = springs
+        return np.clip(layout.coordinates(row), layout.lower, layout.upper)
+
+    def springs(self, fit: Fit, moduli: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Return natural values (s,) of the springs in the order of the layout of ``fit``."""
+        layout = fit.problem.layout
+        row = layout.values(fit.x)[: spring_count(layout)]
+        mu, t = layout.column("mu"), layout.column("T")
+        row[mu] = moduli[[layout.quantities[j].index for j in mu]]
+        row[t] = times
+        return row
+
+    # -- the baseline
+
+    def baseline(self, progress: Callable[[str, float], None]) -> Fit:
+        """Return the model without effects, fitted from a global search of its springs."""
+        base = replace(self.base, effects=())
+        problem = self.problem(base)
+        if not self.of_actuator:
+            return self._strip_baseline(problem, progress)
+        starts = voltage_starts(problem, progress, _BASELINE_STARTS)
+        fits = self.map(lambda x: self.descend(problem, x, 8), list(starts))
+        leaders = sorted(fits, key=lambda f: f.cost)[:2]
+        fits = self.map(lambda f: self.descend(problem, f.x, _BASELINE_ITERATIONS, sure=True), leaders)
+        best = self.refined(min(fits, key=lambda f: f.cost))
+        self._prepare(best.model)
+        return self.refined(replace(best, problem=self.problem(best.model)))
+
+    def _prepare(self, model: Actuator | Strip) -> None:
+        """Thin the records as the fitted ``model`` allows, and find their coarse drives."""
+        thin = [self._thin(r, model) for r in self.full]
+        self.records = tuple(
+            replace(r, coarse_drive=coarse_drive_of(r, model))
+            if isinstance(r, ActuatorRecord) and isinstance(model, Actuator)
+            else r
+            for r in thin
+        )
+        self._space.clear()
+        self._coarse.clear()
+
+    def _strip_baseline(
+        self, problem: WhitenedProblem, progress: Callable[[str, float], None]
+    ) -> Fit:
+        """The same of strips: the locking limits are free where that explains significantly more."""
+        found, fixed = fit_globally(problem, None, progress, stiffening=False)
+        if fixed.any():
+            freed, free = fit_globally(problem, None, progress)
+            if is_worth_freeing(problem, found.cost, freed, int(fixed.sum())):
+                found, fixed = freed, free
+        self._limits = fixed
+        return replace(_fit(problem, fixed, found), converged=True)
+
+
+def spring_count(layout: Layout) -> int:
+    """Return the number of parameters of the springs, which come first in a layout."""
+    return sum(q.kind != "effect" for q in layout.quantities)
+
+
+def _fit(problem: WhitenedProblem, fixed: np.ndarray, found: LocalFit) -> Fit:
+    return Fit(
+        problem, found.x, fixed, found.cost, found.residuals, found.jacobian, found.converged
+    )
+
+
+def information(samples: float, loss: float, free: int) -> float:
+    """Return n ln(loss) + k ln(n): minus twice the logarithm of the evidence, but for a constant."""
+    return samples * math.log(max(loss, 1e-12)) + free * math.log(max(samples, 2.0))

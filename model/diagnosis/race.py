@@ -1,0 +1,154 @@
+"""The race of candidates: successive halving of output-error fits (Jamieson and Talwalkar, 2016).
+
+Each rung fits fewer candidates for more iterations. In the first ones, two starts of each candidate
+run abreast: with springs anew and with the parent's. In the last ones each candidate also starts
+beside the springs of the one that leads, and from the best law of its own family with what it has
+more neutral.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dearig.model import kernel
+from dearig.model.diagnosis.evidence import Judge
+from dearig.model.diagnosis.fits import Fit, Fitter, spring_count, with_effect
+from dearig.model.diagnosis.regression import Start
+from dearig.model.diagnosis.shapes import amplitudes, typical_values
+from dearig.model.effects import EFFECTS
+
+__all__ = ["Candidate", "race"]
+
+_TINY = 1e-3  # of the typical amplitude: an effect that hardly acts, and has a derivative
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Effects that are added to a parent together, and the starts of their fit, best first."""
+
+    effects: tuple[str, ...]
+    starts: tuple[Start, ...]
+
+    @property
+    def misfit(self) -> float:
+        """What the regression leaves from the best start."""
+        return self.starts[0].misfit
+
+
+def race(
+    fitter: Fitter, judge: Judge, parent: Fit, candidates: Sequence[Candidate]
+) -> list[Fit]:
+    """Return the fits of the candidates that came through the race, the most probable first."""
+    rungs = fitter.settings.rungs
+    entered = sorted(candidates, key=lambda c: c.misfit)[: rungs[0].effects]
+    first = fitter.map(lambda c: _entered(fitter, parent, c, rungs[0].iterations), entered)
+    runners = [fit for fits in first for fit in fits]
+    for place, rung in enumerate(rungs[1:], start=1):
+        judge.see(runners)
+        runners = _leading(judge.ranked(runners), rung.effects, abreast=place == 1)
+        leader, late, last = runners[0], place > 1, rung is rungs[-1]
+
+        def fit(runner: Fit, n: int = rung.iterations, late: bool = late, last: bool = last, leader: Fit = leader, among: list[Fit] = runners) -> Fit:
+            return _run(fitter, judge, runner, leader, among, n, late, last)
+
+        runners = fitter.map(fit, runners)
+    judge.see(runners)
+    return _leading(judge.ranked(runners), len(runners), abreast=False)
+
+
+def _leading(ranked: Sequence[Fit], effects: int, abreast: bool) -> list[Fit]:
+    """Return the fits of the first ``effects`` sets of effects; unless ``abreast``, one of each."""
+    keys = list(dict.fromkeys(fit.members for fit in ranked))[:effects]
+    if abreast:
+        return [fit for fit in ranked if fit.members in keys]
+    return [next(fit for fit in ranked if fit.members == key) for key in keys]
+
+
+def _entered(fitter: Fitter, parent: Fit, candidate: Candidate, iterations: int) -> list[Fit]:
+    """Return first fits of a candidate: from its best start with new springs, and with old ones."""
+    model = parent.model
+    for name in candidate.effects:
+        model = with_effect(model, name, typical_values(EFFECTS[name]))
+    problem = fitter.problem(model, parent.drift, kernel.ROUGH)
+    anew, beside = [], []
+    for start in candidate.starts:
+        values = [v for _, own in start.effects for v in own]
+        springs = fitter.springs(parent, start.moduli, start.times)
+        anew.append(fitter.start_of(problem, parent, values, springs))
+        beside.append(fitter.start_of(problem, parent, values, None))
+    # and from nothing, in the best shape
+    values = [v for name, own in candidate.starts[0].effects for v in _hardly(name, own)]
+    beside.append(fitter.start_of(problem, parent, values, None))
+    costs = fitter.costs(problem, np.array(anew + beside))
+    chosen = (int(np.argmin(costs[: len(anew)])), len(anew) + int(np.argmin(costs[len(anew) :])))
+    rows = anew + beside
+    return [fitter.descend(problem, rows[i], iterations) for i in chosen]
+
+
+def _hardly(name: str, values: Sequence[float]) -> list[float]:
+    """Return ``values`` of effect ``name`` with amplitudes next to neutral."""
+    return [
+        v if p.neutral is None else p.neutral + _TINY * p.typical
+        for p, v in zip(EFFECTS[name].parameters, values, strict=True)
+    ]
+
+
+def _run(
+    fitter: Fitter,
+    judge: Judge,
+    runner: Fit,
+    leader: Fit,
+    among: Sequence[Fit],
+    iterations: int,
+    late: bool,
+    last: bool,
+) -> Fit:
+    """Return a runner after one rung: the best of its own path and, ``late``, of the others'."""
+    fits = [fitter.further(runner, iterations)]
+    limit = fitter.settings.noise_margin**2 * min(1.0, leader.cost)
+    if late and runner is not leader and fits[0].cost > limit:
+        x = _transplanted(fitter, runner, leader, among)
+        fits.append(fitter.descend(fits[0].problem, x, iterations))
+    best = min(fits, key=lambda f: f.cost)
+    return fitter.refined(best) if last else best
+
+
+def _transplanted(fitter: Fitter, runner: Fit, leader: Fit, among: Sequence[Fit]) -> np.ndarray:
+    """Return coordinates (d,) of ``runner`` beside the springs of another, those of least cost.
+
+    The springs of ``leader``, at several amplitudes of the last effect; and the springs of better
+    fits whose last effect is of the same family, with the parameters that both have.
+    """
+    layout = runner.problem.layout
+    count = spring_count(layout)
+    effect = EFFECTS[runner.effects[-1]]
+    begin = layout.size - len(effect.parameters)
+    own = layout.values(runner.x)
+    rows = []
+    row = own.copy()
+    row[:count] = leader.problem.layout.values(leader.x)[:count]
+    rows.append(row)
+    if len(effect.amplitudes) == 1:
+        for amplitude in amplitudes(effect.amplitudes[0], fitter.settings.amplitudes):
+            rows.append(row.copy())
+            rows[-1][begin] = amplitude
+    for other in among:
+        law = EFFECTS[other.effects[-1]]
+        if other is runner or other.cost >= runner.cost or law.family != effect.family:
+            continue
+        theirs = other.problem.layout.values(other.x)
+        known = {
+            (p.name, p.unit): v
+            for p, v in zip(law.parameters, theirs[-len(law.parameters) :], strict=True)
+        }
+        row = own.copy()
+        row[:count] = theirs[:count]
+        for i, p in enumerate(effect.parameters):
+            old = row[begin + i] if p.neutral is None else p.neutral
+            row[begin + i] = known.get((p.name, p.unit), old)
+        rows.append(row)
+    inside = np.array([np.clip(layout.coordinates(r), layout.lower, layout.upper) for r in rows])
+    return inside[int(np.argmin(runner.problem.costs(inside)))]

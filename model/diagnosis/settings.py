@@ -1,0 +1,110 @@
+"""Settings of a diagnosis: every number of the search, each with its derivation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["DiagnosisSettings", "Rung"]
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One rung of the race: how many effects run in it, and for how many iterations each."""
+
+    effects: int
+    iterations: int
+
+
+@dataclass(frozen=True)
+class DiagnosisSettings:
+    """Numbers of the search, in groups: work, regression, race, evidence, noise.
+
+    Parameters
+    ----------
+    effort
+        Integration steps that the search may take: some 45 s of two cores.
+    branch_time_min_s
+        A branch that relaxes faster than the excitation varies acts as a drag, and is sought as
+        one: half of the shortest lobe's quarter.
+    branch_time_max
+        In durations of the longest record. A slower branch cannot be told from the equilibrium
+        spring: over a third of its relaxation time it relaxes by 28 %.
+    grid_ratio
+        Ratio of neighbouring relaxation times of the regression. A branch between two nodes is met
+        to (ln ratio)^2/32 of its stress, here 1.5e-3: below the noise of a motion of 500 noises.
+    bandwidth_hz
+        Rate of the means that the regression fits. The film rings at 70 Hz: above half of this
+        rate its response to a stress has no more than 1/8 of its power.
+    smoothing_s
+        Standard deviation of the filter for lam' and lam'': it passes what the means resolve.
+    shapes
+        Points of a Sobol sequence over the bounds of the shape parameters, beside an effect's own
+        starts. 16 points leave no gap above a quarter of the range of each of two parameters.
+    amplitudes
+        Amplitudes, in typical ones, of effects whose response is not linear. Steps by a factor of
+        3 and coefficients from 1/2 to 2 of each secant cover the range without gaps.
+    moments
+        Instants at which an event is tried in each record; the regression's own resolution then
+        refines the best.
+    starts
+        Starts of one effect that are simulated, each with new springs and with the parent's.
+    modulus_freedom
+        Part of mu_0 that the regression may take away: the rest of the baseline knows mu_0 to
+        better than this, and a start that explains everything without springs is none.
+    rungs
+        The race: each rung takes about as much work as the one before (successive halving).
+    pairs
+        Pairs of effects in the race where no single effect reaches the noise: a tenth of those
+        that the regression ranks first contain the true pair in the prototype's cases.
+    effects_max
+        Effects in one model. One recording of half a minute does not determine more.
+    odds
+        Least gain of the criterion for an effect: twice the logarithm of some forty candidates
+        (7.4), and e^2 in its favour.
+    unnamed_odds
+        Further gain for an effect without a cause, or one that may not happen again: a named cause
+        is worth e^10.
+    form_error
+        Relative RMS to which a law is true. Differences below this part of what is explained
+        decide nothing.
+    form_share
+        Part of what is explained (mean square) that the wrong form of a law may leave: no further
+        effect is sought in it once the rest is within the noise.
+    share
+        Part of what is above the noise that a further effect must explain: the wrong form of the
+        first one leaves structure that any other effect explains to some part.
+    noise_margin
+        RMS over noise up to which a residual counts as noise. A lead-in of 2 s at 200 Hz gives the
+        noise to 1/sqrt(2 * 400) = 3.5 %; this is 2.3 of these.
+    white_correlation
+        Correlation time in samples up to which a residual counts as white.
+    drift_modes
+        Cosines of the drift of one record; slower than the drive's lobes are the first half.
+    tempering
+        Divisor of the criterion in probabilities: residuals of laws that are not quite true are
+        no samples of their noise. Calibrated on made rigs (``tests/blind``).
+    """
+
+    effort: float = 2.8e8
+    branch_time_min_s: float = 0.1
+    branch_time_max: float = 3.0
+    grid_ratio: float = 1.25
+    bandwidth_hz: float = 50.0
+    smoothing_s: float = 0.010
+    shapes: int = 16
+    amplitudes: tuple[float, ...] = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+    moments: int = 60
+    starts: int = 3
+    modulus_freedom: float = 0.3
+    rungs: tuple[Rung, ...] = (Rung(28, 3), Rung(12, 6), Rung(6, 12), Rung(3, 30))
+    pairs: int = 16
+    effects_max: int = 3
+    odds: float = 12.0
+    unnamed_odds: float = 20.0
+    form_error: float = 0.01
+    form_share: float = 0.02
+    share: float = 0.5
+    noise_margin: float = 1.08
+    white_correlation: float = 1.3
+    drift_modes: int = 24
+    tempering: float = 4.0
