@@ -17,6 +17,7 @@ from dearig.model import kernel
 from dearig.model.diagnosis.evidence import Judge
 from dearig.model.diagnosis.fits import Fit, Fitter, spring_count, with_effect
 from dearig.model.diagnosis.regression import Start
+from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import amplitudes, typical_values
 from dearig.model.effects import EFFECTS
 
@@ -43,9 +44,11 @@ def race(
 ) -> list[Fit]:
     """Return the fits of the candidates that came through the race, the most probable first."""
     rungs = fitter.settings.rungs
-    entered = sorted(candidates, key=lambda c: c.misfit)[: rungs[0].effects]
+    entered = _contending(candidates, fitter.settings)
     first = fitter.map(lambda c: _entered(fitter, parent, c, rungs[0].iterations), entered)
     runners = [fit for fits in first for fit in fits]
+    if not runners:
+        return []
     for place, rung in enumerate(rungs[1:], start=1):
         judge.see(runners)
         runners = _leading(judge.ranked(runners), rung.effects, abreast=place == 1)
@@ -57,6 +60,17 @@ def race(
         runners = fitter.map(fit, runners)
     judge.see(runners)
     return _leading(judge.ranked(runners), len(runners), abreast=False)
+
+
+def _contending(candidates: Sequence[Candidate], settings: DiagnosisSettings) -> list[Candidate]:
+    """Return the candidates of which the regression leaves open whether they may lead.
+
+    As many as enter the last rung but one in any case.
+    """
+    ranked = sorted(candidates, key=lambda c: c.misfit)
+    limit = settings.contenders * max(ranked[0].misfit, 1.0) if ranked else 0.0
+    least, most = settings.rungs[-2].effects, settings.rungs[0].effects
+    return [c for i, c in enumerate(ranked[:most]) if i < least or c.misfit < limit]
 
 
 def _leading(ranked: Sequence[Fit], effects: int, abreast: bool) -> list[Fit]:

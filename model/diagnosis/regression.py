@@ -31,7 +31,7 @@ from dearig.model.diagnosis.imposed import (
 )
 from dearig.model.diagnosis.noise import Drift, DriftSpace, drift_modes
 from dearig.model.diagnosis.settings import DiagnosisSettings
-from dearig.model.diagnosis.shapes import Extent, amplitudes, shape_points
+from dearig.model.diagnosis.shapes import Extent, amplitudes, moved, shape_points
 from dearig.model.effects import EFFECTS, PLACES, Effect
 from dearig.model.film import Strip, unit_stresses
 from dearig.model.records import ActuatorRecord, FilmRecord, Record
@@ -40,7 +40,9 @@ __all__ = ["Regression", "Start", "electric"]
 
 _REST_STEP = 0.02  # of mu_0: the difference quotient of the misfit through the rest stretch
 _NEAR = 0.2  # relative: starts that differ by less are one
-_SECANT = (0.5, 2.0)  # coefficients of a secant: beyond, the next amplitude's is closer
+_SECANT = (0.3, 3.3)  # coefficients of a secant: beyond, the next amplitude's is closer
+_PATTERN = (0.1, 0.05, 0.02)  # steps of the pattern search, in parts of a parameter's range
+_SHARPENED_MIN = 8  # effects, the best ones, that are sharpened in any case
 _LINEAR = 0.02  # relative difference of two secants up to which a response is linear
 _BRANCH_POOL = 8  # nodes of the grid, the most used ones, of which sets of branches are made
 _WEAK = 1e-3  # of the largest modulus: a branch without weight still needs influence to move
@@ -86,6 +88,9 @@ class _Columns:
         return (*map(float, self.neutral + coefficients * self.unit), *self.shape)
 
 
+_Row = tuple[float, np.ndarray, _Columns]  # misfit, coefficients, columns
+
+
 def electric(name: str) -> bool:
     """Whether the effect changes the pull of the field."""
     module = PLACES[name].module
@@ -115,6 +120,8 @@ class Regression:
         self._springs = springs_of_grid(model, self.grid)
         self._displacements = _clean(records, model, settings, went)
         self._records = tuple(records)
+        self._linear: dict[str, bool] = {}
+        self._best: dict[str, list[_Row]] = {}
         self._imposed = self._impose(model)
         self._whiten = self._drift(drift) if drift else None
         self.columns = self._joined([i.columns for i in self._imposed])
@@ -220,47 +227,87 @@ class Regression:
         low, high = np.hstack([c.limits for c in columns])
         return bounded(self._triangle, self._inside, self._outside, inside, outside, low, high)
 
-    def _columns_of(self, effect: Effect, shape: tuple[float, ...]) -> list[_Columns]:
-        """Return the responses of ``effect`` in one shape: one, or a secant of each amplitude."""
-        neutral = np.array([p.neutral or 0.0 for p in effect.amplitudes])
-        found = []
-        for probes, linear in self._probes(effect, shape):
-            rows = []
-            for i, probe in enumerate(probes):
-                values = neutral.copy()
-                values[i] = probe
-                rows.append(self._response(effect, (*values, *shape)))
-            joined = np.array(rows)
-            if not (np.isfinite(joined).all() and np.any(joined, axis=1).all()):
-                continue
-            unit = np.array(probes) - neutral
-            bounds = np.array([p.fit_bounds for p in effect.amplitudes])
-            limits = np.sort((bounds - neutral[:, None]).T / unit, axis=0)
-            if not linear:
-                limits = np.clip(limits, *_SECANT)
-            inside = self._q.T @ joined.T
-            outside = joined.T - self._q @ inside
-            found.append(_Columns(effect, shape, joined, limits, neutral, unit, inside, outside))
-        return found
+    def _columns_of(
+        self, effect: Effect, shape: tuple[float, ...], probes: tuple[float, ...]
+    ) -> _Columns | None:
+        """Return the responses of ``effect`` in one shape to ``probes`` of its amplitudes.
 
-    def _probes(
-        self, effect: Effect, shape: tuple[float, ...]
-    ) -> list[tuple[tuple[float, ...], bool]]:
-        """Return amplitudes to probe together, and whether the response is linear in them."""
+        None where one of them has none.
+        """
+        neutral = np.array([p.neutral or 0.0 for p in effect.amplitudes])
+        rows = []
+        for i, probe in enumerate(probes):
+            values = neutral.copy()
+            values[i] = probe
+            rows.append(self._response(effect, (*map(float, values), *shape)))
+        joined = np.array(rows)
+        if not (np.isfinite(joined).all() and np.any(joined, axis=1).all()):
+            return None
+        unit = np.array(probes) - neutral
+        bounds = np.array([p.fit_bounds for p in effect.amplitudes])
+        limits = np.sort((bounds - neutral[:, None]).T / unit, axis=0)
+        if len(probes) == 1 and not self._linear.get(effect.name, True):
+            limits = np.clip(limits, *_SECANT)
+        inside = self._q.T @ joined.T
+        outside = joined.T - self._q @ inside
+        return _Columns(effect, shape, joined, limits, neutral, unit, inside, outside)
+
+    def _tried(
+        self, effect: Effect, shape: tuple[float, ...], probes: tuple[float, ...]
+    ) -> _Row | None:
+        """Return the misfit with ``effect`` in one shape, its coefficients and columns."""
+        columns = self._columns_of(effect, shape, probes)
+        if columns is None:
+            return None
+        a, left = self._solve([columns])
+        return self._weighed(left, a, [columns]), a, columns
+
+    def _sharpened(self, row: _Row, extent: Extent) -> _Row:
+        """Return ``row`` after a pattern search of the effect's shape parameters.
+
+        Secants are taken at the amplitude that was found last.
+        """
+        effect = row[2].effect
+        for part in _PATTERN:
+            for i, parameter in enumerate(effect.shape_parameters):
+                for sign in (1.0, -1.0):
+                    shape = list(row[2].shape)
+                    shape[i] = moved(parameter, extent, shape[i], sign * part)
+                    row = self._better(row, tuple(shape))
+            row = self._better(row, row[2].shape)
+        return row
+
+    def _better(self, row: _Row, shape: tuple[float, ...]) -> _Row:
+        """Return the better of ``row`` and its effect in another ``shape``."""
+        _, a, columns = row
+        effect, probes = columns.effect, tuple(columns.neutral + columns.unit)
+        if not self._linear.get(effect.name, True):
+            found = float(columns.neutral[0] + a[0] * columns.unit[0])
+            probes = (found,) if found != columns.neutral[0] else probes
+        other = self._tried(effect, shape, probes)
+        return other if other is not None and other[0] < row[0] else row
+
+    def _probes(self, effect: Effect, shape: tuple[float, ...]) -> list[tuple[float, ...]]:
+        """Return the amplitudes to probe together: typical ones, and several of a single one.
+
+        Of a single amplitude in which the response is linear the typical one is enough.
+        """
         typical = tuple(amplitudes(p, (1.0,))[0] for p in effect.amplitudes)
-        if len(effect.amplitudes) > 1:
-            return [(typical, True)]
-        only = effect.amplitudes[0]
-        tried = amplitudes(only, self.settings.amplitudes)
-        neutral = only.neutral or 0.0
-        ends = [a for a in tried if (a - neutral) * (typical[0] - neutral) > 0.0]
-        first = self._response(effect, (typical[0], *shape))
-        last = self._response(effect, (ends[-1], *shape))
-        scaled = last * ((typical[0] - neutral) / (ends[-1] - neutral))
-        size = float(np.linalg.norm(first))
-        if np.isfinite(last).all() and float(np.linalg.norm(scaled - first)) <= _LINEAR * size:
-            return [(typical, True)]
-        return [((a,), False) for a in tried]
+        if len(effect.amplitudes) > 1 or self._is_linear(effect, typical[0], shape):
+            return [typical]
+        return [(a,) for a in amplitudes(effect.amplitudes[0], self.settings.amplitudes)]
+
+    def _is_linear(self, effect: Effect, typical: float, shape: tuple[float, ...]) -> bool:
+        """Whether the response is linear in the amplitude: asked in the first shape only."""
+        if effect.name not in self._linear:
+            neutral = effect.amplitudes[0].neutral or 0.0
+            tried = amplitudes(effect.amplitudes[0], self.settings.amplitudes)
+            last = [a for a in tried if (a - neutral) * (typical - neutral) > 0.0][-1]
+            first = self._response(effect, (typical, *shape))
+            far = self._response(effect, (last, *shape)) * ((typical - neutral) / (last - neutral))
+            near = float(np.linalg.norm(far - first)) <= _LINEAR * float(np.linalg.norm(first))
+            self._linear[effect.name] = near
+        return self._linear[effect.name]
 
     def _response(self, effect: Effect, values: tuple[float, ...]) -> np.ndarray:
         return self._joined([i.response(effect.name, values) for i in self._imposed])
@@ -289,23 +336,28 @@ class Regression:
 
         The last of each has the parent's springs.
         """
-        self._best: dict[str, list[tuple[float, np.ndarray, _Columns]]] = {}
-        found = {}
+        rows: dict[str, list[_Row]] = {}
         for effect in effects:
-            rows = [
-                (self._weighed(left, a, [c]), a, c)
+            tried = (
+                self._tried(effect, shape, probes)
                 for shape in shape_points(effect, extent, self.settings)
-                for c in self._columns_of(effect, shape)
-                for a, left in (self._solve([c]),)
-            ]
-            if not rows:
-                continue
-            rows.sort(key=lambda row: row[0])
-            self._best[effect.name] = _distinct(rows, self.settings.starts)
-            found[effect.name] = [
-                self._start([(c, a)], left) for left, a, c in self._best[effect.name]
-            ]
-        return found
+                for probes in self._probes(effect, shape)
+            )
+            some = sorted((row for row in tried if row is not None), key=lambda row: row[0])
+            if some:
+                rows[effect.name] = _distinct(some, self.settings.starts)
+        self._best = {}
+        least = self.misfit
+        for name in sorted(rows, key=lambda n: rows[n][0][0]):
+            some = rows[name]
+            if some[0][0] < self.settings.contenders * least or len(self._best) < _SHARPENED_MIN:
+                some = sorted((self._sharpened(row, extent) for row in some), key=lambda row: row[0])
+                least = min(least, some[0][0])
+            self._best[name] = some
+        return {
+            name: [self._start([(c, a)], left) for left, a, c in some]
+            for name, some in self._best.items()
+        }
 
     def pairs(self, many: int) -> list[Start]:
         """Return the ``many`` best starts of two effects of different families, best first.
@@ -401,10 +453,10 @@ def bounded(
 
 
 def _distinct(
-    rows: Sequence[tuple[float, np.ndarray, _Columns]], many: int
-) -> list[tuple[float, np.ndarray, _Columns]]:
+    rows: Sequence[_Row], many: int
+) -> list[_Row]:
     """Return the first ``many`` of ``rows`` that differ in a parameter of the effect."""
-    kept: list[tuple[float, np.ndarray, _Columns]] = []
+    kept: list[_Row] = []
     for row in rows:
         values = row[2].values(row[1])
         if any(np.allclose(values, c.values(a), rtol=_NEAR, atol=0.0) for _, a, c in kept):

@@ -39,10 +39,11 @@ class DiagnosisSettings:
         Standard deviation of the filter for lam' and lam'': it passes what the means resolve.
     shapes
         Points of a Sobol sequence over the bounds of the shape parameters, beside an effect's own
-        starts. 16 points leave no gap above a quarter of the range of each of two parameters.
+        starts. 8 points leave no gap above a third of the range of each of two parameters; a
+        pattern search goes on from the best.
     amplitudes
         Amplitudes, in typical ones, of effects whose response is not linear. Steps by a factor of
-        3 and coefficients from 1/2 to 2 of each secant cover the range without gaps.
+        10 and coefficients from 0.3 to 3.3 of each secant cover the range without gaps.
     moments
         Instants at which an event is tried in each record; the regression's own resolution then
         refines the best.
@@ -51,6 +52,9 @@ class DiagnosisSettings:
     modulus_freedom
         Part of mu_0 that the regression may take away: the rest of the baseline knows mu_0 to
         better than this, and a start that explains everything without springs is none.
+    contenders
+        Ratio of the regression's misfits up to which an effect takes part in the race. The misfit
+        is the fit's to first order: what leaves four times as much will not lead.
     rungs
         The race: each rung takes about as much work as the one before (successive halving).
     pairs
@@ -91,11 +95,12 @@ class DiagnosisSettings:
     grid_ratio: float = 1.25
     bandwidth_hz: float = 50.0
     smoothing_s: float = 0.010
-    shapes: int = 16
-    amplitudes: tuple[float, ...] = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+    shapes: int = 8
+    amplitudes: tuple[float, ...] = (0.1, 1.0, 10.0, 100.0)
     moments: int = 60
     starts: int = 3
     modulus_freedom: float = 0.3
+    contenders: float = 4.0
     rungs: tuple[Rung, ...] = (Rung(28, 3), Rung(12, 6), Rung(6, 12), Rung(3, 30))
     pairs: int = 16
     effects_max: int = 3

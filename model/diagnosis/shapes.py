@@ -14,7 +14,7 @@ from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import Effect, Parameter
 from dearig.model.records import ActuatorRecord, Record
 
-__all__ = ["Extent", "amplitudes", "extent_of", "shape_points", "strongest_line", "typical_values"]
+__all__ = ["Extent", "amplitudes", "extent_of", "moved", "shape_points", "strongest_line", "typical_values"]
 
 _DECADES = 2.0  # about the typical value: how far a logarithmic shape parameter is spread
 _PADDING = 8  # of a spectrum: a line between two bins is met to a sixteenth of a bin
@@ -110,15 +110,33 @@ def _starts(parameter: Parameter, extent: Extent, moments: int) -> list[float]:
     return found
 
 
+def moved(parameter: Parameter, extent: Extent, value: float, part: float) -> float:
+    """Return ``value`` moved by ``part`` (-1 to 1) of the range in which ``parameter`` shows."""
+    low, high = _range(parameter, extent)
+    if parameter.logarithmic:
+        value *= math.exp(part * math.log(high / low))
+    else:
+        value += part * (high - low)
+    return float(min(max(value, parameter.fit_bounds[0]), parameter.fit_bounds[1]))
+
+
 def _between(parameter: Parameter, extent: Extent, part: float) -> float:
     """Return the value at ``part`` (0 to 1) of the range in which ``parameter`` shows."""
+    low, high = _range(parameter, extent)
+    if parameter.logarithmic:
+        return low * math.exp(part * math.log(high / low))
+    return low + part * (high - low)
+
+
+def _range(parameter: Parameter, extent: Extent) -> tuple[float, float]:
     low, high = parameter.fit_bounds
     if parameter.relative_to in ("displacement", "voltage"):
         # below a fiftieth of the largest value hardly any sample differs, above it none
         scale = extent.scale(parameter)
-        low, high = max(low, 0.02 * scale), min(high, 1.2 * scale)
-    if not parameter.logarithmic:
-        return low + part * (high - low)
-    low = max(low, parameter.typical / 10**_DECADES)
-    high = min(high, parameter.typical * 10**_DECADES)
-    return low * math.exp(part * math.log(high / low))
+        return max(low, 0.02 * scale), min(high, 1.2 * scale)
+    if parameter.relative_to == "duration":
+        return 0.0, extent.duration
+    if parameter.logarithmic:
+        reach = 10**_DECADES
+        return max(low, parameter.typical / reach), min(high, parameter.typical * reach)
+    return low, high

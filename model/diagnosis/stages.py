@@ -1,0 +1,172 @@
+"""What a fit comes to: errors, cross-validation of whole segments of time, intervals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from dearig.model.actuator import Actuator
+from dearig.model.diagnosis.evidence import Judge
+from dearig.model.diagnosis.fits import Fit
+from dearig.model.diagnosis.results import Stage
+from dearig.model.effects import EFFECTS
+from dearig.model.film import Strip
+from dearig.model.fitting import Estimate
+from dearig.model.fitting.identify import is_determined
+from dearig.model.fitting.intervals import covariance
+from dearig.model.records import ActuatorRecord, Record
+
+__all__ = ["DRIFT_LAW", "drift_values", "stage_of", "with_drift"]
+
+#: The effect by which the drift of a record is written into models: polynomials of the time.
+DRIFT_LAW = "fitful drift"
+
+_SEGMENTS = 10  # of time, each predicted by a fit to the others
+_RIDGE = 1e-3  # of a parameter's own curvature, so that no segment alone determines it
+_NORMAL_95 = 1.96
+_AT_BOUND = 1e-9  # of a coordinate
+
+
+def stage_of(
+    fit: Fit,
+    judge: Judge,
+    full: Sequence[Record],
+    *,
+    estimated: bool = False,
+    for_others: Actuator | Strip | None = None,
+) -> Stage:
+    """Return the errors of ``fit``; with ``estimated`` the intervals of its parameters too.
+
+    ``for_others`` is the model that predicts other recordings, where it is another one. Errors are
+    of readings of the ``full`` records.
+    """
+    problem = fit.problem
+    jacobian = problem.jacobian(fit.x, ~fit.fixed, None if estimated else fit.residuals)
+    good = np.isfinite(problem.sigma)
+    scale = problem.sigma[good]
+    # thinning took noise away: put back, so that errors compare with those of every sample
+    lost = _noise_lost(problem.records, full)
+    predicted = _cross_validated(fit, jacobian)[good] * scale
+    return Stage(
+        model=fit.model,
+        cost=fit.cost,
+        train_rms=math.sqrt(float(np.mean((fit.residuals[good] * scale) ** 2)) + lost),
+        selection_rms=math.sqrt(float(np.mean(predicted**2)) + lost),
+        selection_max=float(np.max(np.abs(predicted))),
+        criterion=judge.criterion(fit),
+        estimates=_estimates(fit, jacobian) if estimated else (),
+        for_others=for_others or fit.model,
+        models=with_drift(fit),
+    )
+
+
+def _noise_lost(thin: Sequence[Record], full: Sequence[Record]) -> float:
+    """Return the mean square of the noise that thinning averaged away, pooled over readings."""
+    sizes = np.array([r.measured.size for r in thin], dtype=float)
+    lost = np.array([f.noise**2 - t.noise**2 for f, t in zip(full, thin, strict=True)])
+    return max(float(np.sum(sizes * lost) / np.sum(sizes)), 0.0)
+
+
+def _cross_validated(fit: Fit, jacobian: np.ndarray) -> np.ndarray:
+    """Return residuals over noise (N,) of each segment of time, predicted by a fit to all others.
+
+    The fit without a segment is the linear one about the optimum: exact where the model is linear
+    over the change that a segment makes, and that is small where a segment is one of many.
+    """
+    edges = np.linspace(0, fit.residuals.size, _SEGMENTS + 1).astype(int)
+    out = fit.residuals.copy()
+    reach = fit.problem.layout.reach(fit.x)[~fit.fixed]
+    normal = jacobian.T @ jacobian
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    for low, high in pairwise(edges):
+        part, r = jacobian[low:high], fit.residuals[low:high]
+        rest = (normal - part.T @ part) / np.outer(scale, scale)
+        w, q = np.linalg.eigh(rest)
+        inverse = (q / (np.maximum(w, 0.0) + _RIDGE)) @ q.T
+        # at the optimum the gradient of the others is minus that of the segment
+        step = np.clip(inverse @ ((part.T @ r) / scale) / scale, -reach, reach)
+        out[low:high] = r + part @ step
+    return out
+
+
+def _estimates(fit: Fit, jacobian: np.ndarray) -> tuple[Estimate, ...]:
+    """Return all parameters with 95 % intervals from the curvature of the likelihood.
+
+    Widened by what the residual is above the noise, and by its correlation.
+    """
+    layout = fit.problem.layout
+    inflation = max(1.0, fit.cost) * max(1.0, fit.correlation)
+    spread = np.full(fit.x.size, math.inf)
+    spread[~fit.fixed] = np.sqrt(np.diag(covariance(jacobian.T @ jacobian, inflation)))
+    room = np.minimum(fit.x - layout.lower, layout.upper - fit.x)
+    values = layout.values(fit.x)
+    found = []
+    for q, x, value, sigma, free in zip(
+        layout.quantities, fit.x, values, spread, room, strict=True
+    ):
+        if not math.isfinite(sigma):
+            found.append(Estimate(q.name, q.unit, float(value), 0.0, math.inf, False, "held"))
+            continue
+        low, high = x - _NORMAL_95 * sigma, x + _NORMAL_95 * sigma
+        if q.logarithmic:
+            low, high = math.exp(max(low, -700.0)), math.exp(min(high, 700.0))
+        low, high = max(float(low), q.bounds[0]), min(float(high), q.bounds[1])
+        sure = is_determined(low, high)
+        note = "" if sure else "poorly determined by these data"
+        if free < _AT_BOUND:
+            note = "at the end of its search range"
+        found.append(Estimate(q.name, q.unit, float(value), low, high, sure, note))
+    return (*found, *_drift_estimates(fit))
+
+
+# ---------------------------------------------------------------- drift
+
+
+def drift_values(fit: Fit) -> list[np.ndarray]:
+    """Return the amplitudes (n,) in m of ``DRIFT_LAW`` nearest to each record's drift."""
+    drift = fit.problem.noise_drift
+    basis_of = EFFECTS[DRIFT_LAW].drift_basis
+    if drift is None or basis_of is None:
+        return []
+    mean = drift.mean(fit.plain_residuals())
+    found = []
+    for record, (a, b) in zip(fit.problem.records, pairwise(fit.problem.edges), strict=True):
+        if isinstance(record, ActuatorRecord):
+            basis = record.seen(basis_of(record.time).T).T
+            scale = np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
+            amplitudes, *_ = np.linalg.lstsq(basis / scale, mean[a:b] * record.noise, rcond=1e-10)
+            found.append(amplitudes / scale)
+    return found
+
+
+def with_drift(fit: Fit) -> tuple[Actuator | Strip, ...]:
+    """Return the fitted model of each record, each with its own drift; () without drift."""
+    return tuple(_drifting(fit.model, values) for values in drift_values(fit))
+
+
+def _drifting(model: Actuator | Strip, values: np.ndarray) -> Actuator | Strip:
+    parameters = EFFECTS[DRIFT_LAW].parameters
+    inside = (
+        (p.name, float(min(max(v, p.bounds[0]), p.bounds[1])))
+        for p, v in zip(parameters, values, strict=True)
+    )
+    return replace(model, effects=(*model.effects, (DRIFT_LAW, tuple(inside))))
+
+
+def _drift_estimates(fit: Fit) -> Iterator[Estimate]:
+    """Yield the RMS of each record's drift; its interval is that of the drift's variance."""
+    drift = fit.problem.noise_drift
+    if drift is None:
+        return
+    mean = drift.mean(fit.plain_residuals())
+    for record, (a, b) in zip(fit.problem.records, pairwise(fit.problem.edges), strict=True):
+        part = mean[a:b]
+        rms = float(np.sqrt(np.mean(part**2))) * record.noise
+        # of the drift's many modes, those above the noise are known to the noise over sqrt(N)
+        error = _NORMAL_95 * record.noise / math.sqrt(part.size)
+        name = f"{DRIFT_LAW}: rms in {record.name}"
+        yield Estimate(name, "m", rms, max(rms - error, 0.0), rms + error, True)
