@@ -233,7 +233,7 @@ def _them(names: list[str]) -> str:
 
 def _film_tolerance(outcome: DiagnoseOutcome) -> str:
     """Return the model error that a film model is allowed besides the noise."""
-    from dearig.model.diagnosis.bench import FILM_MODEL_ERROR
+    from dearig.model.diagnosis.preparation import FILM_MODEL_ERROR
 
     film = outcome.kind == "film"
     return f", or {100.0 * FILM_MODEL_ERROR:g} % of the largest stress," if film else ""

@@ -18,6 +18,7 @@ from scipy.stats.qmc import Sobol
 
 from dearig.model import kernel
 from dearig.model.actuator import Actuator, at_rest
+from dearig.model.diagnosis.preparation import prepared, with_model_error
 from dearig.model.diagnosis.results import NOISE_RMS, NOT_BY_CHANCE, Stage
 from dearig.model.effects import any_hysteretic
 from dearig.model.film import Strip
@@ -31,12 +32,9 @@ from dearig.model.fitting.parallel import Job, Result, parallel_map
 from dearig.model.fitting.parameters import Estimate, Layout
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import moving_starts, voltage_misfit, voltage_starts
-from dearig.model.fitting.thinning import thinned
-from dearig.model.noise import noise_at_rest
-from dearig.model.records import ActuatorRecord, FilmRecord, Record
+from dearig.model.records import ActuatorRecord, Record
 
 __all__ = [
-    "FILM_MODEL_ERROR",
     "Bench",
     "Trial",
     "akaike",
@@ -45,11 +43,6 @@ __all__ = [
     "relieved",
 ]
 
-_RATE = 200.0  # Hz, to which records may be thinned: mains and a load's ringing still show
-_QUIET_MIN = 100  # samples of a lead-in from which a thinned record's noise is read again
-_FILM_SAMPLES = 1500
-#: of the largest stress: no model of a rubber is better than that, and none is asked to be
-FILM_MODEL_ERROR = 5e-3
 #: s; a branch that relaxes faster than the excitation shows is a drag, and is sought as one
 FASTEST_BRANCH = 0.1
 _LONGER_THAN_RECORD = 3.0  # a branch slower than so many records is another equilibrium spring
@@ -252,9 +245,9 @@ class Bench:
     ) -> None:
         self.watched = watched
         self.work = work or Work()
-        self.full = tuple(_with_model_error(r) for r in records)
+        self.full = tuple(with_model_error(r) for r in records)
         # what a model of a rubber gets wrong no averaging takes away
-        self.records = tuple(_with_model_error(_thinned(r, model)) for r in records)
+        self.records = tuple(with_model_error(prepared(r, model)) for r in records)
         self.workers = workers
         self._coarse_columns: dict[tuple[str, ...], np.ndarray] = {}
         longest = max(float(r.time[-1] - r.time[0]) for r in records)
@@ -335,7 +328,7 @@ class Bench:
         """The ``fit`` to records thinned as its own model asks, where it asks for other rates."""
         layout = problem.layout
         model = layout.model(layout.values(fit.x))
-        records = tuple(_thinned(r, model) for r in self.full)
+        records = tuple(prepared(r, model) for r in self.full)
         if [r.measured.size for r in records] == [r.measured.size for r in self.records]:
             return problem, fit
         self.records = records
@@ -987,35 +980,6 @@ def _correlation(problem: Problem, fit: LocalFit) -> float:
 def _by_record(problem: Problem, residuals: np.ndarray) -> list[np.ndarray]:
     edges = np.cumsum([r.measured.size for r in problem.records])
     return np.split(residuals, edges[:-1])
-
-
-def _thinned(record: Record, model: Actuator | Strip) -> Record:
-    """The record at a rate that is enough, with its noise read again from its quiet lead-in."""
-    if isinstance(record, FilmRecord) or isinstance(model, Strip):
-        return record.coarse(_FILM_SAMPLES)
-    thin = thinned(record, _RATE, model)
-    if thin is record:
-        return record
-    moving = np.flatnonzero(thin.drive.voltage)
-    if not (moving.size and moving[0] > _QUIET_MIN):
-        return thin
-    quiet = np.zeros(thin.displacement.size, dtype=bool)
-    quiet[: moving[0] - 1] = True
-    if thin.valid is not None:
-        quiet &= thin.valid
-    if np.count_nonzero(quiet) < _QUIET_MIN:
-        return thin
-    # a sensor that averages makes noise that thinning does not average away
-    noise = noise_at_rest(thin.time[quiet], thin.displacement[quiet])
-    return replace(thin, noise=max(thin.noise, noise))
-
-
-def _with_model_error(record: Record) -> Record:
-    if isinstance(record, ActuatorRecord):
-        return record
-    stress = record.stress if record.valid is None else record.stress[record.valid]
-    error = FILM_MODEL_ERROR * float(np.max(np.abs(stress)))
-    return replace(record, noise=math.hypot(record.noise, error))
 
 
 def _left_out(trial: Trial, jac: np.ndarray) -> np.ndarray:

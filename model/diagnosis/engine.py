@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from dearig.model.diagnosis.evidence import Judge
 from dearig.model.diagnosis.fits import Fit, Fitter
 from dearig.model.diagnosis.race import Candidate, race
 from dearig.model.diagnosis.regression import Regression
-from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import Extent, extent_of, strongest_line
 from dearig.model.effects import EFFECTS
 from dearig.model.records import ActuatorRecord, Record
@@ -34,11 +33,15 @@ class Spent(Exception):  # noqa: N818
 
 @dataclass(frozen=True)
 class Race:
-    """One race: its ``parent``, the fits that came through, and the one that was taken, if any."""
+    """One race: its ``parent``, the fits that came through, and the one that was taken, if any.
+
+    ``misfit`` is what the regression leaves without an effect, ``starts`` with each of them.
+    """
 
     parent: Fit
     fits: tuple[Fit, ...]
-    starts: dict[str, float] = field(default_factory=dict)
+    misfit: float
+    starts: dict[str, float]
     taken: Fit | None = None
 
 
@@ -58,12 +61,17 @@ class Found:
 
 
 class Search:
-    """A search with a ``fitter``, whose ``watched`` must be ``self.watch``."""
+    """A search by a ``fitter``. ``log`` receives a line on each choice."""
 
     def __init__(
-        self, fitter: Fitter, progress: Progress, stop: Callable[[], bool], log: Callable[[str], None] = lambda _: None
+        self,
+        fitter: Fitter,
+        progress: Progress,
+        stop: Callable[[], bool],
+        log: Callable[[str], None] = lambda _: None,
     ) -> None:
         self.fitter, self.settings = fitter, fitter.settings
+        fitter.watched = self.watch
         self.progress, self.stop, self.log = progress, stop, log
         self.fits: dict[frozenset[str], Fit] = {}
         self.races: list[Race] = []
@@ -168,10 +176,7 @@ class Search:
             self.judge.see([best, *fits])
             top = fits[0]
             worth = self.judge.is_worth(best, top)
-            self.log(
-                f"{sorted(best.members)} {best.cost:.4g} -> {sorted(top.members)} {top.cost:.4g} gain "
-                f"{self.judge.gain(best, top):.1f} {'taken' if worth else 'left'} {self.fitter.work.effort:.2e}"
-            )
+            self._say("grown" if worth else "not grown", best, top)
             if not worth:
                 break
             self.races[-1] = replace(self.races[-1], taken=top)
@@ -180,23 +185,23 @@ class Search:
         return self._pruned(best) if len(best.members) > 1 else best
 
     def _exchanged(self, best: Fit) -> Fit:
-        """Return ``best`` with effects replaced, each by a race without it, where that is better."""
+        """Return ``best`` with each effect replaced, by a race without it, where that is better."""
         if len(best.members) < 2:
             return best
         for name in best.effects:
             if self.judge.is_settled(best) or name not in best.effects:
                 break
-            fits = self._raced(self._without(best, name))
+            fits = self._raced(self.without(best, name))
             self.judge.see([best, *fits])
             if fits and fits[0].members != best.members and self.judge.gain(best, fits[0]) > 1.0:
-                self.log(f"exchanged {sorted(best.members)} for {sorted(fits[0].members)} {fits[0].cost:.4g}")
+                self._say("exchanged", best, fits[0])
                 best = fits[0]
         return best
 
     def _pruned(self, best: Fit) -> Fit:
         """Return ``best`` without what the evidence, or the form of a law, does not ask for."""
         while best.effects:
-            smaller = [self._without(best, name) for name in best.effects]
+            smaller = [self.without(best, name) for name in best.effects]
             self.judge.see([best, *smaller])
             least = self.judge.ranked(smaller)[0]
             explained = self.judge.base_cost - least.cost
@@ -205,17 +210,25 @@ class Search:
                 self.judge.gain(least, best) > self.settings.odds
             ):
                 break
-            self.log(f"pruned to {sorted(least.members)} {best.cost:.4g} -> {least.cost:.4g}")
+            self._say("pruned", best, least)
             best = least
         return best
 
-    def _without(self, fit: Fit, name: str) -> Fit:
+    def without(self, fit: Fit, name: str) -> Fit:
         """Return ``fit`` refitted without one of its effects."""
         known = dict(zip(fit.problem.layout.names, fit.x, strict=True))
         effects = tuple(e for e in fit.model.effects if e[0] != name)
         problem = self.fitter.problem(replace(fit.model, effects=effects), fit.drift)
         x = np.array([known[n] for n in problem.layout.names])
         return self.keep(self.fitter.refined(self.fitter.descend(problem, x, 20)))
+
+    def _say(self, what: str, before: Fit, after: Fit) -> None:
+        """Log a choice: members and costs before and after, the gain, and the work until now."""
+        names = [" + ".join(sorted(f.members)) or "nothing" for f in (before, after)]
+        self.log(
+            f"{what}: {names[0]} {before.cost:.4g} -> {names[1]} {after.cost:.4g}, "
+            f"gain {self.judge.gain(before, after):.1f}, effort {self.fitter.work.effort:.2e}"
+        )
 
     # -- one race
 
@@ -225,18 +238,27 @@ class Search:
         effects = [e for e in self.effects if e.name not in parent.effects]
         starts = regression.starts(effects, extent)
         fits = race(
-            self.fitter, self.judge, parent,
+            self.fitter,
+            self.judge,
+            parent,
             [Candidate((name,), tuple(some)) for name, some in starts.items()],
-        )  # fmt: skip
+        )
         if pairs and fits and not self.judge.is_noise(fits[0]):
             both = race(
-                self.fitter, self.judge, parent,
+                self.fitter,
+                self.judge,
+                parent,
                 [Candidate(s.names, (s,)) for s in regression.pairs(self.settings.pairs)],
-            )  # fmt: skip
+            )
             fits = self.judge.ranked([*fits, *both])
         fits = [self.keep(fit) for fit in fits]
         self.races.append(
-            Race(parent, tuple(fits), {name: some[0].misfit for name, some in starts.items()})
+            Race(
+                parent,
+                tuple(fits),
+                regression.misfit,
+                {name: some[0].misfit for name, some in starts.items()},
+            )
         )
         return fits
 
@@ -249,9 +271,13 @@ class Search:
             went = drift.mean(parent.plain_residuals()) * noise
         times = fitter.times if fitter.of_actuator else _film_times(records)
         regression = Regression(
-            records, parent.model, times, self.settings,
-            drift.amplitude if drift else 0.0, went,
-        )  # fmt: skip
+            records,
+            parent.model,
+            times,
+            self.settings,
+            drift.amplitude if drift else 0.0,
+            went,
+        )
         longest = int(np.argmax([r.measured.size for r in records]))
         residual = parent.by_record()[longest]
         step = float(np.median(np.diff(records[longest].time)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,6 +13,7 @@ import numpy as np
 from dearig.model import kernel
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.noise import Drift, DriftSpace, WhitenedProblem, drift_modes
+from dearig.model.diagnosis.preparation import prepared, with_model_error
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
 from dearig.model.film import Strip
@@ -124,9 +124,7 @@ class Work:
             self.effort += effort
 
 
-def with_effect(
-    model: Actuator | Strip, name: str, values: Sequence[float]
-) -> Actuator | Strip:
+def with_effect(model: Actuator | Strip, name: str, values: Sequence[float]) -> Actuator | Strip:
     """Return ``model`` with effect ``name`` at ``values`` in the order of its parameters."""
     names = (p.name for p in EFFECTS[name].parameters)
     pairs = tuple(zip(names, map(float, values), strict=True))
@@ -137,7 +135,7 @@ class Fitter:
     """Training ``records``, ``full`` and as the search uses them, and the fits made to them.
 
     ``watched`` is called after each population of simulations, from any thread, and may raise to
-    end the search. ``thin(record, model)`` returns a record as the search uses it.
+    end the search.
     """
 
     def __init__(
@@ -145,13 +143,13 @@ class Fitter:
         records: Sequence[Record],
         base: Actuator | Strip,
         settings: DiagnosisSettings,
-        thin: Callable[[Record, Actuator | Strip], Record],
         workers: int = 2,
         watched: Callable[[], None] = lambda: None,
     ) -> None:
         self.base, self.settings, self.workers = base, settings, workers
-        self.full, self._thin = tuple(records), thin
-        self.records = tuple(thin(r, base) for r in records)
+        self._measured = tuple(records)
+        self.full = tuple(with_model_error(r) for r in records)
+        self.records = self._prepared(base)
         self.work, self.watched = Work(), watched
         longest = max(float(r.time[-1] - r.time[0]) for r in records)
         self.times = (settings.branch_time_min_s, settings.branch_time_max * longest)
@@ -160,6 +158,10 @@ class Fitter:
         self._limits = np.zeros(0, dtype=bool)
 
     # -- problems
+
+    def _prepared(self, model: Actuator | Strip) -> tuple[Record, ...]:
+        # what a model of a rubber gets wrong no averaging takes away
+        return tuple(with_model_error(prepared(r, model)) for r in self._measured)
 
     @property
     def of_actuator(self) -> bool:
@@ -268,14 +270,20 @@ class Fitter:
 
     def careful(self, fit: Fit, iterations: int) -> Fit:
         """Return ``fit`` on every sample, with careful steps and two-sided differences."""
-        # the drift's variance is in units of one reading's noise
-        problem = self.problem(fit.model, fit.drift, kernel.CAREFUL, full=True)
+        # the drift's variance is in units of one reading's noise, which thinning has lowered
+        ratios = [(t.noise / f.noise) ** 2 for t, f in zip(self.records, self.full, strict=True)]
+        drift = fit.drift * sum(ratios) / len(ratios)
+        problem = self.problem(fit.model, drift, kernel.CAREFUL, full=True)
         gain = max(_GAIN, _GAIN_PART * fit.cost * problem.samples)
         found = descend(problem, fit.x, fit.fixed, iterations, gain, damping=1e-4)
         return replace(_fit(problem, fit.fixed, found), converged=True)
 
     def start_of(
-        self, problem: WhitenedProblem, fit: Fit, values: Sequence[float], springs: np.ndarray | None
+        self,
+        problem: WhitenedProblem,
+        fit: Fit,
+        values: Sequence[float],
+        springs: np.ndarray | None,
     ) -> np.ndarray:
         """Return coordinates (d,): those of ``fit``, then effects at ``values``.
 
@@ -308,19 +316,20 @@ class Fitter:
         starts = voltage_starts(problem, progress, _BASELINE_STARTS)
         fits = self.map(lambda x: self.descend(problem, x, 8), list(starts))
         leaders = sorted(fits, key=lambda f: f.cost)[:2]
-        fits = self.map(lambda f: self.descend(problem, f.x, _BASELINE_ITERATIONS, sure=True), leaders)
+        fits = self.map(
+            lambda f: self.descend(problem, f.x, _BASELINE_ITERATIONS, sure=True), leaders
+        )
         best = self.refined(min(fits, key=lambda f: f.cost))
         self._prepare(best.model)
         return self.refined(replace(best, problem=self.problem(best.model)))
 
     def _prepare(self, model: Actuator | Strip) -> None:
         """Thin the records as the fitted ``model`` allows, and find their coarse drives."""
-        thin = [self._thin(r, model) for r in self.full]
         self.records = tuple(
             replace(r, coarse_drive=coarse_drive_of(r, model))
             if isinstance(r, ActuatorRecord) and isinstance(model, Actuator)
             else r
-            for r in thin
+            for r in self._prepared(model)
         )
         self._space.clear()
         self._coarse.clear()
@@ -328,7 +337,7 @@ class Fitter:
     def _strip_baseline(
         self, problem: WhitenedProblem, progress: Callable[[str, float], None]
     ) -> Fit:
-        """The same of strips: the locking limits are free where that explains significantly more."""
+        """The same of strips; the limits are free where that explains significantly more."""
         found, fixed = fit_globally(problem, None, progress, stiffening=False)
         if fixed.any():
             freed, free = fit_globally(problem, None, progress)
@@ -347,8 +356,3 @@ def _fit(problem: WhitenedProblem, fixed: np.ndarray, found: LocalFit) -> Fit:
     return Fit(
         problem, found.x, fixed, found.cost, found.residuals, found.jacobian, found.converged
     )
-
-
-def information(samples: float, loss: float, free: int) -> float:
-    """Return n ln(loss) + k ln(n): minus twice the logarithm of the evidence, but for a constant."""
-    return samples * math.log(max(loss, 1e-12)) + free * math.log(max(samples, 2.0))

@@ -2,10 +2,13 @@
 
 A record becomes stresses per unit modulus of many springs, and a function that returns the stress
 which they must carry together under given effects. Both pass through the linearised compliance
-G(s) = L1/(m s^2 + K(s)) of the film, K = mu_0 (1 + 3/lam0^4) + sum (4 mu_i/lam0^2) s t_i/(1 + s t_i)
-with t_i = lam0 T_i/4, so that an error of the stress becomes, to first order, the error of the
-reading: white and of the noise's size. The ratio of the instantaneous stiffness at rest to that at
-the sample comes before it. Films driven by stretch measure the stress itself: G is 1.
+G(s) = L1/(m s^2 + K(s)) of the film,
+
+    K = mu_0 (1 + 3/lam0^4) + sum (4 mu_i/lam0^2) s t_i/(1 + s t_i),  t_i = lam0 T_i/4,
+
+so that an error of the stress becomes, to first order, the error of the reading: white and of the
+noise's size. The ratio of the instantaneous stiffness at rest to that at the sample comes before
+it. Films driven by stretch measure the stress itself: G is 1.
 """
 
 from __future__ import annotations
@@ -54,7 +57,7 @@ def is_sensor(name: str) -> bool:
 def springs_of_grid(model: Actuator | Strip, grid: np.ndarray) -> Network:
     """Return springs of unit modulus: the equilibrium spring and branches at times ``grid`` (G,).
 
-    Their limits are those of ``model`` for a strip, whose springs stiffen, and wide for an actuator.
+    Their limits are those of ``model`` for a strip, whose springs stiffen; wide for an actuator.
     """
     springs = model.network.springs
     wide = isinstance(model, Actuator)
@@ -159,7 +162,7 @@ class ImposedActuator:
         return self._counted(moved)
 
     def _counted(self, moved: np.ndarray) -> np.ndarray:
-        """Return means ``moved`` (..., M) in m in noises, from the lead-in's mean, 0 where masked."""
+        """Return ``moved`` (..., M) m in noises, from the lead-in's mean, 0 where masked."""
         moved = moved - moved[..., : self._edges].mean(axis=-1, keepdims=True)
         valid = self.record.valid
         if valid is not None:
@@ -186,7 +189,9 @@ class ImposedActuator:
         if not is_sensor(name):
             return self.through(self._stress(c) - self._carried)
         moved = (self.motion[0] - self.rest) * self.length
-        return self._counted(self._means(_sensed(_only(c, name), self.record.time, moved, self.step) - moved))
+        return self._counted(
+            self._means(_sensed(_only(c, name), self.record.time, moved, self.step) - moved)
+        )
 
 
 class ImposedStrip:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -39,9 +40,7 @@ class Candidate:
         return self.starts[0].misfit
 
 
-def race(
-    fitter: Fitter, judge: Judge, parent: Fit, candidates: Sequence[Candidate]
-) -> list[Fit]:
+def race(fitter: Fitter, judge: Judge, parent: Fit, candidates: Sequence[Candidate]) -> list[Fit]:
     """Return the fits of the candidates that came through the race, the most probable first."""
     rungs = fitter.settings.rungs
     entered = _contending(candidates, fitter.settings)
@@ -52,12 +51,10 @@ def race(
     for place, rung in enumerate(rungs[1:], start=1):
         judge.see(runners)
         runners = _leading(judge.ranked(runners), rung.effects, abreast=place == 1)
-        leader, late, last = runners[0], place > 1, rung is rungs[-1]
-
-        def fit(runner: Fit, n: int = rung.iterations, late: bool = late, last: bool = last, leader: Fit = leader, among: list[Fit] = runners) -> Fit:
-            return _run(fitter, judge, runner, leader, among, n, late, last)
-
-        runners = fitter.map(fit, runners)
+        run = partial(
+            _run, fitter, runners, rung.iterations, late=place > 1, last=rung is rungs[-1]
+        )
+        runners = fitter.map(run, runners)
     judge.see(runners)
     return _leading(judge.ranked(runners), len(runners), abreast=False)
 
@@ -112,31 +109,33 @@ def _hardly(name: str, values: Sequence[float]) -> list[float]:
 
 def _run(
     fitter: Fitter,
-    judge: Judge,
-    runner: Fit,
-    leader: Fit,
     among: Sequence[Fit],
     iterations: int,
+    runner: Fit,
     late: bool,
     last: bool,
 ) -> Fit:
-    """Return a runner after one rung: the best of its own path and, ``late``, of the others'."""
+    """Return a runner after one rung: the best of its own path and, if ``late``, of the others'.
+
+    ``among`` are all runners of the rung, the leader first.
+    """
+    leader = among[0]
     fits = [fitter.further(runner, iterations)]
     limit = fitter.settings.noise_margin**2 * min(1.0, leader.cost)
     if late and runner is not leader and fits[0].cost > limit:
-        x = _transplanted(fitter, runner, leader, among)
+        x = _transplanted(fitter, runner, among)
         fits.append(fitter.descend(fits[0].problem, x, iterations))
     best = min(fits, key=lambda f: f.cost)
     return fitter.refined(best) if last else best
 
 
-def _transplanted(fitter: Fitter, runner: Fit, leader: Fit, among: Sequence[Fit]) -> np.ndarray:
+def _transplanted(fitter: Fitter, runner: Fit, among: Sequence[Fit]) -> np.ndarray:
     """Return coordinates (d,) of ``runner`` beside the springs of another, those of least cost.
 
-    The springs of ``leader``, at several amplitudes of the last effect; and the springs of better
+    The springs of the leader, at several amplitudes of the last effect; and the springs of better
     fits whose last effect is of the same family, with the parameters that both have.
     """
-    layout = runner.problem.layout
+    layout, leader = runner.problem.layout, among[0]
     count = spring_count(layout)
     effect = EFFECTS[runner.effects[-1]]
     begin = layout.size - len(effect.parameters)

@@ -25,7 +25,6 @@ from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.imposed import (
     ImposedActuator,
     ImposedStrip,
-    is_sensor,
     springs_of_grid,
     without_sensor,
 )
@@ -95,14 +94,16 @@ def electric(name: str) -> bool:
     """Whether the effect changes the pull of the field."""
     module = PLACES[name].module
     hooks = ("supply", "polarise", "permittivity")
-    return any(getattr(module, h, None) is not None for h in hooks) and not hasattr(module, "soften")
+    return any(getattr(module, h, None) is not None for h in hooks) and not hasattr(
+        module, "soften"
+    )
 
 
 class Regression:
     """The regression of ``records`` about a fitted ``model``, whose effects stay as they are.
 
     ``times`` is the range of relaxation times in s, ``drift`` the variance of the records' drift in
-    units of a reading's noise; the most probable drift ``went`` (N,) in m is taken off the readings.
+    units of a reading's noise; the most probable drift ``went`` (N,) in m is subtracted.
     """
 
     def __init__(
@@ -329,9 +330,7 @@ class Regression:
 
     # -- starts
 
-    def starts(
-        self, effects: Sequence[Effect], extent: Extent
-    ) -> dict[str, list[Start]]:
+    def starts(self, effects: Sequence[Effect], extent: Extent) -> dict[str, list[Start]]:
         """Return the best starts of each of ``effects``, best first; none of one without response.
 
         The last of each has the parent's springs.
@@ -351,7 +350,9 @@ class Regression:
         for name in sorted(rows, key=lambda n: rows[n][0][0]):
             some = rows[name]
             if some[0][0] < self.settings.contenders * least or len(self._best) < _SHARPENED_MIN:
-                some = sorted((self._sharpened(row, extent) for row in some), key=lambda row: row[0])
+                some = sorted(
+                    (self._sharpened(row, extent) for row in some), key=lambda row: row[0]
+                )
                 least = min(least, some[0][0])
             self._best[name] = some
         return {
@@ -372,7 +373,7 @@ class Regression:
                 ranked.append((self._weighed(left, a, [c, d]), m, n))
         ranked.sort()
         taken: dict[frozenset[str], int] = {}
-        found = []
+        found: list[Start] = []
         for _, m, n in ranked:
             families = frozenset((EFFECTS[m].family, EFFECTS[n].family))
             if taken.get(families, 0) == 3 or len(found) == many:
@@ -430,7 +431,7 @@ def bounded(
     """
     springs, k = triangle.shape[1], low.size
     both = np.column_stack([d_outside, outside])
-    corner = np.linalg.qr(both, mode="r")
+    corner = np.asarray(np.linalg.qr(both, mode="r"))
     two_sided = low < 0.0
     d_in = np.hstack([-d_inside, d_inside[:, two_sided]])
     d_out = np.hstack([-corner[:, :k], corner[:, :k][:, two_sided]])
@@ -452,9 +453,7 @@ def bounded(
     return held, math.hypot(in_springs, float(np.linalg.norm(corner[:, k] + corner[:, :k] @ held)))
 
 
-def _distinct(
-    rows: Sequence[_Row], many: int
-) -> list[_Row]:
+def _distinct(rows: Sequence[_Row], many: int) -> list[_Row]:
     """Return the first ``many`` of ``rows`` that differ in a parameter of the effect."""
     kept: list[_Row] = []
     for row in rows:

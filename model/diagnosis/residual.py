@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from scipy.signal import welch
 from scipy.stats import chi2, norm
 
-from dearig.model.diagnosis.bench import Trial
 from dearig.model.diagnosis.results import NOISE_RMS, NOT_BY_CHANCE, Dependence, Signature
 from dearig.model.fitting.intervals import correlation_time, unevenness
 from dearig.model.records import ActuatorRecord, Record
@@ -22,7 +22,21 @@ _SHARE = 0.03  # of the residual's variance beyond chance: below, there is no de
 _REPORTED_SHARE = 0.1  # the same, for a sentence
 
 
-def signatures(records: Sequence[Record], trial: Trial) -> tuple[Signature, ...]:
+class _Scaled(Protocol):
+    sigma: np.ndarray
+
+
+class _Fitted(Protocol):
+    """A fit: ``residuals`` (N,) are model less measured over the noise ``problem.sigma``."""
+
+    @property
+    def problem(self) -> _Scaled: ...
+
+    @property
+    def residuals(self) -> np.ndarray: ...
+
+
+def signatures(records: Sequence[Record], trial: _Fitted) -> tuple[Signature, ...]:
     """Return the signature of the residual of each of ``records`` under the model of ``trial``."""
     found, start = [], 0
     for record in records:

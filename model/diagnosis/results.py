@@ -215,7 +215,10 @@ class Diagnosis:
     for the choice of an experiment. ``interrupted`` is True where the operator stopped the search;
     everything found until then is kept. ``held`` is True where the records declare the voltage
     linear between samples, but the data show that it is held until the next. ``notes`` are
-    sentences for the operator.
+    sentences for the operator. ``status`` is ``complete``, ``stopped`` (by the operator) or
+    ``budget`` (the search took the work that it may). ``families`` are the probabilities of the
+    families, of ``none`` and of ``unknown``, largest first, which add up to 1; () where the search
+    computes none.
     """
 
     verdict: str
@@ -233,3 +236,5 @@ class Diagnosis:
     interrupted: bool = False
     held: bool = False
     notes: tuple[str, ...] = field(default=())
+    status: str = "complete"
+    families: tuple[tuple[str, float], ...] = ()

@@ -1582,6 +1582,7 @@ class _Search:
             interrupted=self.interrupted,
             held=self.held,
             notes=tuple(notes),
+            status="stopped" if self.interrupted else "budget" if self.ran_out else "complete",
         )
 
     def _polished(self, trial: Trial) -> Trial:

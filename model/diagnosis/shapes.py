@@ -14,7 +14,15 @@ from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import Effect, Parameter
 from dearig.model.records import ActuatorRecord, Record
 
-__all__ = ["Extent", "amplitudes", "extent_of", "moved", "shape_points", "strongest_line", "typical_values"]
+__all__ = [
+    "Extent",
+    "amplitudes",
+    "extent_of",
+    "moved",
+    "shape_points",
+    "strongest_line",
+    "typical_values",
+]
 
 _DECADES = 2.0  # about the typical value: how far a logarithmic shape parameter is spread
 _PADDING = 8  # of a spectrum: a line between two bins is met to a sixteenth of a bin
@@ -64,7 +72,7 @@ def strongest_line(residual: np.ndarray, step: float, low: float, high: float) -
 
 def typical_values(effect: Effect) -> tuple[float, ...]:
     """Return the typical value of each parameter, inside the bounds of a fit."""
-    return tuple(min(max(p.typical, p.fit_bounds[0]), p.fit_bounds[1]) for p in effect.parameters)
+    return tuple(_inside(p, p.typical) for p in effect.parameters)
 
 
 def amplitudes(parameter: Parameter, factors: Sequence[float]) -> list[float]:
@@ -76,7 +84,9 @@ def amplitudes(parameter: Parameter, factors: Sequence[float]) -> list[float]:
     neutral = parameter.neutral or 0.0
     signs = (1.0, -1.0) if low < neutral else (1.0,)
     steps = [neutral + sign * f * parameter.typical for sign in signs for f in factors]
-    return [s for s in steps if low <= s <= high] or [min(max(neutral + parameter.typical, low), high)]
+    return [s for s in steps if low <= s <= high] or [
+        min(max(neutral + parameter.typical, low), high)
+    ]
 
 
 def shape_points(
@@ -92,9 +102,15 @@ def shape_points(
     points = list(product(*(_starts(p, extent, settings.moments) for p in shapes)))
     if not any(p.relative_to == "duration" for p in shapes):
         spread = Sobol(len(shapes), scramble=False).random(settings.shapes)[1:]
-        points += [tuple(_between(p, extent, u) for p, u in zip(shapes, row, strict=True)) for row in spread]
+        points += [
+            tuple(_between(p, extent, u) for p, u in zip(shapes, row, strict=True))
+            for row in spread
+        ]
     inside = (
-        tuple(float(min(max(v, p.fit_bounds[0]), p.fit_bounds[1])) for p, v in zip(shapes, point, strict=True))
+        tuple(
+            float(min(max(v, p.fit_bounds[0]), p.fit_bounds[1]))
+            for p, v in zip(shapes, point, strict=True)
+        )
         for point in points
     )
     return list(dict.fromkeys(inside))
@@ -117,7 +133,12 @@ def moved(parameter: Parameter, extent: Extent, value: float, part: float) -> fl
         value *= math.exp(part * math.log(high / low))
     else:
         value += part * (high - low)
-    return float(min(max(value, parameter.fit_bounds[0]), parameter.fit_bounds[1]))
+    return _inside(parameter, value)
+
+
+def _inside(parameter: Parameter, value: float) -> float:
+    low, high = parameter.fit_bounds
+    return float(min(max(value, low), high))
 
 
 def _between(parameter: Parameter, extent: Extent, part: float) -> float:

@@ -13,7 +13,8 @@ import pytest
 from dearig.model import kernel
 from dearig.model.actuator import Drive
 from dearig.model.diagnosis import bench as diagnosis_bench
-from dearig.model.diagnosis.bench import FILM_MODEL_ERROR, Bench, information, merged, relieved
+from dearig.model.diagnosis.bench import Bench, information, merged, relieved
+from dearig.model.diagnosis.preparation import FILM_MODEL_ERROR
 from dearig.model.diagnosis.screening import Screen
 from dearig.model.effects import EFFECTS
 from dearig.model.excitation import Chirp, Ramp, Sequence

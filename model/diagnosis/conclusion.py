@@ -1,0 +1,285 @@
+"""From the end of a search to a diagnosis: careful fits, steps with their evidence, the verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from dearig.model.actuator import Actuator
+from dearig.model.diagnosis.engine import Found, Race
+from dearig.model.diagnosis.evidence import Judge, family_of
+from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter
+from dearig.model.diagnosis.residual import signatures
+from dearig.model.diagnosis.results import (
+    EXPLAINED,
+    NOTHING_MISSING,
+    PARTLY_EXPLAINED,
+    UNEXPLAINED,
+    Candidate,
+    Diagnosis,
+    Round,
+    Stage,
+    Step,
+)
+from dearig.model.diagnosis.stages import DRIFT_LAW, stage_of
+from dearig.model.diagnosis.stress import missing_stress
+from dearig.model.diagnosis.symbolic_regression import describe_unnamed
+from dearig.model.effects import EFFECTS
+from dearig.model.film import Strip
+
+__all__ = ["conclude"]
+
+_ITERATIONS = 8  # of the last fits, on every sample
+_EXPLAINED_RMS = 1.15  # residual over noise up to which a record is explained (contracts of --json)
+_NAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
+_TRUSTED_SHARE = 0.8  # of the same: what explains less may be a disguise, and predicts nothing else
+_ALIKE = 10.0  # of the criterion: odds of e^5, below which two explanations are not told apart
+
+
+class _Conclusion:
+    """One search's end, with the fits that the conclusion adds."""
+
+    def __init__(self, found: Found, fitter: Fitter, without: Callable[[Fit, str], Fit]) -> None:
+        self.found, self.fitter, self.judge = found, fitter, found.judge
+        self._without = without
+        self.first = fitter.careful(found.baseline, _ITERATIONS)
+        self.last = fitter.careful(found.best, _ITERATIONS) if found.best.members else self.first
+
+    @property
+    def explained(self) -> float:
+        """Part of what the baseline leaves above the noise that the best fit explains."""
+        missing = self.first.cost - 1.0
+        return 1.0 - max(self.last.cost - 1.0, 0.0) / missing if missing > 0.0 else 1.0
+
+    @property
+    def is_small(self) -> bool:
+        """Whether the residual is within 15 % of the noise."""
+        return self.last.cost < _EXPLAINED_RMS**2
+
+    def verdict(self) -> str:
+        """Return the verdict on the training records."""
+        if not self.found.best.members:
+            nothing = self.is_small and self.found.status == "complete"
+            return NOTHING_MISSING if nothing else UNEXPLAINED
+        if self.is_small:
+            return EXPLAINED
+        return PARTLY_EXPLAINED if self.explained > _NAMED_SHARE else UNEXPLAINED
+
+    def with_only(self, members: frozenset[str]) -> Fit:
+        """Return the best fit with these members, refitted from one with more where unknown."""
+        fits = self.found.fits
+        fit = self.found.best
+        for member in sorted(fit.members - members):
+            if fit.members - {member} in fits:
+                fit = fits[fit.members - {member}]
+            elif member != DRIFT:
+                fit = self._without(fit, member)
+        return fit
+
+    def order(self) -> list[str]:
+        """Return the members of the best fit: what explains most alone, then with the next, ..."""
+        members = sorted(self.found.best.members)
+        chosen: list[str] = []
+        while len(chosen) < len(members):
+            rest = [m for m in members if m not in chosen]
+            chosen.append(min(rest, key=lambda m: self.with_only(frozenset([*chosen, m])).cost))
+        return chosen
+
+    def alike(self, member: str) -> list[tuple[str, Fit]]:
+        """Return members of other families that explain as much in place of ``member``."""
+        best = self.found.best
+        others = best.members - {member}
+        taken: dict[str, tuple[float, str, Fit]] = {}
+        for members, fit in self.found.fits.items():
+            fresh = members - others
+            if len(fresh) != 1 or not others <= members:
+                continue
+            (other,) = fresh
+            family = family_of(other)
+            behind = self.judge.gain(fit, best)
+            near = behind < _ALIKE or fit.cost - best.cost < self._form()
+            if family != family_of(member) and near and behind < taken.get(family, (math.inf,))[0]:
+                taken[family] = (behind, other, fit)
+        return [(other, fit) for _, other, fit in sorted(taken.values(), key=lambda t: t[0])]
+
+    def _form(self) -> float:
+        """Return the difference of costs by which no two laws are told apart."""
+        s = self.judge.settings
+        explained = self.judge.base_cost - self.found.best.cost
+        return min(s.form_error**2 * explained, s.form_error)
+
+    def predicting(self, fit: Fit, careful: Fit) -> Actuator | Strip:
+        """Return the model that predicts other recordings: without what may not happen again."""
+        once = [n for n in fit.effects if not EFFECTS[n].is_reproducible]
+        kept = tuple(e for e in careful.model.effects if e[0] not in once)
+        return replace(careful.model, effects=kept)
+
+    def steps(self, final: Stage) -> tuple[list[Step], list[tuple[str, Actuator | Strip]]]:
+        """Return the steps with their evidence, and the rivals by family."""
+        best, steps, rivals = self.found.best, [], []
+        order = self.order()
+        for i, member in enumerate(order):
+            name = DRIFT_LAW if member == DRIFT else member
+            effect = EFFECTS[name]
+            alike = self.alike(member)
+            rivals += [(family_of(other), fit.model) for other, fit in alike]
+            without = self.with_only(best.members - {member})
+            with_it = self.with_only(frozenset(order[: i + 1]))
+            worth = self.judge.gain(without, best)
+            own = tuple(
+                replace(e, name=e.name.split(": ", 1)[1])
+                for e in final.estimates
+                if e.name.startswith(f"{name}: ")
+            )
+            said = [
+                f"without it the residual is {math.sqrt(without.cost):.3g} times the noise, with "
+                f"it {math.sqrt(best.cost):.3g} times",
+                f"without it the information criterion is worse by {worth:.0f}",
+                *(f"{_label(other)} explains these data as well" for other, _ in alike),
+            ]
+            stage = final
+            if i < len(order) - 1:
+                stage = stage_of(
+                    with_it,
+                    self.judge,
+                    self.fitter.full,
+                    for_others=self.predicting(with_it, with_it),
+                )
+            families = tuple(dict.fromkeys(family_of(other) for other, _ in alike))
+            steps.append(
+                Step(
+                    name,
+                    effect.family,
+                    effect.acts_on,
+                    stage,
+                    own,
+                    families,
+                    tuple(said),
+                    (("criterion_without", worth),),
+                )
+            )
+        return steps, rivals
+
+
+def conclude(
+    found: Found, fitter: Fitter, without: Callable[[Fit, str], Fit], held: bool = False
+) -> Diagnosis:
+    """Return the diagnosis that a search has ``found``; ``without(fit, name)`` refits."""
+    end = _Conclusion(found, fitter, without)
+    judge, full = found.judge, fitter.full
+    doubtful = not end.is_small and end.explained < _TRUSTED_SHARE
+    others = end.first.model if doubtful else end.predicting(found.best, end.last)
+    first = stage_of(end.first, judge, full, estimated=True)
+    final = stage_of(end.last, judge, full, estimated=True, for_others=others)
+    steps, rivals = end.steps(final)
+    before, after = signatures(full, end.first), signatures(full, end.last)
+    models = final.of_each(len(full))
+    missing_after = tuple(
+        m
+        for record, model in zip(full, models, strict=True)
+        for m in missing_stress([record], model)
+    )
+    verdict = end.verdict()
+    unnamed = None
+    open_end = verdict in (UNEXPLAINED, PARTLY_EXPLAINED) and found.status != "stopped"
+    if open_end or any(s.family == "unknown" for s in steps):
+        unnamed = describe_unnamed(missing_after, after, steps)
+    return Diagnosis(
+        verdict=verdict,
+        baseline=first,
+        rounds=tuple(_round(race, judge, fitter) for race in found.races),
+        steps=tuple(steps),
+        final=final,
+        before=before,
+        after=after,
+        missing_before=missing_stress(full, end.first.model),
+        missing_after=missing_after,
+        unnamed=unnamed,
+        rivals=tuple(rivals),
+        simulations=fitter.work.simulations,
+        interrupted=found.status == "stopped",
+        held=held,
+        notes=tuple(_notes(end, doubtful, others, after)),
+        status=found.status,
+        families=_families(end),
+    )
+
+
+def _label(member: str) -> str:
+    return "slow drift of the reading" if member == DRIFT else member
+
+
+def _families(end: _Conclusion) -> tuple[tuple[str, float], ...]:
+    """Return the probability of each family, largest first; they add up to 1."""
+    found = end.judge.probabilities(list(end.found.fits.values()))
+    if not end.is_small and not (end.found.best.members and end.explained > _TRUSTED_SHARE):
+        # what no fit explains is of no known family
+        left = 1.0 - max(end.explained, 0.0)
+        found = {family: p * (1.0 - left) for family, p in found.items()}
+        found["unknown"] = found.get("unknown", 0.0) + left
+    return tuple(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def _notes(
+    end: _Conclusion, doubtful: bool, others: Actuator | Strip, after: Sequence[object]
+) -> list[str]:
+    """Return sentences for the operator."""
+    said = []
+    if end.found.status == "budget":
+        said.append("the search stopped at its computing budget; --thorough searches further")
+    if end.found.status == "stopped" and not (end.found.races or end.found.best.members):
+        said.append("interrupted before the first round ended: it is not known what is missing")
+    kept = {name for name, _ in others.effects}
+    gone = [name for name in end.found.best.effects if name not in kept]
+    if DRIFT in end.found.best.members:
+        gone.append("slow drift of the reading")
+    if gone and doubtful:
+        said.append(
+            "the effects found explain too little: other recordings are predicted without them"
+        )
+    elif gone:
+        said.append(
+            f"{', '.join(gone)}: specific to these recordings as far as they show; other "
+            "recordings are predicted without it"
+        )
+    if end.is_small and not all(getattr(s, "is_noise", True) for s in after):
+        said.append(
+            "the residual is not quite white noise, but too small to attribute to an effect"
+        )
+    return said
+
+
+def _round(race: Race, judge: Judge, fitter: Fitter) -> Round:
+    """Return a race as a round of the report: candidates with one more effect, best first."""
+    parent, candidates = race.parent, []
+    single = [f for f in race.fits if len(f.members - parent.members) == 1]
+    best = judge.ranked(race.fits)[0] if race.fits else parent
+    for fit in judge.ranked(single):
+        (name,) = fit.members - parent.members
+        effect = EFFECTS[name]
+        gain = judge.gain(parent, fit)
+        verdict = "worthless"
+        if race.taken is not None and fit.members == race.taken.members:
+            verdict = "chosen"
+        elif gain > judge.settings.odds:
+            behind = judge.gain(fit, best)
+            verdict = "indistinguishable" if behind < _ALIKE else "better"
+        promised = 1.0 - min((race.starts.get(name, math.inf) / race.misfit) ** 2, 1.0)
+        candidates.append(
+            Candidate(
+                name,
+                effect.family,
+                effect.acts_on,
+                stage_of(fit, judge, fitter.full),
+                promised,
+                1.0 - fit.cost / parent.cost,
+                gain,
+                judge.gain(fit, best),
+                verdict,
+            )
+        )
+    added = sorted(race.taken.members - parent.members) if race.taken is not None else []
+    chosen = added[0] if len(added) == 1 else None
+    reason = f"{' and '.join(added)} explain most" if added else "no effect is worth its parameters"
+    return Round(parent.effects, tuple(candidates), chosen, reason)
