@@ -241,6 +241,7 @@ class Search:
             self.fitter,
             self.judge,
             parent,
+            regression.misfit,
             [Candidate((name,), tuple(some)) for name, some in starts.items()],
         )
         if pairs and fits and not self.judge.is_noise(fits[0]):
@@ -248,6 +249,7 @@ class Search:
                 self.fitter,
                 self.judge,
                 parent,
+                regression.misfit,
                 [Candidate(s.names, (s,)) for s in regression.pairs(self.settings.pairs)],
             )
             fits = self.judge.ranked([*fits, *both])

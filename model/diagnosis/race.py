@@ -17,7 +17,7 @@ import numpy as np
 from dearig.model import kernel
 from dearig.model.diagnosis.evidence import Judge
 from dearig.model.diagnosis.fits import Fit, Fitter, spring_count, with_effect
-from dearig.model.diagnosis.regression import Start
+from dearig.model.diagnosis.regression import Start, contention
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import amplitudes, typical_values
 from dearig.model.effects import EFFECTS
@@ -40,10 +40,15 @@ class Candidate:
         return self.starts[0].misfit
 
 
-def race(fitter: Fitter, judge: Judge, parent: Fit, candidates: Sequence[Candidate]) -> list[Fit]:
-    """Return the fits of the candidates that came through the race, the most probable first."""
+def race(
+    fitter: Fitter, judge: Judge, parent: Fit, misfit: float, candidates: Sequence[Candidate]
+) -> list[Fit]:
+    """Return the fits of the candidates that came through the race, the most probable first.
+
+    ``misfit`` is what the regression leaves without a candidate.
+    """
     rungs = fitter.settings.rungs
-    entered = _contending(candidates, fitter.settings)
+    entered = _contending(candidates, misfit, fitter.settings)
     first = fitter.map(lambda c: _entered(fitter, parent, c, rungs[0].iterations), entered)
     runners = [fit for fits in first for fit in fits]
     if not runners:
@@ -59,13 +64,18 @@ def race(fitter: Fitter, judge: Judge, parent: Fit, candidates: Sequence[Candida
     return _leading(judge.ranked(runners), len(runners), abreast=False)
 
 
-def _contending(candidates: Sequence[Candidate], settings: DiagnosisSettings) -> list[Candidate]:
+def _contending(
+    candidates: Sequence[Candidate], misfit: float, settings: DiagnosisSettings
+) -> list[Candidate]:
     """Return the candidates of which the regression leaves open whether they may lead.
 
-    As many as enter the last rung but one in any case.
+    Their misfit is near the least, and they explain the better part of what the best explains. As
+    many as enter the last rung but one run in any case.
     """
     ranked = sorted(candidates, key=lambda c: c.misfit)
-    limit = settings.contenders * max(ranked[0].misfit, 1.0) if ranked else 0.0
+    if not ranked:
+        return []
+    limit = contention(misfit, ranked[0].misfit, settings)
     least, most = settings.rungs[-2].effects, settings.rungs[0].effects
     return [c for i, c in enumerate(ranked[:most]) if i < least or c.misfit < limit]
 

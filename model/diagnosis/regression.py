@@ -35,7 +35,7 @@ from dearig.model.effects import EFFECTS, PLACES, Effect
 from dearig.model.film import Strip, unit_stresses
 from dearig.model.records import ActuatorRecord, FilmRecord, Record
 
-__all__ = ["Regression", "Start", "electric"]
+__all__ = ["Regression", "Start", "bounded", "contention", "electric"]
 
 _REST_STEP = 0.02  # of mu_0: the difference quotient of the misfit through the rest stretch
 _NEAR = 0.2  # relative: starts that differ by less are one
@@ -88,6 +88,17 @@ class _Columns:
 
 
 _Row = tuple[float, np.ndarray, _Columns]  # misfit, coefficients, columns
+
+
+def contention(misfit: float, best: float, settings: DiagnosisSettings) -> float:
+    """Return the misfit up to which an effect may come to lead: ``best`` is the least of all.
+
+    What leaves several times as much will not lead, and what explains less than a part of what the
+    best one explains of the ``misfit`` without an effect will not either.
+    """
+    explained = misfit**2 - best**2
+    part = math.sqrt(max(misfit**2 - settings.share * explained, 0.0))
+    return min(settings.contenders * max(best, 1.0), part)
 
 
 def electric(name: str) -> bool:
@@ -346,10 +357,11 @@ class Regression:
             if some:
                 rows[effect.name] = _distinct(some, self.settings.starts)
         self._best = {}
-        least = self.misfit
+        least = min((some[0][0] for some in rows.values()), default=self.misfit)
         for name in sorted(rows, key=lambda n: rows[n][0][0]):
             some = rows[name]
-            if some[0][0] < self.settings.contenders * least or len(self._best) < _SHARPENED_MIN:
+            limit = contention(self.misfit, least, self.settings)
+            if some[0][0] < limit or len(self._best) < _SHARPENED_MIN:
                 some = sorted(
                     (self._sharpened(row, extent) for row in some), key=lambda row: row[0]
                 )

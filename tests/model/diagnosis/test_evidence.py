@@ -1,0 +1,90 @@
+"""The criterion against Schwarz's, and probabilities of families."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dearig.model.actuator import Actuator
+from dearig.model.diagnosis.evidence import Judge
+from dearig.model.diagnosis.fits import Fit
+from dearig.model.diagnosis.noise import Drift, DriftSpace, WhitenedProblem, drift_modes
+from dearig.model.diagnosis.settings import DiagnosisSettings
+from dearig.model.fitting.parameters import Layout
+from tests.tools.engine import PLAIN, record_of, typical
+
+SETTINGS = DiagnosisSettings()
+DRAG, CURVED = (replace(PLAIN, effects=(typical(n),)) for n in ("linear drag", "sensor curvature"))
+
+
+def fit(model: Actuator, cost: float, seed: int = 0, drift: float = 0.0) -> Fit:
+    """A fit of ``model`` that leaves white noise of this mean square."""
+    record = record_of(PLAIN)
+    noise = Drift(DriftSpace([drift_modes(record, 4)]), drift) if drift else None
+    problem = WhitenedProblem([record], Layout(model), noise, workers=1)
+    r = np.random.default_rng(seed).standard_normal(problem.samples)
+    r *= math.sqrt(cost / float(np.mean(r**2)))
+    x = problem.layout.coordinates(problem.layout.initial())
+    held = np.zeros(x.size, dtype=bool)
+    held[problem.layout.column("J")] = True
+    return Fit(problem, x, held, cost, r, np.zeros((r.size, int((~held).sum()))))
+
+
+def test_the_criterion_is_schwarzs_but_for_the_form_error() -> None:
+    baseline, better = fit(PLAIN, 4.0), fit(DRAG, 1.0)
+    judge = Judge(SETTINGS, baseline)
+    n, delta2 = judge.samples, SETTINGS.form_error**2
+    expected = n * math.log(4.0 / (1.0 + 3.0 * delta2)) - math.log(n)
+    assert judge.gain(baseline, better) == pytest.approx(expected)
+
+
+def test_below_the_form_error_laws_are_not_told_apart() -> None:
+    baseline = fit(PLAIN, 1e6)
+    judge = Judge(SETTINGS, baseline)
+    near, nearer = fit(DRAG, 3.0), fit(CURVED, 1.0)
+    unlimited = judge.samples * math.log(3.0)
+    assert 0.0 < judge.gain(near, nearer) < 0.05 * unlimited
+
+
+def test_drift_pays_for_the_volume_of_its_prior() -> None:
+    baseline = fit(PLAIN, 2.0)
+    judge = Judge(SETTINGS, baseline)
+    drifting = fit(PLAIN, 2.0, drift=100.0)
+    assert drifting.problem.noise_drift is not None
+    expected = drifting.problem.noise_drift.log_det + math.log(judge.samples)
+    assert judge.criterion(drifting) - judge.criterion(baseline) == pytest.approx(expected)
+
+
+def test_correlated_residuals_count_as_fewer_samples_until_a_fit_is_white() -> None:
+    smooth = fit(PLAIN, 4.0)
+    slow = np.convolve(smooth.residuals, np.ones(20) / 20, "same")
+    baseline = replace(smooth, residuals=slow)
+    judge = Judge(SETTINGS, baseline)
+    before = judge.samples
+    judge.see([fit(DRAG, 1.0)])
+    assert before < 0.3 * judge.samples
+
+
+def test_probabilities_add_up_to_one_and_follow_the_evidence() -> None:
+    baseline = fit(PLAIN, 1.1)
+    judge = Judge(SETTINGS, baseline)
+    one, other = fit(DRAG, 1.000), fit(CURVED, 1.004)
+    found = judge.probabilities([baseline, one, other])
+    assert sum(found.values()) == pytest.approx(1.0)
+    assert found["drag"] > found["sensor_nonlinearity"] > found["none"]
+    ratio = found["drag"] / found["sensor_nonlinearity"]
+    expected = math.exp(0.5 * judge.gain(other, one) / SETTINGS.tempering)
+    assert ratio == pytest.approx(expected)
+
+
+def test_a_second_effect_must_explain_half_of_the_rest() -> None:
+    baseline = fit(PLAIN, 100.0)
+    judge = Judge(SETTINGS, baseline)
+    first = fit(DRAG, 3.0)
+    both = replace(DRAG, effects=(*DRAG.effects, *CURVED.effects))
+    assert judge.is_worth(baseline, first)
+    assert not judge.is_worth(first, fit(both, 2.5))
+    assert judge.is_worth(first, fit(both, 1.2))
