@@ -82,7 +82,7 @@ class Comparison:
         error = self.errors.rms if self.rms_without_events is None else self.rms_without_events
         allowed = 0.0
         if self.kind == "film":
-            from dearig.model.diagnosis.bench import FILM_MODEL_ERROR
+            from dearig.model.diagnosis.preparation import FILM_MODEL_ERROR
 
             allowed = FILM_MODEL_ERROR * float(np.nanmax(np.abs(self.measured)))
         return error / math.hypot(max(self.noise or 0.0, noise), allowed)
