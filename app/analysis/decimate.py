@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["decimate", "decimate_path"]
+__all__ = ["decimate", "decimate_on_grid", "decimate_path"]
 
 
 def decimate(x: np.ndarray, y: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
@@ -27,6 +27,20 @@ def decimate(x: np.ndarray, y: np.ndarray, columns: int) -> tuple[np.ndarray, np
         raise ValueError("x must increase")
     column = np.minimum(((x - x[0]) / span * columns).astype(np.int64), columns - 1)
     starts = np.flatnonzero(np.diff(column, prepend=-1))
+    return _pick(x, y, _extremes(y, starts))
+
+
+def decimate_on_grid(x: np.ndarray, y: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points of ``y`` (N,) over ``x`` (N,), not decreasing, in columns of ``step``.
+
+    As ``decimate``, but the columns begin at multiples of ``step``: a curve keeps its points while
+    the range that is shown moves.
+    """
+    if not step > 0.0:
+        raise ValueError(f"step = {step} must be above 0")
+    if not x.size:
+        return x, y
+    starts = np.flatnonzero(np.diff(np.floor(x / step), prepend=-np.inf))
     return _pick(x, y, _extremes(y, starts))
 
 

@@ -176,6 +176,13 @@ def _sheet(t: Theme) -> str:
     QPushButton[role="primary"]:disabled {{
         color: {t.muted}; background: {t.window}; border-color: {t.line};
     }}
+    QToolButton[role="tool"] {{
+        padding: 1px 7px; border: 1px solid {t.line}; border-radius: 4px; background: {t.raised};
+    }}
+    QToolButton[role="tool"]:hover, QToolButton[role="tool"]:focus {{ border-color: {t.accent}; }}
+    QToolButton[role="tool"]:checked {{ border-color: {t.accent}; background: {t.surface}; }}
+    QToolButton[role="tool"]:disabled {{ color: {t.muted}; }}
+    QToolButton[role="tool"]::menu-indicator {{ width: 9px; subcontrol-position: right center; }}
     QLineEdit, QPlainTextEdit {{
         padding: 3px 5px; border: 1px solid {t.line}; border-radius: 4px; background: {t.surface};
         selection-background-color: {t.accent}; selection-color: {t.on_accent};

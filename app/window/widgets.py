@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
 from dearig.window.theme import SPACE, digits
 
 __all__ = [
+    "ElidedLabel",
     "Message",
     "Readout",
     "button",
@@ -118,6 +119,33 @@ class Message(QLabel):
         set_role(self, role)
         self.setText(text)
         self.setVisible(bool(text))
+
+
+class ElidedLabel(QLabel):
+    """One line of plain text that is cut at its end where there is no room; the tip has all."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.full_text = ""  #: text that is shown as far as there is room
+
+    def show_text(self, text: str) -> None:
+        """Show ``text``."""
+        if text != self.full_text:
+            self.full_text = text
+            self.setToolTip(plain_tip(text))
+            self._cut()
+
+    def resizeEvent(self, event: QtGui.QResizeEvent) -> None:  # noqa: N802
+        super().resizeEvent(event)
+        self._cut()
+
+    def _cut(self) -> None:
+        room = max(self.width() - 2, 0)
+        self.setText(
+            self.fontMetrics().elidedText(self.full_text, Qt.TextElideMode.ElideRight, room)
+        )
 
 
 class Readout(QWidget):
