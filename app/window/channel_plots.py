@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QWidget
 from dearig.window.live import Live
 from dearig.window.session import Session
 from dearig.window.theme import pen, style_plot
+from dearig.window.trip_lines import TripLevel, TripLines
 
 __all__ = ["ChannelPlots"]
 
@@ -29,18 +30,29 @@ class ChannelPlots(pg.GraphicsLayoutWidget):
         self._shown: tuple[tuple[str, str], ...] = ()
         self.plots: list[pg.PlotItem] = []
         self.curves: list[pg.PlotCurveItem] = []
+        self.trips: list[TripLines] = []
+        self._levels: list[tuple[TripLevel, ...]] = []
         self.setAccessibleName("Curves of the declared channels")
         self.setVisible(False)
         session.theme_changed.connect(self._restyle)
 
     def show_channels(
-        self, channels: Sequence[tuple[str, str]], beside: pg.PlotItem | None = None
+        self,
+        channels: Sequence[tuple[str, str]],
+        beside: pg.PlotItem | None = None,
+        limits: Sequence[tuple[float | None, float | None]] = (),
     ) -> None:
-        """Show empty plots for ``channels``, each a label and a unit; ``beside`` sets the time."""
-        if tuple(channels) != self._shown:
+        """Show empty plots for ``channels``, each a label and a unit; ``beside`` sets the time.
+
+        ``limits`` are the lowest and the highest value that each channel may have, None without.
+        """
+        levels = [_levels(unit, *pair) for (_, unit), pair in zip(channels, limits, strict=False)]
+        levels += [()] * (len(channels) - len(levels))
+        if (tuple(channels), levels) != (self._shown, self._levels):
+            self._levels = levels
             self._shown = tuple(channels)
             self.clear()
-            self.plots, self.curves = [], []
+            self.plots, self.curves, self.trips = [], [], []
             for row, (label, unit) in enumerate(channels):
                 plot = self.addPlot(row=row, col=0)
                 plot.setLabel("left", escape(f"{label} ({unit})"))  # it is HTML
@@ -49,6 +61,7 @@ class ChannelPlots(pg.GraphicsLayoutWidget):
                 plot.addItem(curve)
                 self.plots.append(plot)
                 self.curves.append(curve)
+                self.trips.append(TripLines(plot, 1.0))
             self.setFixedHeight(_HEIGHT * max(1, len(channels)))
             self.setVisible(bool(channels))
             self._restyle()
@@ -74,3 +87,12 @@ class ChannelPlots(pg.GraphicsLayoutWidget):
         for plot, curve in zip(self.plots, self.curves, strict=True):
             style_plot(plot, theme)
             curve.setPen(pen(theme.measured))
+        for lines, levels in zip(self.trips, self._levels, strict=True):
+            lines.show_levels(levels, theme)
+
+
+def _levels(unit: str, low: float | None, high: float | None) -> tuple[TripLevel, ...]:
+    """Return the trip levels of a channel."""
+    return tuple(
+        TripLevel("", value, f"trip {value:g} {unit}") for value in (low, high) if value is not None
+    )

@@ -261,6 +261,7 @@ class MainWindow(QMainWindow):
         self.study_page.show_model.connect(self._show_model)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_colour_scheme)
         session.running_changed.connect(self._filter_keys)
+        self.addActions(run.display.mark_bar.actions())  # the key M on every page
         session.blocks_changed.connect(lambda: self.banners.show_blocks(session.blocks))
         self._rig_or_folder_changed()
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from queue import SimpleQueue
 
 import numpy as np
@@ -23,7 +24,7 @@ from dearig.model.errors import ModelError
 from dearig.recording.rest_noise import lead_in
 from dearig.window.traces import ErrorsSoFar, Pyramid, RunningErrors
 
-__all__ = ["Live", "RunSnapshot"]
+__all__ = ["Live", "LiveEvent", "RunSnapshot"]
 
 _SIGNALS = {
     "voltage_command": "command",
@@ -65,6 +66,14 @@ class RunSnapshot:
     revision: int = 0
 
 
+@dataclass(frozen=True)
+class LiveEvent:
+    """An event of the run, and the local time ``at`` which the run recorded it."""
+
+    event: Event
+    at: datetime
+
+
 class Live(RunObserver):
     """Looks on at one run. ``close`` ends its thread, after everything that came was taken in."""
 
@@ -75,7 +84,7 @@ class Live(RunObserver):
         )
         self._wanted = (tuple(overlays), drive)
         self._run: _Run | None = None
-        self._events: list[Event] = []
+        self._events: list[LiveEvent] = []
         self._thread: threading.Thread | None = None
 
     # called from the rig's thread
@@ -92,7 +101,7 @@ class Live(RunObserver):
 
     def event(self, event: Event) -> None:
         with self._lock:
-            self._events.append(event)
+            self._events.append(LiveEvent(event, datetime.now().astimezone()))
 
     # called from the interface thread
 
@@ -101,7 +110,7 @@ class Live(RunObserver):
         self._wanted = (tuple(overlays), drive)
         self._inbox.put(self._wanted)
 
-    def take_events(self) -> list[Event]:
+    def take_events(self) -> list[LiveEvent]:
         """Return the events since the last call."""
         with self._lock:
             taken, self._events = self._events, []

@@ -4,27 +4,24 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer, Signal, Slot
+from PySide6.QtCore import QTimer, Signal, Slot
 from PySide6.QtWidgets import (
     QCheckBox,
-    QComboBox,
     QHBoxLayout,
     QLineEdit,
-    QPlainTextEdit,
     QVBoxLayout,
     QWidget,
 )
 
+from dearig.acquisition.marks import RunMarks
 from dearig.acquisition.overlay import OverlayModel
 from dearig.drivers.daqmx.watchdog import watchdog_words
-from dearig.drivers.settings import ChannelSettings
 from dearig.sim_backend.faults import FaultPlan
-from dearig.window.channel_plots import ChannelPlots
 from dearig.window.hv import HighVoltage
 from dearig.window.live import Live
 from dearig.window.overlay_chooser import OverlayChooser
 from dearig.window.run_controls import RunControls
-from dearig.window.run_plots import RunPlots
+from dearig.window.run_display import RunDisplay
 from dearig.window.running import RunEnd, Runner, RunRequest, simulated
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
@@ -32,12 +29,8 @@ from dearig.window.widgets import Message, button, label
 
 __all__ = ["RunPage"]
 
-_FRAME = 16  # ms between two frames of the plots
 _NUMBERS = 100  # ms between two updates of the readouts: faster ones cannot be read
 _ARMED = 30_000  # ms after which a rig that was armed and not started is disarmed
-_SPANS = {"last 2 s": 2.0, "last 5 s": 5.0, "last 10 s": 10.0, "last 30 s": 30.0,
-          "last 60 s": 60.0, "whole run": None}  # fmt: skip
-_NOT_DRAWN = (-1, None)
 
 
 class RunPage(QWidget):
@@ -55,11 +48,9 @@ class RunPage(QWidget):
         self.runner = Runner(self)
         self.faults: FaultPlan | None = None  #: faults of the next simulated run
         self.live: Live | None = None
-        self._drawn: tuple[int, float | None] = _NOT_DRAWN  # revision and span of the last frame
         self._runs = 0
         self._segments: tuple[tuple[str, float, float], ...] = ()
         self._last_recording: Path | None = None
-        self._channels: tuple[ChannelSettings, ...] = ()  # declared, of the run that is drawn
 
         self.controls = RunControls(session)
         self.badge = self.controls.badge
@@ -68,14 +59,13 @@ class RunPage(QWidget):
         self.stop_button = self.controls.stop_button
         self.blocked = self.controls.blocked
         self.overlays = OverlayChooser(session)
-        self.plots = RunPlots(session)
-        self.channel_plots = ChannelPlots(session)
+        self.display = RunDisplay(session)
+        self.plots = self.display.plots
+        self.alarms = self.display.alarms
         self._build()
         self._connect()
         self._disarm = QTimer(self, singleShot=True, interval=_ARMED)
         self._disarm.timeout.connect(self._disarmed)
-        self._frames = QTimer(self, interval=_FRAME, timerType=Qt.TimerType.PreciseTimer)
-        self._frames.timeout.connect(self._draw)
         self._numbers = QTimer(self, interval=_NUMBERS)
         self._numbers.timeout.connect(self._update_readouts)
         self._overlays_changed()
@@ -89,30 +79,38 @@ class RunPage(QWidget):
         session, preview = self.session, self.session.preview
         if preview is None or preview.loaded is None or not preview.playable:
             return
-        live = Live(session.overlays, session.overlay_drive)
+        if self.display.digest != preview.digest:
+            self._refuse_unseen()
+            return
+        live, marks = Live(session.overlays, session.overlay_drive), RunMarks()
         request = RunRequest(
             preview.loaded, session.address, session.rig_file, session.rig_text, session.folder,
             operator=session.operator, film=session.film, notes=session.notes,
             seed=self._next_seed(), paced=self.paced.isChecked(), faults=self.faults,
-            overlay=self._recorded_overlay(),
+            overlay=self._recorded_overlay(), marks=marks, waveform_digest=self.display.digest,
         )  # fmt: skip
         if not self.runner.start(request, live):
             return
         if self.live is not None:
             self.live.close()
-        self.live, self._drawn, self._segments = live, _NOT_DRAWN, preview.segments
-        self.plots.show_prediction(preview)
-        self.plots.start()
-        self._channels = session.rig_file.channel
-        self.channel_plots.show_channels([(c.shown, c.unit) for c in self._channels])
-        self.log.clear()
+        self.live, self._segments = live, preview.segments
+        self.display.begin(live, preview, preview.loaded.sequence.name, marks)
         self.result.show_text("")
         self.show_button.hide()
-        self._frames.start()
         self._numbers.start()
         session.set_running(True)
         self._refresh()
         self.stop_button.setFocus()
+
+    def _refuse_unseen(self) -> None:
+        """Disarm: what would be played is not what the plots show."""
+        self.result.show_text(
+            "Not started: the plots did not show what would have been played. Look at the plan "
+            "that they show now, then arm it again.",
+            "bad",
+        )
+        self._disarmed()
+        self.display.show_planned()
 
     @Slot()
     def stop(self) -> None:
@@ -132,9 +130,9 @@ class RunPage(QWidget):
         """Make the rig safe, and wait for every thread."""
         self.runner.stop()
         self.runner.wait()
-        self._frames.stop()
         self._numbers.stop()
         self._disarm.stop()
+        self.display.forget_run()
         self.overlays.close_work()
         if self.live is not None:
             self.live.close()
@@ -166,6 +164,8 @@ class RunPage(QWidget):
     @Slot(object)
     def _state_changed(self, state: HighVoltage) -> None:
         self.session.set_armed(state is HighVoltage.ARMED)
+        if state is HighVoltage.ARMED:
+            self.display.show_planned()
         self.controls.show_state(state, self._simulated_label())
         self.controls.show_stop(ramping=state is HighVoltage.RAMPING)
 
@@ -200,8 +200,6 @@ class RunPage(QWidget):
         self.controls.show_state(self.runner.state, self._simulated_label())
         self._describe_plan()
         self.to_sequence.setVisible(preview is not None and not preview.playable)
-        if preview is not None and self.live is None:
-            self.plots.show_prediction(preview)
 
     def _describe_watchdog(self) -> None:
         """Show whether the card's hardware watchdog is wired; a simulated rig has no card."""
@@ -216,37 +214,19 @@ class RunPage(QWidget):
         self.watchdog.show_text(f"Hardware watchdog: {words}", "" if card.watchdog_s else "warn")
 
     def _describe_plan(self) -> None:
-        session, preview = self.session, self.session.preview
+        preview = self.session.preview
         if preview is None:
             self.plan.show_text("Planning the sequence …", "muted")
         elif preview.plan is None:
             self.plan.show_text(preview.sentence, "bad")
         elif preview.loaded is not None:
-            name, seconds = preview.loaded.sequence.name, preview.plan.duration
+            name = preview.loaded.sequence.name
             if preview.playable:
-                rate = preview.plan.rate
-                self.plan.show_text(
-                    f"{name}: {seconds:.1f} s at {rate:g} Hz on {session.address}", ""
-                )
+                self.plan.show_text("")  # the plots say what it is
             else:
                 self.plan.show_text(
                     f"{name!r} is refused: {'; '.join(preview.plan.reasons)}", "bad"
                 )
-
-    @Slot()
-    def _draw(self) -> None:
-        live = self.live
-        now = None if live is None else live.now()
-        if live is None or now is None or not self.isVisible():
-            return
-        frame = (now.revision, self.plots.window)
-        if frame == self._drawn:
-            return
-        self._drawn = frame
-        end = now.samples / now.rate
-        self.plots.draw(live, end)
-        names = [channel.name for channel in self._channels]
-        self.channel_plots.draw(live, names, self.plots.window, end)
 
     @Slot()
     def _update_readouts(self) -> None:
@@ -254,11 +234,10 @@ class RunPage(QWidget):
         if live is None:
             return
         now = live.now()
-        for event in live.take_events():
-            at = f"{event.sample / now.rate:8.2f} s" if now is not None else ""
-            self.log.appendPlainText(f"{at}  {event.level}: {event.message}")
+        self.display.take_events()
         if now is None:
             return
+        self.display.show_numbers(now)
         self.controls.show_numbers(now)
         failures = [
             f"{model.name}: {reason}"
@@ -291,6 +270,7 @@ class RunPage(QWidget):
         self.result.show_text(f"{end.headline}: {end.sentence}{where}", role)
         self._last_recording = end.path
         self.show_button.setVisible(end.path is not None)
+        self.display.end(end.headline, end.sentence, _end_level(end))
         self.session.set_running(False)
         self._refresh()
         if end.path is not None:
@@ -299,15 +279,9 @@ class RunPage(QWidget):
     @Slot()
     def _overlays_changed(self) -> None:
         self.controls.show_models()
-        self._drawn = _NOT_DRAWN
+        self.display.redraw()
         if self.live is not None:
             self.live.follow(self.session.overlays, self.session.overlay_drive)
-
-    @Slot()
-    def _span_changed(self) -> None:
-        self.plots.window = self.span.currentData()
-        self._drawn = _NOT_DRAWN
-        self._draw()
 
     @Slot()
     def _show_last(self) -> None:
@@ -338,8 +312,7 @@ class RunPage(QWidget):
         self.overlay_failures = Message()
         right.addWidget(self.overlays.message)
         right.addWidget(self.overlay_failures)
-        right.addWidget(self.plots, 1)
-        right.addWidget(self.channel_plots)
+        right.addWidget(self.display, 1)
         right.addLayout(self._end_row())
         outer.addLayout(right, 1)
 
@@ -351,8 +324,12 @@ class RunPage(QWidget):
         self.runner.state_changed.connect(self._state_changed)
         self.runner.ended.connect(self._run_ended)
         session.preview_changed.connect(self._refresh)
+        session.preview_changed.connect(self.display.show_planned)
         session.sequence_changed.connect(self._sequence_changed)
+        session.sequence_changed.connect(self.display.show_planned)
         session.rig_changed.connect(self._refresh)
+        session.rig_changed.connect(self.display.show_planned)
+        self.display.mark_bar.left.connect(self.stop_button.setFocus)
         session.overlays_changed.connect(self._overlays_changed)
         session.blocks_changed.connect(self._refresh)
 
@@ -388,14 +365,6 @@ class RunPage(QWidget):
         row = QHBoxLayout()
         row.addWidget(self.overlays, 3)
         row.addStretch(1)
-        self.span = QComboBox()
-        for words, seconds in _SPANS.items():
-            self.span.addItem(f"Show {words}", seconds)
-        self.span.setCurrentIndex(2)
-        self.span.setToolTip("Time span of the plots, in s")
-        self.span.setAccessibleName("Time span of the plots")
-        self.span.activated.connect(self._span_changed)
-        row.addWidget(self.span)
         return row
 
     def _end_row(self) -> QVBoxLayout:
@@ -418,12 +387,9 @@ class RunPage(QWidget):
         row.addWidget(self.result, 1)
         row.addWidget(self.show_button)
         column.addLayout(row)
-        self.log = QPlainTextEdit()
-        self.log.setReadOnly(True)
-        self.log.setMaximumBlockCount(1000)
-        self.log.setFixedHeight(58)
-        self.log.setPlaceholderText("Events of the run")
-        self.log.setAccessibleName("Events of the run")
-        self.log.setTabChangesFocus(True)
-        column.addWidget(self.log)
         return column
+
+
+def _end_level(end: RunEnd) -> str:
+    """Return the level of the end of a run in the list of alarms."""
+    return "info" if end.result is not None or end.headline == "Stopped" else "fault"

@@ -10,6 +10,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, QThread, Signal, Slot
 
 from dearig.acquisition.interrupts import Interrupts
+from dearig.acquisition.marks import RunMarks
 from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.rigs import is_simulated
 from dearig.acquisition.run import RunOptions, RunResult, record
@@ -48,7 +49,8 @@ class RunRequest:
     """Everything that a run needs; the recording is written to ``folder``, named by the sequence.
 
     For a simulated rig, ``seed`` is that of its noise, ``paced`` runs it in real time, and
-    ``faults`` occur in it. The displacement of the model ``overlay`` is kept in the recording.
+    ``faults`` occur in it. The displacement of the model ``overlay`` is kept in the recording, and
+    so are the ``marks``. A waveform other than that of ``waveform_digest`` is refused.
     """
 
     loaded: LoadedSequence
@@ -63,6 +65,8 @@ class RunRequest:
     paced: bool = True
     faults: FaultPlan | None = None
     overlay: OverlayModel | None = None
+    marks: RunMarks | None = None
+    waveform_digest: str = ""
 
 
 @dataclass(frozen=True)
@@ -186,10 +190,12 @@ class _RunThread(QThread):
             options = RunOptions(
                 order.configuration, order.operator, order.film, order.notes,
                 seed=order.seed, paced=order.paced, faults=order.faults,
+                waveform_digest=order.waveform_digest,
             )  # fmt: skip
             result = record(
                 order.loaded, order.address, order.rig_file, out, options, overlay=order.overlay,
-                observer=self._live, interrupts=self.interrupts, clock=time.monotonic,
+                observer=self._live, interrupts=self.interrupts, marks=order.marks,
+                clock=time.monotonic,
             )  # fmt: skip
         except DearigError as error:
             played = self._live.now() is not None

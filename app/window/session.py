@@ -65,6 +65,12 @@ class Preview:
         """True if the gate accepts the plan."""
         return self.plan is not None and self.plan.waveform is not None
 
+    @property
+    def digest(self) -> str:
+        """Digest of the waveform that the gate has admitted, "" without one."""
+        waveform = None if self.plan is None else self.plan.waveform
+        return "" if waveform is None else waveform.digest
+
 
 class Session(QObject):
     """Rig, sequence, overlay models, folder, and the operator's entries for a recording.

@@ -183,6 +183,9 @@ def _sheet(t: Theme) -> str:
     QToolButton[role="tool"]:checked {{ border-color: {t.accent}; background: {t.surface}; }}
     QToolButton[role="tool"]:disabled {{ color: {t.muted}; }}
     QToolButton[role="tool"]::menu-indicator {{ width: 9px; subcontrol-position: right center; }}
+    QPushButton[role="switch"]:checked {{
+        color: {t.on_accent}; background: {t.accent}; border-color: {t.accent};
+    }}
     QLineEdit, QPlainTextEdit {{
         padding: 3px 5px; border: 1px solid {t.line}; border-radius: 4px; background: {t.surface};
         selection-background-color: {t.accent}; selection-color: {t.on_accent};

@@ -231,7 +231,7 @@ def test_what_goes_wrong_is_said_and_the_rig_is_safe(
     page.faults = FaultPlan.parse([fault])
     path = play(qtbot, page)
     assert page.result.text().startswith(headline)
-    assert words in page.result.text() + page.log.toPlainText()
+    assert words in page.result.text() + " ".join(a.message for a in page.alarms.alarms)
     assert page.runner.state is HighVoltage.SAFE
     recording = open_recording(path)
     assert recording.events

@@ -1,0 +1,235 @@
+"""Right side of the Run page: the plan or a run in plots, marks, and alarms."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, QTimer, Slot
+from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
+
+from dearig.acquisition.marks import RunMarks
+from dearig.drivers.settings import ChannelSettings
+from dearig.recording.marks import read_mark
+from dearig.window.alarms import AcknowledgeBar, Alarm, AlarmLog, AlarmTable
+from dearig.window.channel_plots import ChannelPlots
+from dearig.window.layout_state import remember
+from dearig.window.live import Live, LiveEvent, RunSnapshot
+from dearig.window.marks import MarkBar
+from dearig.window.run_plots import RunPlots
+from dearig.window.run_view import RunView, TimeScroll
+from dearig.window.session import Preview, Session
+from dearig.window.theme import SPACE
+
+__all__ = ["RunDisplay"]
+
+_FRAME = 16  # ms between two frames of the plots
+_NOTHING: tuple[object, ...] = ()
+
+
+class RunDisplay(QWidget):
+    """Shows a plan, a run in progress, or the last run.
+
+    While no run is in progress it shows the plan that Start would play: every new plan replaces
+    what is drawn, and so does arming. The last run is shown when the operator asks for it, and
+    after its end until then.
+    """
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._session = session
+        self._live: Live | None = None
+        self._running = False
+        self._drawn = _NOTHING  # what the last frame was made of
+        self._channels: tuple[ChannelSettings, ...] = ()
+        self.plots = RunPlots(session)
+        self.channel_plots = ChannelPlots(session)
+        self.view = RunView(session, self.plots)
+        self.time_scroll = TimeScroll()
+        self.alarms = AlarmLog(self)
+        self.table = AlarmTable(self.alarms, session)
+        self.acknowledge = AcknowledgeBar(self.alarms, session)
+        self.mark_bar = MarkBar()
+        self._frames = QTimer(self, interval=_FRAME, timerType=Qt.TimerType.PreciseTimer)
+        self._frames.timeout.connect(self.draw)
+        self._build()
+        self.view.changed.connect(self._chosen)
+        self.view.span_changed.connect(self._span_changed)
+        self.time_scroll.scrolled.connect(self._scrolled)
+        self.mark_bar.said.connect(session.message)
+        self.alarms.acknowledged.connect(self._acknowledged)
+        self._span_changed()
+
+    # before a run
+
+    @property
+    def digest(self) -> str:
+        """Digest of the waveform whose plan is drawn; "" where none is that may be played."""
+        return self.plots.digest
+
+    def show_planned(self) -> None:
+        """Show the plan of the session; during a run nothing changes."""
+        if self._running:
+            return
+        preview = self._session.preview
+        self._frames.stop()
+        self.time_scroll.follow()
+        self.view.show_planned(preview)
+        self.plots.show_prediction(preview)
+        self._show_channels(self._session.rig_file.channel)
+        self.time_scroll.show_run(0.0, None)
+
+    # a run
+
+    def begin(self, live: Live, preview: Preview, name: str, marks: RunMarks) -> None:
+        """Show the run of ``live`` from its start."""
+        self._live, self._running, self._drawn = live, True, _NOTHING
+        self.view.begin(name)
+        self.plots.show_prediction(preview)
+        self.plots.start()
+        self._show_channels(self._session.rig_file.channel)
+        self.time_scroll.follow()
+        self.mark_bar.follow(marks)
+        self.alarms.add("info", f"{name}: run started", 0.0)
+        self._frames.start()
+
+    def end(self, headline: str, sentence: str, level: str) -> None:
+        """Show how the run ended, and its curves until the plan changes."""
+        self.take_events()
+        now = None if self._live is None else self._live.now()
+        seconds = None if now is None else now.samples / now.rate
+        self.alarms.add(level, f"{headline}: {sentence}", seconds)
+        self._running = False
+        self.mark_bar.follow(None)
+        self.view.end(headline)
+
+    def forget_run(self) -> None:
+        """Stop drawing: the curves of the run are about to be closed."""
+        self._frames.stop()
+        self._live = None
+
+    def redraw(self) -> None:
+        """Draw the next frame even if no sample has come."""
+        self._drawn = _NOTHING
+
+    def show_numbers(self, now: RunSnapshot) -> None:
+        """Renew the scroll bar; called some ten times a second."""
+        if not self.view.shows_plan:
+            self.time_scroll.show_run(now.samples / now.rate, self.plots.window)
+
+    def take_events(self) -> None:
+        """Put the events since the last call into the list, and draw those that are marked."""
+        live = self._live
+        now = None if live is None else live.now()
+        if live is None or now is None:
+            return
+        for happened in live.take_events():
+            self._take(happened, happened.event.sample / now.rate)
+
+    def _take(self, happened: LiveEvent, seconds: float) -> None:
+        event = happened.event
+        mark = read_mark(event.message) if event.level == "info" else None
+        if mark is not None:
+            number, note = mark
+            self.plots.add_mark(f"mark {number}", seconds, note or f"mark {number}")
+        elif event.level != "info":
+            self.plots.add_mark(f"alarm {event.sample} {event.message}", seconds, event.level,
+                                event.level)  # fmt: skip
+        # the operator knows that he has pressed STOP
+        known = event.message.startswith("interrupted by the operator")
+        self.alarms.add(event.level, event.message, seconds, happened.at, "STOP" if known else "")
+
+    @Slot(object, str)
+    def _acknowledged(self, alarms: tuple[Alarm, ...], who: str) -> None:
+        """Record the acknowledgement in the run in progress."""
+        marks = self.mark_bar.marks
+        if marks is not None:
+            count = f"{len(alarms)} alarms" if len(alarms) > 1 else "1 alarm"
+            marks.remark(f"{count} acknowledged by {who[:80]}")
+
+    @Slot()
+    def draw(self) -> None:
+        """Draw a frame, if there is something new."""
+        live = self._live
+        now = None if live is None else live.now()
+        if live is None or now is None or self.view.shows_plan or not self.isVisible():
+            return
+        frame = (now.revision, self.plots.window, self.plots.look_at)
+        if frame == self._drawn:
+            return
+        self._drawn = frame
+        end = now.samples / now.rate
+        self.plots.draw(live, end)
+        names = [channel.name for channel in self._channels]
+        if self.plots.look_at is None:
+            self.channel_plots.draw(live, names, self.plots.window, end)
+        else:
+            first, last = self.plots.look_at
+            self.channel_plots.draw(live, names, last - first, last)
+
+    # what the operator chooses
+
+    @Slot()
+    def _chosen(self) -> None:
+        if self.view.shows_plan:
+            self.show_planned()
+        elif self._live is not None:
+            self.view.show_last()
+            self.plots.start()
+            self._show_channels(self._channels)
+            self.redraw()
+            self._frames.start()
+            now = self._live.now()
+            if now is not None:
+                self.show_numbers(now)
+
+    @Slot()
+    def _span_changed(self) -> None:
+        self.plots.window = self.view.span.currentData()
+        self.time_scroll.follow()
+        self.redraw()
+        self.draw()
+
+    @Slot(object)
+    def _scrolled(self, span: tuple[float, float] | None) -> None:
+        self.plots.look_at = span
+        self.redraw()
+        self.draw()
+
+    def _show_channels(self, channels: tuple[ChannelSettings, ...]) -> None:
+        self._channels = channels
+        self.channel_plots.show_channels(
+            [(c.shown, c.unit) for c in channels],
+            limits=[(c.limit_min, c.limit_max) for c in channels],
+        )
+
+    # layout
+
+    def _build(self) -> None:
+        above = QVBoxLayout()
+        above.setContentsMargins(0, 0, 0, 0)
+        above.setSpacing(SPACE // 2)
+        above.addWidget(self.view)
+        above.addWidget(self.plots, 1)
+        above.addWidget(self.channel_plots)
+        above.addWidget(self.time_scroll)
+        upper = QWidget()
+        upper.setLayout(above)
+        row = QHBoxLayout()
+        row.setSpacing(SPACE)
+        row.addWidget(self.mark_bar, 1)
+        row.addWidget(self.acknowledge)
+        below = QVBoxLayout()
+        below.setContentsMargins(0, 0, 0, 0)
+        below.setSpacing(SPACE // 2)
+        below.addLayout(row)
+        below.addWidget(self.table, 1)
+        lower = QWidget()
+        lower.setLayout(below)
+        self.split = QSplitter(Qt.Orientation.Vertical)
+        self.split.addWidget(upper)
+        self.split.addWidget(lower)
+        self.split.setStretchFactor(0, 1)
+        self.split.setStretchFactor(1, 0)
+        self.split.setChildrenCollapsible(False)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.split)
+        remember(self.split, self._session.settings, "run")
