@@ -6,7 +6,16 @@ import re
 from dataclasses import dataclass
 from types import MappingProxyType
 
-__all__ = ["SHOWN", "Shown", "parameter_unit", "readable"]
+__all__ = ["SHOWN", "Shown", "name_and_unit", "parameter_unit", "readable"]
+
+#: Unit at the end of a key, and the unit as it is printed.
+_KEY_UNITS = MappingProxyType({
+    "kV_per_s": "kV/s", "MV_per_m": "MV/m", "V_per_us": "V/µs", "V_per_kV": "V/kV",
+    "V_per_mA": "V/mA", "V_per_V": "V/V", "mm_per_V": "mm/V", "celsius_per_V": "°C/V",
+    "kg_m3": "kg/m³", "kV": "kV", "Hz": "Hz", "kHz": "kHz", "MHz": "MHz", "deg": "°", "mm": "mm",
+    "um": "µm", "us": "µs", "ms": "ms", "s": "s", "mA": "mA", "mV": "mV", "mK": "mK", "V": "V",
+    "g": "g", "J": "J", "MB": "MB", "ppm": "ppm", "celsius": "°C",
+})  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -61,3 +70,11 @@ def parameter_unit(unit: str) -> tuple[float, str]:
 def readable(text: str) -> str:
     """Return ``text`` with um written as the sign of the micrometre."""
     return re.sub(r"(?<=\d) um\b", " \N{MICRO SIGN}m", text)
+
+
+def name_and_unit(key: str) -> tuple[str, str]:
+    """Return the name and the unit in a key of a file: ``rest_length_mm`` is rest length in mm."""
+    for ending in sorted(_KEY_UNITS, key=len, reverse=True):
+        if key.endswith(f"_{ending}"):
+            return key.removesuffix(f"_{ending}").replace("_", " "), _KEY_UNITS[ending]
+    return key.replace("_", " "), ""

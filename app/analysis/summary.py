@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -13,67 +13,90 @@ import numpy as np
 from dearig.analysis.decimate import decimate
 from dearig.analysis.records import compare
 from dearig.config.modelfile import load_model
-from dearig.errors import DearigError, InputError
+from dearig.errors import DearigError
 from dearig.model.actuator import Actuator
 from dearig.model.film import Strip
 from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from dearig.model.measures import Errors
 from dearig.progress import Progress, quiet
 from dearig.recording.exporters import export_recording
-from dearig.recording.files import in_words
+from dearig.recording.index import Entry, glance
 from dearig.recording.reader import open_recording
 from dearig.recording.recording import RecordedEvent, Recording
 from dearig.recording.recover import recover
 from dearig.recording.summary import describe_rows
-from dearig.units import readable
+from dearig.units import name_and_unit, readable
 
 __all__ = [
-    "SUFFIXES",
+    "QUANTITIES",
+    "Assessment",
     "Curves",
     "Difference",
+    "Quantity",
     "RecordingSummary",
+    "assess",
     "curves",
     "differences",
     "export_file",
-    "recordings_in",
+    "how_it_ended",
+    "numbers",
+    "read_entries",
     "recover_file",
-    "summarise",
+    "summary_of",
 ]
 
-SUFFIXES = (".h5", ".hdf5", ".nxs")  #: of files that may be recordings
-
-_THUMBNAIL = 60  # columns of a thumbnail
 _COLUMNS = 20_000  # of a plot that can be zoomed into
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """Errors of a model against one recording.
+
+    ``unfit`` says why there are no ``errors``; ``noise`` is the noise floor in SI units, None where
+    it is unknown; ``fitted``: the model was fitted to this very recording, so its error proves
+    nothing.
+    """
+
+    path: Path
+    errors: Errors | None = None
+    noise: float | None = None
+    unfit: str = ""
+    fitted: bool = False
 
 
 @dataclass(frozen=True)
 class RecordingSummary:
     """Summary of one file of a folder; ``trouble`` says why the file cannot be read.
 
-    ``started`` is ISO time, ``duration`` in s. ``thumbnail`` are ``(time, signal)`` of a few points
-    in SI units. ``errors`` are against the model that was asked for, ``unfit`` says why there are
-    none; ``fitted``: the model was fitted to this very recording, so its error proves nothing.
+    ``name`` is its path in the folder without the ending. ``started`` is ISO time, ``duration`` in
+    s. ``peaks`` has the largest absolute value of each channel, with its sign, in SI units.
+    ``thumbnail`` are ``(time, signal)`` of a few points, scaled to 0 to 1. ``errors``, ``noise``,
+    ``unfit`` and ``fitted`` are those of the ``Assessment``, once it is there.
     """
 
     path: Path
     trouble: str = ""
+    name: str = ""
     kind: str = ""
     title: str = ""
     film: str = ""
     operator: str = ""
     rig: str = ""
     notes: str = ""
+    identifier: str = ""
     started: str = ""
     duration: float = 0.0
     samples: int = 0
     complete: bool = True
     outcome: str = ""
     events: tuple[RecordedEvent, ...] = ()
-    noise: float | None = None
+    peaks: Mapping[str, float] = field(default_factory=dict)
+    tags: tuple[str, ...] = ()
     thumbnail: tuple[np.ndarray, np.ndarray] = field(
         default_factory=lambda: (np.empty(0), np.empty(0))
     )
     errors: Errors | None = None
+    noise: float | None = None
     unfit: str = ""
     fitted: bool = False
 
@@ -104,39 +127,171 @@ class Curves:
 
 @dataclass(frozen=True)
 class Difference:
-    """A condition in which recordings differ, with its value in each."""
+    """A condition in which recordings differ, with its value in each.
 
+    ``group`` is what it belongs to (Run, Sample, Instruments, Sequence, Rig file); ``what`` has the
+    unit of the values in brackets.
+    """
+
+    group: str
     what: str
     values: tuple[str, ...]
 
 
-def recordings_in(folder: Path) -> dict[Path, tuple[float, int]]:
-    """Return the files in ``folder`` that may be recordings, with time of last change and size.
+def read_entries(
+    folder: Path, names: Sequence[str], progress: Progress = quiet
+) -> tuple[Entry, ...]:
+    """Return the index entries of the files ``names`` in ``folder``.
 
-    Raises ``InputError`` where the folder cannot be read.
+    It never raises: a file that cannot be read has an entry with the reason.
     """
-    found = {}
+    entries = []
+    for i, name in enumerate(names):
+        path = folder / name
+        try:
+            size = path.stat().st_size
+        except OSError:
+            size = 0  # the entry says what is wrong
+        entries.append(glance(path, name, size))
+        progress(name, (i + 1) / len(names))
+    return tuple(entries)
+
+
+def summary_of(folder: Path, entry: Entry) -> RecordingSummary:
+    """Return the summary of the file of ``entry``, without errors of a model."""
+    path = folder / entry.path
+    return RecordingSummary(
+        path=path,
+        trouble=entry.trouble,
+        name=str(PurePosixPath(entry.path).with_suffix("")),
+        kind=entry.kind,
+        title=entry.title,
+        film=entry.film_id,
+        operator=entry.operator,
+        rig=entry.rig,
+        notes=entry.notes,
+        identifier=entry.identifier,
+        started=entry.start_time,
+        duration=entry.duration_s or 0.0,
+        samples=entry.samples,
+        complete=entry.complete,
+        outcome=entry.outcome,
+        events=tuple(
+            RecordedEvent(0, float(time), str(level), str(message))
+            for time, level, message in entry.events
+        ),
+        peaks=entry.peaks,
+        thumbnail=_thumbnail(entry.outline),
+    )
+
+
+def _thumbnail(outline: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points of a line through the bins of ``outline``, least and greatest in turn."""
     try:
-        for path in folder.iterdir():
-            if path.suffix.lower() in SUFFIXES and path.is_file():
-                about = path.stat()
-                found[path] = (about.st_mtime, about.st_size)
-    except OSError as error:
-        raise InputError(f"{folder} cannot be read: {in_words(error)}") from error
-    return found
+        values = np.frombuffer(bytes.fromhex(outline), dtype=np.uint8) / 255.0
+    except ValueError:  # a cache that was edited by hand
+        values = np.empty(0)
+    if values.size < 4 or values.size % 2:
+        return np.empty(0), np.empty(0)
+    pairs = values.reshape(-1, 2).copy()
+    # in the order of the slope, so that a slope is drawn as one line and not as teeth
+    middle = pairs.mean(axis=1)
+    falling = np.gradient(middle) < 0.0
+    pairs[falling] = pairs[falling, ::-1]
+    return np.linspace(0.0, 1.0, values.size), pairs.reshape(-1)
 
 
-def summarise(
+def how_it_ended(summary: RecordingSummary) -> tuple[str, str]:
+    """Return how serious the end of a run is (fault, warning or ""), and the end in a few words."""
+    if summary.trouble:
+        reason = summary.trouble.removeprefix(str(summary.path)).lstrip(" :")
+        return "fault", reason.partition(";")[0].partition(", as recordings are")[0]
+    levels = {event.level for event in summary.events}
+    level = next((known for known in ("fault", "warning") if known in levels), "")
+    if not summary.complete:
+        words = summary.outcome
+        return level or "warning", words if "killed" in words else f"incomplete: {words}"
+    count = sum(event.level != "info" for event in summary.events)
+    words = summary.outcome or "finished"
+    if words != "finished" and not level:
+        level = "warning"
+    if count and words == "finished":
+        words = f"finished, {count} event{'' if count == 1 else 's'}"
+    return level, words
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of a recording that can be a column or a trend: ``label`` with its unit."""
+
+    key: str
+    label: str
+    tip: str
+
+
+#: The numbers of a summary, in the units in which they are shown.
+QUANTITIES = (
+    Quantity("rms_um", "RMS error (µm)", "RMS error of the chosen model"),
+    Quantity("over_noise", "RMS error / noise", "RMS error over the noise floor; 1 is the best"),
+    Quantity("nrmse_pct", "NRMSE (%)", "RMS error in % of the measured range"),
+    Quantity("max_um", "Largest error (µm)", "Largest error of the chosen model"),
+    Quantity("noise_um", "Noise floor (µm)", "Noise of the displacement at 0 V"),
+    Quantity("peak_kV", "Peak voltage (kV)", "Largest commanded voltage"),
+    Quantity("monitor_kV", "Peak monitor voltage (kV)", "Largest voltage that was measured"),
+    Quantity("peak_mm", "Peak displacement (mm)", "Largest displacement"),
+    Quantity("mm_per_kV2", "Displacement / voltage² (mm/kV²)", "Peak values; a soft film has more"),
+    Quantity("current_mA", "Peak current (mA)", "Largest current that was measured"),
+    Quantity("temperature_C", "Peak temperature (°C)", "Largest temperature"),
+    Quantity("stress_kPa", "Peak stress (kPa)", "Largest nominal stress of a film"),
+    Quantity("duration_s", "Duration (s)", "Duration of the run"),
+    Quantity("events", "Events", "Events that are warnings or faults"),
+)
+
+
+def numbers(summary: RecordingSummary) -> dict[str, float]:
+    """Return the numbers of a recording by the keys of ``QUANTITIES``; unknown ones are missing."""
+    if summary.trouble:
+        return {}
+    found = {
+        "duration_s": summary.duration,
+        "events": float(sum(event.level != "info" for event in summary.events)),
+    }
+    for key, channel, factor in (
+        ("peak_kV", "voltage_command", 1e-3),
+        ("monitor_kV", "voltage_monitor", 1e-3),
+        ("peak_mm", "displacement", 1e3),
+        ("current_mA", "current_monitor", 1e3),
+        ("temperature_C", "temperature", 1.0),
+        ("stress_kPa", "nominal_stress", 1e-3),
+    ):
+        if channel in summary.peaks:
+            found[key] = summary.peaks[channel] * factor
+    if found.get("peak_kV") and "peak_mm" in found:
+        found["mm_per_kV2"] = found["peak_mm"] / found["peak_kV"] ** 2
+    actuator = summary.kind == "actuator"
+    if summary.errors is not None:
+        found["nrmse_pct"] = summary.errors.nrmse_pct
+        if actuator:
+            found |= {"rms_um": summary.errors.rms * 1e6, "max_um": summary.errors.max * 1e6}
+        if summary.noise:
+            found["over_noise"] = summary.errors.rms / summary.noise
+    if summary.noise is not None and actuator:
+        found["noise_um"] = summary.noise * 1e6
+    return {key: value for key, value in found.items() if np.isfinite(value)}
+
+
+def assess(
     path: Path, model: Path | None, drive: str = "command", progress: Progress = quiet
-) -> RecordingSummary:
-    """Summarise the file at ``path`` with its errors against ``model`` (None is the thesis's).
+) -> Assessment:
+    """Compare the recording at ``path`` with ``model`` (None is the thesis's).
 
-    It never raises: a file that cannot be read is listed with the reason.
+    It never raises: ``unfit`` says why there are no errors.
     """
     try:
         recording = open_recording(path)
+        noise = recording.noise_floor
     except DearigError as error:
-        return RecordingSummary(path, trouble=str(error))
+        return Assessment(path, unfit=str(error))
     errors, fitted, unfit = None, False, ""
     try:
         chosen, of_these = _model(model, recording)
@@ -145,27 +300,7 @@ def summarise(
     except DearigError as error:
         unfit = str(error)
     progress(recording.name, 1.0)
-    about = recording.provenance
-    return RecordingSummary(
-        path=path,
-        kind=recording.kind,
-        title=recording.title,
-        film=recording.film_id,
-        operator=str(about.get("operator", "")),
-        rig=str(about.get("rig", "")),
-        notes=recording.notes,
-        started=str(about.get("start_time", "")),
-        duration=recording.duration,
-        samples=recording.samples,
-        complete=recording.complete,
-        outcome=recording.outcome,
-        events=recording.events,
-        noise=recording.noise_floor,
-        thumbnail=_short(recording.time, recording.signal, _THUMBNAIL),
-        errors=errors,
-        unfit=unfit,
-        fitted=fitted,
-    )
+    return Assessment(path, errors, noise, unfit, fitted)
 
 
 def curves(
@@ -215,12 +350,13 @@ def differences(paths: Sequence[Path], progress: Progress = quiet) -> tuple[Diff
 
     Raises ``InputError`` where one cannot be read.
     """
-    told: list[dict[str, str]] = []
+    told: list[dict[tuple[str, str], str]] = []
     for i, path in enumerate(paths):
         told.append(_conditions(open_recording(path)))
         progress(path.stem, (i + 1) / len(paths))
     names = dict.fromkeys(name for conditions in told for name in conditions)
-    rows = (Difference(name, tuple(c.get(name, "") for c in told)) for name in names)
+    rows = [Difference(*name, tuple(c.get(name, "") for c in told)) for name in names]
+    rows.sort(key=lambda row: GROUPS.index(row.group))
     return tuple(row for row in rows if len(set(row.values)) > 1)
 
 
@@ -265,38 +401,61 @@ _RESULTS = (
 )
 
 
-def _conditions(recording: Recording) -> dict[str, str]:
-    """Return the conditions of a recording: sample, instruments, settings, sequence."""
-    rows = describe_rows(recording)
-    found = {what: value for what, value in rows if what not in _RESULTS and " at " not in what}
-    if "start time" in found:  # two words, so that a narrow column can break it
-        found["start time"] = found["start time"][:19].replace("T", " ")
-    found |= {"sequence": recording.title, "events": str(len(recording.events))}
-    for what, text in (
-        ("rig file", str(recording.provenance.get("configuration", ""))),
-        ("sequence", recording.sequence_toml),
+#: Groups of conditions, in the order in which they are shown.
+GROUPS = ("Run", "Sample", "Sequence", "Rig file", "Instruments")
+_SAMPLE = ("film", "load", "kinematics", "notes")
+
+
+def _conditions(recording: Recording) -> dict[tuple[str, str], str]:
+    """Return the conditions of a recording by group and name."""
+    instruments = {instrument.role for instrument in recording.instruments}
+    found: dict[tuple[str, str], str] = {}
+    for what, value in describe_rows(recording):
+        if what in _RESULTS or " at " in what or what in recording.declared.values():
+            continue
+        group = "Instruments" if what in instruments else "Sample" if what in _SAMPLE else "Run"
+        # without the offset from UTC, which is the same for all
+        found[group, what] = value[:19] if what == "start time" else readable(value)
+    found["Run", "events"] = str(len(recording.events))
+    found["Sequence", "name"] = recording.title
+    for group, text in (
+        ("Rig file", str(recording.provenance.get("configuration", ""))),
+        ("Sequence", recording.sequence_toml),
     ):
-        found |= {f"{what}: {key}": value for key, value in _flat(text).items()}
+        for key, value in _flat(text).items():
+            found.setdefault((group, key), value)
     return found
 
 
 def _flat(toml: str) -> dict[str, str]:
-    """Return the keys of a TOML text with their values, as ``segment 2.to_kV``."""
+    """Return the keys of a TOML text in words, with their values: ``segment 2: amplitude (kV)``."""
     try:
         data = tomllib.loads(toml)
     except tomllib.TOMLDecodeError:
         return {}  # text that is not TOML has no keys to compare
     found: dict[str, str] = {}
 
-    def visit(value: Any, place: str) -> None:
+    def visit(value: Any, place: str, key: str) -> None:
+        inside = f"{place}, {key}" if place and key else place or key
         if isinstance(value, Mapping):
-            for key, inner in value.items():
-                visit(inner, f"{place}.{key}" if place else str(key))
+            for inner_key, inner in value.items():
+                visit(inner, inside, str(inner_key))
         elif isinstance(value, list) and value and isinstance(value[0], Mapping):
             for i, inner in enumerate(value):
-                visit(inner, f"{place} {i + 1}")
+                visit(inner, place, f"{key} {i + 1}")
         else:
-            found[place] = str(value)
+            name, unit = name_and_unit(key)
+            label = f"{name} ({unit})" if unit else name
+            found[f"{place}: {label}" if place else label] = _shown(value)
 
-    visit(data, "")
+    visit(data, "", "")
     return found
+
+
+def _shown(value: Any) -> str:
+    """Return a value of a TOML file for people."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        return "; ".join(_shown(item) for item in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -282,4 +282,6 @@ def index_(
     if json != "-":
         print_lines(console_for(), lines(found))
     listed = [asdict(entry) for entry in found]
+    for entry in listed:
+        del entry["outline"]  # a thumbnail for the window
     write_result({"format": "dearig-index/1", "folder": str(folder), "recordings": listed}, json)

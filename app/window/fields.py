@@ -12,18 +12,9 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from dearig.config.toml_input import allowed
+from dearig.units import name_and_unit
 
 __all__ = ["FormField", "form_fields", "shown_value", "typed_value"]
-
-# unit at the end of a key -> unit as it is printed
-_UNITS = {
-    "kV_per_s": "kV/s", "MV_per_m": "MV/m", "V_per_us": "V/µs", "V_per_kV": "V/kV",
-    "V_per_mA": "V/mA", "V_per_V": "V/V", "mm_per_V": "mm/V", "celsius_per_V": "°C/V",
-    "kg_m3": "kg/m³", "kV": "kV", "Hz": "Hz", "kHz": "kHz", "MHz": "MHz", "deg": "°", "mm": "mm",
-    "um": "µm", "us": "µs", "ms": "ms", "s": "s", "mA": "mA", "mV": "mV", "mK": "mK", "V": "V",
-    "g": "g", "J": "J", "MB": "MB", "ppm": "ppm", "celsius": "°C",
-}  # fmt: skip
-
 
 #: Between the numbers of a list: semicolons, spaces, and commas that are not between digits.
 _SEPARATOR = re.compile(r"[;\s]|(?<![0-9]),|,(?![0-9])")
@@ -61,11 +52,7 @@ def form_fields(table: type[BaseModel], leave_out: tuple[str, ...] = ()) -> Iter
 
 
 def _field(key: str, info: FieldInfo) -> FormField:
-    name, unit = key, ""
-    for ending in sorted(_UNITS, key=len, reverse=True):
-        if key.endswith(f"_{ending}"):
-            name, unit = key.removesuffix(f"_{ending}"), _UNITS[ending]
-            break
+    name, unit = name_and_unit(key)
     kind = _bare(info.annotation)
     choices: tuple[Any, ...] = ()
     words = {float: "number", int: "whole", str: "text"}.get(kind, "text")
@@ -75,7 +62,7 @@ def _field(key: str, info: FieldInfo) -> FormField:
         words = "numbers"
     default = None if info.is_required() else info.get_default(call_default_factory=True)
     return FormField(
-        key, name.replace("_", " "), unit, info.description or "", allowed(info), words, choices,
+        key, name, unit, info.description or "", allowed(info), words, choices,
         default,
     )  # fmt: skip
 

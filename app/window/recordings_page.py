@@ -4,29 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import (
-    QItemSelection,
-    QItemSelectionModel,
-    QModelIndex,
-    QSortFilterProxyModel,
-    Qt,
-    QTimer,
-    Signal,
-    Slot,
-)
+from PySide6.QtCore import Qt, QTimer, Signal, Slot
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QCheckBox,
     QComboBox,
     QFileDialog,
     QHBoxLayout,
-    QHeaderView,
     QLabel,
     QLineEdit,
     QMenu,
     QSplitter,
-    QTableView,
     QTabWidget,
     QVBoxLayout,
     QWidget,
@@ -40,18 +28,23 @@ from dearig.analysis.summary import (
     export_file,
     recover_file,
 )
+from dearig.errors import InputError
 from dearig.recording.exporters import EXPORTS
+from dearig.recording.tags import clean_tags
 from dearig.report.numbers import significant
 from dearig.report.tables import Row, Table
 from dearig.units import SHOWN
+from dearig.window.conditions_table import ConditionsTable
 from dearig.window.curves_plot import CurvesPlot
-from dearig.window.folder_table import COLUMNS, PATH, SORT, FolderModel, ThumbnailDelegate
+from dearig.window.folder_table import FolderModel
 from dearig.window.layout_state import remember
 from dearig.window.library import shared_library
+from dearig.window.recordings_table import RecordingsTable
 from dearig.window.report_table import ReportTable, two_columns
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
-from dearig.window.widgets import Message, button, label, plain_tip
+from dearig.window.trend_plot import TrendPlot
+from dearig.window.widgets import Message, button, label, menu_button, plain_tip
 from dearig.window.worker import Job
 
 __all__ = ["RecordingsPage"]
@@ -84,6 +77,8 @@ class RecordingsPage(QWidget):
         self._choose = QTimer(self, singleShot=True, interval=_CHOOSE_MS)
         self._choose.timeout.connect(self._show_chosen)
 
+        self._shown: tuple[object, ...] = ()  # what was asked for last
+        self.folder_message = Message()  # of the folder; the other one is of what is selected
         self.message = Message()
         self._build()
         self._connect()
@@ -94,11 +89,11 @@ class RecordingsPage(QWidget):
 
     def _build(self) -> None:
         self.files = FolderModel(self._session)
-        self._rows = _FilteredRows(self)
-        self._rows.setSourceModel(self.files)
-        self.table = _table(self._rows, self._session)
+        self.table = RecordingsTable(self.files, self._session)
         self.plot = CurvesPlot(self._session)
-        self.details, self.events, self.differences = (ReportTable(words=True) for _ in range(3))
+        self.trend = TrendPlot(self._session)
+        self.details, self.events = (ReportTable(words=True) for _ in range(2))
+        self.differences = ConditionsTable()
         self.side_tabs = QTabWidget()
         self.side_tabs.addTab(self.details, "Details")
         self.side_tabs.addTab(self.events, "Events")
@@ -109,16 +104,21 @@ class RecordingsPage(QWidget):
         self.columns.addWidget(self.plot)
         self.columns.addWidget(self.side_tabs)
         self.columns.setChildrenCollapsible(False)
+        self.views = QTabWidget()
+        self.views.addTab(self.columns, "Curves")
+        self.views.addTab(self.trend, "Trend")
+        self.views.setTabToolTip(1, "A number of all listed recordings over time")
+        self.views.currentChanged.connect(self._view_changed)
         below = QWidget()
         inner = QVBoxLayout(below)
         inner.setContentsMargins(0, 0, 0, 0)
         inner.addLayout(self._tools())
-        inner.addWidget(self.columns, 1)
+        inner.addWidget(self.views, 1)
         self.splitter = QSplitter(Qt.Orientation.Vertical)
         self.splitter.addWidget(self.table)
         self.splitter.addWidget(below)
         self.splitter.setChildrenCollapsible(False)
-        self.reset_layout()
+        self._default_sizes()
         remember(self.splitter, self._session.settings, "recordings/rows")
         remember(self.columns, self._session.settings, "recordings/columns")
 
@@ -126,15 +126,19 @@ class RecordingsPage(QWidget):
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
         outer.setSpacing(SPACE)
         outer.addLayout(self._top_row())
+        outer.addWidget(self.folder_message)
         outer.addWidget(self.message)
         outer.addWidget(self.splitter, 1)
 
     def _connect(self) -> None:
-        self.table.selectionModel().selectionChanged.connect(self._selected)
-        self.filter.textChanged.connect(self._rows.find)
+        self.table.chosen_changed.connect(self._selected)
+        self.table.verticalScrollBar().valueChanged.connect(self._prefer_visible)
+        self.filter.textChanged.connect(self._find)
+        self.files.arranged.connect(self._rows_changed)
+        self.trend.picked.connect(self._pick)
         self._library.listed.connect(self._listed)
         self._library.summarised.connect(self._summarised)
-        self._library.trouble.connect(self.message.show_text)
+        self._library.trouble.connect(self.folder_message.show_text)
         self._library.busy.connect(self._busy)
         self._session.folder_changed.connect(self._name_folder)
         self._session.overlays_changed.connect(self._list_models)
@@ -142,9 +146,12 @@ class RecordingsPage(QWidget):
     def _top_row(self) -> QHBoxLayout:
         self.folder_button = button("", "")
         self.folder_button.clicked.connect(self._ask_folder)
-        self.filter = QLineEdit(placeholderText="Search name, sequence, film, operator and notes")
+        self.filter = QLineEdit(placeholderText="Search in all columns")
         self.filter.setClearButtonEnabled(True)
-        self.filter.setToolTip("Show only recordings with all of these words (Ctrl+F)")
+        self.filter.setToolTip(
+            "Show only recordings with all of these words in any column, also in one that is not "
+            "shown, and in their notes (Ctrl+F)"
+        )
         find = QAction(self)
         find.setShortcut(QKeySequence(QKeySequence.StandardKey.Find))
         find.triggered.connect(self.filter.setFocus)
@@ -155,12 +162,19 @@ class RecordingsPage(QWidget):
         compare_label = QLabel("&Compare with")
         compare_label.setBuddy(self.model_box)
         self.count = label("", "muted")
+        self.subfolders = QCheckBox("Su&bfolders")
+        self.subfolders.setChecked(self._library.deep)
+        self.subfolders.setToolTip("List the recordings in subfolders too")
+        self.subfolders.toggled.connect(self._library.set_deep)
+        columns = menu_button("Columns", "Choose the columns of the table", self.table.columns_menu)
         row = QHBoxLayout()
         row.addWidget(self.folder_button)
+        row.addWidget(self.subfolders)
         row.addWidget(self.filter, 1)
+        row.addWidget(self.count)
+        row.addWidget(columns)
         row.addWidget(compare_label)
         row.addWidget(self.model_box)
-        row.addWidget(self.count)
         return row
 
     def _tools(self) -> QHBoxLayout:
@@ -183,7 +197,21 @@ class RecordingsPage(QWidget):
         tools = QHBoxLayout()
         for made in (self.export_button, self.recover_button, self.sequence_button):
             tools.addWidget(made)
-        tools.addStretch(1)
+        self.tags = QLineEdit(placeholderText="good, new grease")
+        self.tags.setToolTip(
+            "Tags of the selected recordings, separated by commas; of several, those that all have "
+            "(Ctrl+T). They are kept in dearig-tags.json beside the recordings, which stay as they "
+            "are"
+        )
+        self.tags.editingFinished.connect(self._tags_typed)
+        tag_key = QAction(self)
+        tag_key.setShortcut(QKeySequence("Ctrl+T"))
+        tag_key.triggered.connect(self.tags.setFocus)
+        self.addAction(tag_key)
+        tags_label = QLabel("Ta&gs")
+        tags_label.setBuddy(self.tags)
+        tools.addWidget(tags_label)
+        tools.addWidget(self.tags, 1)
         self.model_shown = QCheckBox("&Model and residual")
         self.model_shown.setChecked(True)
         self.model_shown.setToolTip("Plot the model and its residual")
@@ -196,7 +224,11 @@ class RecordingsPage(QWidget):
 
     @Slot()
     def reset_layout(self) -> None:
-        """Give every part its default size."""
+        """Give every part its default size, and show the columns of the first start."""
+        self._default_sizes()
+        self.table.reset_columns()
+
+    def _default_sizes(self) -> None:
         self.splitter.setSizes([252, 438])
         self.columns.setSizes([760, 420])
 
@@ -210,19 +242,14 @@ class RecordingsPage(QWidget):
 
     def chosen(self) -> list[Path]:
         """Return the selected recordings, in the order of the table."""
-        rows = sorted(self.table.selectionModel().selectedRows(), key=QModelIndex.row)
-        return [row.data(PATH) for row in rows]
+        return self.table.chosen
 
     def choose(self, paths: list[Path]) -> None:
         """Select the rows of ``paths``; files that are not listed yet are selected later."""
         self._to_choose = [path for path in paths if path not in self._library.files]
-        selection = QItemSelection()
-        for row in range(self._rows.rowCount()):
-            index = self._rows.index(row, 0)
-            if index.data(PATH) in paths:
-                selection.select(index, self._rows.index(row, len(COLUMNS) - 1))
-        flags = QItemSelectionModel.SelectionFlag
-        self.table.selectionModel().select(selection, flags.ClearAndSelect | flags.Rows)
+        self.table.choose(paths)
+        if self.table.chosen:
+            self.table.scrollTo(self.table.currentIndex())
 
     @Slot()
     def _selected(self) -> None:
@@ -231,6 +258,12 @@ class RecordingsPage(QWidget):
     @Slot()
     def _show_chosen(self) -> None:
         chosen = self.chosen()
+        self._show_tags(chosen)
+        self.trend.show_chosen(chosen)
+        asked = (*chosen, self._library.model, *map(self._changed_at, chosen))
+        if asked == self._shown:
+            return  # the rows have only moved
+        self._shown = asked
         self.export_button.setEnabled(bool(chosen))
         self.recover_button.setEnabled(any(self._incomplete(path) for path in chosen))
         self.sequence_button.setEnabled(False)
@@ -265,9 +298,12 @@ class RecordingsPage(QWidget):
         if self._differing is not None:
             self._differing.cancel()
             self._differing = None
-        self.differences.show_table(Table("", (), ()))
+        self.differences.show_differences((), ())
         self.side_tabs.setTabText(2, "Differences")
-        if len(readable) > 1:
+        if len(readable) < 2:
+            if self.side_tabs.currentWidget() is self.differences:
+                self.side_tabs.setCurrentWidget(self.details)
+        else:
             of = self._round
             self._differing = self._library.submit(differences, readable)
             self._differing.finished.connect(
@@ -280,7 +316,7 @@ class RecordingsPage(QWidget):
 
     def _incomplete(self, path: Path) -> bool:
         summary = self._library.summaries.get(path)
-        return summary is not None and not summary.complete
+        return summary is not None and not summary.complete and not summary.trouble
 
     def _take_curves(self, found: Curves, of: int) -> None:
         if of != self._round:
@@ -325,9 +361,8 @@ class RecordingsPage(QWidget):
     def _show_differences(self, paths: list[Path], rows: tuple[Difference, ...], of: int) -> None:
         if of != self._round:
             return
-        head = (("Condition", ""), *((path.stem, "") for path in paths))
-        cells = tuple(Row((row.what, *row.values)) for row in rows)
-        self.differences.show_table(Table("", head, cells))
+        names = [s.name if (s := self._library.summaries.get(p)) else p.stem for p in paths]
+        self.differences.show_differences(names, rows)
         self.side_tabs.setTabText(2, f"Differences ({len(rows)})")
         self.side_tabs.setCurrentIndex(2)
 
@@ -420,7 +455,6 @@ class RecordingsPage(QWidget):
     def compare_with(self, model: Path | None) -> None:
         """Compare all recordings with the model file ``model``; None is the thesis model."""
         if model != self._library.model:
-            self.files.clear_errors()
             self._library.set_model(model)
             self._show_chosen()
         self._list_models()
@@ -430,23 +464,113 @@ class RecordingsPage(QWidget):
         self.files.set_files(self._library.files, self._library.summaries)
         if self._to_choose and all(path in self._library.files for path in self._to_choose):
             self.choose(self._to_choose)
+        self._choose_first()
+        self._show_count()
+        self._show_trend()
+        self._prefer_visible()
         if not self._library.files:
-            self.count.setText("no recordings yet")
+            self._choose.start()  # nothing of the previous folder stays
 
     @Slot(Path)
     def _summarised(self, path: Path) -> None:
         self.files.set_summary(self._library.summaries[path])
-        if not self.chosen() and self._rows.rowCount():
-            # show the first row, which is the newest recording unless sorted otherwise
-            self.choose([self._rows.index(0, 0).data(PATH)])
+        self._choose_first()
         if path in self.chosen() and path not in [c.path for c in self.plot.shown]:
+            self._shown = ()
             self._choose.start()  # it could not be read before, or has changed
+
+    def _choose_first(self) -> None:
+        """Select the first row, the newest recording unless sorted otherwise, if none is."""
+        if not self.chosen() and self.files.rowCount() and not self._to_choose:
+            path = self.files.path_at(0)
+            if path in self._library.summaries:
+                self.choose([path])
+
+    def _changed_at(self, path: Path) -> object:
+        return self._library.files.get(path)
+
+    @Slot(str)
+    def _find(self, text: str) -> None:
+        self.files.find(text)
+        self._show_count()
+
+    @Slot()
+    def _rows_changed(self) -> None:
+        self._show_count()
+        self._show_trend()
+        self._prefer_visible()
+
+    @Slot()
+    def _prefer_visible(self) -> None:
+        self._library.prefer([*self.chosen(), *self.table.visible_paths()])
 
     @Slot(int)
     def _busy(self, left: int) -> None:
-        count = len(self._library.files)
-        words = f"{count} recording{'' if count == 1 else 's'}"
-        self.count.setText(f"{words}, {left} still to read" if left else words)
+        self._show_count()
+        if not left:
+            self._show_trend()
+
+    def _show_count(self) -> None:
+        shown, total = self.files.rowCount(), len(self._library.files)
+        words = "no recordings yet"
+        if total:
+            words = f"{total} recording{'' if total == 1 else 's'}"
+            if self.filter.text().strip():
+                words = f"{shown} of {words}"
+            if self._library.left:
+                words += f", {self._library.left} to read"
+        self.count.setText(words)
+
+    @Slot(int)
+    def _view_changed(self, _: int) -> None:
+        curves = self.views.currentWidget() is self.columns
+        self.model_shown.setVisible(curves)
+        self.whole.setVisible(curves)
+        self._show_trend()
+
+    def _show_trend(self) -> None:
+        if self.views.currentWidget() is self.trend:
+            self.trend.show_summaries(self.files.shown)
+            self.trend.show_chosen(self.chosen())
+
+    @Slot(Path)
+    def _pick(self, path: Path) -> None:
+        self.choose([path])
+
+    # tags
+
+    def _common_tags(self, paths: list[Path]) -> tuple[str, ...]:
+        """Return the tags that all of ``paths`` have."""
+        known = [s.tags for path in paths if (s := self._library.summaries.get(path))]
+        return tuple(t for t in known[0] if all(t in tags for tags in known)) if known else ()
+
+    def _show_tags(self, chosen: list[Path]) -> None:
+        self.tags.setEnabled(bool(chosen))
+        if not self.tags.hasFocus():
+            self.tags.setText(", ".join(self._common_tags(chosen)))
+
+    @Slot()
+    def _tags_typed(self) -> None:
+        """Give the typed tags to the selected recordings; tags that only some have stay."""
+        chosen = self.chosen()
+        try:
+            typed = clean_tags(self.tags.text())
+        except InputError as error:
+            self.message.show_text(str(error))
+            return
+        common = self._common_tags(chosen)
+        if typed == common or not chosen:
+            return
+        fresh = {}
+        for path in chosen:
+            summary = self._library.summaries.get(path)
+            before = () if summary is None else summary.tags
+            own = tuple(tag for tag in before if tag not in common and tag not in typed)
+            fresh[path] = (*typed, *own)
+        try:
+            self._library.set_tags(fresh)
+        except InputError as error:
+            self.message.show_text(str(error))
 
 
 def _rms(curves: Curves) -> str:
@@ -454,53 +578,3 @@ def _rms(curves: Curves) -> str:
         return curves.unfit
     shown = SHOWN[curves.kind]
     return f"{significant(curves.errors.rms * shown.error_factor)} {shown.error_unit} RMS"
-
-
-class _FilteredRows(QSortFilterProxyModel):
-    """Rows that contain all search words."""
-
-    def __init__(self, parent: QWidget) -> None:
-        super().__init__(parent)
-        self._words: list[str] = []
-        self.setSortRole(SORT)
-
-    @Slot(str)
-    def find(self, text: str) -> None:
-        """Keep the rows that contain all words of ``text``."""
-        self.beginFilterChange()
-        self._words = text.casefold().split()
-        self.endFilterChange()
-
-    def filterAcceptsRow(self, row: int, parent: QModelIndex) -> bool:  # type: ignore[override]  # noqa: N802
-        if not self._words:
-            return True
-        model = self.sourceModel()
-        cells = [str(model.index(row, column, parent).data() or "") for column in range(1, 5)]
-        tip = str(model.index(row, 1, parent).data(Qt.ItemDataRole.ToolTipRole) or "")
-        text = " ".join([*cells, tip]).casefold()
-        return all(word in text for word in self._words)
-
-
-def _table(model: QSortFilterProxyModel, session: Session) -> QTableView:
-    table = QTableView()
-    table.setModel(model)
-    table.setAccessibleName("Recordings of the folder")
-    table.setSortingEnabled(True)
-    table.sortByColumn(4, Qt.SortOrder.DescendingOrder)
-    table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-    table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
-    table.setAlternatingRowColors(True)
-    table.setShowGrid(False)
-    table.setTabKeyNavigation(False)
-    table.setWordWrap(False)
-    table.setItemDelegateForColumn(0, ThumbnailDelegate(session))
-    table.verticalHeader().hide()
-    table.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-    table.verticalHeader().setDefaultSectionSize(32)
-    header = table.horizontalHeader()
-    header.setHighlightSections(False)
-    for column, width in enumerate((88, 170, 170, 120, 126, 64, 84, 74, 84, 110)):
-        table.setColumnWidth(column, width)
-    for column in (1, 2):
-        header.setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
-    return table

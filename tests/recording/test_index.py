@@ -7,6 +7,8 @@ import os
 import shutil
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
 
 from dearig.drivers.rig import Block
@@ -14,7 +16,7 @@ from dearig.errors import InputError
 from dearig.model.trusted_folder import CacheFolder
 from dearig.recording import RunMetadata, save_recording
 from dearig.recording import index as index_module
-from dearig.recording.index import Entry, index_folder, lines
+from dearig.recording.index import OUTLINE, Entry, index_folder, lines
 from dearig.recording.timestamps import local_time
 from tests.recording.test_reader import film_values
 from tests.tools.command import dearig
@@ -48,6 +50,14 @@ def test_what_lies_in_a_folder(shelf: Path, tmp_path: Path) -> None:
     )  # fmt: skip
     assert (run.complete, run.rig, run.film_id, run.operator) == (True, "sim:7", "film 3", "Ada")
     assert run.start_time.startswith("2027-01-15T08:00:00")
+    with h5py.File(shelf / run.path) as file:
+        data = file["entry/data"]
+        for name in ("voltage_command", "displacement"):
+            values = data[name][()]
+            assert run.peaks[name] == pytest.approx(values[np.argmax(np.abs(values))], rel=1e-9)
+    assert (run.notes, run.identifier != "") == ("second day", True)
+    assert len(run.outline) == 4 * OUTLINE
+    assert set(found["film.h5"].peaks) == {"stretch", "nominal_stress"}
     assert run.bytes == (shelf / run.path).stat().st_size
     assert (found["film.h5"].kind, found["film.h5"].samples) == ("film", 200)
     assert found["film.h5"].duration_s == pytest.approx(10.0**1.5)
@@ -111,8 +121,8 @@ def test_the_command(shelf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     told = dearig("index", shelf).out.splitlines()
     assert told[0].startswith("not read")
     assert told[2] == (
-        f"{local_time('2027-01-15T08:00:00+00:00')}     2.999 s  day 1/run.h5: two lobes, sim:7, "
-        f"film 3, Ada"
+        f"{local_time('2027-01-15T08:00:00+00:00')}     2.999 s  day 1/run.h5: two lobes, "
+        f"6.1 kV, 11 mm, sim:7, film 3, Ada"
     )
     assert told[3].endswith("INCOMPLETE: killed, or still running")
     assert dearig("index", tmp_path / "no").code == 2

@@ -39,7 +39,11 @@ def open_page(session: Session, keep: Keep, qtbot: QtBot) -> RecordingsPage:
 def looked_at(page: RecordingsPage, qtbot: QtBot) -> None:
     library = page._library
     qtbot.waitUntil(
-        lambda: bool(library.files) and set(library.summaries) == set(library.files),
+        lambda: (
+            bool(library.files)
+            and set(library.summaries) == set(library.files)
+            and not library.left
+        ),
         timeout=_PATIENCE,
     )
 
@@ -51,7 +55,7 @@ def drawn(page: RecordingsPage, qtbot: QtBot, *names: str) -> None:
 
 def cells(page: RecordingsPage, column: str) -> dict[str, str]:
     """Name of every row to its text in ``column``."""
-    at, model = [name for name, _ in COLUMNS].index(column), page.table.model()
+    at, model = [c.head for c in COLUMNS].index(column), page.table.model()
     return {
         model.index(row, 1).data(): model.index(row, at).data() for row in range(model.rowCount())
     }
@@ -84,18 +88,21 @@ def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
     # what is there, with something drawn at once
     assert cells(page, "Sequence") == {"low": "lobes of 4.0 kV", "high": "lobes of 6.0 kV"}
     assert cells(page, "Film") == {"low": "film 1", "high": "film 2"}
-    noise = cells(page, "RMS")
+    assert cells(page, "Operator") == {"low": "Ada", "high": "Grace"}
+    assert cells(page, "Peak kV") == {"low": "4.00", "high": "6.00"}
+    noise = cells(page, "RMS error")
     for text in noise.values():
         number, unit = text.split()
         assert unit == "µm"
         assert float(number) == pytest.approx(1.0, abs=0.2)  # the simulated noise
-    assert set(cells(page, "State").values()) == {"✓ finished"}
+    assert set(cells(page, "How it ended").values()) == {"✓ finished"}
     qtbot.waitUntil(lambda: len(page.plot.shown) == 1, timeout=_PATIENCE)
     assert rows(page.details)["outcome"] == ["finished"]
 
     # words find a recording
     qtbot.keyClicks(page.filter, "grace film")
     assert set(cells(page, "Sequence")) == {"high"}
+    assert page.count.text() == "1 of 2 recordings"
     page.filter.clear()
     assert set(cells(page, "Sequence")) == {"low", "high"}
 
@@ -103,9 +110,20 @@ def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
     page.choose([folder / "low.h5", folder / "high.h5"])
     drawn(page, qtbot, "low", "high")
     qtbot.waitUntil(lambda: page.differences.rowCount() > 0, timeout=_PATIENCE)
-    order = [page.differences.horizontalHeaderItem(i).text() for i in (1, 2)]
-    operators = rows(page.differences)["operator"]
+    # a row for each recording, a column for each condition, with its group above
+    order = [page.differences.verticalHeaderItem(i).text() for i in (0, 1)]
+    heads = [
+        page.differences.horizontalHeaderItem(i).text().split("\n")
+        for i in range(page.differences.columnCount())
+    ]
+    assert heads[0][0] == "Run"
+    at = [what for _, what in heads].index("operator")
+    operators = [page.differences.item(row, at).text() for row in (0, 1)]
     assert dict(zip(order, operators, strict=True)) == {"low": "Ada", "high": "Grace"}
+    metrics = page.differences.fontMetrics()
+    for place, head in enumerate(heads):
+        wide = page.differences.columnWidth(place)
+        assert wide >= min(260, max(map(metrics.horizontalAdvance, head)))  # nothing is cut
     assert page.side_tabs.currentWidget() is page.differences
     assert len(page.plot.plots[1].listDataItems()) == 4
     assert all(words in page.plot.key.text() for words in (*order, "model\N{NO-BREAK SPACE}of"))
@@ -121,9 +139,9 @@ def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
         Actuator(THESIS_FILM, THESIS_LOAD, Network(TABLE_3.equilibrium)), {},
     )  # fmt: skip
     page.compare_with(stiff)
-    assert set(cells(page, "RMS").values()) == {""}
-    qtbot.waitUntil(lambda: all(cells(page, "RMS").values()), timeout=_PATIENCE)
-    of_stiff = cells(page, "RMS")
+    assert set(cells(page, "RMS error").values()) == {""}
+    qtbot.waitUntil(lambda: all(cells(page, "RMS error").values()), timeout=_PATIENCE)
+    of_stiff = cells(page, "RMS error")
     assert all(float(of_stiff[n].split()[0]) > 10 * float(noise[n].split()[0]) for n in noise)
     assert page.model_box.currentText() == "stiff"
 
@@ -151,7 +169,9 @@ def test_what_is_broken_is_said_and_what_can_be_mended_is_mended(session, keep, 
     path = killed(session.folder, "torn")
     (session.folder / "letter.h5").write_text("dear reader")
     page = open_page(session, keep, qtbot)
-    assert cells(page, "State") == {"torn": "! incomplete", "letter": "✕ cannot be read"}
+    assert cells(page, "How it ended") == {
+        "torn": "! killed, or still running", "letter": "✕ is not an HDF5 file",
+    }  # fmt: skip
     page.choose([session.folder / "letter.h5"])
     qtbot.waitUntil(lambda: "is not an HDF5 file" in page.message.text(), timeout=_PATIENCE)
     assert page.plot.shown == ()
@@ -192,5 +212,22 @@ def test_the_list_follows_the_folder(session, folder, keep, qtbot, tmp_path):
     session.set_folder(other)
     qtbot.waitUntil(lambda: set(cells(page, "Sequence")) == {"elsewhere"}, timeout=_PATIENCE)
     session.set_folder(tmp_path / "gone")
-    qtbot.waitUntil(lambda: "gone cannot be read" in page.message.text(), timeout=_PATIENCE)
+    qtbot.waitUntil(lambda: "gone is not there" in page.folder_message.text(), timeout=_PATIENCE)
     assert cells(page, "Sequence") == {}
+    # what was wrong with one folder is not said of another
+    fresh = tmp_path / "fresh"
+    fresh.mkdir()
+    session.set_folder(fresh)
+    qtbot.waitUntil(lambda: not page.folder_message.isVisible(), timeout=_PATIENCE)
+    assert page.count.text() == "no recordings yet"
+
+
+def test_nothing_of_one_folder_is_said_of_the_next(session, keep, qtbot, tmp_path):
+    (session.folder / "letter.h5").write_text("dear reader")
+    page = open_page(session, keep, qtbot)
+    qtbot.waitUntil(lambda: "is not an HDF5 file" in page.message.text(), timeout=_PATIENCE)
+    fresh = tmp_path / "fresh"
+    fresh.mkdir()
+    session.set_folder(fresh)
+    qtbot.waitUntil(lambda: page.message.isHidden(), timeout=_PATIENCE)
+    assert page.details.item(0, 1).text().startswith("Select a recording")

@@ -12,7 +12,7 @@ from pytestqt.qtbot import QtBot
 
 from dearig.analysis.outcomes import DiagnoseOutcome
 from dearig.analysis.study import Study
-from dearig.analysis.summary import summarise
+from dearig.analysis.summary import assess
 from dearig.config.modelfile import load_model
 from dearig.window.frame import MainWindow
 from dearig.window.hv import HighVoltage
@@ -158,7 +158,7 @@ def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
     with qtbot.waitSignal(session.recorded, timeout=_PATIENCE) as told:
         click(qtbot, run.start_button)
     recorded: Path = told.args[0]
-    before, after = summarise(recorded, None).errors, summarise(recorded, found.model).errors
+    before, after = assess(recorded, None).errors, assess(recorded, found.model).errors
     assert before is not None
     assert after is not None
     assert after.rms < 0.5 * before.rms
