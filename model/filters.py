@@ -15,6 +15,7 @@ __all__ = [
     "bristles_slip",
     "lagged",
     "low_pass",
+    "moved_along",
     "slewed",
     "slid",
     "switched",
@@ -77,6 +78,15 @@ def along_cubic(
     a, b = _cubic(x0, u0, x1, u1, h)
     integral = at * (x0 + at * (u0 / 2.0 + at * (a / 6.0 + at * b / 24.0)))
     return integral, x0 + at * (u0 + at * (a / 2.0 + at * b / 6.0))
+
+
+@jit
+def moved_along(
+    x0: float, u0: float, x1: float, u1: float, h: float, at: float
+) -> tuple[float, float]:
+    """Position and rate after ``at`` s on the cubic as above."""
+    a, b = _cubic(x0, u0, x1, u1, h)
+    return x0 + at * (u0 + at * (a / 2.0 + at * b / 6.0)), u0 + at * (a + at * b / 2.0)
 
 
 @jit

@@ -1,4 +1,8 @@
-"""Open a simulated rig by its address: ``sim`` follows the model, ``sim:SEED`` hides an effect."""
+"""Open a simulated rig by its address: ``sim`` follows the model, ``sim:SEED`` hides an effect.
+
+``sim:SEED:HAND:NOISE``, each of the last two optional, names another maker's forms of effects and
+another kind of noise; see ``dearig.sim_backend.truth.cases``.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ from dearig.model.actuator import Actuator
 from dearig.model.material import TABLE_3, Film, Load
 from dearig.sim_backend.clock import Clock, ManualClock, PacedClock
 from dearig.sim_backend.faults import FaultPlan
+from dearig.sim_backend.laser_noise import WHITE
 from dearig.sim_backend.model_plant import ModelPlant
 from dearig.sim_backend.plant import Plant
 from dearig.sim_backend.rig import SimulatedRig
@@ -35,14 +40,17 @@ def open_simulated_rig(
 
     ``sim`` is a film with the model ``actuator``, by default ``film`` under ``load`` with the
     network of the thesis's Table 3. ``sim:SEED`` is a film of the same make; SEED decides which
-    effects are hidden in it, if any. SEED and ``seed`` together seed the instruments' noise, so
-    that another ``seed`` records the same rig again. ``paced`` runs in real time; otherwise the
-    rig runs as fast as it is read. ``clock`` replaces either. ``faults`` occur in every run.
+    effects are hidden in it, if any. ``sim:SEED:second`` hides effects of forms that the model does
+    not have, ``sim:SEED:NOISE`` has another kind of noise (``laser_noise.NOISES``). SEED and
+    ``seed`` together seed the instruments' noise, so that another ``seed`` records the same rig
+    again. ``paced`` runs in real time; otherwise the rig runs as fast as it is read. ``clock``
+    replaces either. ``faults`` occur in every run.
 
     Raises ``AddressError`` for any other address, ``ModelError`` or ``ValueError`` for a film
     without a rest state, ``ValueError`` for faults that this rig cannot have.
     """
-    plant, hidden = plant_of(address, film, load, actuator)
+    plant, case = _plant_and_case(address, film, load, actuator)
+    hidden = None if case is None else case.seed
     return SimulatedRig(
         settings,
         plant,
@@ -52,6 +60,7 @@ def open_simulated_rig(
         identity_seed=hidden,
         block_samples=block_samples,
         faults=faults,
+        noise=WHITE if case is None else case.noise,
     )
 
 
@@ -60,9 +69,22 @@ def plant_of(
 ) -> tuple[Plant, int | None]:
     """Return the plant of the rig at ``address``, at rest, and the seed of its hidden effect.
 
-    Raises as ``open_simulated_rig``.
+    Raises as ``open_simulated_rig``, and ``AddressError`` for an address with a kind of noise: the
+    plant has none.
     """
-    found = re.fullmatch(r"sim(?::(\d{1,18}))?", address)
+    plant, case = _plant_and_case(address, film, load, actuator)
+    if case is not None and case.noise != WHITE:
+        raise AddressError(
+            f"rig {address!r} has {case.noise} noise, which only a rig without a server can have: "
+            f"write {cases.address_of(case.seed, case.hand)}"
+        )
+    return plant, None if case is None else case.seed
+
+
+def _plant_and_case(
+    address: str, film: Film, load: Load, actuator: Actuator | None
+) -> tuple[Plant, cases.TruthCase | None]:
+    found = re.fullmatch(r"sim(?::(\d{1,18})((?::[a-z]+)*))?", address)
     if not found:
         raise AddressError(
             f"rig {address!r} is not a simulated rig: write sim, or sim:SEED with a whole number "
@@ -72,5 +94,8 @@ def plant_of(
         return ModelPlant.at_rest(actuator or Actuator(film, load, TABLE_3)), None
     if actuator is not None:
         raise AddressError(f"rig {address!r} has its own film; only sim takes an actuator")
-    hidden = int(found[1])
-    return cases.draw(hidden, film, load).plant(), hidden
+    try:
+        case = cases.case_of(int(found[1]), found[2].split(":")[1:], film, load)
+    except ValueError as error:
+        raise AddressError(f"rig {address!r} is not a simulated rig: {error}") from None
+    return case.plant(), case

@@ -14,6 +14,7 @@ import numpy as np
 
 from dearig.drivers.settings import LaserSettings
 from dearig.model.jit import allocating, jit
+from dearig.sim_backend.laser_noise import WHITE, LaserNoise
 from dearig.sim_backend.streams import Streams
 
 __all__ = ["Laser", "LaserRows", "LaserState"]
@@ -122,14 +123,15 @@ class LaserState:
     """Past samples that the moving average still needs.
 
     ``position`` and ``velocity`` (K,) are the nodes since ``first_node``; there are none before the
-    first read. ``draws`` (Q, 2) is the noise of the last sample intervals. ``alarm`` is True while
-    the film is out of range.
+    first read. ``draws`` (Q, 2) is the noise of the last sample intervals, ``kind`` the state of
+    the noise's kind. ``alarm`` is True while the film is out of range.
     """
 
     first_node: int
     position: np.ndarray
     velocity: np.ndarray
     draws: np.ndarray
+    kind: np.ndarray
     alarm: bool = False
 
 
@@ -145,7 +147,13 @@ class Laser:
     """Sensor in one run, read once every ``interval`` s; the state is passed in and out."""
 
     def __init__(
-        self, settings: LaserSettings, streams: Streams, run: int, interval: float, spacing: float
+        self,
+        settings: LaserSettings,
+        streams: Streams,
+        run: int,
+        interval: float,
+        spacing: float,
+        noise: str = WHITE,
     ) -> None:
         self._settings = settings
         self._streams = streams
@@ -157,10 +165,12 @@ class Laser:
         self._phase = generator.uniform(0.0, self._period)
         self._whole, self._part = divmod(settings.averaging * self._period, interval)
         self._before = generator.standard_normal((int(self._whole) + 1, 2))
+        self._kind = LaserNoise(noise, interval)
+        self._kind_before = self._kind.start(streams.before_run("laser_noise", run))
 
     def start(self) -> LaserState:
         """Return the state before the first read."""
-        return LaserState(0, np.zeros(0), np.zeros(0), self._before)
+        return LaserState(0, np.zeros(0), np.zeros(0), self._before, self._kind_before)
 
     def read(
         self,
@@ -193,9 +203,15 @@ class Laser:
             mean,
         )
         noise, draws = self._noise(times.size, chunk, chunk_samples, state.draws)
+        noise, kind = self._kind.shape(
+            noise,
+            chunk_samples,
+            self._streams.of_chunk("laser_noise", self._run, chunk),
+            state.kind,
+        )
         reading = settings.rest_position_mm * 1e-3 + mean + settings.noise_um * 1e-6 * noise
-        if settings.resolution_um > 0.0:
-            step = settings.resolution_um * 1e-6
+        step = max(settings.resolution_um * 1e-6, self._kind.step)
+        if step > 0.0:
             reading = np.rint(reading / step) * step
         limit = settings.range_mm * 1e-3
         alarm = np.abs(reading) > limit
@@ -205,7 +221,7 @@ class Laser:
         keep = math.ceil((settings.averaging + 1) * self._period / self._spacing) + 1
         cut = max(0, position.size - 1 - keep)
         after = LaserState(
-            state.first_node + cut, position[cut:], velocity[cut:], draws, bool(alarm[-1])
+            state.first_node + cut, position[cut:], velocity[cut:], draws, kind, bool(alarm[-1])
         )
         return LaserRows(volts, alarm), after
 

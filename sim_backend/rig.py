@@ -16,6 +16,7 @@ from dearig.drivers.settings import RigSettings
 from dearig.sim_backend.card import INPUT_OVERWRITTEN, Card
 from dearig.sim_backend.clock import Clock
 from dearig.sim_backend.faults import Fault, FaultKind, FaultPlan
+from dearig.sim_backend.laser_noise import WHITE
 from dearig.sim_backend.plant import Plant
 from dearig.sim_backend.signal_path import CHUNK, PathState, SignalPath
 from dearig.sim_backend.streams import Streams
@@ -106,7 +107,8 @@ class SimulatedRig:
 
     ``plant`` is the film at rest. Every run starts from it, as if the operator had let the film
     relax. Blocks hold ``block_samples`` samples, or a tenth of a second where that is None; the
-    data do not depend on their length. ``faults`` occur in every run. All methods are thread-safe.
+    data do not depend on their length. ``faults`` occur in every run. ``noise`` is the laser's kind
+    of noise, one of ``laser_noise.NOISES``. All methods are thread-safe.
     """
 
     def __init__(
@@ -120,10 +122,12 @@ class SimulatedRig:
         identity_seed: int | None = None,
         block_samples: int | None = None,
         faults: FaultPlan | None = None,
+        noise: str = WHITE,
     ) -> None:
         if block_samples is not None and block_samples < 1:
             raise ValueError(f"block_samples = {block_samples} must be 1 or more, or None")
         self._faults = faults or FaultPlan()
+        self._noise = noise
         for fault in self._faults.of(*_NOT_IN_PROCESS):
             raise ValueError(
                 f"fault {fault.kind} needs a server or a serial port: an in-process rig cannot "
@@ -193,7 +197,13 @@ class SimulatedRig:
             waveform.check_within(self._settings.limits.gate_limits())
             rate = self._card.actual_rate(waveform.rate)
             path = SignalPath(
-                self._settings, self._card, self._streams, self._runs, rate, self._faults
+                self._settings,
+                self._card,
+                self._streams,
+                self._runs,
+                rate,
+                self._faults,
+                self._noise,
             )
             command = Command(waveform, self._card.channels[0].scaling)
             self._run = _Run(command, path, path.start(self._plant))

@@ -14,6 +14,7 @@ from dearig.sim_backend.amplifier import Amplifier, AmplifierRows, AmplifierStat
 from dearig.sim_backend.card import Card
 from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.laser import Laser, LaserRows, LaserState
+from dearig.sim_backend.laser_noise import WHITE
 from dearig.sim_backend.plant import Motion, Plant
 from dearig.sim_backend.streams import Streams
 
@@ -61,6 +62,7 @@ class SignalPath:
         run: int,
         rate: float,
         faults: FaultPlan | None = None,
+        noise: str = WHITE,
     ) -> None:
         self._settings = settings
         self._rate = rate
@@ -72,7 +74,7 @@ class SignalPath:
         self._nodes = max(1, math.ceil(1.0 / (rate * _NODE_SPACING) - 1e-9))
         self._spacing = 1.0 / (rate * self._nodes)
         self._amplifier = Amplifier(settings.amplifier)
-        self._laser = Laser(settings.laser, streams, run, 1.0 / rate, self._spacing)
+        self._laser = Laser(settings.laser, streams, run, 1.0 / rate, self._spacing, noise)
         self._names = settings.channel_names
         self._skews = {name: settings.skew(i) for i, name in enumerate(self._names[1:])}
 

@@ -12,7 +12,7 @@ import numpy as np
 
 __all__ = ["Streams"]
 
-_INSTRUMENTS = ("card", "amplifier", "laser", "thermometer", "film", "channels")
+_INSTRUMENTS = ("card", "amplifier", "laser", "thermometer", "film", "channels", "laser_noise")
 
 
 @dataclass(frozen=True)

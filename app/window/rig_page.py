@@ -257,8 +257,9 @@ class RigPage(QWidget):
         kind = "remote" if "@" in body else "local" if address.startswith("daqmx:") else "sim"
         if address.startswith("sim:"):
             kind = "hidden"
+            seed = body.partition(":")[0]
             with QSignalBlocker(self.seed):  # shown, not chosen
-                self.seed.setValue(int(body) if body.isdigit() else 0)
+                self.seed.setValue(int(seed) if seed.isdigit() else 0)
         if kind in ("local", "remote"):
             device, _, server = body.partition("@")
             self.device.setText(device)

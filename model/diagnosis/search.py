@@ -171,7 +171,7 @@ class _Search:
         self._reached = 0.0
         self.stop = stop
         self._searching = False
-        self.effects = [e for e in EFFECTS.values() if is_of(e, self.bench)]
+        self.effects = [e for e in EFFECTS.values() if not e.is_general and is_of(e, self.bench)]
         self.rounds: list[Round] = []
         self.found: dict[frozenset[str], Trial] = {}
         self.settled: set[frozenset[str]] = set()

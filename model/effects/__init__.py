@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from dearig.model.effects.description import FAMILIES, Effect, EffectValues, Parameter
+from dearig.model.effects.description import FAMILIES, Curve, Effect, EffectValues, Parameter
 
 if TYPE_CHECKING:
     from dearig.model.effects.registry import (
@@ -39,6 +39,7 @@ __all__ = [
     "PROBLEMS",
     "SENSOR_COLUMNS",
     "SENSOR_MEMORY",
+    "Curve",
     "Effect",
     "EffectValues",
     "Parameter",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["ACTS_ON", "FAMILIES", "Effect", "EffectValues", "Parameter", "faults_of"]
+__all__ = ["ACTS_ON", "FAMILIES", "Curve", "Effect", "EffectValues", "Parameter", "faults_of"]
 
 #: The places of the signal path where an effect can act.
 ACTS_ON = (
@@ -41,11 +42,26 @@ FAMILIES = (
     "amplifier",
     "interference",
     "slack",
+    "viscoplasticity",
+    "humidity",
     "unknown",
 )
 
 #: Effects of a model with their values: ((name, ((parameter, value), ...)), ...).
 EffectValues = tuple[tuple[str, tuple[tuple[str, float], ...]], ...]
+
+
+class Curve(NamedTuple):
+    """The shape that a general law has found, for a report.
+
+    ``axis`` (N,) and ``values`` (N,) in the units of their labels. A label is a quantity with its
+    unit, such as "stretch rate (1/s)".
+    """
+
+    axis: np.ndarray
+    values: np.ndarray
+    axis_label: str
+    values_label: str
 
 
 @dataclass(frozen=True)
@@ -129,6 +145,12 @@ class Effect:
     generalises
         Name of an effect that this one contains as a special case. A diagnosis tries this one only
         where that one explains most and leaves more than noise.
+    is_general
+        The effect is the general law of its family: linear in its amplitudes, non-negative weights
+        on a fixed grid of shapes, with a ``curve``.
+    curve
+        For a general law: a function of the parameters' values by name that returns the ``Curve``
+        that they describe.
     drift_basis
         For a drift of the reading that is linear in the amplitudes and different in every
         recording: a function of times (N,) s that returns what a unit of each amplitude adds to the
@@ -147,6 +169,8 @@ class Effect:
     is_reproducible: bool = True
     is_viscoelastic: bool = False
     generalises: str = ""
+    is_general: bool = False
+    curve: Callable[[Mapping[str, float]], Curve] | None = None
     drift_basis: Callable[[np.ndarray], np.ndarray] | None = None
 
     @property
@@ -189,6 +213,8 @@ def _faults(effect: Effect) -> Iterator[str]:
         yield "it has no amplitude: a parameter with a neutral value"
     if effect.parameters != effect.amplitudes + effect.shape_parameters:
         yield "its amplitudes do not come before its shape parameters"
+    if effect.is_general != (effect.curve is not None):
+        yield "it needs a curve if it is a general law, and has none otherwise"
     if effect.memory < 0:
         yield f"its memory of {effect.memory} is negative"
     for parameter in effect.parameters:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
 
 from dearig.model.material import TABLE_3, Branch, Film, Load, Network, Spring
+from dearig.sim_backend.laser_noise import NOISES, WHITE
 from dearig.sim_backend.truth.effect import Draw, TruthEffect
 from dearig.sim_backend.truth.effects import (
     amplifier,
@@ -34,8 +35,21 @@ from dearig.sim_backend.truth.effects import (
 )
 from dearig.sim_backend.truth.film import FilmNumbers
 from dearig.sim_backend.truth.plant import TruthPlant
+from dearig.sim_backend.truth.second_hand import dielectric, electric, sensor
+from dearig.sim_backend.truth.second_hand import film as film_stress
+from dearig.sim_backend.truth.second_hand import load as load_forms
 
-__all__ = ["FORMS", "KINDS", "UNKNOWN", "TruthCase", "draw"]
+__all__ = [
+    "FORMS",
+    "HANDS",
+    "KINDS",
+    "SECOND_FORMS",
+    "UNKNOWN",
+    "TruthCase",
+    "address_of",
+    "case_of",
+    "draw",
+]
 
 UNKNOWN = "unknown"
 
@@ -94,7 +108,39 @@ FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
         ),
     }
 )
-_COVERED = tuple(family for family in FORMS if family != UNKNOWN)
+#: Forms of the second hand: published laws that neither the model nor the first hand has.
+SECOND_FORMS: Mapping[str, tuple[Draw, ...]] = MappingProxyType(
+    {
+        "amplifier": (electric.tanh_stage, electric.slewing_pair, electric.intercept),
+        "electrode_resistance": (electric.measured_gauge, electric.contacts),
+        "leakage": (electric.trap_filled,),
+        "dielectric_relaxation": (dielectric.kohlrausch, dielectric.havriliak_negami),
+        "permittivity": (dielectric.booth, dielectric.johnson, dielectric.peaked),
+        "creep": (film_stress.kohlrausch, film_stress.bergstrom_boyce),
+        "softening": (film_stress.ogden_roxburgh, film_stress.simo),
+        "thermal": (film_stress.convection, film_stress.ramp),
+        "rate_independent_hysteresis": (film_stress.lognormal_stops, film_stress.coleman_hodgdon),
+        "viscoplasticity": (film_stress.perzyna, film_stress.bodner_partom),
+        "load_inertia": (load_forms.lever, load_forms.pulley),
+        "drag": (load_forms.carreau, load_forms.ostwald, load_forms.naumann),
+        "friction": (load_forms.maxwell_slip, load_forms.makkar),
+        "sensor_lag": (sensor.delay, sensor.butterworth),
+        "sensor_nonlinearity": (sensor.triangulation, sensor.legendre),
+        "drift": (sensor.logarithm, sensor.brownian),
+        "interference": (sensor.fan,),
+        UNKNOWN: (load_forms.magnet, load_forms.swing),
+    }
+)
+
+#: Whose forms a case has.
+HANDS: Mapping[str, Mapping[str, tuple[Draw, ...]]] = MappingProxyType(
+    {"first": FORMS, "second": SECOND_FORMS}
+)
+
+
+def _covered(hand: str) -> tuple[str, ...]:
+    return tuple(family for family in HANDS[hand] if family != UNKNOWN)
+
 
 #: Probability of each kind of case.
 KINDS: Mapping[str, float] = MappingProxyType(
@@ -109,7 +155,8 @@ _MODULI, _TIMES = 0.15, 0.20
 class TruthCase:
     """Hidden effects of the rig of ``seed``, in a film with its own ``network``.
 
-    For tests and scores only: no program displays it.
+    ``hand`` is one of ``HANDS``, ``noise`` the kind of the laser's noise, one of ``NOISES``. For
+    tests and scores only: no program displays it.
     """
 
     seed: int
@@ -117,6 +164,8 @@ class TruthCase:
     load: Load
     effects: tuple[TruthEffect, ...]
     network: Network = TABLE_3
+    hand: str = "first"
+    noise: str = WHITE
 
     @property
     def families(self) -> tuple[str, ...]:
@@ -180,31 +229,74 @@ def _drawn_network(generator: np.random.Generator) -> Network:
     )
 
 
-def _drawn_families(generator: np.random.Generator, kind: str) -> list[str]:
+def _drawn_families(generator: np.random.Generator, kind: str, hand: str) -> list[str]:
     if kind == "any":
         kind = str(generator.choice(list(KINDS), p=list(KINDS.values())))
     if kind == "clean":
         return []
-    if kind in FORMS:
+    if kind in HANDS[hand]:
         return [kind]
     # in the order of the table, which is that of the signal path
-    places = generator.choice(len(_COVERED), size=2 if kind == "pair" else 1, replace=False)
-    return [_COVERED[place] for place in sorted(places)]
+    covered = _covered(hand)
+    places = generator.choice(len(covered), size=2 if kind == "pair" else 1, replace=False)
+    return [covered[place] for place in sorted(places)]
 
 
-def draw(seed: int, film: Film, load: Load, kind: str = "any") -> TruthCase:
+def draw(
+    seed: int,
+    film: Film,
+    load: Load,
+    kind: str = "any",
+    *,
+    hand: str = "first",
+    noise: str = WHITE,
+) -> TruthCase:
     """Return the case of ``seed``.
 
-    ``kind`` is ``any``, one of ``KINDS``, or a family of ``FORMS``; raises ``ValueError`` for any
-    other. The film of a seed is the same for every kind.
+    ``kind`` is ``any``, one of ``KINDS``, or a family of the hand's forms; raises ``ValueError``
+    for any other. The film of a seed is the same for every kind, hand and noise.
+
+    ``hand`` ``"second"`` draws from ``SECOND_FORMS``: published laws that the model does not have,
+    under the same names of families. ``noise`` is one of ``NOISES``: what the laser adds.
+    ``address_of`` gives the address at which the rig of a case can be opened.
     """
-    if kind not in ("any", *KINDS, *FORMS):
-        offered = ", ".join(("any", *KINDS, *_COVERED))
+    if hand not in HANDS:
+        raise ValueError(f"no hand {hand!r}: choose one of {', '.join(HANDS)}")
+    if noise not in NOISES:
+        raise ValueError(f"no noise {noise!r}: choose one of {', '.join(NOISES)}")
+    forms = HANDS[hand]
+    if kind not in ("any", *KINDS, *forms):
+        offered = ", ".join(("any", *KINDS, *_covered(hand)))
         raise ValueError(f"no case of kind {kind!r}: choose one of {offered}")
     generator = np.random.default_rng(seed)
     network = _drawn_network(generator)
     effects = []
-    for family in _drawn_families(generator, kind):
-        form = FORMS[family][int(generator.integers(len(FORMS[family])))]
+    for family in _drawn_families(generator, kind, hand):
+        form = forms[family][int(generator.integers(len(forms[family])))]
         effects.append(form(generator, load))
-    return TruthCase(seed, film, load, tuple(effects), network)
+    return TruthCase(seed, film, load, tuple(effects), network, hand, noise)
+
+
+def address_of(seed: int, hand: str = "first", noise: str = WHITE) -> str:
+    """Return the address of the rig with the case of ``seed``: ``sim:7``, ``sim:7:second:spikes``.
+
+    What is not the default stands behind the seed, separated by colons.
+    """
+    chosen = [hand] * (hand != "first") + [noise] * (noise != WHITE)
+    return ":".join(("sim", str(seed), *chosen))
+
+
+def case_of(seed: int, words: Sequence[str], film: Film, load: Load) -> TruthCase:
+    """Return the case of ``seed`` of any kind with a hand and a noise given by ``words``.
+
+    Raises ``ValueError`` for a word that is neither, or for two of one sort.
+    """
+    hands = [word for word in words if word in HANDS]
+    noises = [word for word in words if word in NOISES]
+    other = [word for word in words if word not in HANDS and word not in NOISES]
+    if other or len(hands) > 1 or len(noises) > 1:
+        raise ValueError(
+            f"behind the seed stand one of {', '.join(HANDS)} and one of {', '.join(NOISES)}, not "
+            f"{':'.join(words)}"
+        )
+    return draw(seed, film, load, hand=(*hands, "first")[0], noise=(*noises, WHITE)[0])

@@ -10,12 +10,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from dearig.model.jit import allocating, jit
 from dearig.model.material import STANDARD_GRAVITY, VACUUM_PERMITTIVITY, Film, Load, Network
+from dearig.sim_backend.truth import second_laws
+from dearig.sim_backend.truth.second_laws import (
+    added_stress,
+    electrode_charging,
+    fastest_decay,
+    permittivity_factor,
+    trap_leak,
+    warming,
+    wholeness,
+)
 
 __all__ = [
     "COURSE_ELECTRIC",
@@ -123,6 +133,8 @@ class Hidden(NamedTuple):
     second_inertia: float = 0.0
     second_frequency: float = 0.0
     second_damping: float = 0.0
+    # laws of the second hand
+    further: second_laws.Second = second_laws.NOTHING
 
 
 _NOTHING = Hidden()
@@ -204,7 +216,14 @@ class FilmNumbers:
 
     def hiding(self, **numbers: float) -> FilmNumbers:
         """Return the film with some parameters of ``Hidden`` set."""
-        return replace(self, hidden=self.hidden._replace(**numbers))
+        changed: dict[str, Any] = dict(numbers)  # none of them is ``further``
+        return replace(self, hidden=self.hidden._replace(**changed))
+
+    def obeying(self, **numbers: float) -> FilmNumbers:
+        """Return the film with some parameters of the second hand's laws set."""
+        return replace(
+            self, hidden=self.hidden._replace(further=self.hidden.further._replace(**numbers))
+        )
 
     def stepping(self, step: float) -> FilmNumbers:
         """Return the film with integration steps of at most ``step`` s."""
@@ -224,7 +243,8 @@ class FilmNumbers:
 
     def at_rest(self, rest: float) -> FilmState:
         """Return the state at stretch ``rest``; in relaxed branches z_i = 0."""
-        y = np.zeros(_BRANCH + len(self.times))
+        more = 0 if self.hidden.further == second_laws.NOTHING else second_laws.STATES
+        y = np.zeros(_BRANCH + len(self.times) + more)
         memory = np.zeros(_SLIPPED + len(self.stops))
         y[0] = memory[_START] = memory[_LARGEST] = rest
         return FilmState(y, memory)
@@ -235,7 +255,7 @@ class FilmNumbers:
 _BRISTLE, _BOUC, _SECTION_1, _SECTION_2, _WARM_1, _WARM_2, _PATH, _SECOND, _SECOND_RATE = range(
     2, 11
 )
-_BRANCH = 11  # z_1, z_2, ...
+_BRANCH = 11  # z_1, z_2, ...; then the states of the second hand's laws, if it has any
 # Memory changes at the end of a step only: stretch there, largest stretch, slipped elements
 _START, _LARGEST, _SLIPPED = 0, 1, 2
 
@@ -257,6 +277,8 @@ def _leak(h: Hidden, v: float, lam: float) -> tuple[float, float]:
     if h.leak_space > 0.0:
         slope = h.leak_conductance * lam**4 / h.leak_space
         return slope * v * v, 2.0 * slope * v
+    if h.further.trap_voltage > 0.0:
+        return trap_leak(h.further, h.leak_conductance, v, lam)
     if h.leak_tunnel > 0.0:
         if v <= 0.0:
             return 0.0, 0.0
@@ -360,7 +382,20 @@ def _derivative(
         else:
             dy[_SECTION_1] = into / capacitance - growth * v1
             square = v1 * v1
+    second = _BRANCH + springs.shape[1] - 1
+    has_second = y.shape[0] > second
+    if has_second:
+        if h.further.convection_heat > 0.0:
+            dy[_WARM_1] = warming(h.further, square, y[_WARM_1])
+            stiffness *= 1.0 + h.further.convection_stiffness * y[_WARM_1]
+        if h.further.contact > 0.0:
+            current = electrode_charging(h.further, v - y[_SECTION_1], away)
+            into = current / (body.capacitance * lam * lam)
+            dy[_SECTION_1] = into - 2.0 * rate / lam * y[_SECTION_1]
+            square = y[_SECTION_1] * y[_SECTION_1]
     electric *= body.electric
+    if has_second:
+        electric *= permittivity_factor(h.further, square, lam, body.rest)
     if h.permittivity_strain != 0.0:
         u = away / h.permittivity_reach
         electric *= 1.0 + h.permittivity_strain * u / math.sqrt(1.0 + u * u)
@@ -384,7 +419,12 @@ def _derivative(
         depth = away - h.stop_travel
         stress -= h.stop_stiffness * depth**1.5 * max(1.0 + h.stop_damping * rate, 0.0)
 
-    whole = 1.0
+    whole, inertia = 1.0, body.inertia
+    if has_second:
+        stress -= added_stress(h.further, y, second, lam, rate, body.rest, dy)
+        stress -= 0.5 * inertia * h.further.lever * rate * rate
+        inertia *= 1.0 + h.further.lever * away
+        whole = wholeness(h.further, y, second, lam, body.rest)
     if h.damage > 0.0:
         farthest = (max(memory[_LARGEST], lam) - body.rest) / h.damage_reach
         damage = farthest**h.damage_exponent
@@ -407,7 +447,7 @@ def _derivative(
         dy[_SECOND] = y[_SECOND_RATE]
         dy[_SECOND_RATE] = -back - stress / body.inertia
     dy[0] = rate
-    dy[1] = stress / body.inertia
+    dy[1] = stress / inertia
 
 
 @jit
@@ -418,6 +458,7 @@ def _fastest(body: _Body, h: Hidden, rate: float) -> float:
     most.
     """
     slope = h.drag + 2.0 * h.drag_quadratic * rate + 1.5 * h.drag_power * math.sqrt(rate)
+    slope += fastest_decay(h.further, rate)
     bending = 4.0 * rate / h.friction_reach if h.friction > 0.0 else 0.0
     return slope / body.inertia + bending
 

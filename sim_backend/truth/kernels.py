@@ -8,7 +8,17 @@ import numpy as np
 
 from dearig.model.jit import allocating, jit
 
-__all__ = ["lag_voltage", "limit_slew", "low_pass", "moving_average", "polarise", "sway"]
+__all__ = [
+    "delayed",
+    "follow_pair",
+    "lag_voltage",
+    "limit_slew",
+    "low_pass",
+    "moving_average",
+    "polarise",
+    "second_order",
+    "sway",
+]
 
 
 @jit
@@ -199,3 +209,94 @@ def sway(
                 )
         out[0, k] = state[0] - coupling * rows[0, k]
         out[1, k] = state[1] - coupling * rows[1, k]
+
+
+@jit
+def follow_pair(
+    time: np.ndarray,
+    voltage: np.ndarray,
+    slew: float,
+    delay: float,
+    output: float,
+    effective: np.ndarray,
+) -> float:
+    """Follow ``voltage`` (N,) V, held, by y' = S tanh((v - y)/(S tau)); returns the new output.
+
+    In closed form sinh((v - y)/(S tau)) falls as exp(-t/tau). Fills ``effective`` (N,) V with the
+    root of the mean square by Simpson's rule.
+    """
+    nodes = time.shape[0]
+    scale = slew * delay
+    for k in range(nodes - 1):
+        h = time[k + 1] - time[k]
+        v = voltage[k]
+        start = math.sinh((v - output) / scale)
+        middle = v - scale * math.asinh(start * math.exp(-0.5 * h / delay))
+        end = v - scale * math.asinh(start * math.exp(-h / delay))
+        square = (output * output + 4.0 * middle * middle + end * end) / 6.0
+        effective[k] = math.copysign(math.sqrt(square), output + end)
+        output = end
+    effective[nodes - 1] = output
+    return output
+
+
+@jit
+def delayed(time: np.ndarray, rows: np.ndarray, first: int, age: float, out: np.ndarray) -> None:
+    """Return the cubic through ``rows`` (2, N) ``age`` s before each node from ``first`` on.
+
+    Before node 0 the film rests at its position there. Fills ``out`` (2, N - first).
+    """
+    j = 0
+    for k in range(first, time.shape[0]):
+        at = time[k] - age
+        if at <= time[0]:
+            out[0, k - first], out[1, k - first] = rows[0, 0], 0.0
+            continue
+        while j < k - 1 and time[j + 1] < at:
+            j += 1
+        h = time[j + 1] - time[j]
+        u = (at - time[j]) / h
+        x0, v0 = rows[0, j], rows[1, j] * h
+        rise, v1 = rows[0, j + 1] - x0, rows[1, j + 1] * h
+        c2, c3 = 3.0 * rise - 2.0 * v0 - v1, v0 + v1 - 2.0 * rise
+        out[0, k - first] = x0 + u * (v0 + u * (c2 + u * c3))
+        out[1, k - first] = (v0 + u * (2.0 * c2 + 3.0 * u * c3)) / h
+
+
+@allocating
+def second_order(
+    time: np.ndarray,
+    rows: np.ndarray,
+    frequency: float,
+    damping: float,
+    state: np.ndarray,
+    out: np.ndarray,
+) -> None:
+    """Follow the position of ``rows`` (2, N) by y'' + 2 d w y' + w^2 (y - x) = 0.
+
+    ``state`` (2,) is y m and y' m/s, updated in place. Fills ``out`` (2, N). Takes one fourth-order
+    Runge-Kutta step an interval.
+    """
+    slopes = np.empty((4, 2))
+    for k in range(time.shape[0]):
+        if k > 0:
+            h = time[k] - time[k - 1]
+            x0, x1 = rows[0, k - 1], rows[0, k]
+            for stage in range(4):
+                x, ahead = x0, 0.0
+                if stage == 3:
+                    x, ahead = x1, h
+                elif stage > 0:
+                    x = 0.5 * (x0 + x1) + h / 8.0 * (rows[1, k - 1] - rows[1, k])
+                    ahead = 0.5 * h
+                p, q = state[0], state[1]
+                if stage > 0:
+                    p += ahead * slopes[stage - 1, 0]
+                    q += ahead * slopes[stage - 1, 1]
+                slopes[stage, 0] = q
+                slopes[stage, 1] = frequency * frequency * (x - p) - 2.0 * damping * frequency * q
+            for i in range(2):
+                both = slopes[1, i] + slopes[2, i]
+                state[i] += h / 6.0 * (slopes[0, i] + 2.0 * both + slopes[3, i])
+        out[0, k] = state[0]
+        out[1, k] = state[1]

@@ -29,6 +29,7 @@ _COMMANDS = """\
 Made from the code by `python -m tests.docs.reference`.
 
 `RIG` is `sim` (a simulated rig that is the thesis's model), `sim:SEED` (one that hides an effect),
+`sim:SEED:second` (one whose effects have other forms), `sim:SEED:pink` (one with another noise),
 `daqmx:Dev1` (the card in this computer) or `daqmx:Dev1@HOST:PORT` (a card behind NI's gRPC device
 server). `SEQUENCE` is a file or the name of a preset.
 

@@ -121,6 +121,20 @@ def records(model, seed=0):
     return made
 
 
+def grids(model):
+    """The shape parameters of general laws, which no fit changes."""
+    general = [name for name, _ in model.effects if EFFECTS[name].is_general]
+    return [(name, p) for name in general for p in EFFECTS[name].shape_parameters]
+
+
+def require_curve(name, truth, layout, x):
+    """The curve of a general law is found again, though each weight may not be."""
+    found = dict(dict(layout.model(layout.values(x)).effects)[name])
+    a, b = (EFFECTS[name].curve(v) for v in (found, dict(dict(truth.effects)[name])))
+    np.testing.assert_array_equal(a.axis, b.axis)
+    np.testing.assert_allclose(a.values, b.values, atol=0.05 * np.abs(b.values).max())
+
+
 def refitted(truth, start):
     """Fit from ``start`` to records of ``truth``: (layout, found, standard deviations, misfit).
 
@@ -132,6 +146,8 @@ def refitted(truth, start):
     layout = problem.layout
     held = np.zeros(layout.size, dtype=bool)
     held[layout.column("J")] = True
+    for name, p in grids(truth):
+        held[layout.column(f"{name}: {p.name}")] = True
     start = layout.coordinates(layout.initial())
     fit = descend(problem, start, held, iterations=60)
     drift = problem.fit_drift(fit.x)
@@ -166,7 +182,9 @@ def nearby(truth):
     for name, values in truth.effects:
         start = dict(values)
         for p in EFFECTS[name].parameters:
-            if p.neutral is None:
+            if p.neutral is None and EFFECTS[name].is_general:
+                value = start[p.name]
+            elif p.neutral is None:
                 value = start[p.name] * NEARER.get(name, 1.5)
             else:
                 value = p.neutral + SIZED.get(name, 0.3) * (start[p.name] - p.neutral)
@@ -183,6 +201,10 @@ def require_found(truth, but=()):
     assert misfit < 0.15
     expected = Layout(truth)
     wanted = expected.coordinates(expected.initial())
+    for name, _ in truth.effects:
+        if EFFECTS[name].is_general:
+            require_curve(name, truth, layout, fit.x)
+            but = (*but, *(f"{name}: {p.name}" for p in EFFECTS[name].parameters))
     for q, found, true, width in zip(layout.quantities, fit.x, wanted, sigma, strict=True):
         if q.kind == "effect":
             scale = 1.0 if q.logarithmic else abs(true)

@@ -38,7 +38,17 @@ from tests.tools.effect_cases import (
     pulled,
     with_effect,
 )
-from tests.tools.effect_oracle import Film, bouc_wen, extra, follow, limited, spectrum
+from tests.tools.effect_oracle import (
+    Film,
+    bouc_wen,
+    curve_of,
+    extra,
+    follow,
+    limited,
+    spectrum,
+    steps_at,
+    weights_of,
+)
 
 LENGTH = THESIS_FILM.length
 OF_SENSOR = [n for n in BY_VOLTAGE if EFFECTS[n].acts_on == "sensor"]
@@ -274,7 +284,21 @@ def shown_by_walk(p, t):
 SHOWN = {
     "linear drift": lambda p, t: moved(t)[0] + p["drift"] * t,
     "mains interference": mains,
+    "general sensor curve": lambda p, t: (
+        moved(t)[0]
+        + np.array(
+            [
+                curve_of(
+                    x,
+                    weights_of(p, "error"),
+                    steps_at([i * p["travel"] / 8.0 for i in range(10)], 1),
+                )
+                for x in moved(t)[0]
+            ]
+        )
+    ),
     "sensor averaging": shown_by_averaging,
+    "sensor delay": lambda p, t: moved(np.maximum(t - p["delay"], 0.0))[0],
     "sensor bend": lambda p, t: moved(t)[0] + p["cubic"] * moved(t)[0] ** 3,
     "sensor clipping": lambda p, t: np.where(
         moved(t)[0] < p["knee"],

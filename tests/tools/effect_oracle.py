@@ -95,6 +95,11 @@ def ramped(since):
 
 def spectrum(name, p):
     """Moduli in Pa and relaxation times in s of the branches of what creeps."""
+    if name == "general creep":
+        return (
+            np.array([p[f"modulus_{i}"] for i in range(1, 11)]),
+            p["relaxation_time"] * 2.0 ** np.arange(10),
+        )
     if name == "slow branch":
         return np.array([p["modulus"]]), np.array([p["relaxation_time"]])
     a = p["exponent"]
@@ -103,6 +108,29 @@ def spectrum(name, p):
         return p["modulus"] * (times / times[0]) ** -a, times
     times = 0.03 * 10.0 ** np.arange(6)
     return p["modulus"] * math.log(10.0) / math.gamma(a) * times**-a, times
+
+
+def risen(x, knots):
+    """How much of the area of a hat over three knots lies below ``x``."""
+    left, middle, right = knots
+    below = limited((x - left) / (middle - left), 0.0, 1.0) if middle > left else float(x > left)
+    above = limited((right - x) / (right - middle), 0.0, 1.0)
+    if x < middle:
+        return (middle - left) / (right - left) * below**2
+    return 1.0 - (right - middle) / (right - left) * above**2
+
+
+def steps_at(knots, first=0):
+    """The knots of every hat from number ``first`` on; before the first knot there is none."""
+    return [(knots[max(i - 1, 0)], knots[i], knots[i + 1]) for i in range(first, len(knots) - 1)]
+
+
+def curve_of(x, weights, hats):
+    return sum(w * risen(x, knots) for w, knots in zip(weights, hats, strict=True))
+
+
+def weights_of(p, word):
+    return [value for key, value in p.items() if key.startswith(word)]
 
 
 def extra(name, p, film, drive):
@@ -202,6 +230,83 @@ def extra(name, p, film, drive):
             states=count,
             stress=lambda t, lam, u, z, v, lam0: k * sum(moved(z, lam - lam0)) / count,
             commit=lambda z, lam0, lam: moved(z, lam - lam0),
+        )
+
+    def elements(count, ratio):
+        yields = weights_of(p, "yield")
+        ends = [p["reach"] / ratio ** (count - 1 - i) for i in range(count)]
+
+        def moved(z, travel):
+            return [limited(a + travel, -e, e) for a, e in zip(z, ends, strict=True)]
+
+        return Extra(
+            states=count,
+            stress=lambda t, lam, u, z, v, lam0: sum(
+                y * a / e for y, a, e in zip(yields, moved(z, lam - lam0), ends, strict=True)
+            ),
+            commit=lambda z, lam0, lam: moved(z, lam - lam0),
+        )
+
+    def flowing():
+        r, time = p["reach"], p["time_constant"]
+        return Extra(
+            states=1,
+            stress=lambda t, lam, u, z, v: p["yield_stress"] * z[0] / r,
+            slopes=lambda t, lam, u, z, v: (u - (z[0] - limited(z[0], -r, r)) / time,),
+        )
+
+    def general_softening():
+        hats = steps_at([i * p["reach"] / 6.0 for i in range(8)], 1)
+        parts = steps_at([0.25 * i for i in range(6)])
+        damage, regained = weights_of(p, "damage"), weights_of(p, "regained")
+
+        def soften(t, lam, u, z, v, lam0):
+            now = abs(lam - rest)
+            most = max(z[0], now)
+            way_back = curve_of((most - now) / (most + 1e-3), regained, parts)
+            return 1.0 - curve_of(most, damage, hats) - way_back * most / (most + 1e-3)
+
+        return Extra(
+            states=1, soften=soften, commit=lambda z, lam0, lam: [max(z[0], abs(lam - rest))]
+        )
+
+    def general_drag():
+        knots = [0.0, 6e-3, 1.8e-2, 5.4e-2, 0.162, 0.486]
+        weights = weights_of(p, "drag")
+        wide = knots[-1] - knots[-2]
+
+        def stress(t, lam, u, z, v):
+            total = curve_of(abs(u), weights[:-1], steps_at(knots))
+            # the last slope grows up to the last knot, and stays
+            part = max(abs(u) - knots[-2], 0.0) / wide
+            total += weights[-1] * (part**2 if part < 1.0 else 2.0 * part - 1.0)
+            return math.copysign(total, u)
+
+        return Extra(stress=stress)
+
+    def general_polarisation():
+        strengths = np.array(weights_of(p, "strength"))
+        times = p["relaxation_time"] * 3.0 ** np.arange(8)
+        return Extra(
+            states=8,
+            square=lambda t, lam, u, z, v: (
+                v * (v + float(strengths @ (np.array(z) - p["settled"] * v)))
+            ),
+            slopes=lambda t, lam, u, z, v: tuple((v - np.array(z)) / times),
+        )
+
+    def evenly(word):
+        """Weights, and hats on even knots from 0 up to the reach and one beyond."""
+        end = p.get("reach") or p.get("full")
+        return weights_of(p, word), steps_at([i * end / 5.0 for i in range(7)])
+
+    def by_field():
+        weights, _ = evenly("change")
+        hats = steps_at([(i * p["reach"] / 5.0) ** 2 for i in range(7)])
+        return Extra(
+            electric=lambda t, lam, u, z, v: (
+                1.0 + curve_of((v * lam / film.thickness) ** 2, weights, hats)
+            )
         )
 
     def mullins():
@@ -407,7 +512,8 @@ def extra(name, p, film, drive):
         "Mullins softening": mullins,
         "first-loading damage": first_loading,
         **dict.fromkeys(
-            ("power-law creep", "broad creep", "slow branch"), lambda: branches(*spectrum(name, p))
+            ("power-law creep", "broad creep", "slow branch", "general creep"),
+            lambda: branches(*spectrum(name, p)),
         ),
         "strain-dependent permittivity": lambda: Extra(
             electric=lambda t, lam, u, z, v: 1.0 + p["strain_coefficient"] * (lam - rest)
@@ -421,6 +527,28 @@ def extra(name, p, film, drive):
                 ** (-1.0 / p["sharpness"])
             )
         ),
+        "general amplifier curve": lambda: Extra(
+            voltage=lambda t, lam, u, z, v: (
+                v + math.copysign(curve_of(abs(v), *evenly("gained")), v)
+            )
+        ),
+        "general drag": general_drag,
+        "general field-dependent permittivity": by_field,
+        "general friction": lambda: elements(6, 2.2),
+        "general hysteresis": lambda: elements(10, 1.7),
+        "general polarisation": general_polarisation,
+        "general softening": general_softening,
+        "general strain-dependent permittivity": lambda: Extra(
+            electric=lambda t, lam, u, z, v: 1.0 + curve_of(lam - rest, *evenly("change"))
+        ),
+        "thinning drag": lambda: Extra(
+            stress=lambda t, lam, u, z, v: (
+                p["drag"]
+                * (u / 0.1)
+                / (0.1 / (abs(u) + p["linear_below"])) ** (p["exponent"] - 1.0)
+            )
+        ),
+        "viscoplastic flow": flowing,
         "temperature": lambda: Extra(
             soften=lambda t, lam, u, z, v: 1.0 + p["stiffening"] * drive.warmth(t)
         ),

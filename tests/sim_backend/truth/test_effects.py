@@ -136,7 +136,7 @@ def test_its_own_steps_have_converged():
         assert np.abs(fine - coarse).max() < 0.02e-6, (family, form.__name__)
 
 
-@pytest.mark.parametrize("kind", ["bouc_wen", "iwan"])
+@pytest.mark.parametrize("kind", ["bouc_wen", "iwan", "lognormal_stops", "coleman_hodgdon"])
 def test_a_rate_independent_loop_stays_when_run_slowly(kind):
     """On a film without relaxation, up and down differ by as much at a fifth of the speed."""
     elastic = replace(NUMBERS, moduli=NUMBERS.moduli[:1], limits=NUMBERS.limits[:1], times=())
