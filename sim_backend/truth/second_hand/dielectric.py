@@ -21,15 +21,13 @@ from dearig.sim_backend.truth import kernels as loops
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.film import FilmNumbers
 from dearig.sim_backend.truth.sampling import either_sign, log_uniform
-from dearig.sim_backend.truth.second_hand.spectrum import stretched_exponential
+from dearig.sim_backend.truth.second_hand.spectrum import asymmetric, stretched_exponential
 
 __all__ = ["booth", "havriliak_negami", "johnson", "kohlrausch", "peaked"]
 
 _RELAXING = (0.04, 0.4)  # of the permittivity
 _CHANGE = (0.008, 0.2)  # of the permittivity at 8 kV, or over 1.5 mm
 _FIELD = (8000.0 * 1.2) ** 2  # V^2, of 8 kV over the film at a stretch of 1.2
-_TERMS = 21
-_DECADES = 8.0  # natural logarithms of time to either side of a broad spectrum
 
 
 def _relaxing(shares: np.ndarray, times: np.ndarray, words: str) -> TruthEffect:
@@ -67,14 +65,10 @@ def havriliak_negami(generator: np.random.Generator, load: Load) -> TruthEffect:
     share = log_uniform(generator, *_RELAXING)
     time = log_uniform(generator, 0.05, 1.5)
     a, b = generator.uniform(0.5, 0.85), generator.uniform(0.3, 0.7)
-    y = np.linspace(-_DECADES, _DECADES, _TERMS)  # ln(T_i/T)
-    power = np.exp(a * y)
-    angle = np.arctan2(math.sin(math.pi * a), power + math.cos(math.pi * a))
-    size = (power**2 + 2.0 * power * math.cos(math.pi * a) + 1.0) ** (-0.5 * b)
-    density = power**b * np.sin(b * angle) * size
+    weights, times = asymmetric(a, b)
     return _relaxing(
-        share * density / density.sum(),
-        time * np.exp(y),
+        share * weights,
+        time * times,
         f"spread about {time:.2g} s (Havriliak-Negami, {a:.2f} and {b:.2f})",
     )
 
