@@ -36,10 +36,10 @@ __all__ = ["diagnose"]
 
 Progress = Callable[[str, float], None]
 
-# steps of simulations that a search may take: some forty-five seconds of two cores
-# effects that the rules below were not made with; their cost and their rivals are not known
+# effects that the rules below were not made with: neither their cost nor their rivals are known
 _NOT_TRIED = ("sensor delay", "thinning drag", "viscoplastic flow")
 
+# steps of simulations that a search may take: some forty-five seconds of two cores
 _EFFORT = 2.8e8
 _OF_SEVERAL = 0.9  # of that, of several records: there the last fits take longer
 _POLISHING = 2e7  # of these, that each of the final fits may take
