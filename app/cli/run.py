@@ -235,16 +235,24 @@ def gui(
     rig: Rig = "sim",
     rig_file: RigFileOption = None,
     folder: Annotated[
-        Path,
+        Path | None,
         typer.Option(
-            metavar="DIR", help="Folder for recordings.", show_default="the current folder"
+            metavar="DIR",
+            help="Folder for recordings.",
+            show_default="that of the last session, at first the current folder",
         ),
-    ] = Path(),
+    ] = None,
+    fresh: Annotated[
+        bool,
+        typer.Option(
+            "--fresh", help="Restore no folder, sequence or overlay model of the last session."
+        ),
+    ] = False,
 ) -> None:
-    """Open the operator's window."""
+    """Open the operator's window, with what it had in the last session."""
     from dearig.window.main import run_window
 
-    raise typer.Exit(run_window(rig, rig_file, folder))
+    raise typer.Exit(run_window(rig, rig_file, folder, fresh))
 
 
 @commands.command("serve-daqmx", rich_help_panel=_PANEL)

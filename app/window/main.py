@@ -26,11 +26,17 @@ _TRY_FOR = 30.0  # s; a remote screen may be slow
 _NO_SCREEN = ("offscreen", "minimal")
 
 
-def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Path()) -> int:
+def run_window(
+    rig: str = "sim",
+    rig_file: Path | None = None,
+    folder: Path | None = None,
+    fresh: bool = False,
+) -> int:
     """Show the window until it is closed; returns the exit code.
 
-    Recordings are written to ``folder``. Raises ``InputError`` if Qt, a screen or the rig file is
-    missing.
+    Recordings are written to ``folder``, by default that of the last session. With ``fresh``
+    nothing of the last session is restored but sizes, operator and film. Raises ``InputError`` if
+    Qt, a screen or the rig file is missing.
     """
     require_qt()
     require_screen()
@@ -42,6 +48,7 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     from dearig.config.toml_input import read_text
     from dearig.window.collector import Collector
     from dearig.window.frame import MainWindow
+    from dearig.window.restore import SessionKeeper, kept_folder, restore
     from dearig.window.session import Session
     from dearig.window.settings import open_settings
     from dearig.window.theme import prepare_plots, system_theme
@@ -53,11 +60,25 @@ def run_window(rig: str = "sim", rig_file: Path | None = None, folder: Path = Pa
     application.setApplicationName("dearig")
     application.setOrganizationName("dearig")
     prepare_plots()
-    session = Session(folder.absolute(), open_settings(), address=rig, theme=system_theme())
+    kept, said = open_settings(), []
+    if folder is None:
+        folder, gone = (Path().absolute(), "") if fresh else kept_folder(kept, Path().absolute())
+        said += [gone] if gone else []
+    session = Session(folder.absolute(), kept, address=rig, theme=system_theme())
     session.program_errors.install()
     if rig_file is not None:
         session.set_rig_file(rig_file.absolute(), text, settings)
+    if not fresh:
+        said += restore(session)
+    SessionKeeper(session)
     window = MainWindow(session)
+    if said:
+        window.banners.show_text("restored", ". ".join(s[:1].upper() + s[1:] for s in said))
+        for changed in (
+            session.folder_changed, session.sequence_changed, session.overlays_changed,
+            session.running_changed,
+        ):  # fmt: skip
+            changed.connect(lambda *_: window.banners.hide_text("restored"))
     for name in _SIGNALS:
         if (number := getattr(signal, name, None)) is not None:
             signal.signal(number, lambda *_: window.leave())

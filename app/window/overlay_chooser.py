@@ -14,7 +14,7 @@ from dearig.window.background import Background
 from dearig.window.session import Session
 from dearig.window.widgets import Message, label, plain_tip
 
-__all__ = ["OverlayChooser"]
+__all__ = ["OverlayChooser", "read_overlay"]
 
 _NO_MODEL, _OPEN = "no model", "Open a model file …"
 
@@ -117,7 +117,7 @@ class OverlayChooser(QWidget):
     def _load_next(self) -> None:
         if self._to_load and not self._loading.busy:
             _, path = self._to_load[0]
-            self._loading.start(lambda: _read_model(path))
+            self._loading.start(lambda: read_overlay(path))
 
     @Slot(object)
     def _loaded(self, model: OverlayModel) -> None:
@@ -133,7 +133,8 @@ class OverlayChooser(QWidget):
         self._load_next()
 
 
-def _read_model(path: Path) -> OverlayModel:
+def read_overlay(path: Path) -> OverlayModel:
+    """Return the overlay model in the file at ``path``. Raises ``InputError``."""
     actuator = load_actuator(path)
     name = load_model(path).name
     return OverlayModel(name or path.stem, actuator, path, read_text(path, "model file"))

@@ -170,7 +170,6 @@ class Session(QObject):
         """Use another folder for recordings."""
         if folder != self.folder:
             self.folder = folder
-            self.settings.setValue("folder", str(folder))
             self.folder_changed.emit()
 
     def set_notes(self, operator: str, film: str, notes: str) -> None:

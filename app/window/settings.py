@@ -48,10 +48,10 @@ def _value(settings: QSettings, key: str) -> object:
         return None
 
 
-def kept_text(settings: QSettings, key: str, default: str = "") -> str:
-    """Return the text of ``key``; ``default`` where there is none."""
+def kept_text(settings: QSettings, key: str, default: str = "", most: int = _TEXT_MAX) -> str:
+    """Return the text of ``key``, ``default`` without one or if it is longer than ``most``."""
     value = _value(settings, key)
-    return value if isinstance(value, str) and len(value) <= _TEXT_MAX else default
+    return value if isinstance(value, str) and len(value) <= most else default
 
 
 def kept_texts(settings: QSettings, key: str, most: int) -> list[str]:
