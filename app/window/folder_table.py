@@ -342,6 +342,8 @@ def _tip(path: Path, summary: RecordingSummary | None, column: int) -> str:
     if column == _ENDED:
         told = [f"{event.time:.4g} s, {event.level}: {event.message}" for event in summary.events]
         return "\n".join([summary.outcome, *told])
+    if COLUMNS[column].wide and head not in ("Recording", "Notes"):
+        return f"{COLUMNS[column].name}: {COLUMNS[column].text(summary) or NO_VALUE}"
     notes = f"\nNotes: {summary.notes}" if summary.notes else ""
     by = f"\nOperator: {summary.operator}" if summary.operator else ""
     tags = f"\nTags: {', '.join(summary.tags)}" if summary.tags else ""
