@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, Slot
-from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from dearig.analysis.outcomes import Comparison
 from dearig.report.numbers import significant
 from dearig.units import SHOWN
-from dearig.window.plotting import add_curve, add_legend, add_noise, clear_plot, stacked_plots
+from dearig.window.plot_area import PlotArea
+from dearig.window.plot_item import Entry
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
 from dearig.window.widgets import label
@@ -37,8 +37,14 @@ class BeforeAfterPlot(QWidget):
         top.addWidget(of)
         top.addWidget(self.record)
         top.addWidget(self.error_summary, 1)
-        self.area, self.plots = stacked_plots((2, 4, 3))
-        self.area.setAccessibleName("Measurement, models and residuals")
+        self.area = PlotArea(session, "Measurement, models and residuals")
+        labels = ("Voltage (kV)", "Displacement (mm)", "Residual (µm)", "Residual (µm)")
+        # each residual has a plot: one would hide the other, which is about as large
+        self.plots = [
+            self.area.add_plot(row, left=label, weight=weight)
+            for row, (label, weight) in enumerate(zip(labels, (3, 6, 4, 4), strict=True))
+        ]
+        self.area.share_y(*self.plots[2:])
         outer = QVBoxLayout(self)
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
         outer.addLayout(top)
@@ -59,41 +65,43 @@ class BeforeAfterPlot(QWidget):
     @Slot()
     def _draw(self) -> None:
         theme = self._session.theme
-        self.area.setBackground(QColor(theme.surface))
         for plot in self.plots:
-            clear_plot(plot, theme)
+            plot.clear_all()
         index = self.record.currentIndex()
         if not 0 <= index < len(self._pairs):
             self.error_summary.setText("")
             return
         before, after = self._pairs[index]
         shown = SHOWN[before.kind]
-        drive, both, error = self.plots
-        drive.setLabel("left", shown.drive_label)
-        both.setLabel("left", shown.label)
-        error.setLabel("left", f"Residual ({shown.error_unit})")
-        error.setLabel("bottom", "Time (s)")
-        add_legend(both, theme)
+        drive, both, *residuals = self.plots
+        drive.set_axis("left", shown.drive_label)
+        both.set_axis("left", shown.label)
         time = before.time
-        add_curve(drive, time, before.drive * shown.drive_factor, theme.command)
-        add_curve(both, time, before.measured * shown.factor, theme.measured, "measured")
+        drive.add_curve("commanded", theme.command).set_points(
+            time, before.drive * shown.drive_factor
+        )
+        both.add_curve("measured", theme.measured).set_points(time, before.measured * shown.factor)
         said = []
-        for comparison, colour, name in (
-            (before, theme.models[0], "before" if after is not None else "model"),
-            (after, theme.models[1], "after"),
+        for error, comparison, colour, name in (
+            (residuals[0], before, theme.models[0], "before" if after is not None else "model"),
+            (residuals[1], after, theme.models[1], "after"),
         ):
+            self.area.show_plot(error, comparison is not None)
             if comparison is None:
                 continue
-            add_curve(both, time, comparison.model * shown.factor, colour, name)
+            error.set_axis("left", f"Residual ({shown.error_unit})")
+            both.add_curve(name, colour).set_points(time, comparison.model * shown.factor)
             left = (comparison.measured - comparison.model) * shown.error_factor
-            add_curve(error, time, left, colour)
+            error.add_curve(f"residual, {name}", colour).set_points(time, left)
             rms = significant(comparison.errors.rms * shown.error_factor)
             said.append(f"{name} {rms} {shown.error_unit} RMS")
+            if before.noise:
+                level = before.noise * shown.error_factor
+                error.add_levels(theme, "Noise floor", -level, level)
+                error.add_entry(Entry("noise floor", theme.muted, dashed=True))
         if before.noise:
             level = before.noise * shown.error_factor
-            add_noise(error, theme, -level, level)
             said.append(f"noise {significant(level)} {shown.error_unit}")
         self.error_summary.setText("   ".join(said))
-        self.plots[0].setXRange(time[0], time[-1], padding=0.0)
-        for plot in self.plots:
-            plot.enableAutoRange(axis="y")
+        self.area.file_stem = f"{before.name} residuals"
+        self.area.auto_range()

@@ -6,6 +6,7 @@ operator finds them in the bar above the plots and in their context menu, with w
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -142,18 +143,21 @@ class PlotArea(QWidget):
         group: str = "time",
         weight: int = 1,
         least: int = 60,
+        rows: int = 1,
         log: tuple[bool, bool] = (False, False),
     ) -> Plot:
         """Add a plot with the labels ``left`` and ``bottom``, at least ``least`` px high.
 
-        ``weight`` is the share of its row in the height. Below another plot of its group in the
-        same column, only the lower one has numbers on the horizontal axis.
+        ``rows`` is the number of rows that it takes, ``weight`` the share of each in the height.
+        Below another plot of its group in the same column, only the lower one has numbers on the
+        horizontal axis.
         """
         plot = Plot(left, bottom, log)
-        self.canvas.addItem(plot, row, column)
+        self.canvas.addItem(plot, row, column, rowspan=rows)
         layout = self.canvas.ci.layout
-        layout.setRowStretchFactor(row, weight)
-        layout.setRowMinimumHeight(row, least)
+        for taken in range(row, row + rows):
+            layout.setRowStretchFactor(taken, weight)
+            layout.setRowMinimumHeight(taken, least)
         self.canvas.area_plots.append(plot)
         chosen = self._groups.setdefault(group, Group(group))
         chosen.add(plot)
@@ -165,6 +169,11 @@ class PlotArea(QWidget):
         chosen.restyle(self._session.theme)
         self.arrange()
         return plot
+
+    def share_y(self, *plots: Plot) -> None:
+        """Give ``plots`` one vertical range, so that their curves can be compared."""
+        for plot in plots:
+            plot.share_y(plots)
 
     def remove_plot(self, plot: Plot) -> None:
         """Remove ``plot``."""
@@ -329,8 +338,9 @@ class PlotArea(QWidget):
                 self._set_following(following=False)
             plot.vb.setXRange(*x, padding=0.0)
         if y is not None and y[1] > y[0]:
-            plot.set_auto_y(auto=False)
-            plot.vb.setYRange(*y, padding=0.0)
+            for same in plot.same_y:
+                same.set_auto_y(auto=False)
+                same.vb.setYRange(*y, padding=0.0)
         self.view_changed.emit()
 
     @Slot(object, int, float)
@@ -479,7 +489,9 @@ class PlotArea(QWidget):
             self.write(path, text.encode("utf-8-sig"))
 
     def _ask(self, title: str, kinds: str, ending: str) -> Path | None:
-        start = self._session.folder / f"{self.file_stem}{ending}"
+        # names of recordings and sequences may hold what a name of a file must not
+        stem = re.sub(r'[<>:"/\\\\|?*]|[^ -\uffff]', "_", self.file_stem)
+        start = self._session.folder / f"{stem}{ending}"
         return save_as(self, self._session, title, start, kinds, ending)
 
     @contextmanager

@@ -128,10 +128,10 @@ class Group:
     def renew_readout(self) -> None:
         """Write the values at the cursors, or else at the crosshair, into the keys of the plots."""
         for plot in self.plots:
-            plot.renew_key(tuple(self._read(plot, i) for i in range(len(plot.named_curves()))))
+            plot.renew_key(tuple(self._read(plot, i) for i in range(len(plot.curves_in_key()))))
 
     def _read(self, plot: Plot, number: int) -> str:
-        curve = plot.named_curves()[number]
+        curve = plot.curves_in_key()[number]
         if not curve.increasing:
             return ""
         if self.cursors is not None:

@@ -30,9 +30,17 @@ class Curve(pg.PlotCurveItem):
     columns keep their places in x, so that the curve does not flicker while it is moved.
     """
 
-    def __init__(self, name: str, symbol: str = "", line: bool = True, size: int = 5) -> None:
+    def __init__(
+        self,
+        name: str,
+        symbol: str = "",
+        line: bool = True,
+        size: int = 5,
+        in_key: bool = True,
+    ) -> None:
         super().__init__(skipFiniteCheck=False, connect="finite")
         self.title = name
+        self.in_key = in_key and bool(name)
         self.colour = ""
         self.dashed = False
         self.line = line

@@ -65,6 +65,11 @@ class Entry:
     line: bool = True
     area: bool = False
 
+    @property
+    def has_sample(self) -> bool:
+        """True if something is drawn before the name."""
+        return self.line or self.area or bool(self.symbol)
+
 
 class Plot(pg.PlotItem):
     """Plot of a ``PlotArea``, which makes it.
@@ -84,8 +89,9 @@ class Plot(pg.PlotItem):
         self.axis_texts: dict[str, AxisText] = {}
         self.drawn: list[Curve] = []
         self.auto_y = True
+        self.same_y: tuple[Plot, ...] = (self,)  #: plots with this vertical axis
         self._entries: list[Entry] = []
-        self._theme: Theme | None = None
+        self._note = ""
         view.setMouseEnabled(x=False, y=False)  # the area handles the mouse
         view.disableAutoRange()
         view.setAutoVisible(y=True)
@@ -125,6 +131,13 @@ class Plot(pg.PlotItem):
         size = math.inf if self.log[along] else self.pixel()[along]
         return self.axis_texts[side].number(value, size)
 
+    def share_y(self, plots: tuple[Plot, ...]) -> None:
+        """Cover what is visible in all ``plots``, so that their curves can be compared."""
+        self.same_y = plots
+        shared = _SharedBounds(tuple(plot for plot in plots if plot is not self))
+        shared.of_tools = True
+        self.addItem(shared)
+
     # contents
 
     def add_curve(
@@ -135,9 +148,10 @@ class Plot(pg.PlotItem):
         symbol: str = "",
         line: bool = True,
         size: int = 5,
+        in_key: bool = True,
     ) -> Curve:
-        """Add an empty curve; with a ``name`` it is in the key."""
-        curve = Curve(name, symbol, line, size)
+        """Add an empty curve; one without a ``name`` is neither in the key nor in the data."""
+        curve = Curve(name, symbol, line, size, in_key)
         curve.set_colour(colour, dashed)
         curve.set_log(*self.log)
         self.addItem(curve)
@@ -150,6 +164,11 @@ class Plot(pg.PlotItem):
     def add_entry(self, entry: Entry) -> None:
         """Add an entry to the key for something that is not a curve."""
         self._entries.append(entry)
+        self.renew_key()
+
+    def set_note(self, text: str) -> None:
+        """Show ``text`` after the entries of the key, or nothing."""
+        self._note = text
         self.renew_key()
 
     def add_levels(self, theme: Theme, tip: str, *levels: float) -> None:
@@ -168,13 +187,15 @@ class Plot(pg.PlotItem):
             self.removeItem(item)
         self.renew_key()
 
-    def named_curves(self) -> list[Curve]:
+    def curves_in_key(self) -> list[Curve]:
         """Return the curves that are in the key."""
-        return [curve for curve in self.drawn if curve.title]
+        return [curve for curve in self.drawn if curve.in_key]
 
     def entries(self) -> list[Entry]:
         """Return the entries of the key."""
-        curves = [Entry(c.title, c.colour, c.dashed, c.symbol, c.line) for c in self.named_curves()]
+        curves = [
+            Entry(c.title, c.colour, c.dashed, c.symbol, c.line) for c in self.curves_in_key()
+        ]
         return curves + self._entries
 
     def renew_key(self, values: tuple[str, ...] = ()) -> None:
@@ -183,7 +204,6 @@ class Plot(pg.PlotItem):
 
     def restyle(self, theme: Theme) -> None:
         """Use the colours of ``theme`` for the axes and the key."""
-        self._theme = theme
         style_plot(self, theme)
         self.key.set_colour(theme.text)
 
@@ -191,6 +211,38 @@ class Plot(pg.PlotItem):
         super().resizeEvent(event)
         if hasattr(self, "key"):  # the layout of pyqtgraph's constructor comes first
             self.key.arrange()
+
+
+class _SharedBounds(pg.GraphicsObject):
+    """Draws nothing; its vertical bounds are those of the curves in other plots."""
+
+    def __init__(self, plots: tuple[Plot, ...]) -> None:
+        super().__init__()
+        self._plots = plots
+
+    def dataBounds(  # noqa: N802
+        self,
+        ax: int,
+        frac: float = 1.0,
+        orthoRange: tuple[float, float] | None = None,
+    ) -> tuple[float | None, float | None]:
+        found = [
+            curve.dataBounds(ax, frac, orthoRange)
+            for plot in self._plots if ax == 1 and plot.isVisible() for curve in plot.drawn
+        ]  # fmt: skip
+        low = min((b[0] for b in found if b[0] is not None), default=None)
+        return low, max((b[1] for b in found if b[1] is not None), default=None)
+
+    def boundingRect(self) -> QRectF:  # noqa: N802
+        return QRectF()
+
+    def paint(
+        self,
+        painter: QPainter,
+        option: QStyleOptionGraphicsItem,
+        widget: QWidget | None = None,
+    ) -> None:
+        """Draw nothing."""
 
 
 class DecadeAxis(pg.AxisItem):
@@ -246,9 +298,9 @@ class _Key(pg.GraphicsWidget):
         values = (*self._values, *[""] * (len(self._entries) - len(self._values)))
         for entry, value in zip(self._entries, values, strict=True):
             text = f"{entry.name}  {value}" if value else entry.name
-            room = width - _SAMPLE - _GAP
-            text = self._metrics.elidedText(text, Qt.TextElideMode.ElideMiddle, room)
-            size = _SAMPLE + _GAP + self._metrics.horizontalAdvance(text)
+            sample = _SAMPLE + _GAP if entry.has_sample else 0.0
+            text = self._metrics.elidedText(text, Qt.TextElideMode.ElideMiddle, width - sample)
+            size = sample + self._metrics.horizontalAdvance(text)
             if x and x + size > width:
                 x, row = 0.0, row + 1
             self._places.append((entry, text, QPointF(x, row * height)))
@@ -291,7 +343,8 @@ class _Key(pg.GraphicsWidget):
                 draw(square)
             painter.setPen(QColor(self._colour))
             base = place.y() + (height + self._metrics.ascent() - self._metrics.descent()) / 2.0
-            painter.drawText(QPointF(place.x() + _SAMPLE + _GAP, base), text)
+            sample = _SAMPLE + _GAP if entry.has_sample else 0.0
+            painter.drawText(QPointF(place.x() + sample, base), text)
 
     def _row_height(self) -> float:
         return math.ceil(self._metrics.height()) + 1.0

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pyqtgraph as pg
+from PySide6.QtCore import Slot
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QWidget
 
+from dearig.window.plot_area import PlotArea
+from dearig.window.plot_curve import Curve
+from dearig.window.plot_item import Plot
 from dearig.window.session import Preview, Session
-from dearig.window.theme import pen, style_plot
+from dearig.window.theme import pen
 
 __all__ = ["PreviewPlots"]
 
@@ -20,31 +24,26 @@ _PLOTS = {
 _MARKED = {"voltage": "voltage", "slew": "voltage", "true field": "field"}
 
 
-class PreviewPlots(pg.GraphicsLayoutWidget):
-    """Shows a ``Preview``; the wheel zooms in time, a double click shows the whole sequence."""
+class PreviewPlots(PlotArea):
+    """Shows a ``Preview``."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._session = session
+        super().__init__(session, "Planned sequence", parent=parent)
         self._preview: Preview | None = None
         self._chosen: tuple[float, float] | None = None
-        self._plots: dict[str, pg.PlotItem] = {}
-        self._curves: dict[str, pg.PlotCurveItem] = {}
-        self._marks: list[tuple[pg.PlotItem, pg.GraphicsObject]] = []
-        for row, (name, (words, _)) in enumerate(_PLOTS.items()):
-            plot = self.addPlot(row=row, col=0)
-            plot.setLabel("left", words)
-            plot.setMouseEnabled(x=True, y=False)
-            curve = pg.PlotCurveItem(connect="finite")
-            plot.addItem(curve)
-            self._plots[name], self._curves[name] = plot, curve
-            if row < len(_PLOTS) - 1:
-                plot.getAxis("bottom").setStyle(showValues=False)
-            if row:
-                plot.setXLink(self._plots["voltage"])
-        self._plots["field"].setLabel("bottom", "Time (s)")
-        session.theme_changed.connect(self._restyle)
-        self._restyle()
+        self._marks: list[tuple[Plot, pg.GraphicsObject]] = []
+        self._plots = {
+            name: self.add_plot(row, left=words)
+            for row, (name, (words, _)) in enumerate(_PLOTS.items())
+        }
+        self._curves: dict[str, Curve] = {
+            name: self._plots[name].add_curve(words)
+            for name, words in (
+                ("voltage", "planned"), ("displacement", "predicted"), ("field", "predicted"),
+            )
+        }  # fmt: skip
+        session.theme_changed.connect(self._recolour)
+        self._recolour()
 
     @property
     def marks(self) -> int:
@@ -54,8 +53,8 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
     @property
     def drawn(self) -> tuple[str, ...]:
         """Names of the plots with a curve."""
-        found = {name: curve.getData()[1] for name, curve in self._curves.items()}
-        return tuple(n for n, y in found.items() if y is not None and np.isfinite(y).any())
+        found = {name: curve.points[1] for name, curve in self._curves.items()}
+        return tuple(n for n, y in found.items() if np.isfinite(y).any())
 
     def show_preview(self, preview: Preview | None) -> None:
         """Draw ``preview``; None is one that is still being made.
@@ -67,21 +66,22 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
         curves = {} if preview is None else preview.curves
         for name, curve in self._curves.items():
             x, y = curves.get(name, (np.empty(0), np.empty(0)))
-            curve.setData(x, y * _PLOTS[name][1])
-            words = None
+            curve.set_points(x, y * _PLOTS[name][1])
+            words = ""
             if preview is not None and not planned:
                 words = "no prediction: the sequence cannot be played"
             elif y.size and not np.isfinite(y).any():
                 words = "no prediction: a limit is already exceeded"
             elif not np.isfinite(y).all():
                 words = "prediction up to where a limit is exceeded or the model fails"
-            self._plots[name].setTitle(words, color=self._session.theme.muted, size="9pt")
+            self._plots[name].set_note(words)
         self._mark()
         if preview is None or preview.plan is None:
             return
-        self._plots["voltage"].setXRange(0.0, preview.plan.duration, padding=0.01)
-        for plot in self._plots.values():
-            plot.enableAutoRange(axis="y")
+        self.file_stem = (
+            "planned sequence" if preview.loaded is None else preview.loaded.sequence.name
+        )
+        self.auto_range()
 
     def choose(self, span: tuple[float, float] | None) -> None:
         """Shade the time span (s) of the chosen segment."""
@@ -89,18 +89,14 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
             self._chosen = span
             self._mark()
 
-    def mouseDoubleClickEvent(self, event: object) -> None:  # noqa: N802
-        super().mouseDoubleClickEvent(event)
-        if self._preview is not None and self._preview.plan is not None:
-            self._plots["voltage"].setXRange(0.0, self._preview.plan.duration, padding=0.01)
-
-    def _restyle(self) -> None:
+    @Slot()
+    def _recolour(self) -> None:
         theme = self._session.theme
         for name, colour in (
             ("voltage", theme.command), ("displacement", theme.models[0]), ("field", theme.field)
         ):  # fmt: skip
-            style_plot(self._plots[name], theme)
-            self._curves[name].setPen(pen(colour))
+            self._curves[name].set_colour(colour)
+            self._plots[name].renew_key()
         self._mark()
 
     def _mark(self) -> None:
@@ -135,7 +131,7 @@ class PreviewPlots(pg.GraphicsLayoutWidget):
             region.setToolTip(f"{breach.quantity} beyond its limit")
             self._put(self._plots[_MARKED[breach.quantity]], region)
 
-    def _put(self, plot: pg.PlotItem, item: pg.GraphicsObject) -> None:
+    def _put(self, plot: Plot, item: pg.GraphicsObject) -> None:
         item.setZValue(-10)
         plot.addItem(item, ignoreBounds=isinstance(item, pg.LinearRegionItem))
         self._marks.append((plot, item))

@@ -8,19 +8,21 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QSignalBlocker, Slot
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from dearig.analysis.study import Residual
 from dearig.model.diagnosis.results import Dependence, MissingStress
 from dearig.units import SHOWN, readable
-from dearig.window.plotting import DecadeAxis, add_curve, add_noise, clear_plot, set_legend_title
+from dearig.window.plot_area import PlotArea
+from dearig.window.plot_item import Entry
 from dearig.window.session import Session
-from dearig.window.theme import SPACE, pen
+from dearig.window.theme import SPACE
 from dearig.window.widgets import label
 
 __all__ = ["ResidualPlots"]
 
 _POINTS = 2000  # of a scatter plot; more points cover each other
+_LEAST = 66  # px, height of the plot over time of one model; the others are twice as high
 
 
 class ResidualPlots(QWidget):
@@ -37,16 +39,22 @@ class ResidualPlots(QWidget):
         self.stand = QComboBox()
         self.stand.addItems(["before", "after"])
         self.stand.setToolTip("Thesis model (before), or model with the effects found (after)")
-        self.time, self.dependence, self.missing = (pg.PlotWidget() for _ in range(3))
-        self.density = pg.PlotWidget(axisItems={"left": DecadeAxis("left")})
-        for plot, name in (
-            (self.time, "Residual over time"),
-            (self.density, "Residual over frequency"),
-            (self.dependence, "Residual against a quantity"),
-            (self.missing, "Missing stress"),
-        ):
-            plot.setAccessibleName(name)
-            plot.setMinimumHeight(130)
+        self.area = area = PlotArea(session, "Residual")
+        # each model has a plot over time: one residual would hide the other
+        self.time = tuple(area.add_plot(row, left="Residual (µm)", least=_LEAST) for row in (0, 1))
+        area.share_y(*self.time)
+        self.density = area.add_plot(
+            0, 1, left="Density (µm/√Hz)", bottom="Frequency (Hz)", group="frequency", rows=2,
+            least=_LEAST, log=(True, True),
+        )  # fmt: skip
+        self.dependence = area.add_plot(
+            2, left="Residual (µm)", bottom="Quantity", group="quantity", weight=2,
+            least=2 * _LEAST,
+        )  # fmt: skip
+        self.missing = area.add_plot(
+            2, 1, left="Missing stress (Pa)", bottom="Quantity", group="missing stress", weight=2,
+            least=2 * _LEAST,
+        )  # fmt: skip
         self.remarks = label("", "muted")
         self.remarks.setWordWrap(True)
 
@@ -59,14 +67,10 @@ class ResidualPlots(QWidget):
             row.addWidget(of)
             row.addWidget(box)
         row.addStretch(1)
-        grid = QGridLayout()
-        grid.setSpacing(SPACE)
-        for i, plot in enumerate((self.time, self.density, self.dependence, self.missing)):
-            grid.addWidget(plot, i // 2, i % 2)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
         outer.addLayout(row)
-        outer.addLayout(grid, 1)
+        outer.addWidget(area, 1)
         outer.addWidget(self.remarks)
 
         self.record.currentIndexChanged.connect(self._another_record)
@@ -101,13 +105,12 @@ class ResidualPlots(QWidget):
 
     @Slot()
     def _draw(self) -> None:
-        theme = self._session.theme
-        for widget in (self.time, self.density, self.dependence, self.missing):
-            widget.setBackground(QColor(theme.surface))
-            clear_plot(widget.getPlotItem(), theme)
+        plots = (*self.time, self.density, self.dependence, self.missing)
+        for plot in plots:
+            plot.clear_all()
         found = self._found()
-        self.dependence.setVisible(found is None or bool(found.dependences))
-        self.missing.setVisible(found is None or bool(found.missing))
+        self.area.show_plot(self.dependence, found is None or bool(found.dependences))
+        self.area.show_plot(self.missing, found is None or bool(found.missing))
         if found is None:
             self.remarks.setText("")
             return
@@ -119,77 +122,69 @@ class ResidualPlots(QWidget):
             self._against(found.dependences[last], found.kind)
         if found.missing:
             self._stress(found.missing[min(last, len(found.missing) - 1)], found.kind)
+        self.area.file_stem = f"{found.name} residual"
+        self.area.auto_range()
 
-    def _colours(self) -> tuple[tuple[str, str], ...]:
-        theme = self._session.theme
-        return (("before", theme.models[0]), ("after", theme.models[1]))
-
-    def _key(self, stands: int) -> tuple[tuple[str, str, str], ...]:
-        """Return the legend for ``stands`` models."""
-        names = self._colours()[:stands]
-        if stands == 1:
-            names = (("residual", names[0][1]),)
-        return tuple(("\N{EM DASH}", name, colour) for name, colour in names)
+    def _models(self, count: int) -> list[tuple[str, str]]:
+        """Return names and colours of ``count`` models."""
+        colours = self._session.theme.models
+        if count == 1:
+            return [("residual", colours[0])]
+        return list(zip(("before", "after"), colours, strict=True))[:count]
 
     def _over_time(self, found: Residual) -> None:
-        plot, theme, shown = self.time.getPlotItem(), self._session.theme, SHOWN[found.kind]
-        plot.setLabel("left", f"Residual ({shown.error_unit})")
-        plot.setLabel("bottom", "Time (s)")
-        stands = self._colours()[: len(found.over_time)]
-        set_legend_title(plot, *self._key(len(found.over_time)))
-        for (_, colour), trace in zip(stands, found.over_time, strict=True):
-            add_curve(plot, trace.x, trace.y * shown.error_factor, colour)
-        if found.noise is not None:
-            level = found.noise * shown.error_factor
-            add_noise(plot, theme, -level, level)
-        plot.autoRange(padding=0.02)
+        theme, shown = self._session.theme, SHOWN[found.kind]
+        models = self._models(len(found.over_time))
+        for place, plot in enumerate(self.time):
+            self.area.show_plot(plot, place < len(models))
+            if place >= len(models):
+                continue
+            name, colour = models[place]
+            trace = found.over_time[place]
+            plot.set_axis("left", f"Residual ({shown.error_unit})")
+            plot.add_curve(name, colour).set_points(trace.x, trace.y * shown.error_factor)
+            if found.noise is not None:
+                level = found.noise * shown.error_factor
+                plot.add_levels(theme, "Noise floor", -level, level)
+                plot.add_entry(Entry("noise floor", theme.muted, dashed=True))
 
     def _over_frequency(self, found: Residual) -> None:
-        plot, theme, shown = self.density.getPlotItem(), self._session.theme, SHOWN[found.kind]
-        plot.setLogMode(x=True, y=True)
-        plot.setLabel("left", f"Density ({shown.error_unit}/\N{SQUARE ROOT}Hz)")
-        plot.setLabel("bottom", "Frequency (Hz)")
-        set_legend_title(plot, *self._key(len(found.density)), ("- -", "noise floor", theme.muted))
-        for (_, colour), trace in zip(self._colours(), found.density, strict=False):
-            good = (trace.x > 0.0) & (trace.y > 0.0)
-            add_curve(plot, trace.x[good], trace.y[good] * shown.error_factor, colour)
+        plot, theme, shown = self.density, self._session.theme, SHOWN[found.kind]
+        plot.set_axis("left", f"Density ({shown.error_unit}/\N{SQUARE ROOT}Hz)")
+        for (name, colour), trace in zip(
+            self._models(len(found.density)), found.density, strict=True
+        ):  # fmt: skip
+            plot.add_curve(name, colour).set_points(trace.x, trace.y * shown.error_factor)
         if found.floor:
-            add_noise(plot, theme, math.log10(found.floor * shown.error_factor))
-        plot.autoRange(padding=0.02)
+            plot.add_levels(theme, "Noise floor", math.log10(found.floor * shown.error_factor))
+            plot.add_entry(Entry("noise floor", theme.muted, dashed=True))
 
     def _against(self, dependences: tuple[Dependence, ...], kind: str) -> None:
-        plot, theme, shown = self.dependence.getPlotItem(), self._session.theme, SHOWN[kind]
+        plot, theme, shown = self.dependence, self._session.theme, SHOWN[kind]
         chosen = [d for d in dependences if d.quantity == self.quantity.currentText()]
-        plot.setLabel("left", f"Residual ({shown.error_unit})")
+        plot.set_axis("left", f"Residual ({shown.error_unit})")
         if not chosen:
             return
         found, scale = chosen[0], shown.error_factor
         unit = found.unit.replace("^2", "\N{SUPERSCRIPT TWO}")
-        plot.setLabel("bottom", f"{found.quantity} ({unit})" if unit else found.quantity)
-        set_legend_title(
-            plot, ("\N{BLACK CIRCLE}", "loading", theme.command),
-            ("\N{BLACK SQUARE}", "unloading", theme.monitor),
-            ("\N{FULL BLOCK}", "95 % band of noise", theme.muted),
-        )  # fmt: skip
+        plot.set_axis("bottom", f"{found.quantity} ({unit})" if unit else found.quantity)
         chance = 2.0 * found.error * scale
         band = QColor(theme.muted)
         band.setAlpha(60)
         edges = [pg.PlotCurveItem(found.at, sign * chance, pen=None) for sign in (-1.0, 1.0)]
         plot.addItem(pg.FillBetweenItem(*edges, brush=band), ignoreBounds=True)
-        for values, colour, symbol in (
-            (found.loading, theme.command, "o"), (found.unloading, theme.monitor, "s"),
-        ):  # fmt: skip
+        for name, values, colour, symbol in (
+            ("loading", found.loading, theme.command, "o"),
+            ("unloading", found.unloading, theme.monitor, "s"),
+        ):
             good = np.isfinite(values)
-            plot.addItem(
-                pg.PlotDataItem(
-                    found.at[good], values[good] * scale, pen=pen(colour), symbol=symbol,
-                    symbolSize=5, symbolPen=None, symbolBrush=QColor(colour),
-                )
-            )  # fmt: skip
-        plot.autoRange(padding=0.04)
+            plot.add_curve(name, colour, symbol=symbol).set_points(
+                found.at[good], values[good] * scale
+            )
+        plot.add_entry(Entry("95 % band of noise", band.name(QColor.NameFormat.HexArgb), area=True))
 
     def _stress(self, missing: MissingStress, kind: str) -> None:
-        plot, theme = self.missing.getPlotItem(), self._session.theme
+        plot, theme = self.missing, self._session.theme
         quantity = self.quantity.currentText()
         values, text = missing.stretch, "stretch"
         if kind == "actuator" and "oltage" in quantity:
@@ -198,22 +193,13 @@ class ResidualPlots(QWidget):
             values, text = missing.rate, "stretch rate (1/s)"
         elif "time" in quantity:
             values, text = missing.time, "time (s)"
-        plot.setLabel("left", "Missing stress (Pa)")
-        plot.setLabel("bottom", text)
-        set_legend_title(
-            plot, ("\N{BLACK CIRCLE}", "loading", theme.command),
-            ("\N{BLACK SQUARE}", "unloading", theme.monitor),
-        )  # fmt: skip
+        plot.set_axis("bottom", text)
         rising = missing.rate >= 0.0
-        for which, colour, symbol in (
-            (rising, theme.command, "o"), (~rising, theme.monitor, "s"),
+        for name, which, colour, symbol in (
+            ("loading", rising, theme.command, "o"), ("unloading", ~rising, theme.monitor, "s"),
         ):  # fmt: skip
             rows = np.flatnonzero(which)
             rows = rows[:: max(1, rows.size // (_POINTS // 2))]
-            plot.addItem(
-                pg.ScatterPlotItem(
-                    values[rows], missing.stress[rows], size=3, pen=None, symbol=symbol,
-                    brush=QColor(colour),
-                )
-            )  # fmt: skip
-        plot.autoRange(padding=0.04)
+            plot.add_curve(name, colour, symbol=symbol, line=False, size=3).set_points(
+                values[rows], missing.stress[rows]
+            )

@@ -125,11 +125,11 @@ def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
         wide = page.differences.columnWidth(place)
         assert wide >= min(260, max(map(metrics.horizontalAdvance, head)))  # nothing is cut
     assert page.side_tabs.currentWidget() is page.differences
-    assert len(page.plot.plots[1].listDataItems()) == 4
+    assert len(page.plot.plots[1].drawn) == 4
     assert all(words in page.plot.key.text() for words in (*order, "model\N{NO-BREAK SPACE}of"))
     click(qtbot, page.model_shown)
     assert "model" not in page.plot.key.text()
-    assert len(page.plot.plots[1].listDataItems()) == 2
+    assert len(page.plot.plots[1].drawn) == 2
     assert not page.plot.plots[2].isVisible()
     click(qtbot, page.model_shown)
 
@@ -161,7 +161,7 @@ def test_a_folder_is_looked_through(session, folder, keep, qtbot, tmp_path):
 
     # at night
     session.set_theme(DARK)
-    measured = page.plot.plots[1].listDataItems()[0]
+    measured = page.plot.plots[1].drawn[0]
     assert measured.opts["pen"].color().name() == DARK.measured
 
 

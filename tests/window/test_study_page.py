@@ -77,7 +77,7 @@ def test_a_fit_with_its_check_from_ticks_to_files(session, keep, qtbot, tmp_path
     assert [page.curves.record.itemText(i) for i in range(2)] == [
         "high (validation)", "low (training)",
     ]  # fmt: skip
-    assert len(page.residual.time.listDataItems()) == 1
+    assert [len(p.drawn) for p in page.residual.time] == [1, 0]
     assert found.report.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     assert load_model(found.model).model.network.branches
     assert found.model == session.folder / "study-1" / "model.toml"
@@ -137,7 +137,7 @@ def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
     assert outcome.finding.steps
     assert outcome.experiment is not None, outcome.experiment_words
     assert outcome.experiment.name in words(page.experiment)
-    assert len(page.residual.time.listDataItems()) == 2
+    assert [len(p.drawn) for p in page.residual.time] == [1, 1]
 
     # the improved model beside the next measurement
     click(qtbot, page.overlay_button)
