@@ -101,14 +101,14 @@ class CurvesPlot(QWidget):
             both.add_curve(
                 "model" if alone else f"model of {name}", beside, dashed=not alone, in_key=alone
             ).set_points(time, model * shown.factor)
-            if not alone and i == len(self._shown) - 1:
-                both.add_entry(Entry("model of each recording", theme.muted, dashed=True))
             time, left = curves.residual
             residual.add_curve("residual" if alone else name, beside, in_key=alone).set_points(
                 time, left * shown.error_factor
             )
         if alone:
             self._events(self._shown[0])
+        elif self._with_model and any(c.model is not None for c in self._shown):
+            both.add_entry(Entry("model of each recording", theme.muted, dashed=True))
 
     def _events(self, curves: Curves) -> None:
         theme = self._session.theme

@@ -22,7 +22,7 @@ from dearig.drivers.channels import CHANNEL_NAMES, Channel
 from dearig.drivers.rig import Block, Event, RigIdentity
 from dearig.model.errors import ModelError
 from dearig.recording.rest_noise import lead_in
-from dearig.window.traces import ErrorsSoFar, Pyramid, RunningErrors
+from dearig.window.traces import ErrorsSoFar, Newest, Pyramid, RunningErrors
 
 __all__ = ["Live", "LiveEvent", "RunSnapshot"]
 
@@ -40,6 +40,9 @@ _KEPT_MAX = 2**24
 _TOO_LONG = (
     "the run is too long to simulate another model from its start; choose the models before a run"
 )
+# Newest samples of a signal that spectra and loops are made of: 131 s at 1 kHz, 1 MB a signal
+_NEWEST = 2**17
+_NEWEST_OF = ("command", "displacement", "residual 0", "residual 1")
 _GAP = 2**16  # samples, pushed together for a model that has no past
 
 
@@ -141,6 +144,19 @@ class Live(RunObserver):
             samples, values = pyramid.view(begin, end)
         return samples / run.rate, values
 
+    def newest(self, name: str, seconds: float) -> np.ndarray:
+        """Return all samples (n,) in SI units of the newest ``seconds`` of a signal.
+
+        They are fewer where the run is shorter, or where 2**17 samples are. ``name`` is command,
+        displacement, or residual with the number of the model; others give no samples.
+        """
+        run = self._run
+        if run is None:
+            return np.empty(0)
+        with self._lock:
+            ring = run.newest.get(name)
+            return np.empty(0) if ring is None else ring.last(round(seconds * run.rate))
+
     def close(self) -> None:
         """Convert the waiting blocks, and end the thread."""
         if self._thread is not None:
@@ -195,6 +211,7 @@ class _Run:
         self.rate = rate
         self._signals = {c.name: signal for c in channels if (signal := _signal(c.name))}
         self.curves = {signal: Pyramid(total) for signal in self._signals.values()}
+        self.newest = {name: Newest(_NEWEST) for name in _NEWEST_OF}
         self._blocks: list[Block] | None = []  # None once there are too many to keep
         self._kept = 0  # samples
         self._models: tuple[_Model, ...] = ()
@@ -232,6 +249,8 @@ class _Run:
             return fresh
         for signal in self._signals.values():
             fresh.curves[signal] = self.curves[signal]
+        for name in ("command", "displacement"):
+            fresh.newest[name] = self.newest[name]
         fresh._blocks, fresh._rest, fresh._newest = None, self._rest, self._newest
         fresh._go_on(self, overlays, drive)
         return fresh
@@ -250,6 +269,8 @@ class _Run:
             for name in ("model", "residual", "rms"):
                 if there is not None:
                     self.curves[f"{name} {i}"] = before.curves[f"{name} {there}"]
+                    if name == "residual":
+                        self.newest[f"residual {i}"] = before.newest[f"residual {there}"]
                     continue
                 curve = self.curves[f"{name} {i}"] = Pyramid(self.total)
                 for start in range(0, past, _GAP):
@@ -279,6 +300,8 @@ class _Run:
         self.revision += 1
         for name, values in taken.values.items():
             self.curves[name].push(values)
+            if name in self.newest:
+                self.newest[name].push(values)
             last = values[-max(1, round(_READOUT * self.rate)) :]
             self._newest[name] = float(last[-1] if name == "command" else last.mean())
         measured = taken.values.get("displacement")
@@ -287,7 +310,9 @@ class _Run:
             if measured is None:
                 continue
             model.running.push(measured, moved)
-            self.curves[f"residual {i}"].push(measured - moved)
+            left = measured - moved
+            self.curves[f"residual {i}"].push(left)
+            self.newest[f"residual {i}"].push(left)
             recent = model.running.now().recent
             self.curves[f"rms {i}"].push(np.full(moved.size, recent))
 

@@ -105,10 +105,10 @@ class PlotArea(QWidget):
         tools.auto.triggered.connect(self._auto)
         tools.back.triggered.connect(self._back)
         tools.follow.triggered.connect(self.follow)
-        tools.left.triggered.connect(lambda: self._scale(-_STEP, 1.0))
-        tools.right.triggered.connect(lambda: self._scale(_STEP, 1.0))
-        tools.closer.triggered.connect(lambda: self._scale(0.0, _ZOOM_KEY))
-        tools.wider.triggered.connect(lambda: self._scale(0.0, 1.0 / _ZOOM_KEY))
+        tools.left.triggered.connect(lambda: self._scale_x(-_STEP, 1.0))
+        tools.right.triggered.connect(lambda: self._scale_x(_STEP, 1.0))
+        tools.closer.triggered.connect(lambda: self._scale_x(0.0, _ZOOM_KEY))
+        tools.wider.triggered.connect(lambda: self._scale_x(0.0, 1.0 / _ZOOM_KEY))
         tools.copy.triggered.connect(self.copy_picture)
         tools.copy_data.triggered.connect(self.copy_data)
         tools.png.triggered.connect(self._save_png)
@@ -144,15 +144,16 @@ class PlotArea(QWidget):
         weight: int = 1,
         least: int = 60,
         rows: int = 1,
+        own_range: bool = False,
         log: tuple[bool, bool] = (False, False),
     ) -> Plot:
         """Add a plot with the labels ``left`` and ``bottom``, at least ``least`` px high.
 
         ``rows`` is the number of rows that it takes, ``weight`` the share of each in the height.
         Below another plot of its group in the same column, only the lower one has numbers on the
-        horizontal axis.
+        horizontal axis. With ``own_range`` the owner sets the vertical range.
         """
-        plot = Plot(left, bottom, log)
+        plot = Plot(left, bottom, log, own_range)
         self.canvas.addItem(plot, row, column, rowspan=rows)
         layout = self.canvas.ci.layout
         for taken in range(row, row + rows):
@@ -261,6 +262,21 @@ class PlotArea(QWidget):
         self._set_following(following=True)
         self.view_changed.emit()
 
+    def look_at(self, first: float, last: float) -> None:
+        """Show ``first`` to ``last`` s, and do not follow the run."""
+        self._set_following(following=False)
+        self.show_span(first, last)
+        self.view_changed.emit()
+
+    def set_live(self, live: bool) -> None:
+        """Say whether the plots show a run, which is followed at first."""
+        self._live = live
+        self._history.clear()
+        self.tools.back.setEnabled(False)
+        self._following = not live  # so that a change is announced
+        self._set_following(following=live)
+        self.tools.show_follow(shown=False)
+
     def data_changed(self) -> None:
         """Renew the readouts soon; for an owner that has drawn a frame."""
         shown = any(g.hair is not None or g.cursors is not None for g in self._groups.values())
@@ -271,7 +287,7 @@ class PlotArea(QWidget):
         following = following and self._live
         if following != self._following:
             self._following = following
-            self.tools.show_follow(shown=not following)
+            self.tools.show_follow(shown=self._live and not following)
             self.following_changed.emit(following)
 
     # readouts
@@ -384,7 +400,7 @@ class PlotArea(QWidget):
         self._set_following(past.following)
         self.view_changed.emit()
 
-    def _scale(self, shift: float, factor: float) -> None:
+    def _scale_x(self, shift: float, factor: float) -> None:
         """Move the horizontal axis by ``shift`` of its range, and make the range ``factor``."""
         group = self._active_group()
         if group is not None:

@@ -39,8 +39,8 @@ class Curve(pg.PlotCurveItem):
         in_key: bool = True,
     ) -> None:
         super().__init__(skipFiniteCheck=False, connect="finite")
-        self.title = name
-        self.in_key = in_key and bool(name)
+        self.title = name  #: without one, it is neither in the key nor in the data
+        self.in_key = in_key
         self.colour = ""
         self.dashed = False
         self.line = line

@@ -75,10 +75,17 @@ class Plot(pg.PlotItem):
     """Plot of a ``PlotArea``, which makes it.
 
     The key stands above the curves and hides none. While ``auto_y`` is True, the y axis covers what
-    is visible; it is False after the operator has chosen a range of y.
+    is visible; it is False after the operator has chosen a range of y. With ``own_range`` the owner
+    of the plot sets the range, with ``show_y``.
     """
 
-    def __init__(self, left: str, bottom: str, log: tuple[bool, bool] = (False, False)) -> None:
+    def __init__(
+        self,
+        left: str,
+        bottom: str,
+        log: tuple[bool, bool] = (False, False),
+        own_range: bool = False,
+    ) -> None:
         axes = {
             side: DecadeAxis(side) if logarithmic else pg.AxisItem(side)
             for side, logarithmic in (("bottom", log[0]), ("left", log[1]))
@@ -89,13 +96,14 @@ class Plot(pg.PlotItem):
         self.axis_texts: dict[str, AxisText] = {}
         self.drawn: list[Curve] = []
         self.auto_y = True
+        self._own_range = own_range
         self.same_y: tuple[Plot, ...] = (self,)  #: plots with this vertical axis
         self._entries: list[Entry] = []
         self._note = ""
         view.setMouseEnabled(x=False, y=False)  # the area handles the mouse
         view.disableAutoRange()
         view.setAutoVisible(y=True)
-        view.enableAutoRange(axis="y")
+        view.enableAutoRange(axis="y", enable=not own_range)
         for side, logarithmic in zip(("bottom", "left"), log, strict=True):
             self.getAxis(side).setLogMode(logarithmic)
         # a row of its own in place of pyqtgraph's title
@@ -116,7 +124,12 @@ class Plot(pg.PlotItem):
     def set_auto_y(self, auto: bool) -> None:
         """Let the y axis cover what is visible, or keep its range."""
         self.auto_y = auto
-        self.vb.enableAutoRange(axis="y", enable=auto)
+        self.vb.enableAutoRange(axis="y", enable=auto and not self._own_range)
+
+    def show_y(self, low: float, high: float) -> None:
+        """Show ``low`` to ``high`` on the y axis, unless the operator has chosen a range."""
+        if self.auto_y:
+            self.vb.setYRange(low, high, padding=0.0)
 
     def pixel(self) -> tuple[float, float]:
         """Return the size of a pixel in the units of the axes, at the middle of a linear axis."""
@@ -189,7 +202,7 @@ class Plot(pg.PlotItem):
 
     def curves_in_key(self) -> list[Curve]:
         """Return the curves that are in the key."""
-        return [curve for curve in self.drawn if curve.in_key]
+        return [curve for curve in self.drawn if curve.title and curve.in_key]
 
     def entries(self) -> list[Entry]:
         """Return the entries of the key."""

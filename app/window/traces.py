@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["ErrorsSoFar", "Pyramid", "RunningErrors"]
+__all__ = ["ErrorsSoFar", "Newest", "Pyramid", "RunningErrors"]
 
 
 @dataclass(frozen=True)
@@ -166,6 +166,26 @@ class Pyramid:
             x = np.concatenate((x, np.arange(newest, last, dtype=np.float64)))
             y = np.concatenate((y, finest.bins(newest, last).low))
         return x, y
+
+
+class Newest:
+    """The newest ``capacity`` samples of a signal."""
+
+    def __init__(self, capacity: int) -> None:
+        self._ring = np.full(capacity, np.nan)
+        self._count = 0
+
+    def push(self, values: np.ndarray) -> None:
+        """Add ``values`` (n,), the next samples."""
+        self._count += values.size
+        kept = values[-self._ring.size :]
+        places = np.arange(self._count - kept.size, self._count) % self._ring.size
+        self._ring[places] = kept
+
+    def last(self, samples: int) -> np.ndarray:
+        """Return the newest ``samples`` values in the order of time, or as many as are kept."""
+        size = min(samples, self._count, self._ring.size)
+        return self._ring[np.arange(self._count - size, self._count) % self._ring.size]
 
 
 @dataclass(frozen=True)

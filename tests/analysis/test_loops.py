@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from dearig.acquisition.run import record
 from dearig.analysis.loops import cycles, loop_area, loops, loops_of
 from dearig.analysis.spectrum import amplitude_density
-from dearig.config.rigfile import RigFile
-from dearig.config.sequencefile import parse_sequence
 from dearig.errors import InputError
+from tests.tools.recordings import run_counts, write_run
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 4001)
 
@@ -76,22 +75,21 @@ def test_noise_of_a_voltage_makes_no_cycles() -> None:
 
 
 def test_loops_of_a_recording(tmp_path: Path) -> None:
-    sequence = (
-        'name = "two"\nlead_in_s = 0.3\n[[segment]]\nkind = "half_sine"\namplitude_kV = 6.0\n'
-        "frequency_Hz = 2.0\nrepeats = 2\n"
-    )
-    out = tmp_path / "two.h5"
-    record(parse_sequence(sequence, "two", Path()), "sim", RigFile(), out)
-    found = loops(out)
-    assert found.name == "two"
-    assert [round(c.peak) for c in found.cycles] == [6000, 6000]
-    assert all(c.area > 0.0 for c in found.cycles)  # a viscoelastic film lags
+    write_run(tmp_path / "lobes.h5", run_counts(6000))  # the displacement follows without a lag
+    found = loops(tmp_path / "lobes.h5")
+    assert found.name == "lobes"
+    assert len(found.cycles) >= 2
+    peak = max(cycle.peak for cycle in found.cycles)
+    box = peak * float(np.ptp(found.displacement))
+    assert all(abs(cycle.area) < 0.02 * box for cycle in found.cycles)
     assert found.voltage.shape == found.displacement.shape
 
 
-def test_film_has_no_loops(tmp_path: Path) -> None:
-    with pytest.raises(InputError):
-        loops(tmp_path / "none.h5")
+def test_recording_without_a_voltage_has_no_loops(monkeypatch: pytest.MonkeyPatch) -> None:
+    film = SimpleNamespace(name="strip", voltage_command=None, displacement=None)
+    monkeypatch.setattr("dearig.analysis.loops.open_recording", lambda _: film)
+    with pytest.raises(InputError, match="strip has no voltage and displacement"):
+        loops(Path("strip.h5"))
 
 
 # spectra
