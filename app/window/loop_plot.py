@@ -64,13 +64,20 @@ class LoopPlot(QWidget):
         outer.setSpacing(2)
         outer.addLayout(row)
         outer.addWidget(self.area, 1)
-        self.against.currentIndexChanged.connect(self._draw)
+        self.against.currentIndexChanged.connect(self._another_axis)
         session.theme_changed.connect(self._draw)
 
-    def show_loops(self, loops: Sequence[Loops]) -> None:
-        """Draw ``loops``, one for each recording."""
+    def show_loops(self, loops: Sequence[Loops], keep_range: bool = False) -> None:
+        """Draw ``loops``, one for each recording; a range that was chosen is kept, or not."""
         self._shown = tuple(loops)
         self._draw()
+        if not keep_range:
+            self.area.auto_range()
+
+    @Slot()
+    def _another_axis(self) -> None:
+        self._draw()
+        self.area.auto_range()
 
     @Slot()
     def _draw(self) -> None:
@@ -89,4 +96,4 @@ class LoopPlot(QWidget):
         self.area.file_stem = (
             f"{self._shown[0].name} loops" if len(self._shown) == 1 else "loops"
         )  # fmt: skip
-        self.area.auto_range()
+        self.area.fit()

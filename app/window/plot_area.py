@@ -78,6 +78,7 @@ class PlotArea(QWidget):
         self._active: Group | None = None  # the pointer was on it last
         self._history: list[_Past] = []
         self._following = live
+        self._range_chosen = False  # the operator has chosen a range
         self._stale = QTimer(self, singleShot=True, interval=_READOUT)
         self._stale.timeout.connect(self._renew_readouts)
         self.tools = PlotTools(self)
@@ -222,6 +223,7 @@ class PlotArea(QWidget):
 
     def auto_range(self) -> None:
         """Show the whole of all curves."""
+        self._range_chosen = False
         for group in self._groups.values():
             bounds = [curve.dataBounds(0) for plot in group.shown for curve in plot.drawn]
             first = min((low for low, _ in bounds if low is not None), default=0.0)
@@ -232,6 +234,11 @@ class PlotArea(QWidget):
                 group.plots[0].vb.setXRange(first, last, padding=padding)
             for plot in group.plots:
                 plot.set_auto_y(auto=True)
+
+    def fit(self) -> None:
+        """Show the whole of all curves that have changed, unless the operator chose a range."""
+        if not self._range_chosen:
+            self.auto_range()
 
     def span(self, group: str = "time") -> tuple[float, float]:
         """Return the visible range of the horizontal axis of ``group``."""
@@ -349,6 +356,7 @@ class PlotArea(QWidget):
     def _zoomed(
         self, plot: Plot, x: tuple[float, float] | None, y: tuple[float, float] | None
     ) -> None:
+        self._range_chosen = True
         if x is not None and x[1] > x[0]:
             if self._group_of[plot].name == "time":
                 self._set_following(following=False)

@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from PySide6.QtCore import Slot
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from dearig.window.plot_area import PlotArea
-from dearig.window.plot_item import Plot
 from dearig.window.session import Session
-from dearig.window.theme import Theme
 
-__all__ = ["DENSITY_LABEL", "FREQUENCY_LABEL", "Density", "SpectrumPlot", "draw_densities"]
+__all__ = ["Density", "SpectrumPlot"]
 
-DENSITY_LABEL = "Amplitude density (\N{MICRO SIGN}m/\N{SQUARE ROOT}Hz)"
-FREQUENCY_LABEL = "Frequency (Hz)"
+_LABEL = "Amplitude density (\N{MICRO SIGN}m/\N{SQUARE ROOT}Hz)"
 _SCALE = 1e6  # um for each m
 
 
@@ -33,16 +31,6 @@ class Density:
     density: np.ndarray
 
 
-def draw_densities(plot: Plot, densities: Sequence[Density], theme: Theme) -> None:
-    """Draw ``densities`` in a logarithmic ``plot`` in place of what it shows."""
-    plot.clear_all()
-    for found in densities:
-        colour = theme.measured
-        if found.use.startswith("residual"):
-            colour = theme.models[int(found.use.split()[1]) % len(theme.models)]
-        plot.add_curve(found.name, colour).set_points(found.frequency, found.density * _SCALE)
-
-
 class SpectrumPlot(QWidget):
     """Shows spectra of the displacement and of residuals."""
 
@@ -52,7 +40,7 @@ class SpectrumPlot(QWidget):
         self._shown: tuple[Density, ...] = ()
         self.area = PlotArea(session, "Spectrum")
         self.plot = self.area.add_plot(
-            0, left=DENSITY_LABEL, bottom=FREQUENCY_LABEL, group="frequency", log=(True, True)
+            0, left=_LABEL, bottom="Frequency (Hz)", group="frequency", log=(True, True)
         )
         outer = QVBoxLayout(self)
         outer.setContentsMargins(0, 0, 0, 0)
@@ -64,7 +52,15 @@ class SpectrumPlot(QWidget):
         self._shown = tuple(densities)
         self.area.file_stem = stem
         self._draw()
-        self.area.auto_range()
+        self.area.fit()
 
+    @Slot()
     def _draw(self) -> None:
-        draw_densities(self.plot, self._shown, self._session.theme)
+        theme = self._session.theme
+        self.plot.clear_all()
+        for found in self._shown:
+            colour = theme.measured
+            if found.use.startswith("residual"):
+                colour = theme.models[int(found.use.split()[1]) % len(theme.models)]
+            curve = self.plot.add_curve(found.name, colour)
+            curve.set_points(found.frequency, found.density * _SCALE)
