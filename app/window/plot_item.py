@@ -20,7 +20,7 @@ __all__ = ["AxisText", "Entry", "Plot"]
 _SAMPLE = 18.0  # px, length of a line in the key
 _GAP = 5.0  # px between the line and its name
 _BETWEEN = 16.0  # px between two entries
-_KEY_POINTS = 9.0  # pt, size of the text of the key
+_KEY_POINTS = 9.0  # pt, size of the text of keys and labels
 _FEW_DECADES = 2.5  # below this, powers of ten alone are too few labels
 _LABEL = re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)$")
 
@@ -94,6 +94,7 @@ class Plot(pg.PlotItem):
         super().__init__(viewBox=view, axisItems=axes, enableMenu=False)
         self.log = log
         self.axis_texts: dict[str, AxisText] = {}
+        self._labels: dict[str, str] = {}
         self.drawn: list[Curve] = []
         self.auto_y = True
         self._own_range = own_range
@@ -119,7 +120,20 @@ class Plot(pg.PlotItem):
     def set_axis(self, side: str, label: str) -> None:
         """Label the axis ``left`` or ``bottom``; the unit stands in brackets at the end."""
         self.axis_texts[side] = AxisText.of(label)
-        self.setLabel(side, escape(label))  # pyqtgraph takes labels as HTML
+        self._show_label(side)
+
+    def _show_label(self, side: str) -> None:
+        """Show the label of an axis; beside a plot that is too low for it, in two lines."""
+        text = self.axis_texts[side]
+        words = str(text)
+        room = self.vb.height() + self.key.minimumHeight()
+        if side == "left" and text.unit and self.key.width_of(words) > room > 0.0:
+            words = f"{escape(text.name)}<br>{escape(f'({text.unit})')}"
+        else:
+            words = escape(words)  # pyqtgraph takes labels as HTML
+        if words != self._labels.get(side):
+            self._labels[side] = words
+            self.setLabel(side, words, **{"font-size": f"{_KEY_POINTS:g}pt"})
 
     def set_auto_y(self, auto: bool) -> None:
         """Let the y axis cover what is visible, or keep its range."""
@@ -196,6 +210,7 @@ class Plot(pg.PlotItem):
         kept = [item for item in self.items if getattr(item, "of_tools", False)]
         self.drawn.clear()
         self._entries.clear()
+        self._note = ""
         for item in [item for item in self.items if item not in kept]:
             self.removeItem(item)
         self.renew_key()
@@ -209,7 +224,8 @@ class Plot(pg.PlotItem):
         curves = [
             Entry(c.title, c.colour, c.dashed, c.symbol, c.line) for c in self.curves_in_key()
         ]
-        return curves + self._entries
+        note = [Entry(self._note, "#808080", line=False)] if self._note else []
+        return curves + self._entries + note
 
     def renew_key(self, values: tuple[str, ...] = ()) -> None:
         """Draw the key anew; ``values`` follow the names of the curves, in the order of these."""
@@ -224,6 +240,7 @@ class Plot(pg.PlotItem):
         super().resizeEvent(event)
         if hasattr(self, "key"):  # the layout of pyqtgraph's constructor comes first
             self.key.arrange()
+            self._show_label("left")
 
 
 class _SharedBounds(pg.GraphicsObject):
@@ -297,6 +314,10 @@ class _Key(pg.GraphicsWidget):
             return
         self._entries, self._values = entries, values
         self.arrange()
+
+    def width_of(self, text: str) -> float:
+        """Return the width of ``text`` in px."""
+        return self._metrics.horizontalAdvance(text)
 
     @property
     def texts(self) -> list[str]:

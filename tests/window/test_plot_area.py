@@ -346,6 +346,23 @@ def test_key_stands_above_the_curves_and_names_are_not_html(shown: Shown) -> Non
     assert shown.residual.key.texts == ["model <b>"]
 
 
+def test_low_plot_has_its_label_in_two_lines(shown: Shown) -> None:
+    label = shown.residual.getAxis("left").label
+    assert label.toPlainText() == "Residual (\N{MICRO SIGN}m)"
+    shown.area.resize(900, 260)
+    QApplication.processEvents()
+    assert label.toPlainText() == "Residual\n(\N{MICRO SIGN}m)"
+
+
+def test_note_follows_the_entries_of_the_key(shown: Shown) -> None:
+    shown.voltage.set_note("no prediction")
+    assert shown.voltage.key.texts == ["commanded", "no prediction"]
+    shown.move(shown.voltage, 5.0, 3.0)
+    assert shown.voltage.key.texts[1] == "no prediction"
+    shown.voltage.set_note("")
+    assert len(shown.voltage.key.texts) == 1
+
+
 def test_long_names_break_into_rows(shown: Shown) -> None:
     before = shown.voltage.vb.height()
     for i in range(8):
