@@ -479,6 +479,40 @@ class Sampled(_Fixed):
         return np.asarray(np.interp(t, self.times, self.voltages))
 
 
+def join(
+    segments: Iterable[Segment], labels: tuple[str, ...] = ()
+) -> tuple[list[Segment], list[tuple[int, str]]]:
+    """Return the segments, each begun where the one before ends, and what does not join.
+
+    Of each fault: the segment, counted from 0, and a sentence. ``labels`` are the kinds.
+    """
+
+    def label(i: int) -> str:
+        return f"segment {i + 1} ({labels[i]})" if i < len(labels) else f"segment {i + 1}"
+
+    end, joined = 0.0, []
+    faults: list[tuple[int, str]] = []
+    for i, open_segment in enumerate(segments):
+        segment = open_segment.after(end)
+        if abs(segment.start - end) > _JOIN_TOLERANCE:
+            before = f"{label(i - 1)} ends" if i else "the lead-in ends"
+            words = (
+                f"{label(i)} starts at {segment.start * 1e-3:.6g} kV but {before} at "
+                f"{end * 1e-3:.6g} kV: put a ramp between them"
+            )
+            faults.append((i, words))
+        end = segment.end
+        joined.append(segment)
+    if abs(end) > _JOIN_TOLERANCE:
+        last = len(joined) - 1
+        words = (
+            f"{label(last)} ends at {end * 1e-3:.6g} kV but the run ends at 0 kV: put a ramp to 0 "
+            f"at the end"
+        )
+        faults.append((last, words))
+    return joined, faults
+
+
 @dataclass(frozen=True)
 class Sequence:
     """Segments one after another, framed by a quiet lead-in and tail at 0 V (s).
@@ -499,28 +533,10 @@ class Sequence:
         for name, value in (("lead_in", self.lead_in), ("tail", self.tail)):
             if not (math.isfinite(value) and value >= 0.0):
                 raise ModelError(f"{name} = {value!r} s must be a finite number, 0 or more")
-        end, joined = 0.0, []
-        for i, open_segment in enumerate(self.segments):
-            segment = open_segment.after(end)
-            if abs(segment.start - end) > _JOIN_TOLERANCE:
-                before = f"{self._label(i - 1)} ends" if i else "the lead-in ends"
-                raise ModelError(
-                    f"{self._label(i)} starts at {segment.start * 1e-3:.6g} kV but {before} at "
-                    f"{end * 1e-3:.6g} kV: put a ramp between them"
-                )
-            end = segment.end
-            joined.append(segment)
-        if abs(end) > _JOIN_TOLERANCE:
-            raise ModelError(
-                f"{self._label(len(joined) - 1)} ends at {end * 1e-3:.6g} kV but the run ends at "
-                f"0 kV: put a ramp to 0 at the end"
-            )
+        joined, faults = join(self.segments, self.labels)
+        if faults:
+            raise ModelError(faults[0][1])
         object.__setattr__(self, "segments", tuple(joined))
-
-    def _label(self, i: int) -> str:
-        if i < len(self.labels):
-            return f"segment {i + 1} ({self.labels[i]})"
-        return f"segment {i + 1}"
 
     @classmethod
     def thesis(

@@ -6,16 +6,14 @@ import re
 from pathlib import Path
 from typing import Any, get_args
 
-import tomli_w
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
 from dearig.config.rigfile import REPEATED, RigFile, fault_sentence
 from dearig.config.toml_input import allowed, parse_toml, shown
 from dearig.errors import InputError
 
-__all__ = ["SECTIONS", "faults_of", "parse_rig_file", "section_values", "with_value"]
-
-_NEXT_TABLE = re.compile(r"^[ \t]*\[", re.MULTILINE)
+__all__ = ["SECTIONS", "faults_of", "parse_rig_file", "section_values"]
 
 
 def _table(name: str) -> type[BaseModel]:
@@ -50,84 +48,67 @@ def parse_rig_file(text: str, folder: Path | None = None) -> RigFile:
 
 
 def faults_of(text: str) -> dict[tuple[str, str], str]:
-    """Return the errors in ``text``: a sentence for each (table, key).
+    """Return all errors in ``text``: a sentence for each (table, key).
 
-    The key is ("", "") where no single key is at fault. Raises ``InputError`` where the text is not
-    TOML.
+    The key is ("", "") where no single key is at fault. Checks of several keys follow once each key
+    is right, so what is wrong is left out and the rest is checked again; what those checks say of a
+    key that was left out does not count. Raises ``InputError`` where the text is not TOML.
     """
     data = parse_toml(text, "the rig file")
-    try:
-        RigFile.model_validate(data)
-    except ValidationError as error:
-        found: dict[tuple[str, str], str] = {}
-        for fault in error.errors(include_url=False):
-            place = [str(part) for part in fault["loc"]]
-            if place[:1] and place[0] in REPEATED:
-                found.setdefault((place[0], ".".join(place[1:])), fault_sentence(fault))
-                continue
-            table, key = [*place, "", ""][:2]
-            words = str(fault["ctx"]["error"]) if fault["type"] == "value_error" else ""
-            if not key and words:
-                # an error of two keys is shown beside the key that its sentence names first
-                named = re.match(r"(\w+)(?:\.(\w+))?", words)
-                if named and named[1] in SECTIONS and named[2]:
-                    table, key = named[1], named[2]
-            found.setdefault((table, key), _sentence(table, key, fault["input"], words))
-        return found
-    return {}
+    found: dict[tuple[str, str], str] = {}
+    left_out: set[str] = set()
+    while True:
+        try:
+            RigFile.model_validate(data)
+        except ValidationError as error:
+            faults = error.errors(include_url=False)
+        else:
+            return found
+        progress = False
+        for fault in faults:
+            place = _place(fault)
+            sentence = _sentence_at(place, fault)
+            if place not in found and not any(key in sentence for key in left_out):
+                found[place] = sentence
+            progress |= _leave_out(data, *place)
+            left_out.add(f"{place[0]}.{place[1]}")
+        if not progress:
+            return found
+
+
+def _place(fault: ErrorDetails) -> tuple[str, str]:
+    """Return table and key of a fault; of several keys, the one that its sentence names first."""
+    loc = [str(part) for part in fault["loc"]]
+    if loc[:1] and loc[0] in REPEATED:
+        return loc[0], ".".join(loc[1:])
+    table, key = [*loc, "", ""][:2]
+    if not key and fault["type"] == "value_error":
+        named = re.match(r"(\w+)(?:\.(\w+))?", str(fault["ctx"]["error"]))
+        if named and named[1] in SECTIONS and named[2]:
+            return named[1], named[2]
+    return table, key
+
+
+def _sentence_at(place: tuple[str, str], fault: ErrorDetails) -> str:
+    if place[0] in REPEATED or fault["type"] in ("model_type", "model_attributes_type"):
+        return fault_sentence(fault)
+    words = str(fault["ctx"]["error"]) if fault["type"] == "value_error" else ""
+    return _sentence(*place, fault["input"], words)
+
+
+def _leave_out(data: dict[str, Any], table: str, key: str) -> bool:
+    """Remove a key from ``data``, or its table where it lacks the key; False where neither is."""
+    section = data.get(table)
+    if isinstance(section, dict) and key in section:
+        del section[key]
+        return True
+    return data.pop(table, None) is not None
 
 
 def section_values(text: str, table: str) -> dict[str, Any]:
     """Return the keys of ``table`` in ``text``. Raises ``InputError`` where it is not TOML."""
     found = parse_toml(text, "the rig file").get(table, {})
     return dict(found) if isinstance(found, dict) else {}
-
-
-def with_value(text: str, table: str, key: str, value: Any) -> str:
-    """Return ``text`` with the value of a key changed; None removes the key.
-
-    Comments, order and blank lines stay: only the line of that key changes.
-    """
-    line = "" if value is None else f"{key} = {_toml(value)}\n"
-    header = re.search(rf"^[ \t]*\[{table}\][ \t]*(?:#.*)?$\n?", text, re.MULTILINE)
-    if header is None:
-        if value is None:
-            return text
-        gap = "" if not text else "\n" if text.endswith("\n") else "\n\n"
-        return f"{text}{gap}[{table}]\n{line}"
-    start = header.end()
-    following = _NEXT_TABLE.search(text, start)
-    end = following.start() if following else len(text)
-    body = text[start:end]
-    old = re.search(rf"^[ \t]*{key}[ \t]*=[ \t]*", body, re.MULTILINE)
-    if old is not None:
-        rest = _value_end(body, old.end())
-        remark = body[rest:].split("\n", 1)[0].strip()
-        after = rest + len(body[rest:].split("\n", 1)[0]) + 1
-        if line and remark:
-            line = f"{line.rstrip()}  {remark}\n"
-        body = body[: old.start()] + line + body[after:]
-    else:
-        # below the commented-out key where the file has one, else at the end of the table
-        hint = re.search(rf"^[ \t]*#[ \t]*{key}[ \t]*=.*$\n?", body, re.MULTILINE)
-        place = hint.end() if hint else len(body.rstrip("\n")) + (1 if body.rstrip("\n") else 0)
-        if not hint and body and not body.endswith("\n"):
-            body += "\n"
-        body = body[:place] + line + body[place:]
-    return text[:start] + body + text[end:]
-
-
-def _value_end(body: str, start: int) -> int:
-    """Return the end of the value that begins at ``start``; a value takes one line."""
-    quoted = re.match(r"\"(?:[^\"\\]|\\.)*\"|'[^']*'", body[start:])
-    if quoted:
-        return start + quoted.end()
-    plain = re.match(r"[^#\n]*", body[start:])
-    return start + (len(plain[0].rstrip()) if plain else 0)
-
-
-def _toml(value: Any) -> str:
-    return tomli_w.dumps({"x": value}).removeprefix("x = ").rstrip("\n")
 
 
 def _sentence(table: str, key: str, value: Any, words: str) -> str:

@@ -23,15 +23,17 @@ from dearig.config.toml_input import NAME_MAX, Table, allowed, meant, parse_toml
 from dearig.drivers.samples import Computed, Samples
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
-from dearig.model.excitation import Segment, Sequence
+from dearig.model.excitation import Segment, Sequence, join
 
 __all__ = [
     "HEAD_FIELDS",
     "HELD_SAMPLES_MAX",
     "SAMPLES_MAX",
     "LoadedSequence",
+    "SequenceFault",
     "load_sequence",
     "parse_sequence",
+    "read_sequence",
 ]
 
 #: Samples of a run, at most: 11 days at 1 kHz, 16 min at 1 MHz. A run does not hold them, but a
@@ -42,15 +44,31 @@ HELD_SAMPLES_MAX = 250_000_000
 
 
 @dataclass(frozen=True)
+class SequenceFault:
+    """A fault of a sequence: a whole ``sentence``, and ``words`` to stand beside its field.
+
+    ``row`` is the table [[segment]] from 0, ``key`` its key; both are None where the fault has
+    none. A key without a row is one of the head.
+    """
+
+    sentence: str
+    words: str
+    row: int | None = None
+    key: str | None = None
+
+
+@dataclass(frozen=True)
 class LoadedSequence:
     """A sequence ready to be sampled, and the TOML that a recording keeps of it.
 
     ``highest_frequency`` is the highest frequency of each segment, 0 for one that has none.
+    ``rows`` is the table [[segment]] of each, from 0: a table with repeats makes several segments.
     """
 
     sequence: Sequence
     toml: str
     highest_frequency: tuple[float, ...]
+    rows: tuple[int, ...]
 
     def sample(self, rate: float) -> tuple[np.ndarray, np.ndarray]:
         """Return time in s and voltage in V, (N,) each, at ``rate`` Hz.
@@ -77,28 +95,39 @@ class LoadedSequence:
             raise InputError(f"sequence {sequence.name!r}: {error}") from error
         return Computed(samples, lambda start, stop: sequence.window(rate, start, stop))
 
-    def _check_clock(self, rate: float, samples_max: int) -> None:
+    def clock_faults(self, rate: float, samples_max: int = SAMPLES_MAX) -> list[SequenceFault]:
+        """Return why the sequence cannot be sampled at ``rate`` Hz, every reason."""
         sequence, count = self.sequence, self.sequence.duration * rate
         name = f"sequence {sequence.name!r}"
         if not count <= samples_max:
-            raise InputError(
-                f"{name} lasts {sequence.duration:.4g} s, which is {count:.3g} samples at "
-                f"{rate:g} Hz, and at most {samples_max:,} can be played: shorten it, or lower "
+            words = (
+                f"lasts {sequence.duration:.4g} s, which is {count:.3g} samples at {rate:g} Hz, "
+                f"and at most {samples_max:,} can be played: shorten it, or lower "
                 f"card.sample_rate_Hz in the rig file"
             )
+            return [SequenceFault(f"{name} {words}", words)]
+        found = []
         for i, segment in enumerate(sequence.segments):
-            label = f"{name}: segment {i + 1} ({sequence.labels[i]})"
+            fastest, words = self.highest_frequency[i], ""
             if segment.duration * rate < 2.0:
-                raise InputError(
-                    f"{label} lasts {segment.duration:.3g} s, less than two samples at {rate:g} "
+                words = (
+                    f"lasts {segment.duration:.3g} s, less than two samples at {rate:g} "
                     f"Hz: make it longer, or raise card.sample_rate_Hz in the rig file"
                 )
-            fastest = self.highest_frequency[i]
-            if fastest > 0.5 * rate:
-                raise InputError(
-                    f"{label} reaches {fastest:g} Hz, and {rate:g} samples a second play at most "
+            elif fastest > 0.5 * rate:
+                words = (
+                    f"reaches {fastest:g} Hz, and {rate:g} samples a second play at most "
                     f"{0.5 * rate:g} Hz: lower it, or raise card.sample_rate_Hz in the rig file"
                 )
+            if words:
+                where = f"{name}: segment {i + 1} ({sequence.labels[i]})"
+                found.append(SequenceFault(f"{where} {words}", words, self.rows[i]))
+        return found
+
+    def _check_clock(self, rate: float, samples_max: int) -> None:
+        found = self.clock_faults(rate, samples_max)
+        if found:
+            raise InputError(found[0].sentence + _more(len(found) - 1))
 
 
 class _Head(Table):
@@ -154,38 +183,94 @@ def parse_sequence(text: str, name: str, folder: Path) -> LoadedSequence:
 
     ``name`` is used in messages; files that segments name lie in ``folder``. Raises ``InputError``.
     """
+    loaded, faults = read_sequence(text, name, folder)
+    if loaded is None:
+        raise InputError(f"{name}: {faults[0].sentence}{_more(len(faults) - 1)}")
+    return loaded
+
+
+def read_sequence(
+    text: str, name: str, folder: Path
+) -> tuple[LoadedSequence | None, list[SequenceFault]]:
+    """Return the sequence in the TOML ``text``, or None with every fault that can be told.
+
+    Which segments do not join is told once each of them is right. Raises ``InputError`` where
+    ``text`` is not TOML.
+    """
     data = parse_toml(text, name)
     try:
         file: Any = _model().model_validate(data)
     except ValidationError as error:
-        raise InputError(f"{name}: {_sentence(error, data)}") from error
-    segments: list[Segment] = []
-    labels: list[str] = []
-    attached = ""
-    fastest: list[float] = []
-    tables: list[SegmentTable] = file.segment
-    for i, table in enumerate(tables):
-        kind = table.kind
+        faults = _faults(error, data)
+        wrong = {fault.row for fault in faults}
+        tables = data.get("segment")
+        right = {
+            i: SEGMENT_KINDS[table["kind"]].model_validate(table)
+            for i, table in enumerate(tables if isinstance(tables, list) else ())
+            if i not in wrong
+        }
+        return None, faults + _Built(right, folder).faults
+    built = _Built(dict(enumerate(file.segment)), folder)
+    if not built.faults:
+        built.join()
+    if built.faults:
+        return None, built.faults
+    try:
+        sequence = Sequence(
+            file.name, tuple(built.segments), file.lead_in_s, file.tail_s, tuple(built.labels)
+        )
+    except ModelError as error:
+        return None, [SequenceFault(str(error), str(error))]
+    toml = text.rstrip("\n") + "\n" + built.attached
+    return LoadedSequence(sequence, toml, tuple(built.fastest), tuple(built.rows)), []
+
+
+class _Built:
+    """Segments of the ``tables``, by their rows, and the ``faults`` in building them."""
+
+    def __init__(self, tables: Mapping[int, SegmentTable], folder: Path) -> None:
+        self.segments: list[Segment] = []
+        self.labels: list[str] = []
+        self.fastest: list[float] = []
+        self.rows: list[int] = []
+        self.attached = ""  # lines on the files that segments read
+        self.faults: list[SequenceFault] = []
+        for row, table in tables.items():
+            self._add(row, table, folder)
+
+    def _add(self, row: int, table: SegmentTable, folder: Path) -> None:
+        where = f"segment {row + 1}"
         try:
             built = table.build(folder)
         except (InputError, ModelError) as error:
-            raise InputError(f"{name}: segment {i + 1}: {error}") from error
-        if len(segments) + table.repeats > SEGMENTS_MAX:
-            raise InputError(
-                f"{name}: segment {i + 1} ({kind}): repeats = {table.repeats} makes more than "
-                f"{SEGMENTS_MAX:,} segments in all; play the sequence several times"
+            self.faults.append(SequenceFault(f"{where}: {error}", str(error), row))
+            return
+        if len(self.segments) + table.repeats > SEGMENTS_MAX:
+            words = (
+                f"repeats = {table.repeats} makes more than {SEGMENTS_MAX:,} segments in all; play "
+                f"the sequence several times"
             )
-        segments += [built] * table.repeats
-        labels += [kind] * table.repeats
-        fastest += [table.highest_frequency] * table.repeats
-        for name_of_file in table.files:
-            digest = hashlib.sha256((folder / name_of_file).read_bytes()).hexdigest()
-            attached += f"# segment {i + 1}: {name_of_file} had sha256 {digest}\n"
-    try:
-        sequence = Sequence(file.name, tuple(segments), file.lead_in_s, file.tail_s, tuple(labels))
-    except ModelError as error:
-        raise InputError(f"{name}: {error}") from error
-    return LoadedSequence(sequence, text.rstrip("\n") + "\n" + attached, tuple(fastest))
+            self.faults.append(
+                SequenceFault(f"{where} ({table.kind}): {words}", words, row, "repeats")
+            )
+            return
+        self.segments += [built] * table.repeats
+        self.labels += [table.kind] * table.repeats
+        self.fastest += [table.highest_frequency] * table.repeats
+        self.rows += [row] * table.repeats
+        for name in table.files:
+            digest = hashlib.sha256((folder / name).read_bytes()).hexdigest()
+            self.attached += f"# {where}: {name} had sha256 {digest}\n"
+
+    def join(self) -> None:
+        """Find the segments that do not start where the one before ends."""
+        for i, sentence in join(self.segments, tuple(self.labels))[1]:
+            words = sentence.removeprefix(f"segment {i + 1} ({self.labels[i]}) ")
+            self.faults.append(SequenceFault(sentence, words, self.rows[i]))
+
+
+def _more(count: int) -> str:
+    return f" ({count} more fault{'s' if count > 1 else ''} after that)" if count else ""
 
 
 _NO_SEGMENTS = (
@@ -194,56 +279,56 @@ _NO_SEGMENTS = (
 )
 
 
-def _sentence(error: ValidationError, data: dict[str, Any]) -> str:
-    """Return a sentence on the first fault; unknown keys come before the faults they may cause."""
-    faults = error.errors(include_url=False)
-    first = min(faults, key=lambda fault: fault["type"] != "extra_forbidden")
-    if first["type"] == "extra_forbidden":
-        # a missing key beside an unknown one is probably the key that was meant
-        beside = first["loc"][:-1]
-        faults = [f for f in faults if f["type"] != "missing" or f["loc"][:-1] != beside]
-    more = len(faults) - 1
-    tail = f" ({more} more fault{'s' if more > 1 else ''} after that)" if more else ""
-    return _fault(first, data) + tail
+def _faults(error: ValidationError, data: dict[str, Any]) -> list[SequenceFault]:
+    """Return all faults; unknown keys come before the faults that they may cause."""
+    found = sorted(
+        error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden"
+    )
+    # a missing key beside an unknown one is probably the key that was meant
+    unknown = {f["loc"][:-1] for f in found if f["type"] == "extra_forbidden"}
+    return [
+        _fault(f, data) for f in found if f["type"] != "missing" or f["loc"][:-1] not in unknown
+    ]
 
 
-def _fault(fault: ErrorDetails, data: dict[str, Any]) -> str:
-    place, value = list(fault["loc"]), fault["input"]
-    fields, where = _model().model_fields, ""
-    if fault["type"] == "model_attributes_type" and place[0] == "segment":
-        return f"segment {int(place[1]) + 1} is not a table: write [[segment]] and its keys below"
+def _fault(fault: ErrorDetails, data: dict[str, Any]) -> SequenceFault:
+    place = list(fault["loc"])
+    fields, where, row = _model().model_fields, "", None
     if len(place) >= 2 and place[0] == "segment":
-        number = int(place[1]) + 1
-        where = f"segment {number}: "
+        row = int(place[1])
+        where = f"segment {row + 1}"
+        if fault["type"] == "model_attributes_type":
+            words = "is not a table: write [[segment]] and its keys below"
+            return SequenceFault(f"{where} {words}", words, row)
         if fault["type"] in ("union_tag_not_found", "union_tag_invalid"):
-            tables = data["segment"]
-            kind = tables[number - 1].get("kind") if isinstance(tables[number - 1], dict) else None
+            kind = data["segment"][row].get("kind")
             known = f"the kinds are {', '.join(SEGMENT_KINDS)}"
-            if kind is None:
-                return f"{where}kind is missing; {known}"
-            return f"{where}kind = {shown(kind)} is not known; {known}"
+            said = "is missing" if kind is None else f"= {shown(kind)} is not known"
+            return SequenceFault(f"{where}: kind {said}; {known}", f"kind {said}; {known}", row)
         if len(place) > 2:
             kind = str(place[2])
-            fields, where = SEGMENT_KINDS[kind].model_fields, f"segment {number} ({kind}): "
+            fields, where = SEGMENT_KINDS[kind].model_fields, f"{where} ({kind})"
             place = place[3:]
+        where += ": "
     if not place:
-        return where + str(fault.get("ctx", {}).get("error", fault["msg"]))
+        words = str(fault.get("ctx", {}).get("error", fault["msg"]))
+        return SequenceFault(where + words, words, row)
     key = str(place[0])
     if fault["type"] == "extra_forbidden":
-        hint = meant(key, fields)
         takes = f"it takes {', '.join(fields)}"
-        return f"{where}{key} is not a key: {hint or takes}"
+        words = f"{key} is not a key: {meant(key, fields) or takes}"
+        return SequenceFault(where + words, words, row, key)
     if key == "segment":
-        return f"{where}{_NO_SEGMENTS}"
+        return SequenceFault(where + _NO_SEGMENTS, _NO_SEGMENTS)
+    info, index, said, value = fields[key], "", "", fault["input"]
+    if len(place) > 1 and isinstance(place[1], int):
+        index, said = f"[{place[1] + 1}]", f"value {place[1] + 1}: "
     if fault["type"] == "missing":
-        info = fields[key]
-        return f"{where}{key} is missing ({info.description}, {allowed(info)})"
-    info = fields[key]
-    index = f"[{int(place[1]) + 1}]" if len(place) > 1 and isinstance(place[1], int) else ""
+        said, words = f"{key} is missing (", f"{info.description}, {allowed(info)})"
+        return SequenceFault(where + said + words, f"is missing ({words}", row, key)
     if fault["type"] == "value_error":
-        return f"{where}{key}{index} = {shown(value)} is not allowed: {fault['ctx']['error']}"
-    takes = allowed(info, item=bool(index))
-    return (
-        f"{where}{key}{index} = {shown(value)} is not allowed: it takes {takes} "
-        f"({info.description})"
-    )
+        words = str(fault["ctx"]["error"])
+    else:
+        words = f"it takes {allowed(info, item=bool(index))} ({info.description})"
+    sentence = f"{where}{key}{index} = {shown(value)} is not allowed: {words}"
+    return SequenceFault(sentence, f"{said}{words}", row, key)

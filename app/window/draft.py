@@ -3,37 +3,52 @@
 from __future__ import annotations
 
 import copy
-import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tomli_w
-
 from dearig.config.segments import SEGMENT_KINDS
+from dearig.config.toml_edit import SegmentTexts, split_segments, written_anew
 from dearig.config.toml_input import parse_toml
 from dearig.errors import InputError
+from dearig.window.document import TextFile
 
-__all__ = ["Draft", "Place", "has_comments", "place_of", "relative_csv"]
+__all__ = ["Draft", "relative_csv"]
 
 _STEPS_MAX = 200
 
 
-class Draft:
-    """Tables of a sequence file, with undo and redo.
+@dataclass(frozen=True)
+class _State:
+    """Tables of a sequence, its text in pieces or whole, and its file; tables stay as they are."""
 
-    ``data`` holds ``name``, ``lead_in_s``, ``tail_s`` and the list ``segment``.
+    data: dict[str, Any]
+    text: SegmentTexts | str
+    file: TextFile
+
+    @property
+    def toml(self) -> str:
+        return self.text if isinstance(self.text, str) else self.text.toml
+
+
+class Draft:
+    """Tables of a sequence file and its text, with undo and redo.
+
+    ``data`` holds ``name``, ``lead_in_s``, ``tail_s`` and the list ``segment``. The text is edited
+    in place: comments stay, and what nobody changes stays to the letter. ``undo`` goes back to the
+    file that was open before, too.
     """
 
-    def __init__(self, toml: str) -> None:
-        self._states: list[tuple[dict[str, Any], str]] = [(_tables(toml), toml)]
+    def __init__(self, toml: str, file: TextFile | None = None) -> None:
+        self._states = [_state(toml, file or TextFile("sequence", toml))]
         self._at = 0
         self._last: tuple[object, ...] = ()
 
     @property
     def data(self) -> dict[str, Any]:
         """Current tables; only the methods of this class change them."""
-        return self._states[self._at][0]
+        return self._states[self._at].data
 
     @property
     def segments(self) -> list[dict[str, Any]]:
@@ -43,8 +58,13 @@ class Draft:
 
     @property
     def toml(self) -> str:
-        """Text of the sequence file: as it was given, or written from the tables after a change."""
-        return self._states[self._at][1]
+        """Text of the sequence file."""
+        return self._states[self._at].toml
+
+    @property
+    def file(self) -> TextFile:
+        """File of the sequence."""
+        return self._states[self._at].file
 
     @property
     def can_undo(self) -> bool:
@@ -66,61 +86,99 @@ class Draft:
         self._at = min(self._at + 1, len(self._states) - 1)
         self._last = ()
 
-    def replace(self, toml: str) -> None:
-        """Replace the whole sequence. Raises ``InputError`` if ``toml`` is not TOML."""
-        self._push(_tables(toml), toml)
+    def replace(self, toml: str, file: TextFile | None = None) -> None:
+        """Replace the whole sequence by that of another file, None of no file.
+
+        Raises ``InputError`` if ``toml`` is not TOML.
+        """
+        self._push(_state(toml, file or TextFile("sequence", toml)))
 
     def set_head(self, key: str, value: Any) -> None:
         """Set ``name``, ``lead_in_s`` or ``tail_s``; None leaves the key out."""
-        self._change(("head", key), lambda data: _put(data, key, value))
+        if self.data.get(key) != value:
+            data = _with(self.data, key, value)
+            self._change(data, lambda text: text.with_head(key, value), ("head", key))
 
     def set_value(self, row: int, key: str, value: Any) -> None:
         """Set a key of a segment; None leaves it out.
 
         Consecutive changes of one key are one change, so that typing is undone at once.
         """
-        self._change((row, key), lambda data: _put(data["segment"][row], key, value))
+        segments = list(self.segments)
+        if segments[row].get(key) != value:
+            segments[row] = _with(segments[row], key, value)
+            self._change_segments(
+                segments, lambda text: text.with_value(row, key, value), (row, key)
+            )
 
     def add(self, kind: str, row: int, **given: Any) -> None:
         """Insert a new segment of ``kind`` at ``row``; ``given`` replaces default values."""
         table = {"kind": kind, **copy.deepcopy(dict(SEGMENT_KINDS[kind].example)), **given}
-        self._change((), lambda data: data["segment"].insert(row, table))
+        self._change_segments(
+            [*self.segments[:row], table, *self.segments[row:]],
+            lambda text: text.with_segment(row, table),
+        )
 
     def duplicate(self, row: int) -> None:
         """Insert a copy of the segment in ``row`` after it."""
-        table = copy.deepcopy(self.segments[row])
-        self._change((), lambda data: data["segment"].insert(row + 1, table))
+        rows = self.segments
+        self._change_segments(
+            [*rows[: row + 1], rows[row], *rows[row + 1 :]], lambda text: text.with_copy(row)
+        )
 
     def remove(self, row: int) -> None:
         """Remove the segment in ``row``."""
-        self._change((), lambda data: data["segment"].pop(row))
+        self._change_segments(
+            [*self.segments[:row], *self.segments[row + 1 :]], lambda text: text.without(row)
+        )
 
     def move(self, row: int, to: int) -> None:
         """Move the segment in ``row`` to the row ``to``."""
-        self._change((), lambda data: data["segment"].insert(to, data["segment"].pop(row)))
+        segments = list(self.segments)
+        segments.insert(to, segments.pop(row))
+        if to != row:
+            self._change_segments(segments, lambda text: text.moved(row, to))
 
-    def _change(self, what: tuple[object, ...], change: Any) -> None:
-        data = copy.deepcopy(self.data)
-        change(data)
-        if data == self.data:
-            return
+    def _change_segments(
+        self,
+        segments: list[dict[str, Any]],
+        edit: Callable[[SegmentTexts], SegmentTexts],
+        what: tuple[object, ...] = (),
+    ) -> None:
+        self._change({**self.data, "segment": segments}, edit, what)
+
+    def _change(
+        self,
+        data: dict[str, Any],
+        edit: Callable[[SegmentTexts], SegmentTexts],
+        what: tuple[object, ...],
+    ) -> None:
+        text = self._states[self._at].text
+        if isinstance(text, str):  # not written as [[segment]]: from now on it is
+            text = split_segments(written_anew(self.data, text)) or text
+        edited = written_anew(data, text) if isinstance(text, str) else edit(text)
+        state = _State(data, edited, self.file)
         if what and what == self._last and not self.can_redo:
-            self._states[self._at] = (data, tomli_w.dumps(data))
+            self._states[self._at] = state
             return
-        self._push(data, tomli_w.dumps(data))
+        self._push(state)
         self._last = what
 
-    def _push(self, data: dict[str, Any], toml: str) -> None:
-        self._states = [*self._states[: self._at + 1], (data, toml)][-_STEPS_MAX:]
+    def _push(self, state: _State) -> None:
+        self._states = [*self._states[: self._at + 1], state][-_STEPS_MAX:]
         self._at = len(self._states) - 1
         self._last = ()
 
 
-def _put(table: dict[str, Any], key: str, value: Any) -> None:
+def _with(table: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
+    """Return a copy of ``table`` with ``key`` set; None leaves it out."""
     if value is None:
-        table.pop(key, None)
-    else:
-        table[key] = value
+        return {k: v for k, v in table.items() if k != key}
+    return {**table, key: value}
+
+
+def _state(toml: str, file: TextFile) -> _State:
+    return _State(_tables(toml), split_segments(toml) or toml, file)
 
 
 def _tables(toml: str) -> dict[str, Any]:
@@ -132,37 +190,6 @@ def _tables(toml: str) -> dict[str, Any]:
             "the keys of each"
         )
     return {"name": "", **{k: v for k, v in data.items() if k != "segment"}, "segment": segments}
-
-
-# strings are matched first: a # inside a string begins no comment, and a quotation mark inside a
-# comment begins no string
-_TEXT_OR_COMMENT = re.compile(
-    r'''"""(?:\\.|[^\\])*?"""|"(?:\\.|[^"\\\n])*"''' r"|'''.*?'''|'[^'\n]*'|#[^\n]*", re.DOTALL
-)
-
-
-def has_comments(toml: str) -> bool:
-    """Return True if ``toml`` has comments; text written from the tables has none."""
-    return any(found[0].startswith("#") for found in _TEXT_OR_COMMENT.finditer(toml))
-
-
-@dataclass(frozen=True)
-class Place:
-    """Place of a fault: ``row`` of the segment from 0, and ``key``; None outside of segments."""
-
-    row: int | None = None
-    key: str | None = None
-
-
-def place_of(sentence: str) -> Place:
-    """Return the place of the fault that ``sentence`` of ``dearig.config.sequencefile`` names."""
-    kinds = "|".join(SEGMENT_KINDS)
-    key = r"(?:: (\w+?)(?:\[\d+\])? (?:=|is))?"
-    found = re.search(rf"segment (\d+)(?: \((?:{kinds})\))?{key}", sentence)
-    if found:
-        return Place(int(found[1]) - 1, found[2])
-    found = re.search(r": (name|lead_in_s|tail_s) (?:=|is)", sentence)
-    return Place(None, found[1] if found else None)
 
 
 def relative_csv(path: Path, folder: Path) -> str:

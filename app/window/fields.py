@@ -6,18 +6,29 @@ import re
 import types
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from dearig.config.rigform import SECTIONS
+from dearig.config.segments import SEGMENT_KINDS
+from dearig.config.sequencefile import HEAD_FIELDS
 from dearig.config.toml_input import allowed
 from dearig.units import name_and_unit
+from dearig.window.number_text import NumberTextError, read_number, read_numbers
 
-__all__ = ["FormField", "form_fields", "shown_value", "typed_value"]
-
-#: Between the numbers of a list: semicolons, spaces, and commas that are not between digits.
-_SEPARATOR = re.compile(r"[;\s]|(?<![0-9]),|,(?![0-9])")
+__all__ = [
+    "FormField",
+    "Typed",
+    "form_field",
+    "form_fields",
+    "in_words",
+    "read_back",
+    "read_typed",
+    "shown_value",
+]
 
 
 @dataclass(frozen=True)
@@ -48,10 +59,11 @@ def form_fields(table: type[BaseModel], leave_out: tuple[str, ...] = ()) -> Iter
     """Yield the fields of a table, in its order."""
     for key, info in table.model_fields.items():
         if key not in leave_out:
-            yield _field(key, info)
+            yield form_field(key, info)
 
 
-def _field(key: str, info: FieldInfo) -> FormField:
+def form_field(key: str, info: FieldInfo) -> FormField:
+    """Return the field of ``key``, which has the type and the bounds of ``info``."""
     name, unit = name_and_unit(key)
     kind = _bare(info.annotation)
     choices: tuple[Any, ...] = ()
@@ -84,29 +96,66 @@ def shown_value(value: Any) -> str:
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
-def typed_value(field: FormField, text: str) -> Any:
+@dataclass(frozen=True)
+class Typed:
+    """A typed text as it is read: the ``value``, or the text itself with ``fault``, a sentence."""
+
+    value: Any
+    fault: str = ""
+
+
+def read_typed(field: FormField, text: str) -> Typed:
     """Return the value of the typed ``text``; None for an empty field.
 
-    Text that is not a number stays text; the check of the file refuses it with a sentence. A comma
-    between two digits is a decimal comma, which no number has, and does not separate a list.
+    A text that is no number keeps its place in the file, whose check refuses it too.
     """
     text = text.strip()
     if not text:
-        return None
-    if field.kind == "number":
-        return _number(text)
-    if field.kind == "whole":
-        number = _number(text)
-        return int(number) if isinstance(number, float) and number.is_integer() else number
-    if field.kind == "numbers":
-        return [_number(part) for part in _SEPARATOR.split(text) if part]
-    if field.kind == "choice":
-        return next((choice for choice in field.choices if str(choice) == text), text)
-    return text
-
-
-def _number(text: str) -> float | str:
+        return Typed(None)
     try:
-        return float(text)
-    except ValueError:
-        return text
+        if field.kind == "number":
+            return Typed(read_number(text))
+        if field.kind == "whole":
+            number = read_number(text, whole=True)
+            return Typed(int(number) if number.is_integer() else number)
+        if field.kind == "numbers":
+            return Typed(read_numbers(text))
+    except NumberTextError as error:
+        return Typed(text, str(error))
+    if field.kind == "choice":
+        return Typed(next((c for c in field.choices if str(c) == text), text))
+    return Typed(text)
+
+
+def read_back(field: FormField, value: Any) -> str:
+    """Return what was read from a number or list field, with its unit; "" for other fields."""
+    if field.kind not in ("number", "whole", "numbers") or not isinstance(
+        value, int | float | list
+    ):
+        return ""
+    text = f"{shown_value(value)} {field.unit}".rstrip()
+    if not isinstance(value, list):
+        return f"= {text}"
+    return f"{text}: {len(value)} value{'' if len(value) == 1 else 's'}"
+
+
+@cache
+def _keys() -> re.Pattern[str]:
+    """Return a pattern of the keys of sequences and rig files that are no words by themselves."""
+    tables = [*SECTIONS.values(), *SEGMENT_KINDS.values()]
+    keys = {*HEAD_FIELDS, *(key for table in tables for key in table.model_fields)}
+    named = "|".join(sorted((key for key in keys if "_" in key), key=len, reverse=True))
+    return re.compile(rf"\b(?:({'|'.join(SECTIONS)})\.)?({named})\b(?!\.)")
+
+
+def in_words(text: str) -> str:
+    """Return ``text`` with keys of files as the fields are labelled.
+
+    ``limits.voltage_max_kV`` becomes limits: voltage max (kV).
+    """
+
+    def worded(match: re.Match[str]) -> str:
+        name, unit = name_and_unit(match[2])
+        return (f"{match[1]}: " if match[1] else "") + (f"{name} ({unit})" if unit else name)
+
+    return _keys().sub(worded, text)

@@ -1,4 +1,4 @@
-"""A form: one line for each field, with what is wrong said beside it."""
+"""A form: one line for each field, and below it what was read or what is wrong."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from PySide6.QtCore import Signal, Slot
 from PySide6.QtWidgets import QComboBox, QGridLayout, QLineEdit, QWidget
 
-from dearig.window.fields import FormField, shown_value, typed_value
+from dearig.window.fields import FormField, read_back, read_typed, shown_value
 from dearig.window.theme import SPACE
 from dearig.window.widgets import Message, label, set_wrong
 
@@ -16,7 +16,11 @@ __all__ = ["Form"]
 
 
 class Form(QWidget):
-    """Edits ``fields``; ``changed`` carries key and value after each key press."""
+    """Edits ``fields``; ``changed`` carries key and value after each key press.
+
+    Below a list, and below a number that is typed, stands what was read from the text. A text that
+    is no number is carried as it is, and its fault is shown in place of those that are found later.
+    """
 
     changed = Signal(str, object)
 
@@ -31,7 +35,10 @@ class Form(QWidget):
         super().__init__(parent)
         self._fields = {field.key: field for field in fields}
         self._widgets: dict[str, QLineEdit | QComboBox] = {}
-        self._faults: dict[str, Message] = {}
+        self._below: dict[str, Message] = {}
+        self._faults: dict[str, str] = {}  # found by the check of the file
+        self._misread: dict[str, str] = {}  # found where the text was read
+        self._edited: set[str] = set()
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(SPACE)
@@ -48,20 +55,20 @@ class Form(QWidget):
                 about = label(field.description, "muted", field.tip)
                 about.setWordWrap(True)
                 grid.addWidget(about, row, 3)
-            fault = Message()
-            grid.addWidget(fault, row + 1, 1, 1, 3)
-            self._faults[key] = fault
+            below = Message()
+            grid.addWidget(below, row + 1, 1, 1, 3)
+            self._below[key] = below
             self._widgets[key] = widget
+            self._show_below(key)
         grid.setColumnStretch(1, 4)
         grid.setColumnStretch(3, 4 if explain else 0)
         grid.setRowStretch(2 * len(self._fields), 1)
 
     def show_faults(self, faults: Mapping[str, str]) -> None:
-        """Show each fault beside its field, and clear the others."""
-        for key, sentence in self._faults.items():
-            words = faults.get(key, "")
-            sentence.show_text(words)
-            set_wrong(self._widgets[key], bool(words))
+        """Show each fault below its field, and clear the others."""
+        self._faults = dict(faults)
+        for key in self._fields:
+            self._show_below(key)
 
     def show_values(self, values: Mapping[str, Any]) -> None:
         """Show other values; a field whose text already means its value keeps its text."""
@@ -69,16 +76,38 @@ class Form(QWidget):
             field, value = self._fields[key], values.get(key)
             if isinstance(widget, QComboBox):
                 widget.setCurrentText(shown_value(field.default if value is None else value))
-            elif typed_value(field, widget.text()) != value:
+            elif read_typed(field, widget.text()).value != value:
                 widget.setText(shown_value(value))
+                self._edited.discard(key)
+                self._misread.pop(key, None)
+                self._show_below(key)
 
     def field(self, key: str) -> QLineEdit | QComboBox:
         """Return the widget of ``key``."""
         return self._widgets[key]
 
+    def has(self, key: str) -> bool:
+        """Return True if the form has a field for ``key``."""
+        return key in self._fields
+
     def fault(self, key: str) -> str:
-        """Return the fault that is shown beside ``key``."""
-        return self._faults[key].text()
+        """Return the fault that is shown below ``key``; "" where there is none."""
+        return self._misread.get(key) or self._faults.get(key, "")
+
+    def note(self, key: str) -> str:
+        """Return what is shown below ``key``: its fault, or what was read from its text."""
+        return self._below[key].text()
+
+    def _show_below(self, key: str) -> None:
+        widget, fault = self._widgets[key], self.fault(key)
+        set_wrong(widget, bool(fault))
+        if fault or isinstance(widget, QComboBox):
+            self._below[key].show_text(fault)
+            return
+        field = self._fields[key]
+        shown = key in self._edited or field.kind == "numbers"
+        text = read_back(field, read_typed(field, widget.text()).value) if shown else ""
+        self._below[key].show_text(text, "muted")
 
     def _widget(self, field: FormField, value: Any) -> QLineEdit | QComboBox:
         if field.kind == "choice":
@@ -98,4 +127,9 @@ class Form(QWidget):
 
     @Slot()
     def _typed(self, field: FormField, text: str) -> None:
-        self.changed.emit(field.key, typed_value(field, text))
+        typed = read_typed(field, text)
+        self._edited.add(field.key)
+        self._misread[field.key] = typed.fault
+        self._faults.pop(field.key, None)  # it was about the text before
+        self._show_below(field.key)
+        self.changed.emit(field.key, typed.value)

@@ -29,6 +29,7 @@ from dearig.window.guide import Guide
 from dearig.window.hv import HighVoltage, HighVoltageBadge
 from dearig.window.layout_state import GROUP
 from dearig.window.planner import Planner
+from dearig.window.questions import may_close, offer_unsaved
 from dearig.window.recordings_page import RecordingsPage
 from dearig.window.rig_page import RigPage
 from dearig.window.run_page import RunPage
@@ -58,7 +59,7 @@ class MainWindow(QMainWindow):
     def __init__(self, session: Session) -> None:
         super().__init__()
         self.session = session
-        self.setWindowTitle("dearig")
+        self.setWindowTitle("dearig[*]")  # Qt shows a mark there while something is not saved
         self.setMinimumHeight(680)  # px; the pages set the minimum width, which depends on fonts
         self.planner = Planner(session, self)
         self.rig_page = RigPage(session)
@@ -75,6 +76,7 @@ class MainWindow(QMainWindow):
         )
         self._guide: Guide | None = None
         self._closing = False
+        self._by_signal = False  # closed by a signal: nobody is there to be asked
         self._build()
         self._connect()
         self._apply_colour_scheme()
@@ -111,8 +113,11 @@ class MainWindow(QMainWindow):
         self.show_page(self.run_page)
 
     def leave(self) -> None:
-        """Close without a question once the rig is safe; for a program that gets a signal."""
-        self._closing = True
+        """Close without a question once the rig is safe; for a program that gets a signal.
+
+        Unsaved texts are kept for the next start.
+        """
+        self._closing = self._by_signal = True
         self.close()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
@@ -137,9 +142,13 @@ class MainWindow(QMainWindow):
         if runner.running:
             # the window shows the ramp, and closes when the run has ended
             runner.stop()
-            runner.ended.connect(self.close, Qt.ConnectionType.QueuedConnection)
             event.ignore()
             return
+        if not self._by_signal and not may_close(self, self.session):
+            self._closing = False
+            event.ignore()
+            return
+        self.session.recovery.close(keep=self._by_signal)
         self._save_state()
         self._filter_keys(running=False)
         self.run_page.close_work()
@@ -149,6 +158,23 @@ class MainWindow(QMainWindow):
         ):  # fmt: skip
             page.close_work()
         event.accept()
+
+    @Slot()
+    def _unsaved_changed(self) -> None:
+        self.setWindowModified(bool(self.session.recovery.unsaved))
+
+    @Slot()
+    def _run_ended(self) -> None:
+        if self._closing:
+            self.close()
+
+    def offer_unsaved(self) -> None:
+        """Offer the unsaved texts of a window that ended without a question."""
+        offer_unsaved(
+            self,
+            self.session,
+            {"sequence": self.sequence_page.restore, "rig file": self.rig_page.restore},
+        )
 
     def _ask_to_close(self) -> bool:
         """Stop the run and return True if the window is to close afterwards."""
@@ -249,6 +275,9 @@ class MainWindow(QMainWindow):
     def _connect(self) -> None:
         session, run = self.session, self.run_page
         run.runner.state_changed.connect(self._state_changed)
+        run.runner.ended.connect(self._run_ended, Qt.ConnectionType.QueuedConnection)
+        session.recovery.changed.connect(self._unsaved_changed)
+        self._unsaved_changed()
         run.show_sequence.connect(lambda: self.show_page(self.sequence_page))
         run.show_recording.connect(self._show_recording)
         session.rig_changed.connect(self._rig_or_folder_changed)
@@ -297,14 +326,14 @@ class MainWindow(QMainWindow):
 
     @Slot(str)
     def _read_sequence(self, toml: str) -> None:
-        self.session.set_sequence(toml, Path())
-        self.show_page(self.sequence_page)
+        if self.sequence_page.take(toml):
+            self.show_page(self.sequence_page)
 
     @Slot(str)
     def _play_sequence(self, toml: str) -> None:
         """Show a proposed experiment on the Run page; the operator arms it as usual."""
-        self.session.set_sequence(toml, Path())
-        self.show_page(self.run_page)
+        if self.sequence_page.take(toml):
+            self.show_page(self.run_page)
 
     @Slot(Path)
     def _show_model(self, path: Path) -> None:

@@ -88,6 +88,7 @@ def run_window(
     wake.start(_SIGNAL_INTERVAL)
     collector = Collector(application)
     window.show()
+    QTimer.singleShot(0, window.offer_unsaved)
     try:
         return application.exec()
     finally:

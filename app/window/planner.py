@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QObject, Signal, Slot
 
 from dearig.acquisition.plan import plan
 from dearig.config.rigfile import RigFile
-from dearig.config.sequencefile import LoadedSequence, parse_sequence
+from dearig.config.sequencefile import LoadedSequence, SequenceFault, read_sequence
+from dearig.config.toml_input import parse_toml
 from dearig.errors import InputError, Interrupted
 from dearig.progress import Progress, quiet
 from dearig.window.background import Background
+from dearig.window.limit_marks import RowPeaks, fields_beyond, rows_beyond
 from dearig.window.session import Breach, Preview, Session
 from dearig.window.traces import Pyramid
 
@@ -68,25 +71,34 @@ class Planner(QObject):
 def make_preview(
     toml: str, folder: Path, rig_file: RigFile, film: str = "", progress: Progress = quiet
 ) -> Preview:
-    """Plan the sequence ``toml``; a fault in it becomes ``Preview.sentence``."""
-    try:
-        loaded = parse_sequence(toml, "the sequence", folder)
-    except InputError as error:
-        return Preview(toml, sentence=str(error))
+    """Plan the sequence ``toml``; all faults in it become ``Preview.faults``."""
     rate, limits = float(rig_file.card.sample_rate_Hz), rig_file.gate_limits()
+    try:
+        loaded, faults = read_sequence(toml, "the sequence", folder)
+    except InputError as error:
+        return _refused(toml, None, [SequenceFault(str(error), str(error))])
+    tables = _tables(toml)
+    if loaded is not None:
+        faults = loaded.clock_faults(rate)
+    if faults or loaded is None:
+        return _refused(toml, loaded, [*faults, *fields_beyond(tables, limits)])
     try:
         voltage = Pyramid(loaded.on_clock(rate).samples)
         high, low, steep = _Spans(), _Spans(), _Steep(rate, limits.slew)
+        peaks = RowPeaks(loaded, rate)
 
         def observe(start: int, volts: np.ndarray) -> None:
             voltage.push(volts)
             high.take(start, volts > limits.voltage_max)
             low.take(start, volts < limits.voltage_min)
             steep.take(start, volts)
+            peaks.take(start, volts)
 
         planned = plan(loaded, rig_file, film=film, progress=progress, observe=observe)
     except InputError as error:
-        return Preview(toml, loaded, sentence=str(error))
+        return _refused(toml, loaded, [SequenceFault(str(error), str(error))])
+    beyond = [] if planned.waveform is not None else rows_beyond(loaded, planned, peaks, limits)
+    voltages = {fault.row for fault in beyond if "voltage reaches" in fault.words}
     field = _Spans()
     field.take(0, planned.field > limits.field)  # NaN, an unknown field, is not marked
     steps = rate / planned.stride
@@ -106,7 +118,22 @@ def make_preview(
             *field.breaches("true field", steps),
         ),
         segments=_segments(loaded, planned.duration),
+        faults=(*beyond, *fields_beyond(tables, limits, {r for r in voltages if r is not None})),
     )
+
+
+def _refused(toml: str, loaded: LoadedSequence | None, faults: list[SequenceFault]) -> Preview:
+    """Return the preview of a sequence that cannot be planned."""
+    many = [fault.sentence for fault in faults]
+    rest = f" (and {len(many) - 1} more)" if len(many) > 1 else ""
+    return Preview(toml, loaded, sentence=many[0] + rest, faults=tuple(faults))
+
+
+def _tables(toml: str) -> list[Mapping[str, Any]]:
+    """Return the tables [[segment]] of a text that is TOML; what is none becomes an empty one."""
+    found = parse_toml(toml, "the sequence").get("segment")
+    tables = found if isinstance(found, list) else []
+    return [table if isinstance(table, dict) else {} for table in tables]
 
 
 def _thinned(values: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ from PySide6.QtCore import QTimer, Slot
 from PySide6.QtWidgets import QGridLayout, QLabel, QProgressBar, QVBoxLayout, QWidget
 
 from dearig.drivers.gate import Margin
+from dearig.window.fields import in_words
 from dearig.window.preview_plots import PreviewPlots
 from dearig.window.session import Preview, Session
 from dearig.window.theme import SPACE
@@ -14,6 +15,7 @@ from dearig.window.widgets import Message, card, label
 __all__ = ["PreviewPanel"]
 
 _MARGINS_MAX = 6
+_FAULTS_MAX = 6  # more do not fit below the plots of a small screen; the table marks all
 #: Time in ms for which the last plan stays drawn, so that the plots do not flicker while one types.
 _CLEAR_AFTER = 300
 
@@ -58,12 +60,20 @@ class PreviewPanel(QWidget):
                 f"✓ Within all limits: {seconds:.2f} s, {samples:,} samples", "good"
             )
         elif preview.plan is not None:
-            reasons = "\n".join(f"✗ {reason}" for reason in preview.plan.reasons)
-            self.state.show_text(f"Refused by the limits of the rig file:\n{reasons}", "bad")
+            rows = [fault.sentence for fault in preview.faults if fault.key is None]
+            self._show_faults(
+                "Refused by the limits of the rig file:", [*preview.plan.reasons, *rows]
+            )
         else:
-            self.state.show_text(f"✗ {preview.sentence}", "bad")
+            self._show_faults("", [fault.sentence for fault in preview.faults])
         waveform = None if preview.plan is None else preview.plan.waveform
         self._show_margins(() if waveform is None else waveform.margins)
+
+    def _show_faults(self, head: str, sentences: list[str]) -> None:
+        lines = [f"✗ {in_words(sentence)}" for sentence in sentences[:_FAULTS_MAX]]
+        if len(sentences) > _FAULTS_MAX:
+            lines.append(f"and {len(sentences) - _FAULTS_MAX} more, marked in the table")
+        self.state.show_text("\n".join(filter(None, [head, *lines])), "bad")
 
     @Slot()
     def _clear_plots(self) -> None:

@@ -10,12 +10,10 @@ from PySide6.QtGui import QColor, QDragEnterEvent, QDropEvent, QKeySequence, QSh
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QButtonGroup,
-    QFileDialog,
     QGridLayout,
     QHBoxLayout,
     QHeaderView,
     QLineEdit,
-    QMessageBox,
     QRadioButton,
     QScrollArea,
     QSpinBox,
@@ -28,21 +26,27 @@ from PySide6.QtWidgets import (
 
 from dearig.acquisition.check import CheckOutcome, check_rig
 from dearig.acquisition.rigs import is_simulated
-from dearig.config.rigform import SECTIONS, faults_of, parse_rig_file, section_values, with_value
+from dearig.config.rigform import SECTIONS, faults_of, parse_rig_file, section_values
+from dearig.config.toml_edit import with_key
 from dearig.config.toml_input import read_text
+from dearig.drivers.daqmx.address import Address
+from dearig.drivers.errors import AddressError
 from dearig.errors import InputError
-from dearig.recording.files import check_output, replaced_when_done
 from dearig.window.background import Background
-from dearig.window.fields import form_fields
+from dearig.window.dialogs import choose_file, save_as
+from dearig.window.document import Asked, Saved, TextFile
+from dearig.window.fields import form_fields, in_words
 from dearig.window.form import Form
+from dearig.window.questions import ask_replace, may_drop
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
-from dearig.window.widgets import Message, button, card, label, plain_tip
+from dearig.window.widgets import Message, button, card, label, plain_tip, set_wrong
 
 __all__ = ["RigPage"]
 
 _SHAPES = {"ok": "●", "warning": "▲", "wrong": "✗", "not wired": "○"}
 _WORDS = {"ok": "OK", "warning": "Check", "wrong": "Wrong", "not wired": "Not wired"}
+_BLOCK, _ADDRESS_BLOCK = "rig file", "rig address"  # keys of what blocks arming
 _KINDS = ("sim", "hidden", "local", "remote")
 
 
@@ -56,9 +60,11 @@ class RigPage(QWidget):
         super().__init__(parent)
         self.session = session
         self.text = session.rig_text
+        self._in_force = session.rig_text  # the last text without faults
+        self._typing = False  # a name or server is typed, and not taken
         self.forms: dict[str, Form] = {}  # made when their tab is first shown
         self._areas: dict[str, QScrollArea] = {}
-        self._saved = session.rig_text
+        self.file = TextFile("rig file", session.rig_text, session.rig_path)
         self._checks = Background(self)
         self._checks.done.connect(self._checked)
         self._checks.failed.connect(lambda words: self.summary.show_text(words))
@@ -89,10 +95,35 @@ class RigPage(QWidget):
             "local": f"daqmx:{device}",
             "remote": f"daqmx:{device}@{self.server.text().strip()}",
         }[kind]
+        self._typing = False
         self.seed.setEnabled(kind == "hidden")
         self.device.setEnabled(kind in ("local", "remote"))
         self.server.setEnabled(kind == "remote")
         self.session.set_address(address)
+        self._block_address()
+
+    @Slot()
+    def _address_typed(self) -> None:
+        """Block arming until the typed name or server is taken: with Enter, or on leaving it."""
+        self._typing = True
+        self._block_address()
+
+    def _block_address(self) -> None:
+        fault, address = "", self.session.address
+        if address.startswith("daqmx:"):
+            try:
+                Address.parse(address)
+            except AddressError as error:
+                fault = str(error)
+        if self._typing:
+            fault = "the name of the card or its server is typed, but not taken: press Enter"
+        for field in (self.device, self.server):
+            set_wrong(field, bool(fault) and field.isEnabled())
+        self.address_fault.show_text(fault, "warn" if self._typing else "bad")
+        if fault:
+            self.session.block(_ADDRESS_BLOCK, f"rig: {fault}", self.title)
+        else:
+            self.session.unblock(_ADDRESS_BLOCK)
 
     @Slot()
     def check(self) -> None:
@@ -128,31 +159,44 @@ class RigPage(QWidget):
         self.outcome = None
         self._show_outcome()
         self._show_address()
-        if self.session.rig_text != self.text:  # another page has opened another file
-            self.text = self._saved = self.session.rig_text
+        session = self.session
+        if session.rig_text not in (self.text, self._in_force):  # another page opened another file
+            self.text = self._in_force = session.rig_text
+            self.file = TextFile("rig file", self.text, session.rig_path)
+            session.recovery.note(self.file, self.text)
             self._show_all()
 
     # the rig file
 
     def open_file(self, path: Path) -> None:
         """Read a rig file."""
-        self._files.start(lambda: (path, read_text(path, "rig file")))
+        if may_drop(self, self.session, self.file, self.text):
+            self._files.start(lambda: (path, read_text(path, "rig file")))
 
-    def save_file(self, path: Path) -> None:
-        """Write the rig file to ``path``; an existing file is replaced."""
-        text = self.text
+    @Slot()
+    def save(self) -> None:
+        """Write the rig file to its file, or ask for one."""
+        if self.file.path is None:
+            self._ask_save()
+        else:
+            self.save_file(self.file.path)
 
-        def write() -> tuple[Path, None]:
-            out = check_output(path, overwrite=True)
-            with replaced_when_done(out, overwrite=True) as partial:
-                partial.write_text(text, encoding="utf-8")
-            return out, None
+    def save_file(self, path: Path, replace: bool = False) -> None:
+        """Write the rig file to ``path``; an existing file is replaced as a whole.
 
-        self._files.start(write)
+        Asks where another program has changed the file since it was opened, unless ``replace``.
+        """
+        file, text = self.file, self.text
+        self._files.start(lambda: file.write(path, text, replace))
 
     def set_value(self, table: str, key: str, value: Any) -> None:
-        """Change one key; a rig file with faults shows them and is not used."""
-        self._take(with_value(self.text, table, key, value), self.session.rig_path)
+        """Change one key; a rig file with faults shows them, is not used, and blocks arming."""
+        self._take(with_key(self.text, table, key, value), self.file)
+
+    def restore(self, text: str, file: TextFile) -> None:
+        """Replace the rig file by the unsaved one of an earlier window."""
+        self._take(text, file)
+        self._show_all()
 
     def close_work(self) -> None:
         """Wait for the threads."""
@@ -160,28 +204,35 @@ class RigPage(QWidget):
         self._files.close()
 
     @Slot(object)
-    def _file_done(self, answer: tuple[Path, str | None]) -> None:
-        path, text = answer
+    def _file_done(self, answer: tuple[Path, str] | Saved | Asked) -> None:
         self.trouble.show_text("")
-        if text is None:
-            self._saved = self.text
-            self.session.set_rig_file(path, self.session.rig_text, self.session.rig_file)
-            self.session.message.emit(f"Saved {path}")
+        if isinstance(answer, Asked):
+            if ask_replace(self, self.session, answer):
+                self.save_file(answer.path, replace=True)
+            else:
+                self.trouble.show_text(f"{answer.sentence}; nothing was written")
+        elif isinstance(answer, Saved):
+            answer.file.note(answer)
+            self._take(self.text, self.file)  # the path may be another one
+            self._show_all()
+            self.session.message.emit(f"Saved {answer.path}")
         else:
-            self._saved = text
-            self._take(text, path)
-        self._show_all()
+            path, text = answer
+            self._take(text, TextFile("rig file", text, path))
+            self._show_all()
 
-    def _take(self, text: str, path: Path | None) -> None:
+    def _take(self, text: str, file: TextFile) -> None:
         try:
             faults = faults_of(text)
         except InputError as error:
-            self.trouble.show_text(str(error))
+            self.trouble.show_text(f"{error}. The rig file is the one of before.")
             return
-        self.text = text
+        self.text, self.file = text, file
         if not faults:
-            folder = None if path is None else path.resolve().parent
-            self.session.set_rig_file(path, text, parse_rig_file(text, folder))
+            self._in_force = text
+            folder = None if file.path is None else file.path.resolve().parent
+            self.session.set_rig_file(file.path, text, parse_rig_file(text, folder))
+        self.session.recovery.note(file, text)
         self._show_faults(faults)
 
     def _show_all(self) -> None:
@@ -190,6 +241,7 @@ class RigPage(QWidget):
         self._show_faults(faults_of(self.text))
 
     def _show_faults(self, faults: dict[tuple[str, str], str]) -> None:
+        faults = {place: in_words(words) for place, words in faults.items()}
         said = set()
         for i, table in enumerate(SECTIONS):
             keys = {k: words for (t, k), words in faults.items() if t == table}
@@ -200,13 +252,35 @@ class RigPage(QWidget):
             self.tabs.setTabText(i, f"{mark}{table}")
         rest = [words for place, words in faults.items() if place not in said]
         errors = f"{len(faults)} error{'s' if len(faults) > 1 else ''}"
-        head = f"Fix {errors}; the previous limits still apply" if faults else ""
+        head = ""
+        if faults:
+            head = f"Fix {errors}; until then nothing can be armed. {self._limits_in_force()}"
         self.state.show_text("\n".join([head, *rest]).strip(), "bad")
-        path = self.session.rig_path
-        unsaved = " (not saved)" if self.text != self._saved else ""
-        self.file_name.setText(f"{path.name if path else 'rig of the thesis, not saved'}{unsaved}")
-        self.file_name.setToolTip("" if path is None else plain_tip(str(path)))
+        self.file_name.setText(self.file.name(self.text))
+        self.file_name.setToolTip(self.file.tip)
         self.save_button.setEnabled(not faults)
+        self.save_as_button.setEnabled(not faults)
+        self._block_arming(faults)
+
+    def _limits_in_force(self) -> str:
+        limits = self.session.rig_file.limits
+        return (
+            f"The previous limits are in force: {limits.voltage_min_kV:g} to "
+            f"{limits.voltage_max_kV:g} kV"
+        )
+
+    def _block_arming(self, faults: dict[tuple[str, str], str]) -> None:
+        """Block arming while the rig file has faults: a limit typed beside them is not in force."""
+        if not faults:
+            self.session.unblock(_BLOCK)
+            return
+        (table, key), words = next(iter(faults.items()))
+        place = in_words(".".join(filter(None, (table, key))))
+        named = words if words.startswith(place) else f"{place}: {words}"
+        more = f" ({len(faults) - 1} more on the page Rig)" if len(faults) > 1 else ""
+        self.session.block(
+            _BLOCK, f"rig file: {named}{more}. {self._limits_in_force()}", self.title
+        )
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802
         if any(url.toLocalFile().endswith(".toml") for url in event.mimeData().urls()):
@@ -269,6 +343,8 @@ class RigPage(QWidget):
         self.seed.setEnabled(kind == "hidden")
         self.device.setEnabled(kind in ("local", "remote"))
         self.server.setEnabled(kind == "remote")
+        self._typing = False
+        self._block_address()
 
     # layout
 
@@ -317,8 +393,11 @@ class RigPage(QWidget):
         grid.setColumnStretch(1, 1)
         self.kinds.idClicked.connect(self.choose)
         self.seed.valueChanged.connect(self.choose)
-        self.device.editingFinished.connect(self.choose)
-        self.server.editingFinished.connect(self.choose)
+        for typed in (self.device, self.server):
+            typed.textEdited.connect(self._address_typed)
+            typed.editingFinished.connect(self.choose)
+        self.address_fault = Message()
+        grid.addWidget(self.address_fault, grid.rowCount(), 0, 1, 3)
         return card(grid)
 
     def _make_check_card(self) -> QWidget:
@@ -361,11 +440,17 @@ class RigPage(QWidget):
         open_button = button("&Open …", "Read a rig file; files can be dropped here (Ctrl+Shift+O)")
         open_button.setShortcut(QKeySequence("Ctrl+Shift+O"))
         open_button.clicked.connect(self._ask_open)
-        self.save_button = button("Save &as …", "Write the rig file")
-        self.save_button.clicked.connect(self._ask_save)
+        self.save_button = button("&Save", "Write the rig file to its file (Ctrl+S)")
+        self.save_button.setShortcut(QKeySequence("Ctrl+S"))
+        self.save_button.clicked.connect(self.save)
+        self.save_as_button = button(
+            "Save &as …", "Write the rig file to another file (Ctrl+Shift+S)"
+        )
+        self.save_as_button.setShortcut(QKeySequence("Ctrl+Shift+S"))
+        self.save_as_button.clicked.connect(self._ask_save)
         defaults = button("&Thesis rig", "Use the rig file of the thesis")
         defaults.clicked.connect(self._ask_defaults)
-        for made in (open_button, self.save_button, defaults):
+        for made in (open_button, self.save_button, self.save_as_button, defaults):
             row.addWidget(made)
         column.addLayout(row)
         self.trouble = Message()
@@ -408,28 +493,22 @@ class RigPage(QWidget):
 
     @Slot()
     def _ask_open(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self, "Rig file", "", "Rig files (*.toml)")
-        if name:
-            self.open_file(Path(name))
+        folder = "" if self.file.path is None else self.file.path.parent
+        path = choose_file(self, self.session, "Rig file", folder, "Rig files (*.toml)")
+        if path is not None:
+            self.open_file(path)
 
     @Slot()
     def _ask_save(self) -> None:
-        start = "" if self.session.rig_path is None else str(self.session.rig_path)
-        name, _ = QFileDialog.getSaveFileName(
-            self, "Save the rig file", start, "Rig files (*.toml)"
+        start = self.file.path or Path()
+        path = save_as(
+            self, self.session, "Save the rig file", start, "Rig files (*.toml)", ".toml"
         )
-        if name:
-            path = Path(name)
-            self.save_file(path if path.suffix else path.with_suffix(".toml"))
+        if path is not None:
+            self.save_file(path)
 
     @Slot()
     def _ask_defaults(self) -> None:
-        if self.text != self._saved:
-            answer = QMessageBox.question(
-                self, "Rig file of the thesis", "The changes are not saved. Discard them?"
-            )
-            if answer is not QMessageBox.StandardButton.Yes:
-                return
-        self._saved = ""
-        self._take("", None)
-        self._show_all()
+        if may_drop(self, self.session, self.file, self.text):
+            self._take("", TextFile("rig file", ""))
+            self._show_all()

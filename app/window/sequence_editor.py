@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import Any
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal, Slot
-from PySide6.QtGui import QKeySequence
+from PySide6.QtGui import QColor, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
@@ -23,17 +24,30 @@ from PySide6.QtWidgets import (
 )
 
 from dearig.config.segments import SEGMENT_KINDS
-from dearig.window.draft import Draft, Place
-from dearig.window.fields import FormField, form_fields, shown_value
+from dearig.config.sequencefile import HEAD_FIELDS, SequenceFault
+from dearig.window.document import TextFile
+from dearig.window.draft import Draft
+from dearig.window.fields import (
+    FormField,
+    Typed,
+    form_field,
+    form_fields,
+    in_words,
+    read_back,
+    read_typed,
+    shown_value,
+)
 from dearig.window.form import Form
 from dearig.window.theme import SPACE
-from dearig.window.widgets import button, label, menu_button, plain_tip, set_wrong
+from dearig.window.widgets import Message, button, label, menu_button, plain_tip, set_wrong
 
 __all__ = ["SequenceEditor"]
 
 _COLUMNS = ("", "Kind", "Settings", "Duration (s)")
 _DURATION = 3  # column
+_FOREGROUND = Qt.ItemDataRole.ForegroundRole
 _LEAST_WIDTH = 430  # px
+_HEADS = {key: form_field(key, info) for key, info in HEAD_FIELDS.items()}
 
 
 class SequenceEditor(QWidget):
@@ -47,17 +61,28 @@ class SequenceEditor(QWidget):
     row_chosen = Signal()
     file_wanted = Signal()
 
-    def __init__(self, toml: str, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, toml: str, file: TextFile | None = None, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
-        self.draft = Draft(toml)
+        self.draft = Draft(toml, file)
         self.form: Form | None = None
         self._form_of: tuple[int, str] | None = None  # row and kind
+        self._faults: tuple[SequenceFault, ...] = ()
+        self._fault_colour = "red"
+        self._misread: dict[str, str] = {}  # what is wrong with the text of a head's field
+        self._head_faults: dict[str, str] = {}
+        self._edited_heads: list[str] = []
+        self.head_note = Message()
+        self.row_fault = Message()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(SPACE)
         column.addLayout(self._head_row())
+        column.addWidget(self.head_note)
         column.addWidget(self._segment_table(), 3)
         column.addLayout(self._row_buttons())
+        column.addWidget(self.row_fault)
         self._form_area = QScrollArea()
         self._form_area.setWidgetResizable(True)
         self._form_area.setFrameShape(QScrollArea.Shape.NoFrame)
@@ -66,9 +91,9 @@ class SequenceEditor(QWidget):
 
     # changes
 
-    def replace(self, toml: str) -> None:
-        """Replace the draft by another sequence. Raises ``InputError`` where it is not TOML."""
-        self.draft.replace(toml)
+    def replace(self, toml: str, file: TextFile) -> None:
+        """Replace the draft by that of another file. Raises ``InputError`` if it is not TOML."""
+        self.draft.replace(toml, file)
         self.fill(0)
 
     def choose(self, row: int) -> None:
@@ -124,13 +149,13 @@ class SequenceEditor(QWidget):
         self.edited.emit()
 
     def _head_typed(self, key: str, text: str) -> None:
-        value: Any = text
-        if key != "name":
-            try:
-                value = float(text) if text.strip() else None
-            except ValueError:
-                value = text  # the check of the file refuses it with a sentence
-        self.draft.set_head(key, value)
+        typed = Typed(text) if key == "name" else read_typed(_HEADS[key], text)
+        self._misread[key] = typed.fault
+        if key != "name" and key not in self._edited_heads:
+            self._edited_heads.append(key)
+        self._faults = tuple(f for f in self._faults if (f.row, f.key) != (None, key))
+        self._show_head(key)
+        self.draft.set_head(key, typed.value)
         self.edited.emit()
 
     # display
@@ -145,21 +170,61 @@ class SequenceEditor(QWidget):
         self.table.setCurrentCell(min(row, len(self.draft.segments) - 1), 1)
         self._row_changed()
         for key, field in self.heads.items():
-            text = shown_value(self.draft.data.get(key))
-            if field.text() != text:
-                field.setText(text)
+            value = self.draft.data.get(key)
+            read = field.text() if key == "name" else read_typed(_HEADS[key], field.text()).value
+            if read != value:
+                field.setText(shown_value(value))
+                self._misread.pop(key, None)
+                if key in self._edited_heads:
+                    self._edited_heads.remove(key)
 
-    def show_fault(self, place: Place, sentence: str) -> None:
-        """Mark ``place`` as wrong and say why beside its field; ``Place()`` marks nothing."""
+    def show_faults(self, faults: Iterable[SequenceFault]) -> None:
+        """Mark every row and field that has a fault, each with its own words."""
+        self._faults = tuple(replace(f, words=in_words(f.words)) for f in faults)
+        by_row: dict[int, list[str]] = {}
+        for fault in self._faults:
+            if fault.row is not None:
+                named = f"{in_words(fault.key)}: {fault.words}" if fault.key else fault.words
+                by_row.setdefault(fault.row, []).append(named)
         for row in range(self.table.rowCount()):
             item = self.table.item(row, 0)
             if item is not None:
-                item.setText(f"✗ {row + 1}" if row == place.row else str(row + 1))
+                words = by_row.get(row, [])
+                item.setText(f"✗ {row + 1}" if words else str(row + 1))
+                item.setData(_FOREGROUND, QColor(self._fault_colour) if words else None)
+                item.setToolTip(plain_tip("\n".join(words)))
+        self._show_faults_of_row()
+        for key in self.heads:
+            self._show_head(key)
+
+    def set_fault_colour(self, colour: str) -> None:
+        """Mark rows with faults in another colour."""
+        self._fault_colour = colour
+        self.show_faults(self._faults)
+
+    def _show_faults_of_row(self) -> None:
+        """Show the faults of the chosen row: above its form, and below its fields."""
+        here = [f for f in self._faults if f.row is not None and f.row == self.table.currentRow()]
+        keys = {f.key: f.words for f in reversed(here) if f.key}
+        shown = {} if self.form is None else {k: w for k, w in keys.items() if self.form.has(k)}
+        above = [f.words for f in here if not f.key or f.key not in shown]
+        self.row_fault.show_text("\n".join(above))
         if self.form is not None:
-            here = place.key is not None and place.row == self.table.currentRow()
-            self.form.show_faults({str(place.key): sentence} if here else {})
-        for key, field in self.heads.items():
-            set_wrong(field, place.row is None and place.key == key)
+            self.form.show_faults(shown)
+
+    def _show_head(self, key: str) -> None:
+        """Show below the head what is wrong with its fields, or was read from them."""
+        found = next((f.words for f in self._faults if f.row is None and f.key == key), "")
+        self._head_faults[key] = self._misread.get(key) or found
+        set_wrong(self.heads[key], bool(self._head_faults[key]))
+        bad = [f"{_HEADS[k].label}: {words}" for k, words in self._head_faults.items() if words]
+        values = {k: read_typed(_HEADS[k], self.heads[k].text()).value for k in self._edited_heads}
+        read = [
+            f"{_HEADS[k].label} {words}"
+            for k, value in values.items()
+            if (words := read_back(_HEADS[k], value))
+        ]
+        self.head_note.show_text("\n".join(bad or read), "bad" if bad else "muted")
 
     def show_durations(self, durations: Iterable[float]) -> None:
         """Show the durations in s of all segments as they are played, repeats one by one."""
@@ -193,6 +258,7 @@ class SequenceEditor(QWidget):
     def _row_changed(self) -> None:
         row = self.table.currentRow()
         self._show_form(row)
+        self._show_faults_of_row()
         for made in self._needs_row:
             made.setEnabled(row >= 0)
         self.row_chosen.emit()

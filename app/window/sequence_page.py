@@ -6,24 +6,28 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal, Slot
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QKeySequence
-from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QMenu, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QMenu, QSplitter, QVBoxLayout, QWidget
 
 from dearig.config.presets import PRESETS
 from dearig.config.toml_input import read_text
 from dearig.errors import InputError
-from dearig.recording.files import check_output, replaced_when_done
 from dearig.window.background import Background
-from dearig.window.draft import Draft, Place, has_comments, place_of, relative_csv
+from dearig.window.dialogs import choose_file, save_as
+from dearig.window.document import Asked, Saved, TextFile
+from dearig.window.draft import Draft, relative_csv
+from dearig.window.fields import in_words
 from dearig.window.layout_state import remember
 from dearig.window.preview_panel import PreviewPanel
+from dearig.window.questions import ask_replace, may_drop
 from dearig.window.sequence_editor import SequenceEditor
-from dearig.window.session import Session
+from dearig.window.session import Preview, Session
 from dearig.window.theme import SPACE
-from dearig.window.widgets import Message, button, label, menu_button, plain_tip
+from dearig.window.widgets import Message, button, label, menu_button
 
 __all__ = ["SequencePage"]
 
 _ENDINGS = (".toml", ".csv")
+_BLOCK = "sequence"  # key of what blocks arming
 
 
 class SequencePage(QWidget):
@@ -37,10 +41,14 @@ class SequencePage(QWidget):
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.session = session
-        self.editor = SequenceEditor(session.sequence_toml)
+        toml, folder = session.sequence_toml, session.sequence_folder
+        # what an earlier session had without a file is in no file yet
+        kept = session.sequence_path is None and toml not in PRESETS.values()
+        file = TextFile("sequence", "" if kept else toml, session.sequence_path, folder)
+        session.recovery.note(file, toml)
+        self.editor = SequenceEditor(toml, file)
         self.preview = PreviewPanel(session)
         self._sent = session.sequence_toml  # the text that this page gave to the session last
-        self._warned: tuple[Path, str] | None = None
         self._files = Background(self)
         self._files.done.connect(self._file_done)
         self._files.failed.connect(lambda sentence: self.trouble.show_text(sentence))
@@ -53,9 +61,12 @@ class SequencePage(QWidget):
         session.rig_changed.connect(self.preview.show_planning)
         session.preview_changed.connect(self._preview_changed)
         session.recent_changed.connect(self._recent_changed)
+        session.theme_changed.connect(self._theme_changed)
+        self._theme_changed()
         self._recent_changed()
         self.editor.fill(0)
         self._enable_undo()
+        self._show_file_name()
         if session.preview is not None:
             self._preview_changed()
 
@@ -70,50 +81,52 @@ class SequencePage(QWidget):
         """Read a sequence (.toml), or add a waveform (.csv) as a segment."""
         if path.suffix.lower() == ".csv":
             self.add_csv(path)
-            return
-        self._files.start(lambda: (path, read_text(path, "sequence")))
+        elif self.may_replace():
+            self._files.start(lambda: (path, read_text(path, "sequence")))
 
-    def save_file(self, path: Path) -> None:
-        """Write the sequence to ``path``; an existing file is replaced.
+    def save_file(self, path: Path, replace: bool = False) -> None:
+        """Write the sequence to ``path``; an existing file is replaced as a whole.
 
-        A changed sequence has no comments. A file that has some is replaced only when asked twice.
+        Asks where another program has changed the file since it was opened, unless ``replace``.
         """
-        text = self.session.sequence_toml
+        file, text = self.draft.file, self.draft.toml
 
-        def write() -> tuple[Path, None]:
-            out = check_output(path, overwrite=True)
-            if self._warned != (path, text) and not has_comments(text) and out.is_file():
-                there = out.read_text(encoding="utf-8", errors="replace")
-                if has_comments(there):
-                    self._warned = path, text
-                    raise InputError(
-                        f"{out.name} has comments (#), which the changed sequence cannot keep; "
-                        f"nothing was written: save again to replace it, or choose another name"
-                    )
-            with replaced_when_done(out, overwrite=True) as partial:
-                partial.write_text(text, encoding="utf-8")
-            return out, None
+        def write() -> Saved | Asked:
+            return file.write(path, text, replace)
 
         self._files.start(write)
 
+    def may_replace(self) -> bool:
+        """Return True if the sequence has no unsaved changes, or the operator gives them up."""
+        return may_drop(self, self.session, self.draft.file, self.draft.toml)
+
+    def take(self, toml: str) -> bool:
+        """Replace the sequence by ``toml`` of another page; False where the operator refuses."""
+        return self.may_replace() and self._take(toml, TextFile("sequence", toml))
+
+    def restore(self, toml: str, file: TextFile) -> None:
+        """Replace the sequence by the unsaved one of an earlier window."""
+        self._take(toml, file)
+
     def add_csv(self, path: Path) -> None:
         """Add a waveform (columns time_s and voltage_kV) as a segment."""
-        session = self.session
-        if session.sequence_path is None and 'kind = "csv"' not in session.sequence_toml:
-            session.sequence_folder = path.parent  # a sequence in no file belongs to its waveform
-        self.editor.add("csv", file=relative_csv(path, session.sequence_folder))
+        file = self.draft.file
+        if file.path is None and all(s.get("kind") != "csv" for s in self.draft.segments):
+            file.folder = path.parent  # a sequence in no file belongs to its waveform
+        self.editor.add("csv", file=relative_csv(path, file.folder))
 
     def preset(self, name: str) -> None:
         """Replace the sequence by the preset ``name``."""
-        self._take(PRESETS[name], Path(), None)
+        self.take(PRESETS[name])
 
     @Slot()
     def save(self) -> None:
         """Write the sequence to its file, or ask for one."""
-        if self.session.sequence_path is None:
+        path = self.draft.file.path
+        if path is None:
             self._ask_save()
         else:
-            self.save_file(self.session.sequence_path)
+            self.save_file(path)
 
     def reset_layout(self) -> None:
         """Give every part its default size."""
@@ -124,30 +137,36 @@ class SequencePage(QWidget):
         self._files.close()
 
     @Slot(object)
-    def _file_done(self, answer: tuple[Path, str | None]) -> None:
-        path, text = answer
-        self._warned = None
-        if text is None:
-            self.session.sequence_path = path
-            self.session.message.emit(f"Saved {path}")
-            self.trouble.show_text("")
-        elif not self._take(text, path.parent, path):
+    def _file_done(self, answer: tuple[Path, str] | Saved | Asked) -> None:
+        if isinstance(answer, Asked):
+            if ask_replace(self, self.session, answer):
+                self.save_file(answer.path, replace=True)
+            else:
+                self.trouble.show_text(f"{answer.sentence}; nothing was written")
             return
+        if isinstance(answer, Saved):
+            path = answer.path
+            answer.file.note(answer)
+            if all(segment.get("kind") != "csv" for segment in self.draft.segments):
+                answer.file.folder = path.parent
+            self.trouble.show_text("")
+            self._edited()  # the path may be another one
+            self.session.message.emit(f"Saved {path}")
+        else:
+            path, text = answer
+            if not self._take(text, TextFile("sequence", text, path, path.parent)):
+                return
         self.session.add_recent(path)
-        self._show_file_name()
 
-    def _take(self, toml: str, folder: Path, path: Path | None) -> bool:
+    def _take(self, toml: str, file: TextFile) -> bool:
         """Replace the sequence; return False, with a message, where ``toml`` is none."""
         try:
-            self.editor.replace(toml)
+            self.editor.replace(toml, file)
         except InputError as error:
-            self.trouble.show_text(str(error))
+            self.trouble.show_text(f"{error}. The sequence is the one of before.")
             return False
         self.trouble.show_text("")
-        self._sent = toml
-        self.session.set_sequence(toml, folder, path)
-        self._enable_undo()
-        self._show_file_name()
+        self._edited()
         return True
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802
@@ -164,10 +183,12 @@ class SequencePage(QWidget):
 
     @Slot()
     def _edited(self) -> None:
-        session = self.session
+        session, file = self.session, self.draft.file
         self._sent = self.draft.toml
         self._enable_undo()
-        session.set_sequence(self._sent, session.sequence_folder, session.sequence_path)
+        session.set_sequence(self._sent, file.folder, file.path)
+        session.recovery.note(file, self._sent)
+        self._show_file_name()
 
     def _enable_undo(self) -> None:
         self.undo_button.setEnabled(self.draft.can_undo)
@@ -177,7 +198,8 @@ class SequencePage(QWidget):
     def _sequence_changed(self) -> None:
         session = self.session
         if session.sequence_toml != self._sent:  # it came from another page
-            self._take(session.sequence_toml, session.sequence_folder, session.sequence_path)
+            toml, folder = session.sequence_toml, session.sequence_folder
+            self._take(toml, TextFile("sequence", toml, session.sequence_path, folder))
         self.preview.show_planning()
 
     # display
@@ -188,13 +210,26 @@ class SequencePage(QWidget):
         if preview is None or preview.toml != self.session.sequence_toml:
             return
         self.preview.show_preview(preview)
-        place = place_of(preview.sentence) if preview.plan is None else Place()
-        self.editor.show_fault(place, _after_key(preview.sentence))
+        self._block_arming(preview)
+        self.editor.show_faults(preview.faults)
         if preview.loaded is None:
-            self.editor.clear_duration(place.row)
+            for row in {fault.row for fault in preview.faults}:
+                self.editor.clear_duration(row)
         else:
             self.editor.show_durations(s.duration for s in preview.loaded.sequence.segments)
         self._highlight()
+
+    def _block_arming(self, preview: Preview) -> None:
+        """Block arming while the sequence cannot be played, and say where and why."""
+        if preview.playable:
+            self.session.unblock(_BLOCK)
+            return
+        said = [
+            *(f.sentence for f in preview.faults),
+            *(preview.plan.reasons if preview.plan else ()),
+        ]
+        more = f" ({len(said) - 1} more on the page Sequence)" if len(said) > 1 else ""
+        self.session.block(_BLOCK, f"sequence: {in_words(said[0])}{more}", self.title)
 
     @Slot()
     def _highlight(self) -> None:
@@ -206,9 +241,13 @@ class SequencePage(QWidget):
         self.preview.plots.choose((played[0][1], played[-1][2]) if played else None)
 
     def _show_file_name(self) -> None:
-        path = self.session.sequence_path
-        self.file_name.setText(path.name if path is not None else "not saved")
-        self.file_name.setToolTip("" if path is None else plain_tip(str(path)))
+        file = self.draft.file
+        self.file_name.setText(file.name(self.draft.toml))
+        self.file_name.setToolTip(file.tip)
+
+    @Slot()
+    def _theme_changed(self) -> None:
+        self.editor.set_fault_colour(self.session.theme.bad)
 
     @Slot()
     def _recent_changed(self) -> None:
@@ -267,7 +306,7 @@ class SequencePage(QWidget):
         row.addWidget(self.undo_button)
         row.addWidget(self.redo_button)
         row.addStretch(1)
-        self.file_name = label("not saved", "muted")
+        self.file_name = label("", "muted")
         row.addWidget(self.file_name)
         run = button("Go to R&un", "Go to the Run page, to arm and start it", primary=True)
         run.clicked.connect(self.show_run)
@@ -276,37 +315,32 @@ class SequencePage(QWidget):
 
     @Slot()
     def _ask_open(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(
-            self, "Open a sequence", str(self.session.sequence_folder),
+        path = choose_file(
+            self, self.session, "Open a sequence", self.draft.file.folder,
             "Sequences (*.toml);;CSV (*.csv)",
         )  # fmt: skip
-        if name:
-            self.open_file(Path(name))
+        if path is not None:
+            self.open_file(path)
 
     @Slot()
     def _ask_csv(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(
-            self, "Waveform with the columns time_s and voltage_kV",
-            str(self.session.sequence_folder), "Waveforms (*.csv)",
+        path = choose_file(
+            self, self.session, "Waveform with the columns time_s and voltage_kV",
+            self.draft.file.folder, "Waveforms (*.csv)",
         )  # fmt: skip
-        if name:
-            self.add_csv(Path(name))
+        if path is not None:
+            self.add_csv(path)
 
     @Slot()
     def _ask_save(self) -> None:
-        name, _ = QFileDialog.getSaveFileName(
-            self, "Save the sequence", str(self.session.sequence_folder), "Sequences (*.toml)"
+        file = self.draft.file
+        start = file.path or file.folder
+        path = save_as(
+            self, self.session, "Save the sequence", start, "Sequences (*.toml)", ".toml"
         )
-        if name:
-            path = Path(name)
-            self.save_file(path if path.suffix else path.with_suffix(".toml"))
+        if path is not None:
+            self.save_file(path)
 
 
 def _can_open(name: str) -> bool:
     return Path(name).suffix.lower() in _ENDINGS
-
-
-def _after_key(sentence: str) -> str:
-    """Return the part of a sentence that follows the name of the key, which stands beside it."""
-    found = sentence.split(" is not allowed: ", 1)
-    return found[1] if len(found) == 2 else sentence.rpartition(": ")[2]

@@ -14,10 +14,11 @@ from dearig.acquisition.plan import Plan
 from dearig.config.modelfile import model_toml
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
-from dearig.config.sequencefile import LoadedSequence
+from dearig.config.sequencefile import LoadedSequence, SequenceFault
 from dearig.model.actuator import Actuator
 from dearig.model.material import TABLE_3
 from dearig.window.program_errors import ProgramErrors
+from dearig.window.recovery import Recovery
 from dearig.window.settings import kept_text, kept_texts
 from dearig.window.theme import LIGHT, Theme
 
@@ -50,6 +51,7 @@ class Preview:
 
     ``curves`` are (time in s, value in SI units) of voltage, displacement and field, decimated with
     their extremes kept; ``segments`` are label, begin and end in s, with lead-in and tail.
+    ``faults`` are those of the rows and fields of the sequence, all of them.
     """
 
     toml: str
@@ -59,6 +61,7 @@ class Preview:
     curves: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     breaches: tuple[Breach, ...] = ()
     segments: tuple[tuple[str, float, float], ...] = ()
+    faults: tuple[SequenceFault, ...] = ()
 
     @property
     def playable(self) -> bool:
@@ -124,6 +127,7 @@ class Session(QObject):
         self.running = False
         self.armed = False
         self._blocks: dict[str, Block] = {}
+        self.recovery = Recovery(settings, self)  #: unsaved sequence and rig file
 
     def set_address(self, address: str) -> None:
         """Use the rig ``sim``, ``sim:7``, ``daqmx:Dev1`` or ``daqmx:Dev1@HOST:PORT``."""

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from dearig.config.rigfile import RigFile, load_rig_file, write_default
-from dearig.config.rigform import SECTIONS, faults_of, parse_rig_file, section_values, with_value
+from dearig.config.rigform import SECTIONS, faults_of, parse_rig_file, section_values
+from dearig.config.toml_edit import with_key
 from dearig.errors import InputError
 
 
@@ -38,27 +39,27 @@ def test_a_written_file_is_what_is_parsed(default: str, tmp_path: Path) -> None:
 def test_one_value_is_changed_and_nothing_else(
     default: str, table: str, key: str, value: Any
 ) -> None:
-    changed = with_value(default, table, key, value)
+    changed = with_key(default, table, key, value)
     wanted = tomllib.loads(default)
     wanted.setdefault(table, {})[key] = value
     assert tomllib.loads(changed) == wanted
     kept = [line for line in default.splitlines() if line.startswith("#")]
     assert [line for line in changed.splitlines() if line.startswith("#")] == kept
-    again = with_value(changed, table, key, None)
+    again = with_key(changed, table, key, None)
     wanted[table].pop(key)
     assert tomllib.loads(again) == wanted
 
 
 def test_a_remark_behind_a_value_stays() -> None:
     text = '[film]\nlength_mm = 75.0  # of 3 May\nname = "a # b" # ours\n[load]\nmass_g = 1.0'
-    text = with_value(with_value(text, "film", "length_mm", 76.0), "film", "name", "c")
-    assert 'length_mm = 76.0  # of 3 May\nname = "c"  # ours\n[load]' in text
-    assert tomllib.loads(with_value(text, "load", "mass_g", 2.0))["load"] == {"mass_g": 2.0}
+    text = with_key(with_key(text, "film", "length_mm", 76.0), "film", "name", "c")
+    assert 'length_mm = 76.0  # of 3 May\nname = "c" # ours\n[load]' in text
+    assert tomllib.loads(with_key(text, "load", "mass_g", 2.0))["load"] == {"mass_g": 2.0}
 
 
 def test_a_key_of_another_table_is_left_alone() -> None:
     text = '[amplifier]\nmodel = "A"\n[laser]\nmodel = "L"\n'
-    changed = tomllib.loads(with_value(text, "laser", "model", "M"))
+    changed = tomllib.loads(with_key(text, "laser", "model", "M"))
     assert changed == {"amplifier": {"model": "A"}, "laser": {"model": "M"}}
 
 
@@ -78,6 +79,21 @@ def test_what_two_keys_do_not_agree_on_stands_at_the_one_that_is_named() -> None
     faults = faults_of("[limits]\nvoltage_max_kV = 12.0\n")
     assert set(faults) == {("limits", "voltage_max_kV")}
     assert "the amplifier's range" in faults["limits", "voltage_max_kV"]
+
+
+def test_what_single_keys_and_several_keys_have_wrong_is_told_at_once() -> None:
+    text = (
+        '[film]\nlength_mm = 75.0\n[laser]\naveraging = "x"\n[load]\nrest_length_mm = 70.0\n'
+        "[limits]\nvoltage_max_kV = 12.0\nslew_max_kV_per_s = 1e6\n"
+    )
+    faults = faults_of(text)
+    assert set(faults) == {
+        ("laser", "averaging"), ("load", "rest_length_mm"), ("limits", "voltage_max_kV"),
+        ("limits", "slew_max_kV_per_s"),
+    }  # fmt: skip
+    # what rest on a key that is itself wrong is not told of the key that stands in its place
+    wrong = faults_of('[film]\nlength_mm = "x"\n[load]\nrest_length_mm = 70.0\n')
+    assert set(wrong) == {("film", "length_mm")}
 
 
 def test_unknown_keys_and_tables_are_said() -> None:

@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 from dearig.config.presets import PRESETS
-from dearig.config.sequencefile import HELD_SAMPLES_MAX, SAMPLES_MAX, load_sequence, parse_sequence
+from dearig.config.sequencefile import (
+    HELD_SAMPLES_MAX,
+    SAMPLES_MAX,
+    load_sequence,
+    parse_sequence,
+    read_sequence,
+)
 from dearig.errors import InputError
 from dearig.model.excitation import Sequence
 
@@ -113,3 +119,36 @@ def test_faults_that_a_wrong_name_causes_are_not_counted() -> None:
     text += "colour = 3\n"
     with pytest.raises(InputError, match=r"\(1 more fault after that\)$"):
         parse_sequence(text, "x", Path())
+
+
+def test_every_fault_of_a_sequence_is_told_with_its_place() -> None:
+    text = (
+        'name = ""\ntail_s = -1.0\n'
+        '[[segment]]\nkind = "hold"\nduration_s = -1.0\nvoltage_kV = "x"\n'
+        '[[segment]]\nkind = "csv"\nfile = "missing.csv"\n'
+        '[[segment]]\nkind = "unknown"\n'
+        '[[segment]]\nkind = "hold"\n'
+    )
+    loaded, faults = read_sequence(text, "x", Path())
+    assert loaded is None
+    assert {(f.row, f.key) for f in faults} == {
+        (None, "name"), (None, "tail_s"), (0, "duration_s"), (0, "voltage_kV"), (1, None),
+        (2, None), (3, "duration_s"),
+    }  # fmt: skip
+    assert all(f.words in f.sentence or f.key for f in faults)
+
+
+def test_every_segment_that_does_not_join_is_told_by_its_row() -> None:
+    hold = '[[segment]]\nkind = "hold"\nduration_s = 1.0\nvoltage_kV = '
+    text = f"{HEAD}{hold}0.0\nrepeats = 3\n{hold}2.0\n{hold}1.0\n"
+    loaded, faults = read_sequence(text, "x", Path())
+    assert loaded is None
+    assert [f.row for f in faults] == [1, 2, 2]
+    assert faults[0].sentence.startswith("segment 4 (hold) starts at 2 kV")
+    assert "ends at 1 kV but the run ends at 0 kV" in faults[2].sentence
+
+
+def test_every_segment_that_is_too_fast_for_the_clock_is_told() -> None:
+    sine = '[[segment]]\nkind = "half_sine"\namplitude_kV = 1.0\nfrequency_Hz = '
+    loaded = parse_sequence(f"{HEAD}{sine}600.0\n{sine}1.0\n{sine}700.0\n", "x", Path())
+    assert [fault.row for fault in loaded.clock_faults(1000.0)] == [0, 2]

@@ -69,6 +69,25 @@ def _no_word_from_qt() -> Iterator[None]:
     assert said == []
 
 
+class Answers:
+    """Answers to the questions of the window, in place of a dialog."""
+
+    def __init__(self) -> None:
+        self.next = False
+        self.questions: list[str] = []
+
+    def __call__(self, *given: object) -> bool:
+        self.questions.append(str(given[3]))
+        return self.next
+
+
+@pytest.fixture
+def answers(monkeypatch: pytest.MonkeyPatch) -> Answers:
+    given = Answers()
+    monkeypatch.setattr("dearig.window.questions.ask", given)
+    return given
+
+
 @pytest.fixture
 def session(tmp_path: Path, qapp: QApplication) -> Session:
     prepare_plots()
@@ -100,7 +119,7 @@ def keep(qtbot: QtBot) -> Iterator[Callable[[QWidget], None]]:
     yield show
     for widget in kept:
         if isinstance(widget, MainWindow):
-            widget.close()
+            widget.leave()  # without a question
         else:
             widget.close_work()  # type: ignore[attr-defined]
 

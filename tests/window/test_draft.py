@@ -5,16 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-import tomli_w
 
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.config.segments import SEGMENT_KINDS
 from dearig.config.sequencefile import parse_sequence
-from dearig.config.toml_input import parse_toml
 from dearig.errors import InputError
-from dearig.window.draft import Draft, Place, has_comments, place_of, relative_csv
-from dearig.window.fields import form_fields, shown_value, typed_value
+from dearig.window.draft import Draft, relative_csv
+from dearig.window.fields import form_fields, read_back, read_typed, shown_value
 from dearig.window.planner import make_preview
 
 
@@ -26,25 +24,6 @@ def test_every_preset_survives_being_edited(name: str) -> None:
     for tail in (9.0, draft.data.get("tail_s")):
         draft.set_head("tail_s", tail)
     assert parse_sequence(draft.toml, name, Path()).sequence == before
-
-
-@pytest.mark.parametrize(
-    ("toml", "there"),
-    [
-        ('name = "a"\n', False),
-        ("# first\nname = 'a'\n", True),
-        ('name = "a" # don\'t\n', True),
-        ('name = "a # b"\n', False),
-        ("name = 'c:\\' # b\n", True),
-        ('name = "\\" # b"\n', False),
-        ('name = """\n# "b"\n"""\n', False),
-        ("name = '''\n# b\n'''\n", False),
-        ('name = "" # "\n', True),
-    ],
-)
-def test_comments_are_told_from_texts(toml: str, there: bool) -> None:
-    assert parse_toml(toml, "it")
-    assert has_comments(toml) is there
 
 
 @pytest.mark.parametrize("kind", [k for k in SEGMENT_KINDS if k != "csv"])
@@ -107,31 +86,68 @@ def test_what_is_no_sequence_is_refused(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "place"),
+    ("changes", "key"),
     [
-        ({"amplitude_kV": "abc"}, Place(2, "amplitude_kV")),
-        ({"from_Hz": -1.0}, Place(2, "from_Hz")),
-        ({"from_Hz": None}, Place(2, "from_Hz")),
-        ({"taper_s": 100.0}, Place(2, None)),
-        ({"to_Hz": 900.0}, Place(2, None)),
-        ({"offset_kV": 1.0}, Place(2, None)),
-        ({"repeats": 1.5}, Place(2, "repeats")),
+        ({"amplitude_kV": "abc"}, "amplitude_kV"),
+        ({"from_Hz": -1.0}, "from_Hz"),
+        ({"from_Hz": None}, "from_Hz"),
+        ({"taper_s": 100.0}, None),
+        ({"to_Hz": 900.0}, None),
+        ({"offset_kV": 1.0}, None),
+        ({"repeats": 1.5}, "repeats"),
     ],
 )
-def test_a_fault_is_found_where_it_is(changes: dict[str, object], place: Place) -> None:
+def test_a_fault_is_found_where_it_is(changes: dict[str, object], key: str | None) -> None:
     draft = Draft(PRESETS["rich"])
-    for key, value in changes.items():
-        draft.set_value(2, key, value)
+    for name, value in changes.items():
+        draft.set_value(2, name, value)
     preview = make_preview(draft.toml, Path(), RigFile())
     assert preview.sentence
-    assert place_of(preview.sentence) == place
+    assert (2, key) in [(fault.row, fault.key) for fault in preview.faults]
 
 
 @pytest.mark.parametrize(("key", "value"), [("name", ""), ("lead_in_s", -1.0), ("tail_s", "x")])
 def test_a_fault_in_the_head_is_found(key: str, value: object) -> None:
     draft = Draft(PRESETS["rich"])
     draft.set_head(key, value)
-    assert place_of(make_preview(draft.toml, Path(), RigFile()).sentence) == Place(None, key)
+    (fault,) = make_preview(draft.toml, Path(), RigFile()).faults
+    assert (fault.row, fault.key) == (None, key)
+
+
+def test_every_fault_is_told_at_once_with_what_exceeds_a_limit() -> None:
+    draft = Draft(PRESETS["rich"])
+    draft.set_head("lead_in_s", -1.0)
+    draft.set_value(1, "duration_s", -1.0)
+    draft.set_value(2, "taper_s", 100.0)
+    draft.set_value(4, "levels_kV", [3.0, 12.5, 9.0, 0.0])
+    faults = {(f.row, f.key): f.words for f in make_preview(draft.toml, Path(), RigFile()).faults}
+    assert set(faults) == {
+        (None, "lead_in_s"), (1, "duration_s"), (2, None), (4, "levels_kV")
+    }  # fmt: skip
+    assert faults[4, "levels_kV"].startswith("value 2 (12.5 kV), value 3 (9 kV) are above 8.5 kV")
+
+
+def test_every_row_and_field_beyond_a_limit_is_marked() -> None:
+    toml = (
+        'name = "x"\n[[segment]]\nkind = "half_sine"\namplitude_kV = 9.0\nfrequency_Hz = 1.0\n'
+        "repeats = 2\n"
+        '[[segment]]\nkind = "hold"\nduration_s = 0.5\n'
+        '[[segment]]\nkind = "ramp"\nto_kV = 5.0\nduration_s = 0.003\n'
+        '[[segment]]\nkind = "sine"\namplitude_kV = 4.9\noffset_kV = 5.0\nfrequency_Hz = 1.0\n'
+        '[[segment]]\nkind = "ramp"\nto_kV = 0.0\nduration_s = 1.0\n'
+    )
+    preview = make_preview(toml, Path(), RigFile())
+    assert preview.plan is not None
+    assert not preview.playable
+    faults = {(f.row, f.key): f.words for f in preview.faults}
+    assert set(faults) == {
+        (0, None), (0, "amplitude_kV"), (2, None), (3, None), (3, "amplitude_kV"), (3, "offset_kV"),
+    }  # fmt: skip
+    assert faults[0, None] == "voltage reaches 9 kV, 8.5 kV is allowed"
+    assert "9 kV is above 8.5 kV, the limit of the rig file" in faults[0, "amplitude_kV"]
+    assert faults[2, None].startswith("slew reaches 16")
+    assert "voltage reaches 9.9 kV" in faults[3, None]
+    assert "with the other fields" in faults[3, "offset_kV"]
 
 
 def test_fields_have_words_units_and_bounds() -> None:
@@ -146,7 +162,8 @@ def test_fields_have_words_units_and_bounds() -> None:
     ("key", "text", "value"),
     [
         ("amplitude_kV", " 6.5 ", 6.5),
-        ("amplitude_kV", "6,5", "6,5"),
+        ("amplitude_kV", "6,5", 6.5),
+        ("amplitude_kV", "1,500", "1,500"),
         ("amplitude_kV", "", None),
         ("repeats", "3", 3),
         ("repeats", "3.5", 3.5),
@@ -155,28 +172,21 @@ def test_fields_have_words_units_and_bounds() -> None:
 )
 def test_what_is_typed_is_taken_as_it_is_meant(key: str, text: str, value: object) -> None:
     field = next(f for f in form_fields(SEGMENT_KINDS["chirp"]) if f.key == key)
-    assert typed_value(field, text) == value
-    assert type(typed_value(field, text)) is type(value)
+    read = read_typed(field, text)
+    assert read.value == value
+    assert type(read.value) is type(value)
+    assert bool(read.fault) == (text == "1,500")
 
 
-def test_a_list_is_typed_with_commas_or_blanks() -> None:
+def test_what_was_read_is_shown_with_its_unit() -> None:
     field = next(f for f in form_fields(SEGMENT_KINDS["steps"]) if f.key == "levels_kV")
-    assert typed_value(field, "3, 7;5 8") == [3.0, 7.0, 5.0, 8.0]
-    assert typed_value(field, ".5,-1 ,2; 3 ;, 4") == [0.5, -1.0, 2.0, 3.0, 4.0]
+    assert read_back(field, read_typed(field, "6,5; 7").value) == "6.5, 7 kV: 2 values"
+    assert read_back(field, read_typed(field, "7").value) == "7 kV: 1 value"
+    assert read_back(field, read_typed(field, "6,5").value) == ""  # it may be two values
+    assert read_typed(field, "6,5").value == "6,5"  # kept as text, which no sequence takes
+    dwell = next(f for f in form_fields(SEGMENT_KINDS["steps"]) if f.key == "dwell_s")
+    assert read_back(dwell, 0.25) == "= 0.25 s"
     assert shown_value([3.0, 0.1]) == "3, 0.1"
-
-
-@pytest.mark.parametrize("text", ["4,5; 7,5; 0", "4,5 7,5 0", "4,5", "4,5, 7,5, 0", "1,2,3"])
-def test_decimal_commas_in_a_list_are_refused_as_in_one_number(text: str) -> None:
-    """Half of Europe writes them; as separators they would make other voltages."""
-    field = next(f for f in form_fields(SEGMENT_KINDS["steps"]) if f.key == "levels_kV")
-    levels = typed_value(field, text)
-    assert levels[0] in ("4,5", "1,2,3")
-    toml = tomli_w.dumps(
-        {"name": "x", "segment": [{"kind": "steps", "dwell_s": 1.0, "levels_kV": levels}]}
-    )
-    with pytest.raises(InputError, match=r'levels_kV\[1\] = "(4,5|1,2,3)" is not allowed'):
-        parse_sequence(toml, "the form", Path())
 
 
 def test_what_breaks_a_limit_is_marked_where_it_does() -> None:
@@ -193,6 +203,47 @@ def test_what_breaks_a_limit_is_marked_where_it_does() -> None:
     assert [s[0] for s in preview.segments] == [
         "lead-in", "ramp (1 of 2)", "ramp (2 of 2)", "tail",
     ]  # fmt: skip
+
+
+COMMENTED = """\
+# ageing, film 7
+
+name = "a"  # short
+# up
+[[segment]]
+kind = "ramp"   # slow
+to_kV = 2.50
+duration_s = 1.0
+
+# and back
+[[segment]]
+kind = "ramp"
+to_kV = 0.0
+duration_s = 1.0
+"""
+
+
+def test_a_changed_sequence_keeps_comments_order_and_letters() -> None:
+    draft = Draft(COMMENTED)
+    draft.set_value(1, "duration_s", 3.0)
+    assert draft.toml == COMMENTED[:-4] + "3.0\n"
+    draft.set_value(0, "duration_s", 2.0)
+    assert draft.toml == COMMENTED.replace("duration_s = 1.0", "duration_s = 2.0", 1)[:-4] + "3.0\n"
+    draft.move(1, 0)
+    assert draft.toml.index("# and back") < draft.toml.index("# up")
+    draft.remove(1)
+    assert "# up" not in draft.toml
+    assert "# ageing, film 7" in draft.toml
+    for _ in range(4):
+        draft.undo()
+    assert draft.toml == COMMENTED
+
+
+def test_segments_in_one_array_are_edited_below_the_comments() -> None:
+    draft = Draft('# why\nname = "a"\nsegment = [{kind = "hold", duration_s = 1.0}]  # so\n')
+    draft.set_value(0, "duration_s", 2.0)
+    assert draft.toml.startswith("# why\n# so\n")
+    assert draft.toml.endswith('[[segment]]\nkind = "hold"\nduration_s = 2.0\n')
 
 
 def test_a_csv_is_named_as_short_as_it_can_be(tmp_path: Path) -> None:

@@ -68,3 +68,30 @@ def test_a_run_by_mouse_and_keys(display: str, tmp_path: Path) -> None:
     assert recording.provenance["operator"] == "ada"
     assert recording.voltage_command is not None
     assert abs(recording.voltage_command[-1]) < 1.0
+
+
+def test_edits_by_mouse_and_keys(display: str, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.window.real_window_edits", str(tmp_path)],
+        env={**os.environ, "DISPLAY": display, "QT_QPA_PLATFORM": "xcb"},
+        capture_output=True,
+        text=True,
+        timeout=280,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    saw = json.loads(done.stdout)
+    (banner,) = saw["banners"]
+    assert "film: length (mm)" in banner
+    assert "previous limits are in force: 0 to 8.5 kV" in banner
+    assert (saw["banner shown"], saw["may arm"]) == (True, False)
+    assert saw["limit"] == 5.0
+    assert saw["read"] == "3.5, 4.5, 0 kV: 3 values"
+    assert saw["file"] == (
+        '# for film 7\nname = "steps"\nlead_in_s = 0.5\n[[segment]]\nkind = "steps"\n'
+        "levels_kV = [3.5, 4.5, 0.0]  # kV\ndwell_s = 0.50\n"
+    )
+    assert saw["closed"] is False
+    assert "segment 1 dwell (s)" in saw["asked"][0]
+    (kept,) = saw["kept"]
+    assert "dwell_s = 0.25" in kept

@@ -13,6 +13,7 @@ from pytestqt.qtbot import QtBot
 from dearig.config.rigfile import write_default
 from dearig.window.rig_page import RigPage
 from dearig.window.session import Session
+from tests.window.conftest import Answers
 
 
 @pytest.fixture
@@ -87,6 +88,88 @@ def test_a_wrong_value_is_said_beside_its_field_and_not_used(qtbot: QtBot, page:
     field.selectAll()
     qtbot.keyClick(field, Qt.Key.Key_Delete)  # left out: the default
     assert page.session.rig_file.limits.voltage_max_kV == 8.5
+
+
+def test_a_limit_beside_a_wrong_field_is_not_ignored_but_blocks_arming(
+    qtbot: QtBot, page: RigPage
+) -> None:
+    wrong = line(page, "film", "length_mm")
+    wrong.selectAll()
+    qtbot.keyClicks(wrong, "seventy")
+    limit = line(page, "limits", "voltage_max_kV")
+    limit.selectAll()
+    qtbot.keyClicks(limit, "5")
+    block = page.session.blocks["rig file"]
+    assert block.page == "Rig"
+    assert "film: length (mm)" in block.sentence
+    assert "previous limits are in force: 0 to 8.5 kV" in block.sentence
+    assert page.tabs.tabText(0) == "✗ film"
+    slew = line(page, "limits", "slew_max_kV_per_s")
+    slew.selectAll()
+    qtbot.keyClicks(slew, "950000")  # what is wrong with several keys is told beside it
+    assert "amplifier's own slew rate" in page.form("limits").fault("slew_max_kV_per_s")
+    assert "not a number" in page.form("film").fault("length_mm")
+    slew.clear()
+    qtbot.keyClicks(slew, "1,5e3")
+    wrong = line(page, "film", "length_mm")
+    wrong.selectAll()
+    qtbot.keyClicks(wrong, "70,5")
+    assert page.form("film").note("length_mm") == "= 70.5 mm"
+    assert page.session.blocks == {}
+    assert page.session.rig_file.limits.voltage_max_kV == 5.0
+    assert page.session.rig_file.film.length_mm == 70.5
+
+
+def test_an_address_that_is_typed_but_not_taken_blocks_arming(qtbot: QtBot, page: RigPage) -> None:
+    page.kinds.button(2).click()
+    page.device.setFocus()
+    page.device.selectAll()
+    qtbot.keyClicks(page.device, "Dev2")
+    assert page.session.address == "daqmx:Dev1"
+    assert "press Enter" in page.session.blocks["rig address"].sentence
+    qtbot.keyClick(page.device, Qt.Key.Key_Return)
+    assert page.session.address == "daqmx:Dev2"
+    assert page.session.blocks == {}
+    page.device.selectAll()
+    qtbot.keyClicks(page.device, "2nd card")
+    qtbot.keyClick(page.device, Qt.Key.Key_Return)
+    assert "is not the address of a card" in page.session.blocks["rig address"].sentence
+    page.kinds.button(0).click()
+    assert page.session.blocks == {}
+
+
+def test_unsaved_changes_of_the_rig_file_are_named_before_they_are_lost(
+    qtbot: QtBot, page: RigPage, tmp_path: Path, answers: Answers
+) -> None:
+    write_default(tmp_path / "rig.toml")
+    page.set_value("limits", "voltage_max_kV", 5.0)
+    text = page.text
+    answers.next = False
+    page.open_file(tmp_path / "rig.toml")
+    page._ask_defaults()
+    assert page.text == text
+    assert all("limits: voltage max (kV)" in question for question in answers.questions)
+    assert len(answers.questions) == 2
+    answers.next = True
+    page._ask_defaults()
+    assert page.text == ""
+    assert page.session.recovery.unsaved == []
+
+
+def test_a_file_with_faults_keeps_its_name_while_they_are_mended(
+    qtbot: QtBot, page: RigPage, tmp_path: Path
+) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_text("# ours\n[film]\nlength_mm = -1.0  # wrong\n")
+    page.open_file(path)
+    qtbot.waitUntil(lambda: "rig file" in page.session.blocks)
+    assert not page.save_button.isEnabled()
+    page.set_value("film", "length_mm", 70.0)
+    assert page.session.blocks == {}
+    assert page.session.rig_path == path
+    with qtbot.waitSignal(page.session.message):
+        page.save()
+    assert path.read_text() == "# ours\n[film]\nlength_mm = 70.0  # wrong\n"
 
 
 def test_a_file_is_read_changed_and_saved(qtbot: QtBot, page: RigPage, tmp_path: Path) -> None:

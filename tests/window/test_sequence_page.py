@@ -22,6 +22,7 @@ from dearig.window.planner import Planner
 from dearig.window.sequence_page import SequencePage
 from dearig.window.session import Preview, Session
 from tests.tools.plugins import run_with_distribution
+from tests.window.conftest import Answers
 
 WAIT = 60_000
 
@@ -247,31 +248,126 @@ def test_a_file_is_saved_read_again_and_remembered(
     assert [action.text() for action in page.recent.actions()] == [str(tmp_path / "mine.toml")]
 
 
-def test_comments_are_not_lost_without_a_word(
+def test_a_second_save_keeps_comments_order_and_letters(
     qtbot: QtBot, page: SequencePage, tmp_path: Path
 ) -> None:
     path, noted = tmp_path / "noted.toml", "# slow, for film 7\n" + PRESETS["rich"]
     path.write_text(noted)
     page.open_file(path)
     qtbot.waitUntil(lambda: page.session.sequence_path == path)
-    with qtbot.waitSignal(page.session.message):
-        page.save()  # nothing was changed: it is the same file
-    assert path.read_text() == noted
-    page.editor.choose(1)
-    page.editor.remove()
+    for duration in ("2", "2,5"):
+        page.editor.choose(1)
+        assert page.editor.form is not None
+        field = page.editor.form.field("duration_s")
+        field.clear()
+        qtbot.keyClicks(field, duration)
+        assert page.file_name.text() == "● noted.toml (not saved)"
+        with qtbot.waitSignal(page.session.message):
+            page.save()
+        assert page.file_name.text() == "noted.toml"
+    assert path.read_text() == noted.replace("duration_s = 1.0", "duration_s = 2.5", 1)
+
+
+def test_a_file_that_another_program_has_changed_is_asked_about(
+    qtbot: QtBot, page: SequencePage, tmp_path: Path, answers: Answers
+) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(PRESETS["rich"])
+    page.open_file(path)
+    qtbot.waitUntil(lambda: page.session.sequence_path == path)
+    other = PRESETS["rich"] + "# by another program\n"
+    path.write_text(other)
+    page.editor.set_value("repeats", 2)
+    answers.next = False
     page.save()
-    qtbot.waitUntil(lambda: "noted.toml has comments (#)" in page.trouble.text())
-    assert path.read_text() == noted
+    qtbot.waitUntil(lambda: "nothing was written" in page.trouble.text())
+    assert "mine.toml was changed by another program" in answers.questions[0]
+    assert path.read_text() == other
+    answers.next = True
     with qtbot.waitSignal(page.session.message):
-        page.save_file(tmp_path / "other.toml")
+        page.save()
+    assert path.read_text() == page.draft.toml
     assert page.trouble.text() == ""
-    page.save_file(path)
-    qtbot.waitUntil(lambda: "noted.toml has comments (#)" in page.trouble.text())
     with qtbot.waitSignal(page.session.message):
-        page.save_file(path)
-    assert path.read_text() == page.session.sequence_toml == page.draft.toml
-    page.editor.undo()  # and what is undone has them again
-    assert page.session.sequence_toml == noted
+        page.save()
+    assert len(answers.questions) == 2
+
+
+def test_unsaved_changes_are_named_before_another_sequence_is_taken(
+    qtbot: QtBot, page: SequencePage, tmp_path: Path, answers: Answers
+) -> None:
+    page.preset("rich")  # nothing was changed: nothing is asked
+    page.editor.choose(1)
+    page.editor.set_value("duration_s", 2.0)
+    changed = page.draft.toml
+    (tmp_path / "other.toml").write_text(PRESETS["thesis"])
+    answers.next = False
+    page.preset("thesis")
+    page.open_file(tmp_path / "other.toml")
+    assert not page.take(PRESETS["thesis"])  # from another page
+    assert page.draft.toml == changed
+    assert [("segment 2 duration (s)" in question) for question in answers.questions] == [True] * 3
+    answers.next = True
+    page.preset("thesis")
+    assert page.draft.toml == PRESETS["thesis"]
+    page.editor.undo()
+    assert page.draft.toml == changed
+
+
+def test_what_is_undone_belongs_to_its_own_file(
+    qtbot: QtBot, page: SequencePage, tmp_path: Path
+) -> None:
+    for name in ("rich", "thesis"):
+        (tmp_path / f"{name}.toml").write_text(PRESETS[name])
+        page.open_file(tmp_path / f"{name}.toml")
+        qtbot.waitUntil(lambda name=name: page.session.sequence_path == tmp_path / f"{name}.toml")
+    page.editor.undo()
+    assert page.session.sequence_path == tmp_path / "rich.toml"
+    assert page.file_name.text() == "rich.toml"
+
+
+def test_decimal_commas_are_shown_as_they_are_read(qtbot: QtBot, page: SequencePage) -> None:
+    page.preset("rich")
+    page.editor.choose(4)
+    assert page.editor.form is not None
+    field = page.editor.form.field("levels_kV")
+    field.clear()
+    qtbot.keyClicks(field, "3,5")
+    assert "may be 3.5 or 3; 5" in page.editor.form.note("levels_kV")
+    settled(qtbot, page.session)
+    assert "sequence" in page.session.blocks
+    qtbot.keyClicks(field, "; 6,5; 0")
+    assert page.editor.form.note("levels_kV") == "3.5, 6.5, 0 kV: 3 values"
+    assert page.draft.segments[4]["levels_kV"] == [3.5, 6.5, 0.0]
+    settled(qtbot, page.session)
+    assert page.session.blocks == {}
+    head = page.editor.heads["tail_s"]
+    head.clear()
+    qtbot.keyClicks(head, "1,5")
+    assert page.draft.data["tail_s"] == 1.5
+    assert page.editor.head_note.text() == "tail = 1.5 s"
+
+
+def test_every_fault_is_marked_and_blocks_arming(qtbot: QtBot, page: SequencePage) -> None:
+    page.preset("rich")
+    page.editor.choose(4)
+    page.editor.set_value("levels_kV", [3.0, 12.5, 0.0])
+    page.editor.choose(2)
+    page.editor.set_value("from_Hz", -1.0)
+    page.editor.set_value("taper_s", "x")
+    settled(qtbot, page.session)
+    marks = [page.editor.table.item(row, 0).text() for row in range(6)]
+    assert marks == ["1", "2", "✗ 3", "4", "✗ 5", "6"]
+    assert page.editor.form is not None
+    assert "a number above 0" in page.editor.form.fault("from_Hz")
+    assert "a number above 0" in page.editor.form.fault("taper_s")
+    page.editor.choose(4)
+    assert "value 2 (12.5 kV) is above 8.5 kV" in page.editor.form.fault("levels_kV")
+    assert page.preview.state.text().count("✗") == 3
+    block = page.session.blocks["sequence"]
+    assert block.page == "Sequence"
+    assert "segment 3 (chirp): from (Hz)" in block.sentence
+    assert "2 more" in block.sentence
 
 
 @pytest.mark.parametrize(
