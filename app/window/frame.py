@@ -292,6 +292,7 @@ class MainWindow(QMainWindow):
         session.running_changed.connect(self._filter_keys)
         self.addActions(run.display.mark_bar.actions())  # the key M on every page
         session.blocks_changed.connect(lambda: self.banners.show_blocks(session.blocks))
+        self.banners.show_blocks(session.blocks)
         self._rig_or_folder_changed()
 
     @Slot(bool)
