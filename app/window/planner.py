@@ -16,6 +16,7 @@ from dearig.config.toml_input import parse_toml
 from dearig.errors import InputError, Interrupted
 from dearig.progress import Progress, quiet
 from dearig.window.background import Background
+from dearig.window.fields import in_words
 from dearig.window.limit_marks import RowPeaks, fields_beyond, rows_beyond
 from dearig.window.session import Breach, Preview, Session
 from dearig.window.traces import Pyramid
@@ -124,7 +125,7 @@ def make_preview(
 
 def _refused(toml: str, loaded: LoadedSequence | None, faults: list[SequenceFault]) -> Preview:
     """Return the preview of a sequence that cannot be planned."""
-    many = [fault.sentence for fault in faults]
+    many = [in_words(fault.sentence) for fault in faults]
     rest = f" (and {len(many) - 1} more)" if len(many) > 1 else ""
     return Preview(toml, loaded, sentence=many[0] + rest, faults=tuple(faults))
 
