@@ -27,7 +27,7 @@ __all__ = ["AcknowledgeBar", "Alarm", "AlarmLog", "AlarmTable"]
 
 log = logging.getLogger(__name__)
 
-_ALARMS_MAX = 1000  # the oldest are dropped
+_ALARMS_MAX = 500  # the oldest are dropped
 _HEADINGS = ("Time of day", "Run time", "Level", "Message", "Acknowledged by")
 _MESSAGE = 3  # column that takes the remaining width
 _SIGNS = {"info": "info", "warning": "⚠ warning", "fault": "✗ fault"}
@@ -57,11 +57,12 @@ class Alarm:
 class AlarmLog(QObject):
     """Alarms of the window since its start, the oldest first.
 
-    ``added`` carries a new alarm, ``changed`` follows every other change, ``acknowledged`` carries
-    the alarms that were acknowledged and the name.
+    ``added`` carries a new alarm, ``dropped``: the oldest is no longer kept, ``changed`` follows
+    every other change, ``acknowledged`` carries the alarms that were acknowledged and the name.
     """
 
     added = Signal(object)
+    dropped = Signal()
     changed = Signal()
     acknowledged = Signal(object, str)
 
@@ -94,7 +95,7 @@ class AlarmLog(QObject):
         self.added.emit(alarm)
         if len(self._alarms) > _ALARMS_MAX:
             del self._alarms[0]
-            self.changed.emit()
+            self.dropped.emit()
 
     def acknowledge(self, who: str, at: datetime | None = None) -> None:
         """Mark all pending alarms as acknowledged by ``who``, and log that."""
@@ -135,9 +136,11 @@ class AlarmTable(QTableWidget):
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         header.setHighlightSections(False)
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setResizeContentsPrecision(0)  # of the rows in view
         header.setSectionResizeMode(_MESSAGE, QHeaderView.ResizeMode.Stretch)
         self.setMinimumHeight(self._height(_ROWS_LEAST))
         alarms.added.connect(self._add)
+        alarms.dropped.connect(lambda: self.removeRow(0))
         alarms.changed.connect(self._show_all)
         session.theme_changed.connect(self._show_all)
 

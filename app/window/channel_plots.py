@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QWidget
 from dearig.window.live import Live
 from dearig.window.session import Session
 from dearig.window.theme import pen, style_plot
-from dearig.window.trip_lines import TripLevel, TripLines
+from dearig.window.trip_lines import PlotOverlay, TripLevel
 
 __all__ = ["ChannelPlots"]
 
@@ -30,7 +30,7 @@ class ChannelPlots(pg.GraphicsLayoutWidget):
         self._shown: tuple[tuple[str, str], ...] = ()
         self.plots: list[pg.PlotItem] = []
         self.curves: list[pg.PlotCurveItem] = []
-        self.trips: list[TripLines] = []
+        self.overlays: list[PlotOverlay] = []
         self._levels: list[tuple[TripLevel, ...]] = []
         self.setAccessibleName("Curves of the declared channels")
         self.setVisible(False)
@@ -52,7 +52,7 @@ class ChannelPlots(pg.GraphicsLayoutWidget):
             self._levels = levels
             self._shown = tuple(channels)
             self.clear()
-            self.plots, self.curves, self.trips = [], [], []
+            self.plots, self.curves, self.overlays = [], [], []
             for row, (label, unit) in enumerate(channels):
                 plot = self.addPlot(row=row, col=0)
                 plot.setLabel("left", escape(f"{label} ({unit})"))  # it is HTML
@@ -61,7 +61,7 @@ class ChannelPlots(pg.GraphicsLayoutWidget):
                 plot.addItem(curve)
                 self.plots.append(plot)
                 self.curves.append(curve)
-                self.trips.append(TripLines(plot, 1.0))
+                self.overlays.append(PlotOverlay(plot, 1.0, self._session.theme))
             self.setFixedHeight(_HEIGHT * max(1, len(channels)))
             self.setVisible(bool(channels))
             self._restyle()
@@ -87,8 +87,9 @@ class ChannelPlots(pg.GraphicsLayoutWidget):
         for plot, curve in zip(self.plots, self.curves, strict=True):
             style_plot(plot, theme)
             curve.setPen(pen(theme.measured))
-        for lines, levels in zip(self.trips, self._levels, strict=True):
-            lines.show_levels(levels, theme)
+        for overlay, levels in zip(self.overlays, self._levels, strict=True):
+            overlay.set_theme(theme)
+            overlay.show_levels(levels)
 
 
 def _levels(unit: str, low: float | None, high: float | None) -> tuple[TripLevel, ...]:

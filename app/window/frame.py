@@ -24,6 +24,7 @@ from PySide6.QtWidgets import (
 )
 
 from dearig.window.banners import Banners
+from dearig.window.compilation import Compilation, CompilationBar
 from dearig.window.error_panel import ErrorPanel
 from dearig.window.guide import Guide
 from dearig.window.hv import HighVoltage, HighVoltageBadge
@@ -62,6 +63,7 @@ class MainWindow(QMainWindow):
         self.setWindowTitle("dearig[*]")  # Qt shows a mark there while something is not saved
         self.setMinimumHeight(680)  # px; the pages set the minimum width, which depends on fonts
         self.planner = Planner(session, self)
+        self.compilation = Compilation(self)
         self.rig_page = RigPage(session)
         self.sequence_page = SequencePage(session)
         self.run_page = RunPage(session)
@@ -81,7 +83,8 @@ class MainWindow(QMainWindow):
         self._connect()
         self._apply_colour_scheme()
         self._restore_state()
-        self.planner.renew()
+        if not self.compilation.start():
+            self.planner.renew()
 
     # commands
 
@@ -152,6 +155,7 @@ class MainWindow(QMainWindow):
         self._save_state()
         self._filter_keys(running=False)
         self.run_page.close_work()
+        self.compilation.close()
         self.planner.close()
         for page in (
             self.rig_page, self.sequence_page, self.recordings_page, self.study_page
@@ -226,6 +230,7 @@ class MainWindow(QMainWindow):
         self._top.setContentsMargins(0, 0, 0, 0)
         self._top.setSpacing(SPACE // 2)
         self._top.addWidget(self.banners)
+        self._top.addWidget(CompilationBar(self.compilation))
         self.error_panel = ErrorPanel(self.session.program_errors)
         self._top.addWidget(self.error_panel)
         self._top.addLayout(row, 1)
@@ -283,6 +288,8 @@ class MainWindow(QMainWindow):
         session.rig_changed.connect(self._rig_or_folder_changed)
         session.folder_changed.connect(self._rig_or_folder_changed)
         session.message.connect(self.status.setText)
+        self.compilation.running_changed.connect(self.planner.hold)
+        self.compilation.failed.connect(lambda words: run.alarms.add("warning", words))
         self.planner.progressed.connect(self.sequence_page.preview.show_progress)
         self.sequence_page.show_run.connect(lambda: self.show_page(run))
         self.recordings_page.open_sequence.connect(self._read_sequence)

@@ -39,6 +39,7 @@ class Planner(QObject):
         super().__init__(parent)
         self._session = session
         self._wanted = 0  # number of the newest plan
+        self._held = False
         self._background = Background(self)
         self._background.done.connect(self._done)
         session.sequence_changed.connect(self.renew)
@@ -49,6 +50,8 @@ class Planner(QObject):
         """Make the plan again."""
         s = self._session
         s.preview = None
+        if self._held:
+            return
         toml, folder, rig_file, film = s.sequence_toml, s.sequence_folder, s.rig_file, s.film
         self._wanted = number = self._wanted + 1
 
@@ -58,6 +61,13 @@ class Planner(QObject):
             self.progressed.emit(part)
 
         self._background.start(lambda: make_preview(toml, folder, rig_file, film, progress))
+
+    @Slot(bool)
+    def hold(self, held: bool) -> None:
+        """Make no plans while the model is being compiled; afterwards make the newest."""
+        if held != self._held:
+            self._held = held
+            self.renew()
 
     def close(self) -> None:
         """End the plan, and wait for the thread."""

@@ -17,6 +17,14 @@ _FIRST_PLACES = (1.0 / 3.0, 2.0 / 3.0)  # of the visible range, where the cursor
 _DELTA = "B\N{MINUS SIGN}A"
 
 
+class _CursorLabel(pg.InfLineLabel):
+    """Letter of a cursor; while it is hidden it is not moved in every frame."""
+
+    def viewTransformChanged(self) -> None:  # noqa: N802
+        if self.line.isVisible():
+            super().viewTransformChanged()
+
+
 class Group:
     """Plots with one horizontal axis: their crosshair, their cursors A and B, and the readouts."""
 
@@ -43,7 +51,7 @@ class Group:
             line.setZValue(50)
             plot.addItem(line, ignoreBounds=True)
         for line, name in zip(lines[1:], "AB", strict=True):
-            line.label = pg.InfLineLabel(line, name, position=0.93)
+            line.label = _CursorLabel(line, name, position=0.93)
         self._lines[plot], self._level[plot] = lines, level
 
     def remove(self, plot: Plot) -> None:
@@ -109,6 +117,7 @@ class Group:
                     line.setValue(place)
             for line in lines[1:]:
                 line.label.setVisible(plot is top and self.cursors is not None)
+                line.label.updatePosition()
             level = self._level[plot]
             here = self._pointer is not None and self._pointer[0] is plot
             level.setVisible(here)

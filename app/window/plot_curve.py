@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import pyqtgraph as pg
+from PySide6.QtCore import QRectF
 from PySide6.QtGui import QColor
 
 from dearig.analysis.decimate import decimate_on_grid
@@ -121,6 +122,16 @@ class Curve(pg.PlotCurveItem):
             inside &= (y >= limits[1][0]) & (y <= limits[1][1])
             self.scatter.setData(x[inside], y[inside])
         self.setData(*cut_lines(x, y, limits[0], limits[1]), connect="finite")
+
+    def boundingRect(self) -> QRectF:  # noqa: N802
+        """Return the visible rectangle for a curve of a run, which changes in every frame.
+
+        Nothing is drawn beyond it, and it needs no look at the points.
+        """
+        view = self.getViewBox()
+        live = self._thinned and isinstance(view, pg.ViewBox)
+        rectangle: QRectF = view.viewRect() if live else super().boundingRect()
+        return rectangle
 
     def dataBounds(  # noqa: N802
         self,

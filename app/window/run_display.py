@@ -11,10 +11,10 @@ from dearig.recording.marks import read_mark
 from dearig.window.alarms import AcknowledgeBar, Alarm, AlarmLog, AlarmTable
 from dearig.window.channel_plots import ChannelPlots
 from dearig.window.layout_state import remember
-from dearig.window.live import Live, LiveEvent, RunSnapshot
+from dearig.window.live import Live, LiveEvent
 from dearig.window.marks import MarkBar
 from dearig.window.run_plots import RunPlots
-from dearig.window.run_view import RunView, TimeScroll
+from dearig.window.run_view import RunView
 from dearig.window.session import Preview, Session
 from dearig.window.theme import SPACE
 
@@ -42,7 +42,6 @@ class RunDisplay(QWidget):
         self.plots = RunPlots(session)
         self.channel_plots = ChannelPlots(session)
         self.view = RunView(session, self.plots)
-        self.time_scroll = TimeScroll()
         self.alarms = AlarmLog(self)
         self.table = AlarmTable(self.alarms, session)
         self.acknowledge = AcknowledgeBar(self.alarms, session)
@@ -52,7 +51,7 @@ class RunDisplay(QWidget):
         self._build()
         self.view.changed.connect(self._chosen)
         self.view.span_changed.connect(self._span_changed)
-        self.time_scroll.scrolled.connect(self._scrolled)
+        self.plots.view_changed.connect(self._view_changed)
         self.mark_bar.said.connect(session.message)
         self.alarms.acknowledged.connect(self._acknowledged)
         self._span_changed()
@@ -70,11 +69,9 @@ class RunDisplay(QWidget):
             return
         preview = self._session.preview
         self._frames.stop()
-        self.time_scroll.follow()
         self.view.show_planned(preview)
         self.plots.show_prediction(preview)
         self._show_channels(self._session.rig_file.channel)
-        self.time_scroll.show_run(0.0, None)
 
     # a run
 
@@ -85,7 +82,6 @@ class RunDisplay(QWidget):
         self.plots.show_prediction(preview)
         self.plots.start()
         self._show_channels(self._session.rig_file.channel)
-        self.time_scroll.follow()
         self.mark_bar.follow(marks)
         self.alarms.add("info", f"{name}: run started", 0.0)
         self._frames.start()
@@ -108,11 +104,6 @@ class RunDisplay(QWidget):
     def redraw(self) -> None:
         """Draw the next frame even if no sample has come."""
         self._drawn = _NOTHING
-
-    def show_numbers(self, now: RunSnapshot) -> None:
-        """Renew the scroll bar; called some ten times a second."""
-        if not self.view.shows_plan:
-            self.time_scroll.show_run(now.samples / now.rate, self.plots.window)
 
     def take_events(self) -> None:
         """Put the events since the last call into the list, and draw those that are marked."""
@@ -151,18 +142,16 @@ class RunDisplay(QWidget):
         now = None if live is None else live.now()
         if live is None or now is None or self.view.shows_plan or not self.isVisible():
             return
-        frame = (now.revision, self.plots.window, self.plots.look_at)
+        at = None if self.plots.following else self.plots.x_range()
+        frame = (now.revision, self.plots.span_s, at)
         if frame == self._drawn:
             return
         self._drawn = frame
         end = now.samples / now.rate
         self.plots.draw(live, end)
         names = [channel.name for channel in self._channels]
-        if self.plots.look_at is None:
-            self.channel_plots.draw(live, names, self.plots.window, end)
-        else:
-            first, last = self.plots.look_at
-            self.channel_plots.draw(live, names, last - first, last)
+        first, last = self.plots.x_range()
+        self.channel_plots.draw(live, names, last - first, last)
 
     # what the operator chooses
 
@@ -176,20 +165,15 @@ class RunDisplay(QWidget):
             self._show_channels(self._channels)
             self.redraw()
             self._frames.start()
-            now = self._live.now()
-            if now is not None:
-                self.show_numbers(now)
 
     @Slot()
     def _span_changed(self) -> None:
-        self.plots.window = self.view.span.currentData()
-        self.time_scroll.follow()
-        self.redraw()
-        self.draw()
+        self.plots.span_s = self.view.span.currentData()
+        if not self.view.shows_plan:
+            self.plots.area.follow()  # draws anew
 
-    @Slot(object)
-    def _scrolled(self, span: tuple[float, float] | None) -> None:
-        self.plots.look_at = span
+    @Slot()
+    def _view_changed(self) -> None:
         self.redraw()
         self.draw()
 
@@ -209,7 +193,6 @@ class RunDisplay(QWidget):
         above.addWidget(self.view)
         above.addWidget(self.plots, 1)
         above.addWidget(self.channel_plots)
-        above.addWidget(self.time_scroll)
         upper = QWidget()
         upper.setLayout(above)
         row = QHBoxLayout()

@@ -237,7 +237,6 @@ class RunPage(QWidget):
         self.display.take_events()
         if now is None:
             return
-        self.display.show_numbers(now)
         self.controls.show_numbers(now)
         failures = [
             f"{model.name}: {reason}"

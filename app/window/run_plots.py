@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pyqtgraph as pg
-from PySide6.QtCore import QRectF, Signal
-from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import Signal, Slot
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from dearig.drivers.settings import RigSettings
 from dearig.window.live import Live
+from dearig.window.plot_area import PlotArea
+from dearig.window.plot_curve import Curve
+from dearig.window.plot_item import Plot
 from dearig.window.session import Preview, Session
-from dearig.window.theme import pen, style_plot
-from dearig.window.trip_lines import TripLines, trip_levels
+from dearig.window.trip_lines import MarkLine, PlotOverlay, trip_levels
 
 __all__ = ["PLOTS", "RunPlots"]
 
@@ -40,73 +40,67 @@ _NAMES = {
     "displacement": "measured",
 }
 _UNPREDICTED = ("current", "residual")
-_LEGEND_SPACE = 0.35  # of the range of a plot, above its curves
 # Smallest range in SI units of the plots that follow what is in view, so that noise does not fill
 # them: 50 uA, five times the noise of a current monitor; 5 um
 _LEAST = {"current": 5e-5, "residual": 5e-6}
 _SHRINK = 0.3  # part of the range below which what is in view makes it smaller
 _BAND = 8  # points of the command that become one of the band within which the monitor must stay
-_MARKS_MAX = 200  # drawn lines of marks and alarms; each costs time in each frame
+_MARKS_MAX = 200  # lines of marks and alarms; each takes time in each frame
+_ROOM = 0.05  # of a range, above and below its curves
 
 
-class RunPlots(pg.GraphicsLayoutWidget):
-    """Draws a plan, or the last ``window`` s of a ``Live`` (the whole run if that is None).
+class RunPlots(QWidget):
+    """Draws a plan, or the last ``span_s`` s of a ``Live`` (the whole run if that is None).
 
     ``digest`` is that of the waveform whose curves are drawn, "" where that is no plan that may be
-    played. ``look_at`` holds another span of the run in view; None follows its newest sample.
+    played. When the operator looks at another time, ``following`` is False until he follows again.
     """
 
     shown_changed = Signal()  #: plots were shown or hidden
+    view_changed = Signal()  #: the operator has changed a range
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
-        self.window: float | None = 10.0
-        self.look_at: tuple[float, float] | None = None
+        self.span_s: float | None = 10.0
         self.digest = ""
         self.trips_in_view = True  #: the range of the current holds its trip levels
         self._duration = 1.0
-        self._predicted: set[str] = set()
+        self._planned_shown = False
+        self._live: Live | None = None
         self._low: dict[str, float] = {}
         self._high: dict[str, float] = {}
-        self._plots: dict[str, pg.PlotItem] = {}
-        self._curves: dict[str, pg.PlotCurveItem] = {}
-        self._legends: list[pg.LegendItem] = []
         self._marks: dict[str, tuple[float, str, str]] = {}  # time, words, level
-        self._mark_lines: list[tuple[pg.PlotItem, pg.InfiniteLine]] = []
         self._settings: RigSettings = session.rig_file
-        self._add_plots()
-        self.trips = {name: TripLines(p, _SCALE[name]) for name, p in self._plots.items()}
+        self.area = PlotArea(session, "run", live=True)
+        self.area.canvas.setAccessibleName("Curves of the run")
+        self._plots: dict[str, Plot] = {
+            name: self.area.add_plot(row, left=label, weight=_SHARES[name])
+            for row, (name, (label, _)) in enumerate(_SIGNALS.items())
+        }
+        for name, plot in self._plots.items():
+            # the labels of four plots must fit into a window of 768 pixels
+            plot.setLabel("left", _SIGNALS[name][0], **{"font-size": "9pt"})
+            plot.setClipToView(False)
+        self._planned = {n: self._plots[n].add_curve() for n in ("voltage", "displacement")}
+        self._band = [self._plots["voltage"].add_curve() for _ in range(2)]
+        self._curves: dict[str, Curve] = {
+            signal: self._plots[name].add_curve()
+            for name, (_, signals) in _SIGNALS.items()
+            for signal in signals
+        }
+        self.overlays = {
+            name: PlotOverlay(plot, _SCALE[name], session.theme)
+            for name, plot in self._plots.items()
+        }
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.area)
+        self.area.view_changed.connect(self._view_changed)
         session.theme_changed.connect(self.restyle)
         session.overlays_changed.connect(self.restyle)
         self.restyle()
         self.show_prediction(None)
-
-    def _add_plots(self) -> None:
-        for row, (name, (words, signals)) in enumerate(_SIGNALS.items()):
-            plot = self.addPlot(row=row, col=0)
-            plot.setLabel("left", words, **{"font-size": "9pt"})
-            plot.setMouseEnabled(x=False, y=False)
-            plot.disableAutoRange()
-            for signal in signals:
-                # plain curves: the data are decimated already
-                curve = pg.PlotCurveItem(skipFiniteCheck=True, connect="all")
-                plot.addItem(curve)
-                self._curves[signal] = curve
-            self._plots[name] = plot
-        self._planned = {name: pg.PlotCurveItem() for name in ("voltage", "displacement")}
-        for name, curve in self._planned.items():
-            curve.setZValue(-5)
-            self._plots[name].addItem(curve)
-        self._band = [pg.PlotCurveItem(skipFiniteCheck=True, connect="all") for _ in range(2)]
-        for curve in self._band:
-            curve.setZValue(-6)
-            self._plots["voltage"].addItem(curve)
-        self._empty = {name: pg.TextItem(anchor=(0.5, 0.5)) for name in _UNPREDICTED}
-        for name, text in self._empty.items():
-            text.setParentItem(self._plots[name].getViewBox())
-            self._plots[name].getViewBox().sigResized.connect(self._place_texts)
-        self._arrange()
 
     # what is shown
 
@@ -115,12 +109,18 @@ class RunPlots(pg.GraphicsLayoutWidget):
         """Names of the plots that are shown."""
         return tuple(name for name, plot in self._plots.items() if plot.isVisible())
 
+    @property
+    def following(self) -> bool:
+        """True while the plots show the newest samples, or the whole plan."""
+        return self.area.following
+
     def show_plot(self, name: str, shown: bool) -> None:
         """Show or hide a plot of ``PLOTS``; the last one stays."""
         if shown == self._plots[name].isVisible() or self.shown == (name,):
             return
-        self._plots[name].setVisible(shown)
-        self._arrange()
+        self.area.show_plot(self._plots[name], shown)
+        row = list(self._plots).index(name)
+        self.area.canvas.ci.layout.setRowStretchFactor(row, _SHARES[name] if shown else 0)
         self._draw_marks()
         self.shown_changed.emit()
 
@@ -130,22 +130,19 @@ class RunPlots(pg.GraphicsLayoutWidget):
         ``name`` is that of a signal of ``Live.view``, "planned voltage", or "planned displacement".
         """
         planned = {f"planned {key}": curve for key, curve in self._planned.items()}
-        x, y = (planned | self._curves)[name].getData()
-        return (np.empty(0), np.empty(0)) if x is None else (x, y)
+        return _drawn(({**planned, **self._curves})[name])
 
     def band(self, side: str) -> tuple[np.ndarray, np.ndarray]:
         """Return time in s and the "upper" or "lower" bound of the monitor in kV."""
-        x, y = self._band[0 if side == "upper" else 1].getData()
-        return (np.empty(0), np.empty(0)) if x is None else (x, y)
+        return _drawn(self._band[0 if side == "upper" else 1])
 
     def x_range(self) -> tuple[float, float]:
         """Return the time in s that is in view."""
-        first, last = self._plots["voltage"].getViewBox().viewRange()[0]
-        return first, last
+        return self.area.span()
 
     def y_range(self, name: str) -> tuple[float, float]:
         """Return the range of a plot in its unit."""
-        low, high = self._plots[name].getViewBox().viewRange()[1]
+        low, high = self._plots[name].vb.viewRange()[1]
         return low, high
 
     @property
@@ -153,18 +150,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
         """Words of the lines of marks and alarms."""
         return [words for _, words, _ in self._marks.values()]
 
-    def _arrange(self) -> None:
-        """Number the time axis of the lowest plot only, and share the height."""
-        layout, shown = self.ci.layout, self.shown or tuple(self._plots)
-        for row, (name, plot) in enumerate(self._plots.items()):
-            layout.setRowStretchFactor(row, _SHARES[name] if plot.isVisible() else 0)
-            axis = plot.getAxis("bottom")
-            axis.setStyle(showValues=name == shown[-1])
-            if name == shown[-1]:
-                plot.setLabel("bottom", "Time (s)")
-            else:
-                axis.showLabel(False)
-
+    @Slot()
     def restyle(self) -> None:
         """Use the colours of the theme and the names of the models."""
         theme = self._session.theme
@@ -177,60 +163,49 @@ class RunPlots(pg.GraphicsLayoutWidget):
             **{f"rms {i}": theme.text for i in (0, 1)},
         }
         for curve in self._planned.values():
-            curve.setPen(pen(theme.muted))
+            curve.set_colour(theme.muted)
         for curve in self._band:
-            curve.setPen(pen(theme.limit, dashed=True))
+            curve.set_colour(theme.limit)  # dashes along a curve take longer than the curve
         for signal, curve in self._curves.items():
             # of two curves that coincide, the upper one is dashed and shows the lower one
             dashed = signal in ("command", "model 1") or signal.startswith("rms")
-            curve.setPen(pen(colours[signal], dashed))
-        for plot in self._plots.values():
-            style_plot(plot, theme)
-        for text in self._empty.values():
-            text.setColor(theme.muted)
+            curve.set_colour(colours[signal], dashed)
+        for overlay in self.overlays.values():
+            overlay.set_theme(theme)
         self._show_levels()
         self._name()
         self._draw_marks()
 
     def _show_levels(self) -> None:
         levels = trip_levels(self._settings)
-        for name, lines in self.trips.items():
-            lines.show_levels(tuple(v for v in levels if v.plot == name), self._session.theme)
+        for name, overlay in self.overlays.items():
+            overlay.show_levels(tuple(level for level in levels if level.plot == name))
 
     def _name(self) -> None:
-        """Make the legends."""
-        theme = self._session.theme
-        ground = QColor(theme.surface)
-        ground.setAlpha(200)  # curves under the legend stay visible
-        for legend in self._legends:
-            legend.scene().removeItem(legend)
-        self._legends = []
-        for name, plot in self._plots.items():
-            legend = pg.LegendItem(
-                offset=(-6, 2), colCount=4, labelTextColor=theme.text, verSpacing=-4, brush=ground
-            )
-            legend.setParentItem(plot.getViewBox())
-            self._legends.append(legend)
-            if name in self._predicted:
-                legend.addItem(self._planned[name], "planned" if name == "voltage" else "predicted")
-            planned = bool(self._predicted)
-            for signal in _SIGNALS[name][1]:
-                if not planned and (words := self._words(signal)):
-                    legend.addItem(self._curves[signal], words)
-            if name == "voltage":
-                tolerance = self._settings.interlocks.monitor_tolerance_kV
-                legend.addItem(self._band[0], f"trip of the monitor, ±{tolerance:g} kV")
+        """Name the curves that are drawn; those without a name are not in the keys."""
+        planned = self._planned_shown
+        for name, curve in self._planned.items():
+            words = "planned" if name == "voltage" else "predicted"
+            curve.title = words if planned else ""
+            curve.setVisible(planned)  # hidden ones cost nothing in a frame
+        for signal, curve in self._curves.items():
+            curve.title = "" if planned else self._words(signal)
+            curve.setVisible(not planned and self._exists(signal))
+        tolerance = self._settings.interlocks.monitor_tolerance_kV
+        self._band[0].title = f"trip of the monitor, ±{tolerance:g} kV"
+        for plot in self._plots.values():
+            plot.renew_key()
 
     # a plan
 
     def show_prediction(self, preview: Preview | None) -> None:
         """Draw the plan of ``preview`` in place of everything else; None is one being made."""
-        self._predicted.clear()
         self.digest = ""
-        self.look_at = None
+        self._live = None
         nothing = np.empty(0)
         for curve in (*self._curves.values(), *self._planned.values(), *self._band):
-            curve.setData(nothing, nothing)
+            curve.supply = None
+            curve.set_points(nothing, nothing)
         self._settings = self._session.rig_file
         self._low = {"voltage": 0.0, "displacement": 0.0}
         self._high = {"voltage": 1e3, "displacement": 1e-4}
@@ -238,62 +213,81 @@ class RunPlots(pg.GraphicsLayoutWidget):
             self._low[name], self._high[name] = -least, least
         self._duration = 1.0
         self._marks.clear()
-        if preview is not None and preview.plan is not None:
-            plan = preview.plan
+        plan = None if preview is None else preview.plan
+        if preview is not None and plan is not None:
             self._duration = plan.duration
-            self.digest = "" if plan.waveform is None else plan.waveform.digest
+            self.digest = preview.digest
             for name in ("voltage", "displacement"):
                 x, y = preview.curves[name]
                 self._include(name, y)
-                self._planned[name].setData(x, y * _SCALE[name], connect="finite")
-                if np.isfinite(y).any():
-                    self._predicted.add(name)
+                self._planned[name].set_points(x, y * _SCALE[name])
             self._draw_band(*preview.curves["voltage"])
-        for text in self._empty.values():
-            text.setText("measured during the run" if self._predicted else "")
+        self._planned_shown = plan is not None
+        for name in _UNPREDICTED:
+            self.overlays[name].show_words("measured during the run" if plan is not None else "")
         self._show_levels()
         self._name()
         self._draw_marks()
+        for plot in self._plots.values():
+            plot.set_auto_y(auto=True)
+        self.area.follow()
+        self.area.roll(0.0, self._duration)
         self._scale()
-        self._show(0.0, self._duration)
 
     # a run
 
     def start(self) -> None:
         """Prepare for a run: remove the prediction, whose drawing would cost frames."""
         for curve in self._planned.values():
-            curve.setData(np.empty(0), np.empty(0))
-        self._predicted.clear()
+            curve.set_points(np.empty(0), np.empty(0))
+        self._planned_shown = False
         self.digest = ""
-        for text in self._empty.values():
-            text.setText("")
+        for name in _UNPREDICTED:
+            self.overlays[name].show_words("")
         self._name()
-        self._roll(0.0)
+        self.area.follow()
+        self.area.roll(*self._span(0.0))
 
     def draw(self, live: Live, end: float) -> None:
-        """Draw the curves up to ``end`` s, or those of the span ``look_at``."""
-        if self.look_at is not None:
-            begin, end = self.look_at
-        else:
-            begin = 0.0 if self.window is None else max(0.0, end - self.window)
-        grown = False
+        """Draw the curves up to ``end`` s, or those of the time that the operator looks at."""
+        if live is not self._live:
+            self._live = live
+            self._supply(live)
+        begin, until = self._span(end) if self.area.following else self.area.span()
+        changed = False
         for name in self.shown:
             low, high = math.inf, -math.inf
             for signal in _SIGNALS[name][1]:
-                x, y = live.view(signal, begin, end)
+                if not self._exists(signal):
+                    continue
+                x, y = live.view(signal, begin, until)
                 known = np.isfinite(y)
                 if not known.all():
                     x, y = x[known], y[known]
-                self._curves[signal].setData(x, y * _SCALE[name])
+                self._curves[signal].set_points(x, y * _SCALE[name], thinned=True)
                 if y.size:
                     low, high = min(low, float(y.min())), max(high, float(y.max()))
                 if signal == "command":
                     self._draw_band(x, y)
             if low <= high:
-                grown |= self._hold(name, low, high)
-        if grown:
+                changed |= self._hold(name, low, high)
+        if changed:
             self._scale()
-        self._roll(end)
+        self.area.roll(begin, until)
+        self.area.data_changed()
+
+    def _supply(self, live: Live) -> None:
+        """Let the files of the data hold the whole run, not only what is drawn."""
+
+        def whole(signal: str, scale: float) -> tuple[np.ndarray, np.ndarray]:
+            now = live.now()
+            x, y = live.view(signal, 0.0, 0.0 if now is None else now.samples / now.rate)
+            return x, y * scale
+
+        for name, (_, signals) in _SIGNALS.items():
+            for signal in signals:
+                scale = _SCALE[name]
+                self._curves[signal].supply = lambda s=signal, k=scale: whole(s, k)
 
     def add_mark(self, key: str, time: float, words: str, level: str = "info") -> None:
         """Draw a line at ``time`` s with ``words``; another one of the same ``key`` is replaced."""
@@ -302,24 +296,15 @@ class RunPlots(pg.GraphicsLayoutWidget):
             self._draw_marks()
 
     def _draw_marks(self) -> None:
-        for plot, line in self._mark_lines:
-            plot.removeItem(line)
-        self._mark_lines = []
         theme = self._session.theme
         colours = {"fault": theme.bad, "warning": theme.warn}
-        shown = self.shown or tuple(self._plots)
-        for time, words, level in self._marks.values():
-            colour = colours.get(level, theme.text)
-            for name in shown:
-                line = pg.InfiniteLine(
-                    time, angle=90, pen=pen(colour, dashed=True),
-                    label=words if name == shown[0] else None,
-                    labelOpts={"position": 0.78, "color": colour, "rotateAxis": None,
-                               "anchors": [(0, 0.5), (1, 0.5)]},
-                )  # fmt: skip
-                line.setZValue(-4)
-                self._plots[name].addItem(line, ignoreBounds=True)
-                self._mark_lines.append((self._plots[name], line))
+        marks = tuple(
+            MarkLine(time, words, colours.get(level, theme.text))
+            for time, words, level in self._marks.values()
+        )
+        first = (self.shown or tuple(self._plots))[0]
+        for name, overlay in self.overlays.items():
+            overlay.show_marks(marks, with_words=name == first)
 
     def _draw_band(self, x: np.ndarray, y: np.ndarray) -> None:
         """Draw the band about the command that the monitor may not leave, from fewer points."""
@@ -331,7 +316,7 @@ class RunPlots(pg.GraphicsLayoutWidget):
             (self._band[0], steps.max(axis=1) + tolerance),
             (self._band[1], steps.min(axis=1) - tolerance),
         ):
-            curve.setData(time, values * _SCALE["voltage"])
+            curve.set_points(time, values * _SCALE["voltage"], thinned=True)
 
     def _words(self, signal: str) -> str:
         if signal in _NAMES:
@@ -344,6 +329,11 @@ class RunPlots(pg.GraphicsLayoutWidget):
         if kind == "rms":
             return "RMS, last 1 s" if number == "0" else ""
         return name if kind == "model" else f"residual of {name}"
+
+    def _exists(self, signal: str) -> bool:
+        """Return False for the curves of a model that is not chosen."""
+        number = signal.rpartition(" ")[2]
+        return not number.isdigit() or int(number) < len(self._session.overlays)
 
     # ranges
 
@@ -372,40 +362,41 @@ class RunPlots(pg.GraphicsLayoutWidget):
             self._high[name] = max(self._high[name], high + room)
         return grown
 
+    @Slot()
     def _scale(self) -> None:
+        """Set the ranges of the plots whose range the operator has not chosen."""
         for name, plot in self._plots.items():
+            if not plot.auto_y:
+                continue
             low, high = self._low[name], self._high[name]
             if name == "current" and self.trips_in_view:
-                for level in self.trips[name].levels:
+                for level in self.overlays[name].levels:
                     low, high = min(low, level.value), max(high, level.value)
-            low, high = low * _SCALE[name], high * _SCALE[name]
-            size = high - low
-            above = _LEGEND_SPACE if name in self._planned else 0.05
-            plot.setYRange(low - 0.05 * size, high + above * size, padding=0.0)
+            room = _ROOM * (high - low)
+            scale = _SCALE[name]
+            plot.vb.setYRange((low - room) * scale, (high + room) * scale, padding=0.0)
 
     def rescale(self) -> None:
         """Set the ranges again after ``trips_in_view`` was changed."""
         self._scale()
 
-    def _roll(self, end: float) -> None:
-        if self.look_at is not None:
-            first, last = self.look_at
-        elif self.window is None:
-            first, last = 0.0, self._duration
-        else:
-            first, last = max(0.0, end - self.window), max(self.window, end)
-        self._show(first, last)
+    @Slot()
+    def _view_changed(self) -> None:
+        self._scale()
+        if self._planned_shown and self.area.following:
+            self.area.roll(0.0, self._duration)
+        self.view_changed.emit()
 
-    def _show(self, first: float, last: float) -> None:
-        for plot in self._plots.values():
-            view: QRectF = plot.getViewBox().viewRect()
-            if abs(view.left() - first) > 1e-9 or abs(view.right() - last) > 1e-9:
-                plot.setXRange(first, last, padding=0.0)
+    def _span(self, end: float) -> tuple[float, float]:
+        """Return the first and the last s that are in view of a run that has come to ``end`` s."""
+        if self.span_s is None:
+            return 0.0, self._duration
+        return max(0.0, end - self.span_s), max(self.span_s, end)
 
-    def _place_texts(self) -> None:
-        for name, text in self._empty.items():
-            view = self._plots[name].getViewBox()
-            text.setPos(view.width() / 2, view.height() / 2)
+
+def _drawn(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
+    x, y = curve.getData()
+    return (np.empty(0), np.empty(0)) if x is None else (x, y)
 
 
 def _next_step(size: float) -> float:

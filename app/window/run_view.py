@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from datetime import datetime
 
 import numpy as np
@@ -13,8 +12,6 @@ from PySide6.QtWidgets import (
     QComboBox,
     QHBoxLayout,
     QMenu,
-    QPushButton,
-    QScrollBar,
     QWidget,
 )
 
@@ -24,12 +21,11 @@ from dearig.window.settings import kept_text
 from dearig.window.theme import SPACE
 from dearig.window.widgets import button, label, menu_button, set_role
 
-__all__ = ["RunView", "TimeScroll", "planned_words"]
+__all__ = ["RunView", "planned_words"]
 
 _SPANS = {"last 2 s": 2.0, "last 5 s": 5.0, "last 10 s": 10.0, "last 30 s": 30.0,
           "last 60 s": 60.0, "whole run": None}  # fmt: skip
 _KEY = "run/plots"  # of the settings: names of the plots that are hidden
-_PER_SECOND = 100  # steps of the scroll bar
 _NO_LAST = "There was no run since the window was opened"
 
 
@@ -119,13 +115,14 @@ class RunView(QWidget):
         self.last.setChecked(True)
         self._set_words(f"Running: {name}", "heading")
         for made in (self.planned, self.last):
-            made.setEnabled(False)
+            made.hide()
 
     def end(self, headline: str, at: datetime | None = None) -> None:
         """Say how the run ended; the plots still show it."""
         moment = at or datetime.now().astimezone()
         self._last = f"{self._last}, {headline.lower()} at {moment:%H:%M:%S}"
         for made in (self.planned, self.last):
+            made.show()
             made.setEnabled(True)
         self.last.setToolTip("Show the last run again")
         self.show_last()
@@ -150,7 +147,7 @@ class RunView(QWidget):
         self.trips_action.setCheckable(True)
         self.trips_action.setChecked(True)
         self.trips_action.toggled.connect(self._show_trips)
-        return menu_button("Plots", "Plots that are shown", menu)
+        return menu_button("Plots shown", "Show or hide each plot", menu)
 
     def _show_plot(self, name: str, shown: bool) -> None:
         self._plots.show_plot(name, shown)
@@ -164,80 +161,3 @@ class RunView(QWidget):
     def _show_trips(self, shown: bool) -> None:
         self._plots.trips_in_view = shown
         self._plots.rescale()
-
-
-class TimeScroll(QWidget):
-    """Scroll bar of the time of a run, and the button that follows the newest sample again.
-
-    At its right end the plots follow the run. ``scrolled`` carries the span in s that is to be
-    shown, or None.
-    """
-
-    scrolled = Signal(object)
-
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.bar = QScrollBar(Qt.Orientation.Horizontal)
-        self.bar.setAccessibleName("Time of the plots")
-        self.bar.setToolTip("Scroll back in the run; at the right end the plots follow it")
-        self.bar.valueChanged.connect(self._moved)
-        self.words = label("", "warn")
-        self.follow_button: QPushButton = button("&Follow the run", "Show the newest samples again")
-        self.follow_button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # no stop key may press it
-        self.follow_button.clicked.connect(self.follow)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(SPACE)
-        row.addWidget(self.bar, 1)
-        row.addWidget(self.words)
-        row.addWidget(self.follow_button)
-        self._span: float | None = None
-        self._setting = False
-        self.show_run(0.0, None)
-
-    def show_run(self, end: float, span: float | None) -> None:
-        """Say that the run has come to ``end`` s, and that ``span`` s of it are in view."""
-        following = self.following or span != self._span
-        self._span = span
-        steps = 0 if span is None else max(0, math.ceil((end - span) * _PER_SECOND))
-        self._setting = True
-        self.bar.setRange(0, steps)
-        if span is not None:
-            self.bar.setPageStep(round(span * _PER_SECOND))
-            self.bar.setSingleStep(max(1, round(span * _PER_SECOND / 10)))
-        if following:
-            self.bar.setValue(steps)
-        self._setting = False
-        self.bar.setEnabled(steps > 0)
-        self._tell()
-
-    @property
-    def following(self) -> bool:
-        """True while the plots follow the newest sample."""
-        return not self.words.text()
-
-    @Slot()
-    def follow(self) -> None:
-        """Follow the newest sample again."""
-        self.words.setText("")
-        self.bar.setValue(self.bar.maximum())
-        self._tell()
-        self.scrolled.emit(None)
-
-    @Slot(int)
-    def _moved(self, value: int) -> None:
-        if self._setting or self._span is None:
-            return
-        if value >= self.bar.maximum():
-            self.follow()
-            return
-        first = value / _PER_SECOND
-        last = first + self._span
-        self.words.setText(f"{first:.1f} to {last:.1f} s")
-        self._tell()
-        self.scrolled.emit((first, last))
-
-    def _tell(self) -> None:
-        back = not self.following
-        self.words.setVisible(back)
-        self.follow_button.setVisible(back)

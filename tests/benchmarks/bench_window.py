@@ -122,9 +122,14 @@ class Listener(QObject):
 class Ours(RunPlots):
     frames = 0
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
-        super().paintEvent(event)
-        self.frames += 1
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self.area.canvas.viewport().installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
+        if event.type() == QEvent.Type.Paint:
+            self.frames += 1
+        return super().eventFilter(watched, event)
 
 
 class Plain(pg.GraphicsLayoutWidget):
@@ -218,7 +223,7 @@ def ours(models: int, window: float | None) -> tuple[Ours, Live, Source]:
     planned = replace(plan(loaded, RigFile()), voltage=still)
     live.started(planned, RigIdentity("sim", True, (), CHANNELS), RATE)
     plots = Ours(session)
-    plots.window = window
+    plots.span_s = window
     plots.show_prediction(make_preview(SEQUENCE, Path(), RigFile()))
     plots.start()
     return plots, live, Source(live.block)

@@ -132,10 +132,10 @@ def test_current_and_trip_levels_of_the_rig_file_are_drawn(
     run_page.session.set_rig_file(None, "", rig)
     plan_of(SHORT)
     plots = run_page.plots
-    assert plots.trips["current"].shown == ["trip 5 mA", "trip -5 mA"]
-    assert "limit 7.5 kV" in plots.trips["voltage"].shown
-    assert "↓ limit -2 kV" in plots.trips["voltage"].shown  # out of view: named at the edge
-    assert plots.trips["displacement"].shown == ["trip 0.3 mm", "↓ trip -20 mm"]
+    assert plots.overlays["current"].shown == ["trip 5 mA", "trip -5 mA"]
+    assert "limit 7.5 kV" in plots.overlays["voltage"].shown
+    assert "↓ limit -2 kV" in plots.overlays["voltage"].shown  # out of view: named at the edge
+    assert plots.overlays["displacement"].shown == ["trip 0.3 mm", "↓ trip -20 mm"]
     play(qtbot, run_page)
     current, command = drawn(run_page, "current"), drawn(run_page, "command")
     assert current.size > 100
@@ -186,22 +186,24 @@ def test_scrolling_back_holds_the_plots_while_the_run_goes_on(
 ) -> None:
     plan_of(SHORT.replace("frequency_Hz = 2.0", "frequency_Hz = 0.1"))
     run_page.paced.setChecked(True)
-    view, scroll = run_page.display.view, run_page.display.time_scroll
+    view, plots = run_page.display.view, run_page.plots
     view.span.setCurrentIndex(0)  # the last 2 s
     view.span.activated.emit(0)
     click(qtbot, run_page.arm_button)
     click(qtbot, run_page.start_button)
-    qtbot.waitUntil(lambda: scroll.bar.maximum() > 50, timeout=RUN_MS)
-    assert not scroll.follow_button.isVisible()
-    scroll.bar.setFocus()
-    qtbot.keyClick(scroll.bar, Qt.Key.Key_Home)
-    came = seconds(run_page)
+    qtbot.waitUntil(lambda: seconds(run_page) > 2.6, timeout=RUN_MS)
+    follow = plots.area.tools.buttons[plots.area.tools.follow]
+    assert not follow.isVisible()
+    plots.area.canvas.setFocus()
+    qtbot.keyClick(plots.area.canvas, Qt.Key.Key_Left)  # a quarter of the range
+    held, came = plots.x_range(), seconds(run_page)
+    assert held[1] < came
     qtbot.waitUntil(lambda: seconds(run_page) > came + 0.3, timeout=RUN_MS)
-    assert run_page.plots.x_range() == (0.0, 2.0)
-    assert scroll.words.text() == "0.0 to 2.0 s"
-    assert run_page.plots.curve("command")[0][-1] == pytest.approx(2.0, abs=0.1)
-    click(qtbot, scroll.follow_button)
-    qtbot.waitUntil(lambda: run_page.plots.x_range()[1] > came)
+    assert plots.x_range() == held
+    assert plots.curve("command")[0][-1] == pytest.approx(held[1], abs=0.1)
+    click(qtbot, follow)
+    qtbot.waitUntil(lambda: plots.x_range()[1] > came)
+    assert plots.following
     run_page.stop()
     qtbot.waitUntil(lambda: not run_page.runner.running, timeout=RUN_MS)
 

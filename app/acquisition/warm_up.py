@@ -1,0 +1,72 @@
+"""Compilation of the numerical kernels before they are needed, and a note that it was done.
+
+The kernels of a fresh installation are compiled at their first call, which takes about a minute of
+one processor. A program with a window does that once, in a process of its own.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+from dearig.acquisition.overlay import OverlayModel
+from dearig.acquisition.run import record
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import parse_sequence
+from dearig.model.actuator import Actuator
+from dearig.model.jit import cache_folder, is_enabled
+from dearig.model.material import TABLE_3
+from dearig.progress import Progress, quiet
+
+__all__ = ["compile_kernels", "is_warm", "kernels_compiled"]
+
+#: Rigs whose kernels a window needs: a plan, an overlay model, and both simulated films.
+_RIGS = ("sim", "sim:1")
+_SEQUENCE = """\
+name = "compile"
+lead_in_s = 0.05
+tail_s = 0.05
+[[segment]]
+kind = "half_sine"
+amplitude_kV = 1.0
+frequency_Hz = 10.0
+"""
+
+
+def is_warm() -> bool:
+    """Return True if the kernels of exactly these sources need no compilation."""
+    note = _note()
+    return not is_enabled() or (note is not None and note.exists())
+
+
+def kernels_compiled() -> int:
+    """Return the number of kernels in the cache, also while another process compiles them."""
+    folder = cache_folder()
+    return 0 if folder is None else sum(1 for _ in folder.rglob("*.nbi"))
+
+
+def compile_kernels(progress: Progress = quiet) -> None:
+    """Compile what a window needs, by a short run on each simulated rig with an overlay model."""
+    rig_file = RigFile()
+    actuator = Actuator(rig_file.as_film(), rig_file.as_load(), TABLE_3)
+    overlay = OverlayModel("Table 3", actuator)
+    loaded = parse_sequence(_SEQUENCE, "the sequence", Path())
+    with tempfile.TemporaryDirectory(prefix="dearig-compile-") as folder:
+        for number, address in enumerate(_RIGS):
+            progress("compiling", number / len(_RIGS))
+            record(loaded, address, rig_file, Path(folder, f"{number}.h5"), overlay=overlay)
+    note = _note()
+    if note is not None:
+        # without it the next start compiles nothing anew, it only looks again
+        with contextlib.suppress(OSError):
+            os.close(os.open(note, os.O_CREAT | os.O_WRONLY, 0o600))
+    progress("compiling", 1.0)
+
+
+def _note() -> Path | None:
+    """Return the file that says that all kernels are in the cache; None without a cache."""
+    folder = cache_folder()
+    return None if folder is None else folder / f"complete-{sys.implementation.cache_tag}"
