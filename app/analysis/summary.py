@@ -106,8 +106,9 @@ class Curves:
     """Curves of one recording for a plot: ``(time s, value)`` pairs in SI units, peaks kept.
 
     ``model`` and ``residual`` are None where the model does not apply, and ``unfit`` says why.
-    ``about`` are (name, value) lines of its metadata. ``declared`` are label, unit and curve of the
-    channels that the rig file declared.
+    ``monitor`` in V and ``current`` in A are those of the amplifier, None where they are not
+    recorded. ``about`` are (name, value) lines of its metadata. ``declared`` are label, unit and
+    curve of the channels that the rig file declared.
     """
 
     path: Path
@@ -123,6 +124,8 @@ class Curves:
     sequence_toml: str
     unfit: str = ""
     declared: tuple[tuple[str, str, tuple[np.ndarray, np.ndarray]], ...] = ()
+    monitor: tuple[np.ndarray, np.ndarray] | None = None
+    current: tuple[np.ndarray, np.ndarray] | None = None
 
 
 @dataclass(frozen=True)
@@ -342,6 +345,8 @@ def curves(
             (label, recording.unit(name), _short(time, recording.values[name], _COLUMNS))
             for name, label in recording.declared.items()
         ),
+        monitor=_of(time, recording.voltage_monitor),
+        current=_of(time, recording.current_monitor),
     )
 
 
@@ -384,6 +389,10 @@ def _model(path: Path | None, recording: Recording) -> tuple[Actuator | Strip, f
         return file.model, file.fitted
     film, load = recording.film or THESIS_FILM, recording.load or THESIS_LOAD
     return Actuator(film, load, TABLE_3), frozenset()
+
+
+def _of(time: np.ndarray, values: np.ndarray | None) -> tuple[np.ndarray, np.ndarray] | None:
+    return None if values is None else _short(time, values, _COLUMNS)
 
 
 def _short(time: np.ndarray, values: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:

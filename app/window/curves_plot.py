@@ -9,12 +9,14 @@ from PySide6.QtCore import Qt, Slot
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from dearig.analysis.summary import Curves
+from dearig.recording.marks import marks_in
 from dearig.units import SHOWN
 from dearig.window.channel_plots import ChannelPlots
 from dearig.window.plot_area import PlotArea
 from dearig.window.plot_item import Entry
 from dearig.window.session import Session
 from dearig.window.theme import pen
+from dearig.window.trip_lines import MarkLine, PlotOverlay
 from dearig.window.widgets import plain_tip
 
 __all__ = ["CurvesPlot"]
@@ -39,6 +41,7 @@ class CurvesPlot(QWidget):
                 (("Voltage (kV)", 3), ("Displacement (mm)", 5), ("Residual (µm)", 4))
             )
         ]
+        self.marks = PlotOverlay(self.plots[1], 1.0, session.theme)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(0, 0, 0, 0)
         outer.addWidget(self.area, 1)
@@ -68,6 +71,8 @@ class CurvesPlot(QWidget):
     @Slot()
     def _draw(self) -> None:
         theme = self._session.theme
+        self.marks.set_theme(theme)
+        self.marks.show_marks((), with_words=True)
         for plot in self.plots:
             plot.clear_all()
         drive, both, residual = self.plots
@@ -106,12 +111,21 @@ class CurvesPlot(QWidget):
                 time, left * shown.error_factor
             )
         if alone:
+            monitor = self._shown[0].monitor
+            if monitor is not None:
+                drive.add_curve("monitor", theme.monitor).set_points(
+                    monitor[0], monitor[1] * shown.drive_factor
+                )
             self._events(self._shown[0])
         elif self._with_model and any(c.model is not None for c in self._shown):
             both.add_entry(Entry("model of each recording", theme.muted, dashed=True))
 
     def _events(self, curves: Curves) -> None:
         theme = self._session.theme
+        self.marks.show_marks(
+            tuple(MarkLine(m.time, m.words, theme.text) for m in marks_in(curves.events)),
+            with_words=True,
+        )
         for event in curves.events:
             if event.level == "info":
                 continue

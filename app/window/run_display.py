@@ -12,6 +12,7 @@ from dearig.window.alarms import AcknowledgeBar, Alarm, AlarmLog, AlarmTable
 from dearig.window.channel_plots import ChannelPlots
 from dearig.window.layout_state import remember
 from dearig.window.live import Live, LiveEvent
+from dearig.window.live_analysis import LiveAnalysis
 from dearig.window.marks import MarkBar
 from dearig.window.run_plots import RunPlots
 from dearig.window.run_view import RunView
@@ -21,6 +22,7 @@ from dearig.window.theme import SPACE
 __all__ = ["RunDisplay"]
 
 _FRAME = 16  # ms between two frames of the plots
+_ANALYSIS = 500  # ms between two loops or spectra of the newest samples
 _NOTHING: tuple[object, ...] = ()
 
 
@@ -37,23 +39,28 @@ class RunDisplay(QWidget):
         self._session = session
         self._live: Live | None = None
         self._running = False
+        self._errors = 0  # of the program, that are in the list
         self._drawn = _NOTHING  # what the last frame was made of
         self._channels: tuple[ChannelSettings, ...] = ()
         self.plots = RunPlots(session)
+        self.analysis = LiveAnalysis(session)
         self.channel_plots = ChannelPlots(session)
-        self.view = RunView(session, self.plots)
+        self.view = RunView(session, self.plots, self.analysis)
         self.alarms = AlarmLog(self)
         self.table = AlarmTable(self.alarms, session)
         self.acknowledge = AcknowledgeBar(self.alarms, session)
         self.mark_bar = MarkBar()
         self._frames = QTimer(self, interval=_FRAME, timerType=Qt.TimerType.PreciseTimer)
         self._frames.timeout.connect(self.draw)
+        self._analyses = QTimer(self, interval=_ANALYSIS)
+        self._analyses.timeout.connect(self._analyse)
         self._build()
         self.view.changed.connect(self._chosen)
         self.view.span_changed.connect(self._span_changed)
         self.plots.view_changed.connect(self._view_changed)
         self.mark_bar.said.connect(session.message)
         self.alarms.acknowledged.connect(self._acknowledged)
+        session.program_errors.changed.connect(self._program_errors)
         self._span_changed()
 
     # before a run
@@ -68,7 +75,7 @@ class RunDisplay(QWidget):
         if self._running:
             return
         preview = self._session.preview
-        self._frames.stop()
+        self._stop_drawing()
         self.view.show_planned(preview)
         self.plots.show_prediction(preview)
         self._show_channels(self._session.rig_file.channel)
@@ -84,7 +91,7 @@ class RunDisplay(QWidget):
         self._show_channels(self._session.rig_file.channel)
         self.mark_bar.follow(marks)
         self.alarms.add("info", f"{name}: run started", 0.0)
-        self._frames.start()
+        self._start_drawing()
 
     def end(self, headline: str, sentence: str, level: str) -> None:
         """Show how the run ended, and its curves until the plan changes."""
@@ -98,7 +105,7 @@ class RunDisplay(QWidget):
 
     def forget_run(self) -> None:
         """Stop drawing: the curves of the run are about to be closed."""
-        self._frames.stop()
+        self._stop_drawing()
         self._live = None
 
     def redraw(self) -> None:
@@ -127,6 +134,13 @@ class RunDisplay(QWidget):
         known = event.message.startswith("interrupted by the operator")
         self.alarms.add(event.level, event.message, seconds, happened.at, "STOP" if known else "")
 
+    @Slot()
+    def _program_errors(self) -> None:
+        """Put errors of the program into the list, each kind once."""
+        for error in self._session.program_errors.errors[self._errors :]:
+            self.alarms.add("fault", f"error of the program: {error.sentence}", at=error.first)
+            self._errors += 1
+
     @Slot(object, str)
     def _acknowledged(self, alarms: tuple[Alarm, ...], who: str) -> None:
         """Record the acknowledgement in the run in progress."""
@@ -153,6 +167,20 @@ class RunDisplay(QWidget):
         first, last = self.plots.x_range()
         self.channel_plots.draw(live, names, last - first, last)
 
+    def _start_drawing(self) -> None:
+        self._frames.start()
+        self._analyses.start()
+
+    def _stop_drawing(self) -> None:
+        self._frames.stop()
+        self._analyses.stop()
+        self.analysis.clear()
+
+    @Slot()
+    def _analyse(self) -> None:
+        if self._live is not None and self.isVisible():
+            self.analysis.draw(self._live, self.plots.span_s)
+
     # what the operator chooses
 
     @Slot()
@@ -164,7 +192,7 @@ class RunDisplay(QWidget):
             self.plots.start()
             self._show_channels(self._channels)
             self.redraw()
-            self._frames.start()
+            self._start_drawing()
 
     @Slot()
     def _span_changed(self) -> None:
@@ -191,7 +219,12 @@ class RunDisplay(QWidget):
         above.setContentsMargins(0, 0, 0, 0)
         above.setSpacing(SPACE // 2)
         above.addWidget(self.view)
-        above.addWidget(self.plots, 1)
+        beside = QSplitter(Qt.Orientation.Horizontal)
+        beside.setChildrenCollapsible(False)
+        beside.addWidget(self.plots)
+        beside.addWidget(self.analysis)
+        beside.setStretchFactor(0, 1)
+        above.addWidget(beside, 1)
         above.addWidget(self.channel_plots)
         upper = QWidget()
         upper.setLayout(above)

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from dearig.window.live_analysis import ANALYSES, LiveAnalysis
 from dearig.window.run_plots import PLOTS, RunPlots
 from dearig.window.session import Preview, Session
 from dearig.window.settings import kept_text
@@ -53,10 +54,17 @@ class RunView(QWidget):
     changed = Signal()
     span_changed = Signal()
 
-    def __init__(self, session: Session, plots: RunPlots, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        session: Session,
+        plots: RunPlots,
+        analysis: LiveAnalysis,
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
         self._session = session
         self._plots = plots
+        self._analysis = analysis
         self._last = ""  # words on the last run
         self.words = label("", "heading")
         self.words.setAccessibleName("What the plots show")
@@ -133,6 +141,7 @@ class RunView(QWidget):
 
     def _plots_menu(self) -> QWidget:
         menu = QMenu(self)
+        analysis = self._analysis
         hidden = kept_text(self._session.settings, _KEY).split(",")
         self.plot_actions: dict[str, QAction] = {}
         for name, words in PLOTS.items():
@@ -142,6 +151,12 @@ class RunView(QWidget):
             action.toggled.connect(lambda shown, name=name: self._show_plot(name, shown))
             self.plot_actions[name] = action
             self._plots.show_plot(name, name not in hidden)
+        menu.addSeparator()
+        for name, words in ANALYSES.items():
+            action = menu.addAction(words)
+            action.setCheckable(True)
+            action.toggled.connect(lambda shown, name=name: analysis.show_view(name, shown))
+            self.plot_actions[name] = action
         menu.addSeparator()
         self.trips_action = menu.addAction("Trip levels of the current in view")
         self.trips_action.setCheckable(True)

@@ -21,6 +21,12 @@ from tests.window.conftest import SHORT
 SOON = 60_000  # ms
 
 
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work in another folder: a child process finds these functions only then."""
+    monkeypatch.chdir(tmp_path)
+
+
 class Slow:
     """Work that lasts until a file appears; it can be sent to another process."""
 

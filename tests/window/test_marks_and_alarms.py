@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from datetime import datetime
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
@@ -159,6 +159,23 @@ def test_the_operators_own_stop_needs_no_acknowledgement(qtbot: QtBot, going: Ru
     marks_of(qtbot, going)
     assert any("interrupted by the operator" in a.message for a in going.alarms.alarms)
     assert going.alarms.pending == 0
+
+
+def test_an_error_of_the_program_is_an_alarm_once(run_page: RunPage, qtbot: QtBot) -> None:
+    def fail() -> None:
+        raise ValueError("a slot has failed")
+
+    run_page.session.program_errors.install()
+    try:
+        for _ in range(2):
+            QTimer.singleShot(0, fail)
+        qtbot.waitUntil(lambda: bool(run_page.alarms.alarms))
+        qtbot.wait(1)
+    finally:
+        run_page.session.program_errors.close()
+    (alarm,) = run_page.alarms.alarms
+    assert alarm.level == "fault"
+    assert "a slot has failed" in alarm.message
 
 
 def test_a_long_list_keeps_the_newest_and_its_last_row_in_view(
