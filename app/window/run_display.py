@@ -39,9 +39,11 @@ class RunDisplay(QWidget):
         self._session = session
         self._live: Live | None = None
         self._running = False
+        self._marks: list[tuple[str, float, str, str]] = []  # of the run: key, time, words, level
         self._errors = 0  # of the program, that are in the list
         self._drawn = _NOTHING  # what the last frame was made of
-        self._channels: tuple[ChannelSettings, ...] = ()
+        self._channels: tuple[ChannelSettings, ...] = ()  # that are drawn
+        self._run_channels: tuple[ChannelSettings, ...] = ()
         self.plots = RunPlots(session)
         self.analysis = LiveAnalysis(session)
         self.channel_plots = ChannelPlots(session)
@@ -85,6 +87,8 @@ class RunDisplay(QWidget):
     def begin(self, live: Live, preview: Preview, name: str, marks: RunMarks) -> None:
         """Show the run of ``live`` from its start."""
         self._live, self._running, self._drawn = live, True, _NOTHING
+        self._marks.clear()
+        self._run_channels = self._session.rig_file.channel
         self.view.begin(name)
         self.plots.show_prediction(preview)
         self.plots.start()
@@ -126,13 +130,18 @@ class RunDisplay(QWidget):
         mark = read_mark(event.message) if event.level == "info" else None
         if mark is not None:
             number, note = mark
-            self.plots.add_mark(f"mark {number}", seconds, note or f"mark {number}")
+            self._mark(f"mark {number}", seconds, note or f"mark {number}", "info")
         elif event.level != "info":
-            self.plots.add_mark(f"alarm {event.sample} {event.message}", seconds, event.level,
-                                event.level)  # fmt: skip
+            key = f"alarm {event.sample} {event.message}"
+            self._mark(key, seconds, event.level, event.level)
         # the operator knows that he has pressed STOP
         known = event.message.startswith("interrupted by the operator")
         self.alarms.add(event.level, event.message, seconds, happened.at, "STOP" if known else "")
+
+    def _mark(self, key: str, time: float, words: str, level: str) -> None:
+        self._marks.append((key, time, words, level))
+        if not self.view.shows_plan:
+            self.plots.add_mark(key, time, words, level)
 
     @Slot()
     def _program_errors(self) -> None:
@@ -190,7 +199,9 @@ class RunDisplay(QWidget):
         elif self._live is not None:
             self.view.show_last()
             self.plots.start()
-            self._show_channels(self._channels)
+            for mark in self._marks:
+                self.plots.add_mark(*mark)
+            self._show_channels(self._run_channels)
             self.redraw()
             self._start_drawing()
 

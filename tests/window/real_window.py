@@ -105,6 +105,7 @@ def main() -> None:
         hand.key(letter)
     until(lambda: page.operator.text() == "ada", "the operator's name")
     saw["operator"] = session.operator
+    saw["planned"] = page.display.view.words.text()
     click(page.arm_button)
     until(page.start_button.isEnabled, "armed")
     saw["armed"] = window.badge.state.name
@@ -119,6 +120,14 @@ def main() -> None:
     until(lambda: seconds() > 2.5, "half a second of the first lobe")
     screen = application.primaryScreen().grabWindow(0).toImage()
     screen.save(str(folder / "screen.png"))
+    hand.key("m")
+    until(page.display.mark_bar.note.hasFocus, "the field of the note")
+    for letter in "my spark":
+        hand.key(letter)
+    until(lambda: page.display.mark_bar.note.text() == "my spark", "the note")
+    hand.key("Return")
+    until(lambda: page.plots.marks == ["my spark"], "the mark in the plots")
+    saw["current drawn"] = page.plots.curve("current")[0].size > 100
     corner = page.stop_button.mapToGlobal(QPoint(12, 46))
     saw["stop"] = screen.pixelColor(corner).name()
     hand.key("Escape")

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from dearig.recording import open_recording
+from dearig.recording.marks import marks_in
 
 pytestmark = [
     pytest.mark.slow,
@@ -60,12 +61,15 @@ def test_a_run_by_mouse_and_keys(display: str, tmp_path: Path) -> None:
     saw = json.loads(done.stdout)
     assert saw["platform"] == "xcb"
     assert saw["operator"] == "ada"
+    assert saw["planned"] == "Planned: thesis identification, peak 8.00 kV, 25.8 s"
+    assert saw["current drawn"]
     assert (saw["armed"], saw["started"], saw["ended"]) == ("ARMED", "ON", "SAFE")
     assert saw["stop"] == "#b3001b"  # large and red, on the screen
     assert "ramped down to 0 V" in saw["result"]
     assert len(saw["recordings"]) == 2
     recording = open_recording(tmp_path / saw["recordings"][0])
     assert recording.provenance["operator"] == "ada"
+    assert [mark.note for mark in marks_in(recording.events)] == ["my spark"]
     assert recording.voltage_command is not None
     assert abs(recording.voltage_command[-1]) < 1.0
 
