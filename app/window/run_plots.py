@@ -75,13 +75,9 @@ class RunPlots(QWidget):
         self.area = PlotArea(session, "run", live=True)
         self.area.canvas.setAccessibleName("Curves of the run")
         self._plots: dict[str, Plot] = {
-            name: self.area.add_plot(row, left=label, weight=_SHARES[name])
+            name: self.area.add_plot(row, left=label, weight=_SHARES[name], own_range=True)
             for row, (name, (label, _)) in enumerate(_SIGNALS.items())
         }
-        for name, plot in self._plots.items():
-            # the labels of four plots must fit into a window of 768 pixels
-            plot.setLabel("left", _SIGNALS[name][0], **{"font-size": "9pt"})
-            plot.setClipToView(False)
         self._planned = {n: self._plots[n].add_curve() for n in ("voltage", "displacement")}
         self._band = [self._plots["voltage"].add_curve() for _ in range(2)]
         self._curves: dict[str, Curve] = {
