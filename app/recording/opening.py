@@ -119,6 +119,11 @@ def opened(path: Path) -> Iterator[h5py.File]:
             before, after, pages = journal or (raw.seek(0, 2), raw.tell(), {})
             patched = Patched(raw, before, {n: bytearray(p) for n, p in pages.items()})
             patched.end = after
+            if not after:
+                raise InputError(
+                    f"{path} is empty: its run or its program ended before it wrote anything; "
+                    f"delete it, or replace it with --force"
+                )
             flags = flags_of(patched.read(SIZE) or b"")
         except OSError as error:
             raise InputError(f"{path} cannot be read: {in_words(error)}") from error

@@ -6,6 +6,7 @@ Codes and meanings are those of ``nidaqmx.error_codes.DAQmxErrors``.
 from __future__ import annotations
 
 import re
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -157,6 +158,24 @@ def instrument_errors(device: str, server: str | None, *, answered: bool = False
         raise RigError(f"card {device}: {_server_fault(server, error, answered)}") from error
     except nidaqmx.errors.Error as error:
         raise RigError(f"card {device}: {error}") from error
+    except Exception as error:
+        # a reply that was garbled on its way fails anywhere in the client library
+        if server is None or not _raised_in_library(error):
+            raise
+        raise RigError(
+            f"card {device}: the reply of the server {server} makes no sense "
+            f"({type(error).__name__}); check the network between this computer and the server"
+        ) from error
+
+
+#: Packages that decode the replies of a server.
+_LIBRARIES = ("nidaqmx", "grpc", "google")
+
+
+def _raised_in_library(error: Exception) -> bool:
+    """Return True if ``error`` was raised in a library that decodes replies, not here."""
+    innermost = list(traceback.walk_tb(error.__traceback__))[-1][0]
+    return str(innermost.f_globals.get("__name__", "")).partition(".")[0] in _LIBRARIES
 
 
 def _server_fault(server: str | None, error: RpcError, answered: bool) -> str:

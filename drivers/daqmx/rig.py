@@ -215,16 +215,22 @@ class DaqmxRig:
         with self._lock:
             if self._state is RigState.CLOSED:
                 return
+            mistake: Exception | None = None
             try:
                 self._bring_down()
-            except RigError as error:
-                log.warning("%s; the guardian is asked", error)
+            except Exception as error:  # noqa: BLE001  (whatever failed, a voltage may be on)
+                code = error.code if isinstance(error, RigError) else None
                 try:
                     self._guardian.take_over()
                 except RigError as failed:
-                    raise RigError(f"{error}; {failed}", error.code) from error
+                    raise RigError(f"{error}; {failed}", code) from error
+                # only now: a log on a disk that is held must not delay the guardian
+                log.warning("%s; the guardian was asked", error)
+                mistake = None if isinstance(error, RigError) else error
             self._guardian.disarm()
             self._state = RigState.SAFE
+            if mistake is not None:
+                raise mistake
 
     def close(self) -> None:
         """Make safe and release the instruments."""

@@ -346,6 +346,20 @@ def test_faults_of_the_card(fault, code, said):
         assert bench.device.wire_voltage() == 0.0
 
 
+def test_a_mistake_while_making_safe_still_asks_the_guardian(monkeypatch):
+    def mistaken(_: object) -> None:
+        raise ZeroDivisionError("a mistake")
+
+    with Bench() as bench:
+        begin(bench.rig, LONG)
+        monkeypatch.setattr(type(bench.rig), "_bring_down", mistaken)
+        with pytest.raises(ZeroDivisionError):
+            bench.rig.make_safe()
+        assert "take over" in bench.guardian.words
+        assert bench.rig.state is RigState.SAFE
+        monkeypatch.undo()
+
+
 def test_a_short_read_loses_nothing():
     with Bench(faults=["short-read@0.5"]) as short, Bench() as whole:
         one, other = play(short.rig, LONG), play(whole.rig, LONG)

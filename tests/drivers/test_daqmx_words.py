@@ -9,6 +9,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import grpc
 import nidaqmx.errors
+import numpy as np
 import pytest
 from grpc import StatusCode
 from nidaqmx import GrpcSessionOptions
@@ -127,3 +128,15 @@ def test_peer_that_is_no_daqmx_server_is_said_to_be_none(peer, said):
 )
 def test_cause_is_that_of_the_librarys_table(code, cause):
     assert cause in explained("Dev1", code, "")
+
+
+def test_a_garbled_reply_is_an_instrument_fault_and_no_mistake_of_the_program() -> None:
+    from nidaqmx._grpc_interpreter import _assign_numpy_array
+
+    with (
+        pytest.raises(
+            RigError, match=r"reply of the server host:1 makes no sense \(AssertionError\)"
+        ),
+        instrument_errors("Dev1", "host:1"),
+    ):
+        _assign_numpy_array(np.empty(1), np.empty(2))  # more samples than were asked for

@@ -18,7 +18,11 @@ from tests.interleave.commands import Ended
 __all__ = ["check"]
 
 #: What is said of the file of a run that was killed before its samples.
-BEFORE_SAMPLES = ("killed before its first sample", "ended before its first block")
+BEFORE_SAMPLES = (
+    "killed before its first sample",
+    "ended before its first block",
+    "is empty: its run or its program ended before it wrote anything",
+)
 #: Exit codes of commands that did their work or were refused, of a verification that failed, and
 #: the commands that put another recording in the place of one.
 ALLOWED, FAILED = (0, 2), 4
