@@ -57,6 +57,7 @@ class Response:
 def serve(connection: Connection) -> None:
     """Do the jobs that come through ``connection`` until its other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.unraisablehook = _unraisable
     work: queue.SimpleQueue[Request] = queue.SimpleQueue()
     current: list[int] = []
     listener = threading.Thread(target=_listen, args=(connection, work, current), daemon=True)
@@ -99,6 +100,14 @@ def _interrupt() -> None:
     else:
         # to the main thread itself, which may be blocked in a call
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+
+
+def _unraisable(found: Any) -> None:
+    """Interrupt again where an interrupt was lost in a callback, which cannot raise it."""
+    if isinstance(found.exc_value, KeyboardInterrupt):
+        _interrupt()
+    else:
+        sys.__unraisablehook__(found)
 
 
 def _done(connection: Connection, request: Request) -> Response:
