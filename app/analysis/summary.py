@@ -12,8 +12,9 @@ import numpy as np
 
 from dearig.analysis.decimate import decimate
 from dearig.analysis.records import compare
+from dearig.analysis.spectrum import amplitude_density
 from dearig.config.modelfile import load_model
-from dearig.errors import DearigError
+from dearig.errors import DearigError, InputError
 from dearig.model.actuator import Actuator
 from dearig.model.film import Strip
 from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
@@ -34,6 +35,7 @@ __all__ = [
     "Difference",
     "Quantity",
     "RecordingSummary",
+    "Spectra",
     "assess",
     "curves",
     "differences",
@@ -42,6 +44,7 @@ __all__ = [
     "numbers",
     "read_entries",
     "recover_file",
+    "spectra",
     "summary_of",
 ]
 
@@ -348,6 +351,43 @@ def curves(
         monitor=_of(time, recording.voltage_monitor),
         current=_of(time, recording.current_monitor),
     )
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """Amplitude densities of one recording: frequency in Hz and density in m/√Hz, (n,) each.
+
+    ``residual`` is None where the model does not apply.
+    """
+
+    name: str
+    measured: tuple[np.ndarray, np.ndarray]
+    residual: tuple[np.ndarray, np.ndarray] | None
+
+
+def spectra(
+    path: Path, model: Path | None, drive: str = "command", progress: Progress = quiet
+) -> Spectra:
+    """Return the spectra of the displacement at ``path`` and of its residual to ``model``.
+
+    Raises ``InputError`` where the recording cannot be read, is of a film driven by stretch, or has
+    no sample clock: without even steps there is no spectrum.
+    """
+    recording = open_recording(path)
+    if recording.displacement is None:
+        raise InputError(f"{recording.name} has no displacement, of which to show a spectrum")
+    if recording.rate is None:
+        raise InputError(f"{recording.name} has no sample clock; a spectrum needs even time steps")
+    progress(recording.name, 0.5)
+    residual = None
+    try:
+        chosen, _ = _model(model, recording)
+        compared = compare(recording, chosen, "validation", drive)
+        residual = amplitude_density(compared.measured - compared.model, recording.rate)
+    except DearigError:
+        residual = None  # the curves say why
+    measured = amplitude_density(recording.displacement, recording.rate)
+    return Spectra(recording.name, measured, residual)
 
 
 def differences(paths: Sequence[Path], progress: Progress = quiet) -> tuple[Difference, ...]:

@@ -33,12 +33,18 @@ class CurvesPlot(QWidget):
         self._session = session
         self._shown: tuple[Curves, ...] = ()
         self._with_model = True
+        self._with_current = False
         self.area = PlotArea(session, "Curves of the selected recordings")
         # the measurement gets the most space
         self.plots = [
             self.area.add_plot(row, left=label, weight=weight)
             for row, (label, weight) in enumerate(
-                (("Voltage (kV)", 3), ("Displacement (mm)", 5), ("Residual (µm)", 4))
+                (
+                    ("Voltage (kV)", 3),
+                    ("Displacement (mm)", 5),
+                    ("Residual (µm)", 4),
+                    ("Current (mA)", 3),
+                )
             )
         ]
         self.marks = PlotOverlay(self.plots[1], 1.0, session.theme)
@@ -68,6 +74,12 @@ class CurvesPlot(QWidget):
         self._with_model = shown
         self._draw()
 
+    @Slot(bool)
+    def show_current(self, shown: bool) -> None:
+        """Show or hide the monitored current."""
+        self._with_current = shown
+        self._draw()
+
     @Slot()
     def _draw(self) -> None:
         theme = self._session.theme
@@ -75,12 +87,13 @@ class CurvesPlot(QWidget):
         self.marks.show_marks((), with_words=True)
         for plot in self.plots:
             plot.clear_all()
-        drive, both, residual = self.plots
+        drive, both, residual, current = self.plots
         shown = SHOWN[self._shown[0].kind if self._shown else "actuator"]
         drive.set_axis("left", shown.drive_label)
         both.set_axis("left", shown.label)
         residual.set_axis("left", f"Residual ({shown.error_unit})")
         self.area.show_plot(residual, self._with_model)
+        self.area.show_plot(current, self._with_current)
         declared = self._shown[0].declared if len(self._shown) == 1 else ()
         self.channels.show_channels([(name, unit) for name, unit, _ in declared], self.plots[0])
         for place, (_, _, values) in enumerate(declared):
@@ -97,6 +110,13 @@ class CurvesPlot(QWidget):
             drive.add_curve(
                 "commanded" if alone else name, theme.command if alone else colour, in_key=alone
             ).set_points(curves.drive[0], curves.drive[1] * shown.drive_factor)
+            if curves.current is not None:
+                time, amperes = curves.current
+                current.add_curve(
+                    "monitored current" if alone else name,
+                    theme.monitor if alone else colour,
+                    in_key=alone,
+                ).set_points(time, amperes * 1e3)
             time, measured = curves.measured
             both.add_curve(name, colour).set_points(time, measured * shown.factor)
             if not self._with_model or curves.model is None or curves.residual is None:

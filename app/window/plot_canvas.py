@@ -51,6 +51,7 @@ class Canvas(pg.GraphicsLayoutWidget):
     zoomed = Signal(object, object, object)  #: plot, range of x or None, range of y or None
     cursor_moved = Signal(object, int, float)  #: plot, cursor 0 or 1, x
     double_clicked = Signal()
+    clicked = Signal(object, QPointF)  #: plot, place in the widget, of a click that moved nothing
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -141,6 +142,8 @@ class Canvas(pg.GraphicsLayoutWidget):
         dragged, self._dragged = self._dragged, None
         event.accept()
         self._band.hide()
+        if dragged is not None and not dragged.moved and dragged.cursor is None:
+            self.clicked.emit(dragged.plot, event.position())
         if dragged is None or dragged.cursor is not None or dragged.kind is Drag.PAN:
             return
         box = self._box(dragged, event.position())

@@ -28,9 +28,7 @@ from dearig.analysis.summary import (
     export_file,
     recover_file,
 )
-from dearig.errors import InputError
 from dearig.recording.exporters import EXPORTS
-from dearig.recording.tags import clean_tags
 from dearig.report.numbers import significant
 from dearig.report.tables import Row, Table
 from dearig.units import SHOWN
@@ -39,9 +37,11 @@ from dearig.window.curves_plot import CurvesPlot
 from dearig.window.folder_table import FolderModel
 from dearig.window.layout_state import remember
 from dearig.window.library import shared_library
+from dearig.window.recording_analysis import RecordingAnalysis
 from dearig.window.recordings_table import RecordingsTable
 from dearig.window.report_table import ReportTable, two_columns
 from dearig.window.session import Session
+from dearig.window.tags_field import TagsField
 from dearig.window.theme import SPACE
 from dearig.window.trend_plot import TrendPlot
 from dearig.window.widgets import Message, button, label, menu_button, plain_tip
@@ -91,6 +91,7 @@ class RecordingsPage(QWidget):
         self.files = FolderModel(self._session)
         self.table = RecordingsTable(self.files, self._session)
         self.plot = CurvesPlot(self._session)
+        self.analysis = RecordingAnalysis(self._session, self._library, self)
         self.trend = TrendPlot(self._session)
         self.details, self.events = (ReportTable(words=True) for _ in range(2))
         self.differences = ConditionsTable()
@@ -106,8 +107,18 @@ class RecordingsPage(QWidget):
         self.columns.setChildrenCollapsible(False)
         self.views = QTabWidget()
         self.views.addTab(self.columns, "Curves")
+        self.views.addTab(self.analysis.loop, "Loop")
+        self.views.addTab(self.analysis.spectrum, "Spectrum")
         self.views.addTab(self.trend, "Trend")
-        self.views.setTabToolTip(1, "A number of all listed recordings over time")
+        for place, tip in enumerate(
+            (
+                "Selected recordings over time",
+                "Displacement of the selected recordings against voltage, or its square",
+                "Spectra of displacement and residual of the first selected recording",
+                "A number of all listed recordings over the time of their runs",
+            )
+        ):
+            self.views.setTabToolTip(place, tip)
         self.views.currentChanged.connect(self._view_changed)
         below = QWidget()
         inner = QVBoxLayout(below)
@@ -136,6 +147,7 @@ class RecordingsPage(QWidget):
         self.filter.textChanged.connect(self._find)
         self.files.arranged.connect(self._rows_changed)
         self.trend.picked.connect(self._pick)
+        self.analysis.trouble.connect(self.message.show_text)
         self._library.listed.connect(self._listed)
         self._library.summarised.connect(self._summarised)
         self._library.trouble.connect(self.folder_message.show_text)
@@ -197,13 +209,8 @@ class RecordingsPage(QWidget):
         tools = QHBoxLayout()
         for made in (self.export_button, self.recover_button, self.sequence_button):
             tools.addWidget(made)
-        self.tags = QLineEdit(placeholderText="good, new grease")
-        self.tags.setToolTip(
-            "Tags of the selected recordings, separated by commas; of several, those that all have "
-            "(Ctrl+T). They are kept in dearig-tags.json beside the recordings, which stay as they "
-            "are"
-        )
-        self.tags.editingFinished.connect(self._tags_typed)
+        self.tags = TagsField(self._library)
+        self.tags.trouble.connect(self.message.show_text)
         tag_key = QAction(self)
         tag_key.setShortcut(QKeySequence("Ctrl+T"))
         tag_key.triggered.connect(self.tags.setFocus)
@@ -218,6 +225,10 @@ class RecordingsPage(QWidget):
         self.model_shown.toggled.connect(self.plot.show_model)
         self.whole = button("&Whole run", "Show the whole time axis again after zooming")
         self.whole.clicked.connect(self._show_whole)
+        self.current_shown = QCheckBox("C&urrent")
+        self.current_shown.setToolTip("Plot the monitored current")
+        self.current_shown.toggled.connect(self.plot.show_current)
+        tools.addWidget(self.current_shown)
         tools.addWidget(self.model_shown)
         tools.addWidget(self.whole)
         return tools
@@ -258,8 +269,9 @@ class RecordingsPage(QWidget):
     @Slot()
     def _show_chosen(self) -> None:
         chosen = self.chosen()
-        self._show_tags(chosen)
-        self.trend.show_chosen(chosen)
+        self.tags.show_recordings(chosen)
+        if self.views.currentWidget() is self.trend:
+            self.trend.show_chosen(chosen)
         asked = (*chosen, self._library.model, *map(self._changed_at, chosen))
         if asked == self._shown:
             return  # the rows have only moved
@@ -284,6 +296,8 @@ class RecordingsPage(QWidget):
         for words in filter(None, map(self._trouble, self._wanted)):
             self.message.show_text(words)
         self._wanted = readable
+        self.analysis.forget()
+        self._analyse()
         if not readable:
             self.plot.show_curves(())
             self._show_about()
@@ -309,6 +323,13 @@ class RecordingsPage(QWidget):
             self._differing.finished.connect(
                 lambda rows, of=of, paths=readable: self._show_differences(paths, rows, of)
             )
+
+    def _analyse(self) -> None:
+        """Show loops or spectra of the selected recordings, if their view is on the screen."""
+        if self.views.currentWidget() is self.analysis.loop:
+            self.analysis.show_loops(self._wanted)
+        elif self.views.currentWidget() is self.analysis.spectrum:
+            self.analysis.show_spectra(self._wanted)
 
     def _trouble(self, path: Path) -> str:
         summary = self._library.summaries.get(path)
@@ -523,54 +544,19 @@ class RecordingsPage(QWidget):
 
     @Slot(int)
     def _view_changed(self, _: int) -> None:
+        self._analyse()
         curves = self.views.currentWidget() is self.columns
-        self.model_shown.setVisible(curves)
-        self.whole.setVisible(curves)
+        for tool in (self.model_shown, self.current_shown, self.whole):
+            tool.setVisible(curves)
         self._show_trend()
 
     def _show_trend(self) -> None:
         if self.views.currentWidget() is self.trend:
-            self.trend.show_summaries(self.files.shown)
-            self.trend.show_chosen(self.chosen())
+            self.trend.show_summaries(self.files.shown, self.chosen())
 
     @Slot(Path)
     def _pick(self, path: Path) -> None:
         self.choose([path])
-
-    # tags
-
-    def _common_tags(self, paths: list[Path]) -> tuple[str, ...]:
-        """Return the tags that all of ``paths`` have."""
-        known = [s.tags for path in paths if (s := self._library.summaries.get(path))]
-        return tuple(t for t in known[0] if all(t in tags for tags in known)) if known else ()
-
-    def _show_tags(self, chosen: list[Path]) -> None:
-        self.tags.setEnabled(bool(chosen))
-        if not self.tags.hasFocus():
-            self.tags.setText(", ".join(self._common_tags(chosen)))
-
-    @Slot()
-    def _tags_typed(self) -> None:
-        """Give the typed tags to the selected recordings; tags that only some have stay."""
-        chosen = self.chosen()
-        try:
-            typed = clean_tags(self.tags.text())
-        except InputError as error:
-            self.message.show_text(str(error))
-            return
-        common = self._common_tags(chosen)
-        if typed == common or not chosen:
-            return
-        fresh = {}
-        for path in chosen:
-            summary = self._library.summaries.get(path)
-            before = () if summary is None else summary.tags
-            own = tuple(tag for tag in before if tag not in common and tag not in typed)
-            fresh[path] = (*typed, *own)
-        try:
-            self._library.set_tags(fresh)
-        except InputError as error:
-            self.message.show_text(str(error))
 
 
 def _rms(curves: Curves) -> str:

@@ -270,12 +270,19 @@ def test_a_trend_has_a_point_for_each_run_of_a_film_that_selects_it(
     assert np.diff(times).tolist() == [3 * DAY, 6 * DAY]
     assert "3 runs; 1 without this number" in plot.words.text()
     assert plot.plot.getAxis("left").labelText == "Peak voltage (kV)"
-    signs = [spot.symbol() for spot in plot._points.points()]
-    assert signs == ["o", "x", "o"]  # the faulty one is told apart without colours
+    # the faulty one is told apart without colours
+    drawn = {curve.title: curve for curve in plot.plot.drawn}
+    assert drawn["with a fault"].symbol == "x" != drawn["finished"].symbol
+    assert drawn["with a fault"].points[0].tolist() == times[1:2]
+    plot.resize(900, 400)
+    plot.show()
+    plot.area.auto_range()
+    canvas = plot.area.canvas
     with qtbot.waitSignal(plot.picked) as told:
-        spot = plot._points.points()[1]
-        plot._points.sigClicked.emit(plot._points, [spot], None)
+        place = canvas.place_of(plot.plot, points[1][1], points[1][2])
+        qtbot.mouseClick(canvas.viewport(), Qt.MouseButton.LeftButton, pos=place)
     assert told.args == [summaries[3].path]
+    assert plot.plot.text_of("bottom", times[0])[:4] == "2025"
     # the film of a selected recording is shown
     plot.show_chosen([summaries[4].path])
     assert plot.film.currentData() == "film 1"
