@@ -41,7 +41,7 @@ def run_window(
     require_qt()
     require_screen()
 
-    from PySide6.QtCore import QTimer
+    from PySide6.QtCore import QCoreApplication, QEvent, QTimer
     from PySide6.QtWidgets import QApplication
 
     from dearig.config.rigfile import load_rig_file
@@ -92,6 +92,10 @@ def run_window(
     try:
         return application.exec()
     finally:
+        # while Python's objects are whole: Qt calls their methods when it lays out what is left
+        # of a widget that is being destroyed, and crashes if they are gone
+        window.deleteLater()
+        QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
         collector.close()
         session.program_errors.close()
 

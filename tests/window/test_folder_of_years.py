@@ -275,8 +275,10 @@ def test_a_trend_has_a_point_for_each_run_of_a_film_that_selects_it(
     assert drawn["with a fault"].symbol == "x" != drawn["finished"].symbol
     assert drawn["with a fault"].points[0].tolist() == times[1:2]
     plot.resize(900, 400)
-    plot.show()
+    with qtbot.waitExposed(plot):
+        plot.show()
     plot.area.auto_range()
+    qtbot.wait(1)  # the layout
     canvas = plot.area.canvas
     with qtbot.waitSignal(plot.picked) as told:
         place = canvas.place_of(plot.plot, points[1][1], points[1][2])
