@@ -75,6 +75,7 @@ class Search:
         self.progress, self.stop, self.log = progress, stop, log
         self.fits: dict[frozenset[str], Fit] = {}
         self.races: list[Race] = []
+        self._left_out: set[tuple[frozenset[str], str]] = set()
         self._searching = False
         drive = "voltage" if fitter.of_actuator else "stretch"
         warm = any(
@@ -215,7 +216,11 @@ class Search:
         return best
 
     def without(self, fit: Fit, name: str) -> Fit:
-        """Return ``fit`` refitted without one of its effects."""
+        """Return ``fit`` refitted without one of its effects; once for each set of effects."""
+        left = fit.members - {name}
+        if (fit.members, name) in self._left_out:
+            return self.fits[left]
+        self._left_out.add((fit.members, name))
         known = dict(zip(fit.problem.layout.names, fit.x, strict=True))
         effects = tuple(e for e in fit.model.effects if e[0] != name)
         problem = self.fitter.problem(replace(fit.model, effects=effects), fit.drift)
@@ -272,13 +277,16 @@ class Search:
             noise = np.concatenate([np.full(r.measured.size, r.noise) for r in records])
             went = drift.mean(parent.plain_residuals()) * noise
         times = fitter.times if fitter.of_actuator else _film_times(records)
+        plain = fitter.problem(parent.model)
+        residuals = -parent.plain_residuals()
         regression = Regression(
             records,
             parent.model,
             times,
             self.settings,
-            drift.amplitude if drift else 0.0,
+            parent.drift,
             went,
+            (plain.jacobian(parent.x, ~parent.fixed, residuals), residuals),
         )
         longest = int(np.argmax([r.measured.size for r in records]))
         residual = parent.by_record()[longest]

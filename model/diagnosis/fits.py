@@ -14,6 +14,7 @@ from dearig.model import kernel
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.noise import Drift, DriftSpace, WhitenedProblem, drift_modes
 from dearig.model.diagnosis.preparation import prepared, with_model_error
+from dearig.model.diagnosis.regression import Values
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
 from dearig.model.film import Strip
@@ -33,7 +34,8 @@ __all__ = ["DRIFT", "Fit", "Fitter", "Work", "with_effect"]
 DRIFT = "drift"
 
 _GAIN = 0.5  # of chi-square: what is left to gain changes no choice, whose odds are 12
-_GAIN_PART = 1e-4  # of chi-square: the same, where a misfit is large
+_GAIN_PART = 1e-3  # of chi-square: the same, where more than twice the noise's power is left
+_POLISHED = 2.0  # mean square over noise: what leaves more only polishes a misfit
 _BASELINE_STARTS = 5  # of the global search
 _BASELINE_ITERATIONS = 20
 
@@ -263,9 +265,9 @@ class Fitter:
         problem = fit.problem
         if problem.fidelity == kernel.ROUGH:
             problem = self.problem(problem.layout.base, fit.drift)
-        gain = max(_GAIN, _GAIN_PART * fit.cost * problem.samples)
+        gain = _gain(fit)
         found = descend_broyden(problem, fit.x, fit.fixed, None, 40, gain, True)
-        found = descend(problem, found.x, fit.fixed, 30, gain, 1e-3, 3, quick=True)
+        found = descend(problem, found.x, fit.fixed, 15, gain, 1e-3, 3, quick=True)
         return replace(_fit(problem, fit.fixed, found), converged=True)
 
     def careful(self, fit: Fit, iterations: int) -> Fit:
@@ -274,36 +276,25 @@ class Fitter:
         ratios = [(t.noise / f.noise) ** 2 for t, f in zip(self.records, self.full, strict=True)]
         drift = fit.drift * sum(ratios) / len(ratios)
         problem = self.problem(fit.model, drift, kernel.CAREFUL, full=True)
-        gain = max(_GAIN, _GAIN_PART * fit.cost * problem.samples)
-        found = descend(problem, fit.x, fit.fixed, iterations, gain, damping=1e-4)
+        found = descend(problem, fit.x, fit.fixed, iterations, _gain(fit), damping=1e-4)
         return replace(_fit(problem, fit.fixed, found), converged=True)
 
-    def start_of(
-        self,
-        problem: WhitenedProblem,
-        fit: Fit,
-        values: Sequence[float],
-        springs: np.ndarray | None,
-    ) -> np.ndarray:
-        """Return coordinates (d,): those of ``fit``, then effects at ``values``.
-
-        ``springs`` (s,), natural values in the order of the layout, replace those of ``fit``.
-        """
+    def start_of(self, problem: WhitenedProblem, parent: np.ndarray, effects: Values) -> np.ndarray:
+        """Return coordinates (d,) of ``problem``: a ``parent``'s, then its new ``effects``."""
         layout = problem.layout
-        known = fit.problem.layout.values(fit.x)
-        row = np.concatenate([known, np.asarray(values, dtype=float)])
-        if springs is not None:
-            row[: springs.size] = springs
-        return np.clip(layout.coordinates(row), layout.lower, layout.upper)
+        new = np.array([v for _, values in effects for v in values])
+        row = np.concatenate([np.zeros(parent.size), new])
+        x = np.concatenate([parent, layout.coordinates(row)[parent.size :]])
+        return np.clip(x, layout.lower, layout.upper)
 
-    def springs(self, fit: Fit, moduli: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Return natural values (s,) of the springs in the order of the layout of ``fit``."""
+    def with_springs(self, fit: Fit, moduli: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Return the coordinates (d,) of ``fit`` with other springs, moduli in Pa, times in s."""
         layout = fit.problem.layout
-        row = layout.values(fit.x)[: spring_count(layout)]
+        row = layout.values(fit.x)
         mu, t = layout.column("mu"), layout.column("T")
         row[mu] = moduli[[layout.quantities[j].index for j in mu]]
         row[t] = times
-        return row
+        return layout.coordinates(row)
 
     # -- the baseline
 
@@ -345,6 +336,11 @@ class Fitter:
                 found, fixed = freed, free
         self._limits = fixed
         return replace(_fit(problem, fixed, found), converged=True)
+
+
+def _gain(fit: Fit) -> float:
+    """Return the gain of chi-square below which a descent from ``fit`` has ended."""
+    return _GAIN if fit.cost < _POLISHED else _GAIN_PART * fit.cost * fit.problem.samples
 
 
 def spring_count(layout: Layout) -> int:

@@ -96,25 +96,27 @@ def _entered(fitter: Fitter, parent: Fit, candidate: Candidate, iterations: int)
     problem = fitter.problem(model, parent.drift, kernel.ROUGH)
     anew, beside = [], []
     for start in candidate.starts:
-        values = [v for _, own in start.effects for v in own]
-        springs = fitter.springs(parent, start.moduli, start.times)
-        anew.append(fitter.start_of(problem, parent, values, springs))
-        beside.append(fitter.start_of(problem, parent, values, None))
+        springs = fitter.with_springs(parent, start.moduli, start.times)
+        anew.append(fitter.start_of(problem, springs, start.effects))
+        shifted = parent.x.copy()
+        if start.shift.size:
+            shifted[~parent.fixed] += start.shift
+        beside.append(fitter.start_of(problem, shifted, start.shifted))
     # and from nothing, in the best shape
-    values = [v for name, own in candidate.starts[0].effects for v in _hardly(name, own)]
-    beside.append(fitter.start_of(problem, parent, values, None))
+    nothing = tuple((name, _hardly(name, own)) for name, own in candidate.starts[0].effects)
+    beside.append(fitter.start_of(problem, parent.x, nothing))
     costs = fitter.costs(problem, np.array(anew + beside))
     chosen = (int(np.argmin(costs[: len(anew)])), len(anew) + int(np.argmin(costs[len(anew) :])))
     rows = anew + beside
     return [fitter.descend(problem, rows[i], iterations) for i in chosen]
 
 
-def _hardly(name: str, values: Sequence[float]) -> list[float]:
+def _hardly(name: str, values: Sequence[float]) -> tuple[float, ...]:
     """Return ``values`` of effect ``name`` with amplitudes next to neutral."""
-    return [
+    return tuple(
         v if p.neutral is None else p.neutral + _TINY * p.typical
         for p, v in zip(EFFECTS[name].parameters, values, strict=True)
-    ]
+    )
 
 
 def _run(

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
 import numpy as np
-from scipy.optimize import nnls
+from scipy.optimize import lsq_linear, nnls
 
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.imposed import (
@@ -44,21 +44,31 @@ _PATTERN = (0.1, 0.05, 0.02)  # steps of the pattern search, in parts of a param
 _SHARPENED_MIN = 8  # effects, the best ones, that are sharpened in any case
 _LINEAR = 0.02  # relative difference of two secants up to which a response is linear
 _BRANCH_POOL = 8  # nodes of the grid, the most used ones, of which sets of branches are made
+_FLAT = 1e-6  # relative singular value: flatter directions are left alone
+_WELL = 1e-2  # of the largest: directions along which the parent is straight over a step
+_POLISHING = 5  # Gauss-Newton steps of relaxation times between the nodes of the grid
 _WEAK = 1e-3  # of the largest modulus: a branch without weight still needs influence to move
+
+
+#: Effects with the values of their parameters.
+Values = tuple[tuple[str, tuple[float, ...]], ...]
 
 
 @dataclass(frozen=True)
 class Start:
-    """Where a fit begins: new effects with their values, and springs.
+    """Where a fit begins: new effects with their values, and springs, in two ways.
 
-    ``springs`` are natural values (mu, T) of the network: moduli (1 + n,) in Pa, times (n,) in s.
-    ``misfit`` is the RMS, in noises of a mean, that the regression leaves.
+    With springs anew, of ``moduli`` (1 + n,) in Pa and ``times`` (n,) in s, the effects are as in
+    ``effects``. With the parent's, moved by ``shift`` (f,) in the parent's free coordinates, they
+    are as in ``shifted``. ``misfit`` is the RMS, in noises of a mean, that the regression leaves.
     """
 
-    effects: tuple[tuple[str, tuple[float, ...]], ...]
+    effects: Values
     moduli: np.ndarray
     times: np.ndarray
     misfit: float
+    shifted: Values
+    shift: np.ndarray
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -114,7 +124,10 @@ class Regression:
     """The regression of ``records`` about a fitted ``model``, whose effects stay as they are.
 
     ``times`` is the range of relaxation times in s, ``drift`` the variance of the records' drift in
-    units of a reading's noise; the most probable drift ``went`` (N,) in m is subtracted.
+    units of a reading's noise; the most probable drift ``went`` (N,) in m is subtracted. ``local``
+    are the derivative (N, f) of the model's readings with respect to its free coordinates, and its
+    residuals (N,), model less measured, both over the noise: by them the parent's springs follow an
+    effect that is small (a Gauss-Newton step).
     """
 
     def __init__(
@@ -125,6 +138,7 @@ class Regression:
         settings: DiagnosisSettings,
         drift: float = 0.0,
         went: np.ndarray | None = None,
+        local: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> None:
         self.model, self.settings = model, settings
         count = int(math.log(times[1] / times[0]) / math.log(settings.grid_ratio)) + 2
@@ -143,6 +157,10 @@ class Regression:
         self._inside = self._q.T @ self._wanted
         self._outside = self._wanted - self._q @ self._inside
         self.misfit = self._rms(self._solve(None)[1])
+        self._residuals = np.zeros(0)
+        if local is not None:
+            self._residuals = self._means(local[1])
+            self._directions = _well_determined(self._means(local[0].T).T)
 
     # -- set-up
 
@@ -170,6 +188,17 @@ class Regression:
             if isinstance(one, ImposedActuator)
         ]
         return Drift(DriftSpace(bases), amplitude)
+
+    def _means(self, rows: np.ndarray) -> np.ndarray:
+        """Return readings (..., N) over the noise as means (..., M) over the noise of a mean."""
+        edges = np.cumsum([0, *(r.measured.size for r in self._records)])
+        parts = []
+        for one, (a, b) in zip(self._imposed, pairwise(edges), strict=True):
+            every = one.every if isinstance(one, ImposedActuator) else 1
+            whole = (b - a) // every
+            part = rows[..., a : a + whole * every].reshape(*rows.shape[:-1], whole, every)
+            parts.append(part.mean(axis=-1) * math.sqrt(every))
+        return self._joined(parts)
 
     def _joined(self, rows: Sequence[np.ndarray]) -> np.ndarray:
         joined = np.concatenate(rows, axis=-1)
@@ -408,7 +437,31 @@ class Regression:
             wanted += a @ c.rows
         moduli, times = self._branches(wanted)
         effects = tuple((c.effect.name, c.values(a)) for c, a in used)
-        return Start(effects, moduli, times, misfit)
+        shifted, shift = self._shifted([c for c, _ in used])
+        return Start(effects, moduli, times, misfit, shifted, shift)
+
+    def _shifted(self, used: Sequence[_Columns]) -> tuple[Values, np.ndarray]:
+        """Return effects, and the step (f,) of the parent's free coordinates that goes with them.
+
+        A Gauss-Newton step along the directions that the records determine well: the others are
+        not straight so far. Without a derivative the effects are neutral, and nothing moves.
+        """
+        rows = np.vstack([c.rows for c in used])
+        low, high = np.hstack([c.limits for c in used])
+        if not self._residuals.size:
+            a, step = np.zeros(low.size), np.zeros(0)
+        else:
+            u, inverse = self._directions
+            beyond = rows - (rows @ u) @ u.T
+            left = self._residuals - u @ (u.T @ self._residuals)
+            a = lsq_linear(beyond.T, -left, (low, high)).x
+            step = -inverse @ (u.T @ (self._residuals + a @ rows))
+        firsts = np.cumsum([0, *(c.rows.shape[0] for c in used)])
+        found = tuple(
+            (c.effect.name, c.values(a[i:j]))
+            for c, (i, j) in zip(used, pairwise(firsts), strict=True)
+        )
+        return found, step
 
     def _branches(self, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return moduli (1 + n,) and times (n,) of the best set of branches that explain (M,)."""
@@ -422,9 +475,57 @@ class Regression:
             mu, left = nnls(self._triangle[:, [0, *(1 + i for i in some)]], inside)
             if left < best:
                 best, chosen, moduli = left, some, mu
-        moduli = moduli.copy()
+        moduli, times = self._polished(moduli, np.log(self.grid[list(chosen)]), inside)
         moduli[0] += self._least
-        return np.maximum(moduli, _WEAK * moduli.max()), self.grid[list(chosen)]
+        return np.maximum(moduli, _WEAK * moduli.max()), np.exp(times)
+
+    def _polished(
+        self, moduli: np.ndarray, log_times: np.ndarray, inside: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return moduli (1 + n,) and log times (n,) between the nodes that fit ``inside`` best.
+
+        Gauss-Newton on the stress of a branch, interpolated between four nodes of the grid.
+        """
+        count = log_times.size
+        best = np.inf
+        kept = (moduli, log_times)
+        for _ in range(_POLISHING):
+            parts, slopes = self._between_nodes(log_times)
+            moduli, left = nnls(parts, inside)
+            if left < best:
+                best, kept = left, (moduli, log_times)
+            jacobian = np.hstack([parts, slopes * moduli[1:]])
+            change, *_ = np.linalg.lstsq(jacobian, inside - parts @ moduli, rcond=_FLAT)
+            log_times = np.clip(
+                log_times + np.clip(change[-count:], -0.5, 0.5),
+                math.log(self.grid[0]), math.log(self.grid[-1]),
+            )  # fmt: skip
+        return kept[0].copy(), kept[1]
+
+    def _between_nodes(self, log_times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return columns (G, 1 + n) at log times (n,), and their derivatives (G, n) by these."""
+        step = math.log(self.grid[1] / self.grid[0])
+        place = (log_times - math.log(self.grid[0])) / step
+        first = np.clip(place.astype(int) - 1, 0, self.grid.size - 4)
+        at = place - first
+        parts, slopes = [self._triangle[:, 0]], []
+        for i, t in zip(first, at, strict=True):
+            nodes = self._triangle[:, 1 + i : 5 + i]
+            parts.append(nodes @ _lagrange(t))
+            slopes.append(nodes @ (_lagrange(t + 1e-3) - _lagrange(t - 1e-3)) / (2e-3 * step))
+        return np.column_stack(parts), np.column_stack(slopes)
+
+
+def _lagrange(t: float) -> np.ndarray:
+    """Return the weights (4,) of cubic interpolation at ``t`` between nodes 0, 1, 2, 3."""
+    return np.array(
+        [
+            -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0,
+            t * (t - 2.0) * (t - 3.0) / 2.0,
+            -t * (t - 1.0) * (t - 3.0) / 2.0,
+            t * (t - 1.0) * (t - 2.0) / 6.0,
+        ]
+    )
 
 
 def bounded(
@@ -463,6 +564,14 @@ def bounded(
         return a, float(left)
     _, in_springs = nnls(triangle, inside + d_inside @ held)
     return held, math.hypot(in_springs, float(np.linalg.norm(corner[:, k] + corner[:, :k] @ held)))
+
+
+def _well_determined(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return directions (M, w) of the readings that are well determined, and the inverse (f, w)."""
+    scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+    u, s, vt = np.linalg.svd(jacobian / scale, full_matrices=False)
+    used = s > _WELL * s[0]
+    return u[:, used], (vt[used] / s[used, None]).T / scale[:, None]
 
 
 def _distinct(rows: Sequence[_Row], many: int) -> list[_Row]:

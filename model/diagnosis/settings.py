@@ -54,7 +54,7 @@ class DiagnosisSettings:
         better than this, and a start that explains everything without springs is none.
     contenders
         Ratio of the regression's misfits up to which an effect takes part in the race. The misfit
-        is the fit's to first order: what leaves four times as much will not lead.
+        is the fit's to first order: what leaves twice as much will not lead.
     rungs
         The race: each rung takes about as much work as the one before (successive halving).
     pairs
@@ -100,8 +100,8 @@ class DiagnosisSettings:
     moments: int = 60
     starts: int = 3
     modulus_freedom: float = 0.3
-    contenders: float = 4.0
-    rungs: tuple[Rung, ...] = (Rung(28, 3), Rung(12, 6), Rung(6, 12), Rung(3, 30))
+    contenders: float = 2.0
+    rungs: tuple[Rung, ...] = (Rung(20, 3), Rung(8, 6), Rung(4, 12), Rung(3, 30))
     pairs: int = 16
     effects_max: int = 3
     odds: float = 12.0
