@@ -179,6 +179,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "verdict": outcome.verdict,
         "verdict_reasons": list(outcome.judgement.reasons),
         "status": outcome.status,
+        "families": [{"family": f, "probability": p} for f, p in finding.families],
         "unnamed": None
         if finding.unnamed is None
         else {

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -29,7 +30,7 @@ from dearig.recording import open_recording
 from dearig.sim_backend.streams import Streams
 from tests.blind.seeds import drawn
 
-__all__ = ["MODES", "VALIDATION", "Bench", "Case", "sources_digest"]
+__all__ = ["ENGINES", "MODES", "VALIDATION", "Bench", "Case", "sources_digest"]
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -38,6 +39,9 @@ ROOT = HERE.parents[1]
 MODES = {"thesis": ("thesis",), "rich": ("thesis", "rich")}
 #: Other amplitudes, other frequencies, and steps.
 VALIDATION = ("validation-a-0.6", "validation-b-7.0", str(HERE / "ramped-steps.toml"))
+
+#: Modules that run the command, by the engine of the diagnosis.
+ENGINES = {"search": "dearig", "evidence": "tests.blind.by_evidence"}
 
 _TIMEOUT = 900.0  # s: far beyond what any case may take; a hang must not end the row
 _INTERRUPTED = 130
@@ -68,8 +72,9 @@ class Case:
 class Bench:
     """A folder of results at one sample rate, with the rig file that made them."""
 
-    def __init__(self, folder: Path, rate: float) -> None:
-        self.folder = folder / f"{rate:g}Hz"
+    def __init__(self, folder: Path, rate: float, engine: str = "search") -> None:
+        self.engine = engine
+        self.folder = folder / (f"{rate:g}Hz" if engine == "search" else f"{rate:g}Hz-{engine}")
         self.folder.mkdir(parents=True, exist_ok=True)
         self.rig_path = self.folder / "rig.toml"
         text = read_text(HERE / "rig.toml", "rig file")
@@ -119,11 +124,22 @@ class Bench:
                 train, validation = self.record(case, folder)
             except DearigError as fault:
                 return self._kept(case, sources, None, f"not recorded: {fault}", 0.0)
-            answer, error, seconds = diagnose(train, validation, folder / "out.json")
-        return self._kept(case, sources, answer, error, seconds)
+            before = _processor_seconds()
+            answer, error, seconds = diagnose(
+                train, validation, folder / "out.json", ENGINES[self.engine]
+            )
+        # of all cases that run at a time: true of one job only
+        processor = _processor_seconds() - before
+        return self._kept(case, sources, answer, error, seconds, processor)
 
     def _kept(
-        self, case: Case, sources: str, answer: dict[str, Any] | None, error: str, seconds: float
+        self,
+        case: Case,
+        sources: str,
+        answer: dict[str, Any] | None,
+        error: str,
+        seconds: float,
+        processor: float = 0.0,
     ) -> dict[str, Any]:
         truth = drawn(case.seed)
         time, voltage = load_sequence("thesis").sample(float(self._rig.card.sample_rate_Hz))
@@ -139,6 +155,7 @@ class Bench:
                 "hidden_um": truth.size(time, voltage) * 1e6,
             },
             "wall_s": seconds,
+            "processor_s": processor,
             "error": error,
             "diagnosis": answer,
         }
@@ -178,11 +195,20 @@ class Bench:
         record(load_sequence(sequence), rig, self._rig, out, RunOptions(text, seed=seed))
 
 
+def _processor_seconds() -> float:
+    """Seconds of processors that ended child processes have taken; 0 on Windows."""
+    times = os.times()
+    return times.children_user + times.children_system
+
+
 def diagnose(
-    train: Sequence[Path], validation: Sequence[Path], out: Path
+    train: Sequence[Path], validation: Sequence[Path], out: Path, module: str = "dearig"
 ) -> tuple[dict[str, Any] | None, str, float]:
-    """Run ``dearig diagnose``: its JSON, or None and what went wrong, and the seconds it took."""
-    command = [sys.executable, "-m", "dearig", "diagnose", *map(str, train)]
+    """Run ``dearig diagnose``: its JSON, or None and what went wrong, and the seconds it took.
+
+    ``module`` is the one that runs the command.
+    """
+    command = [sys.executable, "-m", module, "diagnose", *map(str, train)]
     for path in validation:
         command += ["--validate", str(path)]
     command += ["--json", str(out)]

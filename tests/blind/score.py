@@ -29,7 +29,9 @@ class Score:
     step says that it cannot tell it from what is hidden), ``wrong``, or ``failed``. ``both`` is
     None but for two effects. ``needless`` are families named that are not hidden. ``floor`` is the
     rig's noise, ``own`` what the validation recordings have each of their own: the way a bench has
-    wandered, which the hidden truth itself could not foretell.
+    wandered, which the hidden truth itself could not foretell. ``probability`` is what the
+    diagnosis gives to what is true, ``brier`` the Brier score; ``processor`` are seconds of
+    processors that the command took; all NaN where they are not known.
     """
 
     seed: int
@@ -52,6 +54,9 @@ class Score:
     after: float
     seconds: float
     error: str
+    probability: float = math.nan
+    brier: float = math.nan
+    processor: float = math.nan
 
     @property
     def least(self) -> float:
@@ -128,7 +133,34 @@ def score(result: Mapping[str, Any]) -> Score:
         after=after,
         seconds=result["wall_s"],
         error=result["error"],
+        probability=_probability(families, answer),
+        brier=_brier(families, answer),
+        processor=result.get("processor_s", math.nan),
     )
+
+
+def _truth(families: tuple[str, ...]) -> set[str]:
+    return set(families) or {"none"}
+
+
+def _probability(families: tuple[str, ...], answer: Mapping[str, Any] | None) -> float:
+    """Probability that the diagnosis gives to what is true; NaN where it gives none."""
+    said = _said(answer)
+    return sum(said.get(f, 0.0) for f in _truth(families)) if said else math.nan
+
+
+def _brier(families: tuple[str, ...], answer: Mapping[str, Any] | None) -> float:
+    """Brier score of the probabilities: 0 is certain and right, 2 certain and wrong."""
+    said, truth = _said(answer), _truth(families)
+    wanted = dict.fromkeys(truth, 1.0 / len(truth))
+    every = {*said, *truth}
+    errors = ((said.get(f, 0.0) - wanted.get(f, 0.0)) ** 2 for f in every)
+    return sum(errors) if said else math.nan
+
+
+def _said(answer: Mapping[str, Any] | None) -> dict[str, float]:
+    listed = [] if answer is None else answer.get("families", [])
+    return {item["family"]: item["probability"] for item in listed}
 
 
 def _validation(stand: Mapping[str, Any]) -> float:

@@ -23,6 +23,7 @@ _HEAD = (
     "| s, median / max |\n|---|---|---|---|---|---|---|---|---|\n"
 )
 _TARGETS = "| over all | reached | wanted | |\n|---|---|---|---|\n"
+_SURE = 0.9  # a probability from which on a diagnosis is sure
 
 
 def report(scores: Sequence[Score]) -> str:
@@ -121,7 +122,31 @@ def _totals(mode: str, scores: Sequence[Score]) -> str:
             f"{min(floors):.2f} to {max(floors):.2f} times that. A walk that "
             "is another in each run counts as noise: not even the hidden truth foretells it."
         )
-    return _TARGETS + "\n".join(row for row in rows if row) + said
+    return _TARGETS + "\n".join(row for row in rows if row) + said + _sureness(scores)
+
+
+def _sureness(scores: Sequence[Score]) -> str:
+    """The calibration of probabilities, and the processor time; "" where neither is known."""
+    sure = [s for s in scores if math.isfinite(s.probability)]
+    spent = [s.processor for s in scores if s.processor > 0.0]
+    said = ""
+    if sure:
+        right = [s for s in sure if s.probability >= _SURE]
+        wrong = [s for s in sure if s.probability <= 1.0 - _SURE]
+        mean, brier = _mean(s.probability for s in sure), _mean(s.brier for s in sure)
+        said = (
+            f"\n\nThe probability given to what is true is {mean:.2f} in the mean, the Brier score "
+            f"{brier:.2f} ({len(sure)} cases): {len(right)} times at least {_SURE:g}, "
+            f"{len(wrong)} times at most {1.0 - _SURE:.2g}."
+        )
+    if spent:
+        said += f"\n\nSeconds of processors: median {statistics.median(spent):.1f}, "
+        said += f"largest {max(spent):.0f}."
+    return said
+
+
+def _mean(values: Iterable[float]) -> float:
+    return statistics.fmean(values)
 
 
 def _share(

@@ -212,6 +212,24 @@ def test_what_went_wrong_is_listed_with_its_seed() -> None:
     assert "1.06 -> 1.20 um, WORSE" in listed[1]
 
 
+def test_probabilities_are_held_against_what_is_true() -> None:
+    sure = result(("drag",), step("drag"))
+    sure["diagnosis"]["families"] = [
+        {"family": "drag", "probability": 0.9}, {"family": "creep", "probability": 0.1}
+    ]  # fmt: skip
+    sure["processor_s"] = 12.5
+    s = score(sure)
+    assert (s.probability, s.processor) == (0.9, 12.5)
+    assert s.brier == pytest.approx(0.1**2 + 0.1**2)
+    page = report([s])
+    assert "The probability given to what is true is 0.90 in the mean" in page
+    assert "1 times at least 0.9" in page
+    assert "Seconds of processors: median 12.5" in page
+    clean = result(())
+    clean["diagnosis"]["families"] = [{"family": "none", "probability": 1.0}]
+    assert score(clean).brier == 0.0
+
+
 def test_modes_have_tables_of_their_own() -> None:
     rich = score(result(("drag",), step("creep", "drag"), mode="rich"))
     page = report([*scores(), rich])
