@@ -30,7 +30,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from dearig.errors import DearigError
 from tests.blind.play import ENGINES, MODES, Bench, Case
 from tests.blind.score import Score, score
-from tests.blind.seeds import chosen
+from tests.blind.seeds import LOOKED_AT, chosen
 from tests.blind.table import line, report
 
 
@@ -45,6 +45,8 @@ def main() -> None:
         _print(bench, None, given.keep, console)
         return
     open_cases = [case for case in wanted if bench.kept(case, given.keep) is None]
+    if any(seed in LOOKED_AT for seed in seeds):
+        console.print("some of these seeds were looked at: report figures of others")
     console.print(
         f"{len(wanted)} cases, {len(wanted) - len(open_cases)} of them done; in {bench.folder}"
     )

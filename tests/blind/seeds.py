@@ -9,10 +9,21 @@ from dearig.config.rigfile import RigFile
 from dearig.sim_backend.truth import cases
 from dearig.sim_backend.truth.cases import FORMS, UNKNOWN, TruthCase
 
-__all__ = ["CLEAN_FROM", "FAMILY_FROM", "chosen", "clean_seeds", "drawn", "family_seeds"]
+__all__ = [
+    "CLEAN_FROM",
+    "FAMILY_FROM",
+    "LOOKED_AT",
+    "chosen",
+    "clean_seeds",
+    "drawn",
+    "family_seeds",
+]
 
 #: Extra clean films and extra cases of one family are looked for from these seeds on.
 CLEAN_FROM, FAMILY_FROM = 1000, 2000
+
+#: Seeds whose cases were looked at to mend the diagnosis by evidence: figures come from others.
+LOOKED_AT = range(60000, 60040)
 
 _RIG = RigFile()
 
