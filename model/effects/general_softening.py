@@ -1,7 +1,7 @@
 """Softening by the largest change of stretch so far, of any form.
 
 With steps B_i (``model.splines``), e the change of stretch from rest and e_max its largest value so
-far, the network carries
+far, which heals (falls towards e) with a time, the network carries
 
     1 - sum_i d_i B_i(e_max) - e_max/(e_max + e_0) sum_i r_i B_i((e_max - e)/(e_max + e_0))
 
@@ -13,6 +13,7 @@ was never stretched from softening by small vibrations.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -65,6 +66,15 @@ EFFECT = Effect(
             starts=(2.4e-2, 1.0),
             logarithmic=True,
         ),
+        Parameter(
+            "healing_time",
+            "s",
+            (1.0, 1e5),
+            "in which the largest stretch is forgotten",
+            1e4,
+            starts=(1e4, 40.0),
+            logarithmic=True,
+        ),
     ),
     memory=1,
     is_hysteretic=True,
@@ -75,9 +85,15 @@ EFFECT = Effect(
 
 
 @jit
+def _largest(c, k, before, now, since):
+    left = math.exp(-since / c[k + _STEPS + _PARTS + 1])
+    return now + max(before - now, 0.0) * left
+
+
+@jit
 def soften(c, k, m, j, lam, since, t, warmth):
     now = abs(lam - c[REST])
-    most, spacing, lost = max(m[j], now), c[k + _STEPS + _PARTS] / _STEPS, 0.0
+    most, spacing, lost = _largest(c, k, m[j], now, since), c[k + _STEPS + _PARTS] / _STEPS, 0.0
     for i in range(_STEPS):
         if c[k + i] > 0.0:
             left = i * spacing
@@ -94,5 +110,5 @@ def soften(c, k, m, j, lam, since, t, warmth):
 
 @jit
 def commit(c, k, m, j, lam, rate, lam0, h, t):
-    m[j] = max(m[j], abs(lam - c[REST]))
+    m[j] = _largest(c, k, m[j], abs(lam - c[REST]), h)
     return 0

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.special import erf
 
 from dearig.model.effects import EFFECTS
 from tests.tools.effect_cases import numbers
@@ -63,6 +64,18 @@ def test_a_general_law_comes_close_to_a_simple_one(general, simple, shape, error
     assert approximate(general, response(simple, numbers(simple, **shape))).error < error
 
 
+def healing(path, values):
+    """Ogden and Roxburgh's loss below a largest energy that heals (Proc. R. Soc. A 455, 1999)."""
+    energy = 0.5 * (path.stretch**2 + path.stretch**-2)
+    energy -= energy[0]
+    width, time = values
+    left, most, out = np.exp(-np.diff(path.time, prepend=0.0) / time), 0.0, []
+    for now, kept in zip(energy, left, strict=True):
+        most = max(now, now + (most - now) * kept)
+        out.append(-erf((most - now) / width))
+    return np.array(out)
+
+
 @pytest.mark.parametrize(
     ("general", "law", "values", "error"),
     [
@@ -70,10 +83,12 @@ def test_a_general_law_comes_close_to_a_simple_one(general, simple, shape, error
         ("general creep", kohlrausch, (20.0, 0.5), 0.03),
         ("general hysteresis", lognormal_loop, (3e-3, 0.8), 0.02),
         ("general friction", lognormal_loop, (2e-4, 0.5), 0.03),
+        ("general softening", healing, (0.01, 40.0), 0.06),
     ],
 )
 def test_a_general_law_comes_close_to_a_published_one(general, law, values, error):
-    assert approximate(general, law(motion(), values)).error < error
+    grid = {"healing_time": 40.0} if law is healing else {}
+    assert approximate(general, law(motion(), values), **grid).error < error
 
 
 @pytest.mark.parametrize("name", GENERAL)

@@ -260,6 +260,7 @@ def extra(name, p, film, drive):
         parts = steps_at([0.25 * i for i in range(6)])
         damage, regained = weights_of(p, "damage"), weights_of(p, "regained")
 
+        # over the course of some seconds nothing heals within the ten thousand of the first start
         def soften(t, lam, u, z, v, lam0):
             now = abs(lam - rest)
             most = max(z[0], now)
