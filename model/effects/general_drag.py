@@ -57,7 +57,7 @@ EFFECT = Effect(
     acts_on="load",
     summary="a force against the motion that grows with its rate, in any form",
     parameters=tuple(
-        Parameter(f"drag_{i + 1}", "Pa", (0.0, 1e5), f"gained at step {i + 1}", 8.0, 0.0)
+        Parameter(f"drag_{i + 1}", "Pa", (0.0, 1e5), f"gained at step {i + 1}", 4.0, 0.0)
         for i in range(_STEPS)
     ),
     is_hysteretic=True,  # steep at rest: turning points need short steps

@@ -20,7 +20,7 @@ EFFECT = Effect(
     acts_on="load",
     summary="a force against the motion that grows with a power of its rate, below 1 or above",
     parameters=(
-        Parameter("drag", "Pa", (0.0, 1e4), "nominal stress at a rate of 0.1/s", 50.0, 0.0),
+        Parameter("drag", "Pa", (0.0, 1e4), "nominal stress at a rate of 0.1/s", 20.0, 0.0),
         Parameter("exponent", "", (0.0, 2.0), "of the rate", 0.3, starts=(0.5, 0.2, 1.4)),
         Parameter(
             "linear_below",

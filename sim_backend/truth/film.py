@@ -21,6 +21,7 @@ from dearig.sim_backend.truth.second_laws import (
     added_stress,
     electrode_charging,
     fastest_decay,
+    healed,
     permittivity_factor,
     trap_leak,
     warming,
@@ -424,7 +425,7 @@ def _derivative(
         stress -= added_stress(h.further, y, second, lam, rate, body.rest, dy)
         stress -= 0.5 * inertia * h.further.lever * rate * rate
         inertia *= 1.0 + h.further.lever * away
-        whole = wholeness(h.further, y, second, lam, body.rest)
+        whole = wholeness(h.further, memory[_LARGEST], lam, body.rest)
     if h.damage > 0.0:
         farthest = (max(memory[_LARGEST], lam) - body.rest) / h.damage_reach
         damage = farthest**h.damage_exponent
@@ -558,7 +559,7 @@ def follow(
             for i in range(slipping.shape[1]):
                 memory[_SLIPPED + i] = _slipped(memory[_SLIPPED + i], slipping[0, i], moved)
             memory[_START] = y[0]
-            memory[_LARGEST] = max(memory[_LARGEST], y[0])
+            memory[_LARGEST] = healed(h.further, memory[_LARGEST], y[0], h_step)
             elapsed += h_step
         if not _intact(springs, y):
             for late in range(k + 1, nodes):

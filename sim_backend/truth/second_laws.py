@@ -21,6 +21,7 @@ __all__ = [
     "added_stress",
     "electrode_charging",
     "fastest_decay",
+    "healed",
     "permittivity_factor",
     "trap_leak",
     "warming",
@@ -63,7 +64,7 @@ class Second(NamedTuple):
     makkar_rise: float = 1.0
     makkar_excess: float = 0.0
     makkar_fall: float = 1.0
-    # softening by the largest strain so far, which heals with a time in s (0: never): erf of Ogden
+    # softening by the largest stretch so far, which heals with a time in s (0: never): erf of Ogden
     # and Roxburgh (share, width), exponential of Simo (share, strain)
     heal_time: float = 0.0
     roxburgh: float = 0.0
@@ -98,9 +99,9 @@ class Second(NamedTuple):
 NOTHING = Second()
 
 #: State variables behind those of the film: elastic strains of the viscoplastic element and of the
-#: nonlinear branch, the loop's variable, the healing largest strain.
-STATES = 4
-_FLOW, _CHAIN, _LOOP, _LARGEST = range(STATES)
+#: nonlinear branch, the loop's variable.
+STATES = 3
+_FLOW, _CHAIN, _LOOP = range(STATES)
 
 _CHAIN_FLOOR = 0.01  # keeps the first flow of Bergstrom and Boyce finite
 _CONVECTION = 0.25  # laminar natural convection: heat flow grows with the power 1.25 (McAdams 1954)
@@ -165,22 +166,24 @@ def added_stress(
     if s.magnet > 0.0:
         nearer = 1.0 - away / s.magnet_gap
         stress -= s.magnet * (1.0 / (nearer * nearer) - 1.0)
-    if s.roxburgh > 0.0 or s.simo > 0.0:
-        now, largest = _strain(lam) - _strain(rest), y[at + _LARGEST]
-        if now >= largest:
-            dy[at + _LARGEST] = max((lam - lam**-3) * rate, 0.0)
-        elif s.heal_time > 0.0:
-            dy[at + _LARGEST] = (max(now, 0.0) - largest) / s.heal_time
     return stress
 
 
 @jit
-def wholeness(s: Second, y: np.ndarray, at: int, lam: float, rest: float) -> float:
-    """Return the factor on the equilibrium spring after softening."""
+def healed(s: Second, largest: float, lam: float, elapsed: float) -> float:
+    """Return the largest stretch after a step of ``elapsed`` s that ends at ``lam``."""
+    if s.heal_time > 0.0 and largest > lam:
+        return lam + (largest - lam) * math.exp(-elapsed / s.heal_time)
+    return max(largest, lam)
+
+
+@jit
+def wholeness(s: Second, farthest: float, lam: float, rest: float) -> float:
+    """Return the factor on the equilibrium spring after a largest stretch of ``farthest``."""
     if s.roxburgh == 0.0 and s.simo == 0.0:
         return 1.0
     now = max(_strain(lam) - _strain(rest), 0.0)
-    largest = max(y[at + _LARGEST], now)
+    largest = max(_strain(farthest) - _strain(rest), now)
     whole = 1.0
     if s.roxburgh > 0.0:
         whole -= s.roxburgh * math.erf((largest - now) / s.roxburgh_width)

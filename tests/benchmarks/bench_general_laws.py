@@ -79,7 +79,7 @@ def along(on_film: Callable[[FilmNumbers], FilmNumbers]) -> np.ndarray:
         pairs = zip(square, path.stretch, strict=True)
         return np.array([second_laws.permittivity_factor(s, v2, e, rest) - 1.0 for v2, e in pairs])
     y, dy = np.zeros(second_laws.STATES), np.zeros(second_laws.STATES)
-    slipped, out = np.zeros(len(film.stops)), [0.0]
+    slipped, out, largest = np.zeros(len(film.stops)), [0.0], rest
     times, moduli = np.array(film.times[len(plain.times) :]), film.moduli[len(plain.moduli) :]
     late = np.zeros(times.size)
     for n in range(1, path.time.size):
@@ -98,7 +98,8 @@ def along(on_film: Callable[[FilmNumbers], FilmNumbers]) -> np.ndarray:
             slipped = np.clip(slipped + travel * _FINER, -ends, ends)
             stress += float(stiffness @ slipped)
         if s.simo or s.roxburgh:
-            out.append(second_laws.wholeness(s, y, 0, path.stretch[n], rest) - 1.0)
+            largest = second_laws.healed(s, largest, path.stretch[n], h * _FINER)
+            out.append(second_laws.wholeness(s, largest, path.stretch[n], rest) - 1.0)
         else:
             out.append(stress + float(np.dot(moduli, strain - late)) / path.stretch[n])
     return np.array(out)

@@ -113,11 +113,11 @@ def spectrum(name, p):
 def risen(x, knots):
     """How much of the area of a hat over three knots lies below ``x``."""
     left, middle, right = knots
-    below = limited((x - left) / (middle - left), 0.0, 1.0) if middle > left else float(x > left)
-    above = limited((right - x) / (right - middle), 0.0, 1.0)
+    if x <= left or x >= right:
+        return float(x > left)
     if x < middle:
-        return (middle - left) / (right - left) * below**2
-    return 1.0 - (right - middle) / (right - left) * above**2
+        return (middle - left) / (right - left) * ((x - left) / (middle - left)) ** 2
+    return 1.0 - (right - middle) / (right - left) * ((right - x) / (right - middle)) ** 2
 
 
 def steps_at(knots, first=0):

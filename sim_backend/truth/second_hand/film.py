@@ -5,7 +5,7 @@ branch that flows with a power of its stress and with the inelastic stretch (Ber
 Mech. Phys. Solids 46, 1998).
 
 Softening. ``ogden_roxburgh``: 1 - 1/r erf((W_max - W)/m) (Ogden and Roxburgh, Proc. R. Soc. A 455,
-1999) whose largest energy heals with a time. ``simo``: damage d (1 - exp(-W_max/s)) (Simo, Comp.
+1999) whose largest stretch heals with a time. ``simo``: damage d (1 - exp(-W_max/s)) (Simo, Comp.
 Meth. Appl. Mech. Eng. 60, 1987), which heals as well or does not.
 
 Loops. ``lognormal_stops``: Prandtl and Ishlinskii's stops with lognormal thresholds (density as in

@@ -28,7 +28,7 @@ def law(form, seed=0):
     return drawn(form, seed).on_film(NUMBERS).hidden.further
 
 
-def stress(s, lam=REST, rate=0.0, state=(0.0, 0.0, 0.0, 0.0)):
+def stress(s, lam=REST, rate=0.0, state=(0.0, 0.0, 0.0)):
     """Stress in Pa against the motion, and the slopes of the states."""
     slopes = np.full(second_laws.STATES, np.nan)
     found = second_laws.added_stress(s, np.array(state), 0, lam, rate, REST, slopes)
@@ -39,8 +39,8 @@ def test_nothing_is_added_without_a_law():
     found, slopes = stress(second_laws.NOTHING, REST + 0.01, 0.1)
     assert found == 0.0
     assert not slopes.any()
-    state = np.ones(second_laws.STATES)
-    assert second_laws.wholeness(second_laws.NOTHING, state, 0, REST, REST) == 1.0
+    assert second_laws.wholeness(second_laws.NOTHING, 1.4, REST, REST) == 1.0
+    assert second_laws.healed(second_laws.NOTHING, 1.4, REST, 9.0) == 1.4
     assert second_laws.permittivity_factor(second_laws.NOTHING, 64e6, 1.3, REST) == 1.0
     assert second_laws.fastest_decay(second_laws.NOTHING, 0.5) == 0.0
 
@@ -50,7 +50,7 @@ def test_perzyna_flows_with_the_power_of_what_is_beyond_the_threshold(seed):
     s = law(film.perzyna, seed)
     reach = s.flow_yield / s.flow_spring
     for part in (0.5, 1.0, 1.5, 3.0):
-        found, slopes = stress(s, state=(part * reach, 0.0, 0.0, 0.0))
+        found, slopes = stress(s, state=(part * reach, 0.0, 0.0))
         assert found == pytest.approx(part * s.flow_yield / REST)
         flow = s.flow_rate * max(part - 1.0, 0.0) ** s.flow_exponent
         assert slopes[0] == pytest.approx(-flow, abs=1e-12)
@@ -59,9 +59,9 @@ def test_perzyna_flows_with_the_power_of_what_is_beyond_the_threshold(seed):
 def test_bodner_and_partom_flow_at_any_stress_but_hardly_below_some():
     s = law(film.bodner_partom)
     strain = s.flow_yield / s.flow_spring
-    _, at_its_stress = stress(s, state=(-strain, 0.0, 0.0, 0.0))
+    _, at_its_stress = stress(s, state=(-strain, 0.0, 0.0))
     assert at_its_stress[0] == pytest.approx(s.flow_limit * math.exp(-0.5))
-    _, below = stress(s, state=(0.1 * strain, 0.0, 0.0, 0.0))
+    _, below = stress(s, state=(0.1 * strain, 0.0, 0.0))
     assert 0.0 < -below[0] < 1e-3 * s.flow_limit
 
 
@@ -81,10 +81,10 @@ def test_what_is_drawn_is_what_a_steady_pull_gives():
 
 def test_a_branch_flows_with_a_power_of_its_stress_and_slows_down():
     s = law(film.bergstrom_boyce)
-    _, fresh = stress(s, REST * math.exp(0.01), state=(0.0, 0.01, 0.0, 0.0))
+    _, fresh = stress(s, REST * math.exp(0.01), state=(0.0, 0.01, 0.0))
     held = s.chain_spring * math.sinh(0.02)
     assert fresh[1] == pytest.approx(-s.chain_rate * (held / s.chain_stress) ** s.chain_exponent)
-    _, flowed = stress(s, REST * math.exp(0.11), state=(0.0, 0.01, 0.0, 0.0))
+    _, flowed = stress(s, REST * math.exp(0.11), state=(0.0, 0.01, 0.0))
     assert 0.0 < -flowed[1] < -fresh[1]
 
 
@@ -113,23 +113,24 @@ def test_the_loops_centre_line_is_where_no_loop_is_left():
     away = 0.5 * s.duhem_width
     centre = s.duhem_level * math.tanh(0.5)
     for way in (-1.0, 1.0):
-        _, slopes = stress(s, REST + away, way, (0.0, 0.0, centre, 0.0))
+        _, slopes = stress(s, REST + away, way, (0.0, 0.0, centre))
         assert slopes[2] == pytest.approx(way / s.duhem_reach)
 
 
 def test_softening_is_by_the_largest_energy_and_heals():
     s = law(film.ogden_roxburgh)
-    lam, largest = REST + 0.01, 1.5 * s.roxburgh_width
-    now = second_laws._strain(lam) - second_laws._strain(REST)
-    state = np.array([0.0, 0.0, 0.0, largest])
-    whole = second_laws.wholeness(s, state, 0, lam, REST)
-    expected = 1.0 - s.roxburgh * math.erf(max(largest - now, 0.0) / s.roxburgh_width)
-    assert whole == pytest.approx(expected)
-    _, slopes = stress(s, REST, 0.0, tuple(state))
-    assert slopes[3] == pytest.approx(-largest / s.heal_time)
+    lam, farthest = REST + 0.01, REST + 0.025
+    energy = second_laws._strain(farthest) - second_laws._strain(lam)
+    assert energy == pytest.approx(0.5 * (farthest**2 + farthest**-2 - lam**2 - lam**-2))
+    whole = second_laws.wholeness(s, farthest, lam, REST)
+    assert whole == pytest.approx(1.0 - s.roxburgh * math.erf(energy / s.roxburgh_width))
+    left = second_laws.healed(s, farthest, lam, 0.5 * s.heal_time) - lam
+    assert left == pytest.approx(0.015 * math.exp(-0.5))
+    assert second_laws.healed(s, lam, farthest, 1.0) == farthest
     s = law(film.simo)
-    whole = second_laws.wholeness(s, state, 0, REST, REST)
-    assert whole == pytest.approx(1.0 - s.simo * (1.0 - math.exp(-largest / s.simo_strain)))
+    energy = second_laws._strain(farthest) - second_laws._strain(REST)
+    whole = second_laws.wholeness(s, farthest, REST, REST)
+    assert whole == pytest.approx(1.0 - s.simo * (1.0 - math.exp(-energy / s.simo_strain)))
 
 
 def test_permittivities_are_their_formulas():
