@@ -131,7 +131,7 @@ def require_curve(name, truth, layout, x):
     """The curve of a general law is found again, though each weight may not be."""
     found = dict(dict(layout.model(layout.values(x)).effects)[name])
     a, b = (EFFECTS[name].curve(v) for v in (found, dict(dict(truth.effects)[name])))
-    np.testing.assert_array_equal(a.axis, b.axis)
+    np.testing.assert_allclose(a.axis, b.axis, rtol=1e-9)
     np.testing.assert_allclose(a.values, b.values, atol=0.05 * np.abs(b.values).max())
 
 
