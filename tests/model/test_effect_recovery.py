@@ -62,6 +62,8 @@ LARGER_IN_FILMS = 20.0
 IN_FILMS = {
     "first-loading damage": {"softening": 0.1, "reach": 0.3},
     "distributed hysteresis": {"reach": 0.1},
+    "general hysteresis": {"reach": 0.5},
+    "general softening": {"reach": 0.5},
 }
 # a start that is 1.5 times off is in another valley for these, or where nothing is seen of them
 NEARER = {"mains interference": 1.00005, "sensor ripple": 1.05}
