@@ -85,7 +85,10 @@ class Search:
         self.effects = [
             e
             for e in EFFECTS.values()
-            if drive in e.drives and e.drift_basis is None and (warm or e.name != "temperature")
+            if drive in e.drives
+            and e.drift_basis is None
+            and (warm or e.name != "temperature")
+            and not e.is_general  # their weights are not raced yet
         ]
 
     def watch(self) -> None:
