@@ -195,6 +195,7 @@ class FolderModel(QAbstractTableModel):
             return
         self._summaries[summary.path] = summary
         self._texts.pop(summary.path, None)
+        self._searched(summary.path)  # now, so that the first search does not make all of them
         row = self._row.get(summary.path)
         if row is not None:
             self.dataChanged.emit(self.index(row, 0), self.index(row, len(COLUMNS) - 1))

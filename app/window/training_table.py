@@ -88,7 +88,9 @@ class TrainingTable(QTableWidget):
         self.changed.emit()
 
     def _fill_row(self, row: int, path: Path, train: bool, validate: bool) -> None:
-        item = QTableWidgetItem(path.stem)
+        summary = self._library.summaries.get(path)
+        # with its subfolder, once it is known
+        item = QTableWidgetItem(path.stem if summary is None else summary.name or path.stem)
         item.setData(Qt.ItemDataRole.UserRole, path)
         item.setFlags(Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable)
         self.setItem(row, _NAME, item)
@@ -113,6 +115,7 @@ class TrainingTable(QTableWidget):
         if summary is None:
             return
         item = self._item(row, _NAME)
+        item.setText(summary.name or summary.path.stem)
         film = f", {summary.film}" if summary.film else ""
         about = f"{summary.path}\n{summary.title}, {seconds(summary.duration)}{film}"
         item.setToolTip(plain_tip(summary.trouble or about))
@@ -129,7 +132,9 @@ class TrainingTable(QTableWidget):
 
     @Slot(QTableWidgetItem)
     def _item_changed(self, item: QTableWidgetItem) -> None:
-        if item.column() in (_TRAIN, _VALIDATE) and item.checkState() == Qt.CheckState.Checked:
+        if item.column() not in (_TRAIN, _VALIDATE):
+            return  # a name or its tip
+        if item.checkState() == Qt.CheckState.Checked:
             # an error on training data is no validation: a recording is one or the other
             other = self._item(item.row(), _VALIDATE + _TRAIN - item.column())
             other.setCheckState(Qt.CheckState.Unchecked)
