@@ -43,7 +43,7 @@ class ErrorPanel(QFrame):
         self.dismiss_button.clicked.connect(self._dismiss)
         for made in (self.copy_button, self.log_button, self.dismiss_button):
             # a key that stops a run must never press one of these
-            made.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+            made.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # their letters with Alt press them
         text = QVBoxLayout()
         text.setSpacing(2)
         text.addWidget(self.headline)
