@@ -73,6 +73,7 @@ class PlotArea(QWidget):
         self.file_stem = name  #: proposed name of saved files, without an ending
         self.canvas = Canvas()
         self.canvas.setAccessibleName(name)
+        self._sizes: dict[int, tuple[int, int]] = {}  # of rows: share and least height in px
         self._groups: dict[str, Group] = {}
         self._group_of: dict[Plot, Group] = {}
         self._active: Group | None = None  # the pointer was on it last
@@ -156,10 +157,8 @@ class PlotArea(QWidget):
         """
         plot = Plot(left, bottom, log, own_range)
         self.canvas.addItem(plot, row, column, rowspan=rows)
-        layout = self.canvas.ci.layout
         for taken in range(row, row + rows):
-            layout.setRowStretchFactor(taken, weight)
-            layout.setRowMinimumHeight(taken, least)
+            self._sizes[taken] = (weight, least)
         self.canvas.area_plots.append(plot)
         chosen = self._groups.setdefault(group, Group(group))
         chosen.add(plot)
@@ -179,13 +178,9 @@ class PlotArea(QWidget):
 
     def remove_plot(self, plot: Plot) -> None:
         """Remove ``plot``."""
-        row = self.canvas.ci.items[plot][0][0]
         self._group_of.pop(plot).remove(plot)
         self.canvas.area_plots.remove(plot)
         self.canvas.removeItem(plot)
-        if all(self._row(other) != row for other in self.plots):
-            self.canvas.ci.layout.setRowStretchFactor(row, 0)
-            self.canvas.ci.layout.setRowMinimumHeight(row, 0.0)
         self._history.clear()
         self.arrange()
 
@@ -198,22 +193,26 @@ class PlotArea(QWidget):
     def arrange(self) -> None:
         """Number the lowest horizontal axis of each group in each column, and set the height."""
         lowest: dict[tuple[int, str], Plot] = {}
-        least: dict[int, float] = {}
+        shown: set[int] = set()
         for plot in self.plots:
             if not plot.isVisible():
                 continue
-            row, column = self.canvas.ci.items[plot][0]
+            cells = self.canvas.ci.items[plot]
+            row, column = cells[0]
             place = (column, self._group_of[plot].name)
             if place not in lowest or self._row(lowest[place]) < row:
                 lowest[place] = plot
-            least[row] = max(
-                least.get(row, 0.0), self.canvas.ci.layout.rowMinimumHeight(row)
-            )  # fmt: skip
+            shown.update(taken for taken, _ in cells)
         for plot in self.plots:
             bottom = plot in lowest.values()
             plot.getAxis("bottom").setStyle(showValues=bottom)
             plot.getAxis("bottom").showLabel(bottom)
-        self.canvas.setMinimumHeight(round(sum(least.values())))
+        layout = self.canvas.ci.layout
+        for taken, (weight, least) in self._sizes.items():
+            # the row of a hidden or removed plot takes no height
+            layout.setRowStretchFactor(taken, weight if taken in shown else 0)
+            layout.setRowMinimumHeight(taken, float(least) if taken in shown else 0.0)
+        self.canvas.setMinimumHeight(sum(self._sizes[taken][1] for taken in shown))
 
     def _row(self, plot: Plot) -> int:
         row: int = self.canvas.ci.items[plot][0][0]
