@@ -18,6 +18,7 @@ from dearig.analysis.compatibility import (
     of_rig,
 )
 from dearig.analysis.cores import for_simulations
+from dearig.analysis.early_ends import choose
 from dearig.analysis.experiment import separating_experiment
 from dearig.analysis.outcomes import (
     Comparison,
@@ -26,7 +27,7 @@ from dearig.analysis.outcomes import (
     Stand,
     pooled_rms,
 )
-from dearig.analysis.quality import check_enough, extrapolated, inspect
+from dearig.analysis.quality import check_enough, extrapolated, few_data, inspect
 from dearig.analysis.records import Source, as_record, check_named_once, compare, open_all
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
@@ -65,25 +66,28 @@ def diagnose_recordings(
     drive: str = "command",
     rig_file: RigFile | None = None,
     thorough: bool = False,
+    ended_early: str = "keep",
     clock: Callable[[], float] = time.monotonic,
     progress: Progress = quiet,
 ) -> DiagnoseOutcome:
     """Find the effects that the thesis's model of ``train`` lacks.
 
     The ``validation`` recordings are read last, and play no part in the search. ``progress``
-    receives the fraction of the whole work. A search that is not ``thorough`` ends after about a
+    receives the fraction of the whole work. ``ended_early`` is keep, cut or leave-out: what is done
+    with recordings whose runs ended early. A search that is not ``thorough`` ends after about a
     minute. The first ctrl-C ends it and keeps what was found (``finding.interrupted``); the second
     raises. Nothing is written; ``save_fitted_model`` writes the improved model. Raises
     ``InputError`` for recordings that cannot be diagnosed.
     """
     started = clock()
     check_named_once(train, validation)
-    settings = _Settings(branches, drive, rig_file, thorough)
-    recordings = open_all(train)
-    others = open_all(validation)
+    settings = _Settings(branches, drive, rig_file, thorough, ended_early)
+    recordings, left_out = choose(open_all(train), ended_early)
+    others, also_left_out = choose(open_all(validation), ended_early)
     base, quality = _prepared(recordings, others, settings)
     finding = _search(recordings, base, settings, progress)
-    return _outcome(recordings, others, finding, quality, settings, "", started, clock)
+    said = (*left_out, *also_left_out, *quality)
+    return _outcome(recordings, others, finding, said, settings, "", started, clock)
 
 
 def diagnose_rig(
@@ -99,6 +103,7 @@ def diagnose_rig(
     configuration: str = "",
     seed: int = 0,
     thorough: bool = False,
+    ended_early: str = "keep",
     overwrite: bool = False,
     clock: Callable[[], float] = time.monotonic,
     progress: Progress = quiet,
@@ -108,14 +113,14 @@ def diagnose_rig(
     The first recording is the thesis's (unless ``train`` are given), then come at most
     ``experiments`` more, for as long as rivals are left; at the end ``VALIDATION`` are recorded
     (unless ``validation`` are given) and read once. All recordings go to the folder ``out``.
-    ``seed`` is of a simulated rig's noise, ``thorough`` as of ``diagnose_recordings``. When ctrl-C,
-    an interlock, an instrument or the disk ends a run, the rig is safe and no more is recorded: the
-    results until then are kept, and ``ended`` of the outcome says why. Raises the error that ends
-    the first run, and ``NotSafe`` at once.
+    ``seed`` is of a simulated rig's noise, ``thorough`` and ``ended_early`` as of
+    ``diagnose_recordings``. When ctrl-C, an interlock, an instrument or the disk ends a run, the
+    rig is safe and no more is recorded: the results until then are kept, and ``ended`` of the
+    outcome says why. Raises the error that ends the first run, and ``NotSafe`` at once.
     """
     started = clock()
     check_named_once(train, validation)
-    settings = _Settings(branches, drive, rig_file, thorough)
+    settings = _Settings(branches, drive, rig_file, thorough, ended_early)
     names = [*([] if train else ["thesis"]), *(_experiment_name(n) for n in range(experiments))]
     planned = [*names, *([] if validation else VALIDATION)]
     for name in planned:
@@ -135,7 +140,7 @@ def diagnose_rig(
     )
     others: list[Recording] = []
     if validation:
-        others = open_all(validation)
+        others, _ = choose(open_all(validation), settings.ended_early)
     elif not (ended or finding.interrupted):
         recorded = len(recorder.made)
         ended = recorder.run_until_ended(*VALIDATION)
@@ -159,6 +164,7 @@ class _Settings:
     drive: str
     rig_file: RigFile | None
     thorough: bool
+    ended_early: str
 
     @property
     def rig(self) -> RigFile:
@@ -248,7 +254,7 @@ def _search_and_separate(
     files = [*files]
     performed: list[str] = []
     while True:
-        recordings = open_all(files)
+        recordings, _ = choose(open_all(files), settings.ended_early)
         base, _ = _prepared(recordings, [], settings)
         finding = _search(recordings, base, settings, recorder.parts.part(2.0))
         if finding.interrupted or len(performed) >= experiments:
@@ -356,6 +362,7 @@ def _outcome(
         seconds=seconds,
         performed=tuple(performed),
         rig=rig,
+        few_data=few_data(recordings, drive),
         not_compared=tuple(r.name for r in others if r.name not in compared),
     )
     history = _history(outcome, recordings)

@@ -11,7 +11,9 @@ import numpy as np
 
 from dearig.analysis.compatibility import base_model, check_apart, check_branches
 from dearig.analysis.cores import for_simulations
+from dearig.analysis.early_ends import choose
 from dearig.analysis.outcomes import BranchTrial, Comparison, IdentifyOutcome
+from dearig.analysis.quality import few_data
 from dearig.analysis.records import (
     PUBLISHED_FIT,
     Source,
@@ -46,6 +48,7 @@ def identify_recordings(
     rig_file: RigFile | None = None,
     seed: int = 0,
     intervals: bool = True,
+    ended_early: str = "keep",
     clock: Callable[[], float] = time.monotonic,
     progress: Progress = quiet,
 ) -> IdentifyOutcome:
@@ -54,13 +57,14 @@ def identify_recordings(
     With several numbers of ``branches`` each is fitted, and the one with the lowest information
     criterion on the training data is kept; the ``validation`` recordings are read once, at the end,
     and play no part in the choice. Film and load come from the recordings, else from ``rig_file``.
+    ``ended_early`` is keep, cut or leave-out: what is done with recordings whose runs ended early.
     ``clock`` gives seconds. Nothing is written; ``save_fitted_model`` writes the model. Raises
     ``InputError`` for everything that cannot be fitted.
     """
     check_named_once(train, validation)
     started = clock()
-    recordings = open_all(train)
-    others = open_all(validation)
+    recordings, left_out = choose(open_all(train), ended_early)
+    others, also_left_out = choose(open_all(validation), ended_early)
     check_apart(recordings, others)
     records = [as_record(r, drive) for r in recordings]
     for count in branches:
@@ -103,6 +107,8 @@ def identify_recordings(
         validation=tuple(validated),
         trials=tuple(trials),
         seconds=seconds,
+        quality=(*left_out, *also_left_out),
+        few_data=few_data(recordings, drive),
         published_fit=PUBLISHED_FIT if is_thesis_run else None,
     )
 

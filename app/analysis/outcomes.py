@@ -13,6 +13,7 @@ import numpy as np
 
 from dearig.errors import DearigError
 from dearig.model.verdict import BUDGET, COMPLETE, STOPPED, Judgement, judge
+from dearig.recording.early_end import EarlyEnd, named
 
 if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
@@ -54,7 +55,8 @@ class Comparison:
     the measured unit, None where it could not be read. ``role`` is train or validation. ``table``
     is A, B, or "" for a run that is in neither of the thesis's validation tables, ``row`` its label
     there (f = 0.2 Hz). ``rms_without_events`` is the error in the measured unit without the
-    recording's own drift and events, None where these were not looked for.
+    recording's own drift and events, None where these were not looked for. ``ended`` says how the
+    run ended if it ended early.
     """
 
     name: str
@@ -71,6 +73,12 @@ class Comparison:
     published: Published | None = None
     warnings: tuple[str, ...] = field(default=())
     rms_without_events: float | None = None
+    ended: EarlyEnd | None = None
+
+    @property
+    def marked_name(self) -> str:
+        """The name, marked with how the run ended if it ended early."""
+        return named(self.name, self.ended)
 
     def over_noise(self, noise: float) -> float:
         """Return the error, without events where they are known, over the recording's noise.
@@ -110,7 +118,8 @@ class IdentifyOutcome:
     """A finished identification: fit, training runs, and validation runs if any.
 
     ``model`` is the fitted model with its history; ``model_path`` is where it was saved, "" if it
-    was not. ``seconds`` is the computing time.
+    was not. ``quality`` are sentences on recordings, ``few_data`` says how few data were fitted,
+    "" if there are enough. ``seconds`` is the computing time.
     """
 
     title: str
@@ -123,6 +132,8 @@ class IdentifyOutcome:
     trials: tuple[BranchTrial, ...]
     seconds: float
     model_path: str = ""
+    quality: tuple[str, ...] = ()
+    few_data: str = ""
     published_fit: Published | None = None
 
 
@@ -182,7 +193,8 @@ class DiagnoseOutcome:
     why there is none. ``performed`` describes the experiments that were run on a rig, one sentence
     each. ``quality`` are sentences on recordings. ``ended`` is the error that ended the recording
     on the rig early, None if none did. ``not_compared`` names validation recordings that the final
-    model cannot follow. ``seconds`` is the computing time.
+    model cannot follow. ``few_data`` says how few data were fitted, "" if there are enough.
+    ``seconds`` is the computing time.
     """
 
     title: str
@@ -201,6 +213,7 @@ class DiagnoseOutcome:
     rig: str = ""
     ended: DearigError | None = None
     not_compared: tuple[str, ...] = ()
+    few_data: str = ""
 
     @property
     def status(self) -> str:

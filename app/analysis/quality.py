@@ -15,7 +15,7 @@ from dearig.errors import InputError
 from dearig.model.material import THESIS_FILM, VACUUM_PERMITTIVITY, Film
 from dearig.recording.recording import Recording
 
-__all__ = ["Quality", "check_enough", "driven_by", "extrapolated", "inspect", "overlap"]
+__all__ = ["Quality", "check_enough", "driven_by", "extrapolated", "few_data", "inspect", "overlap"]
 
 #: With fewer samples there are no statistics of a recording to compare a sample with.
 _SAMPLES_MIN = 20
@@ -105,6 +105,40 @@ def check_enough(recordings: Sequence[Recording], drive: str = "command") -> Non
             f"are too few to tell one effect from another; give recordings of several lobes, with "
             f"at least 3 s and 200 samples in all"
         )
+
+
+#: s under voltage below which data are few: the longest relaxation time of the thesis's Table 3.
+_FEW_SECONDS = 8.4
+#: Loadings below which data are few: with two, the first and a later one differ or not; with three,
+#: the later ones can be compared with each other.
+_FEW_LOADINGS = 3
+_FEW_SAMPLES = 300  # of a film: three times what ``check_enough`` refuses
+
+
+def few_data(recordings: Sequence[Recording], drive: str = "command") -> str:
+    """Return how few data ``recordings`` hold in all, as "4.2 s under voltage, 2 loadings".
+
+    Empty where there are enough: loadings to compare with each other, and a time in which slow
+    relaxation shows.
+    """
+    seconds, loadings, samples = 0.0, 0, 0
+    for recording in recordings:
+        moved = driven_by(recording, drive)
+        if moved is None or moved.size == 0:
+            continue
+        pull = np.abs(moved - 1.0 if recording.kind == "film" else moved)
+        high = pull > 0.5 * float(pull.max())
+        loadings += int(np.count_nonzero(high[1:] & ~high[:-1]))
+        samples += moved.size
+        on = np.flatnonzero(pull > 0.02 * float(pull.max()))
+        if on.size:
+            seconds += float(recording.time[on[-1]] - recording.time[on[0]])
+    times = f"{loadings} loading{'' if loadings == 1 else 's'}"
+    if recordings[0].kind == "film":
+        return f"{samples} samples, {times}" if samples < _FEW_SAMPLES else ""
+    if seconds >= _FEW_SECONDS and loadings >= _FEW_LOADINGS:
+        return ""
+    return f"{seconds:.3g} s under voltage, {times}"
 
 
 def overlap(one: Recording, two: Recording) -> tuple[float, float] | None:

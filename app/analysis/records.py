@@ -24,6 +24,7 @@ from dearig.model.film import Strip
 from dearig.model.measures import errors
 from dearig.model.noise import noise_of
 from dearig.model.records import ActuatorRecord, FilmRecord, Record, counted
+from dearig.recording.early_end import early_end
 from dearig.recording.reader import open_recording
 from dearig.recording.recording import Recording
 from dearig.recording.rest_noise import MIN_QUIET, noise_floor
@@ -251,8 +252,9 @@ def compare(
         quiet = recording.quiet & usable
         driven, noise = drive_of.voltage, noise_floor(recording.time[quiet], signal[quiet])
         table, row, published = _place(recording)
-    if not recording.complete:
-        warnings.append("the recording is incomplete: the run was interrupted or killed")
+    ended = early_end(recording)
+    if ended is not None:
+        warnings.append(ended.sentence)
     return Comparison(
         name=recording.name,
         kind=recording.kind,
@@ -267,6 +269,7 @@ def compare(
         row=row,
         published=published,
         warnings=tuple(warnings),
+        ended=ended,
     )
 
 

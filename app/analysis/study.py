@@ -41,7 +41,8 @@ class Task:
     ``diagnose`` or else identify, with Maxwell ``branches``, a ``spring`` (for identify) and
     ``drive`` command or monitor. ``train`` are fitted, ``validation`` read once at the end.
     ``limits`` is the rig file within whose limits an experiment is proposed; film and load are
-    those of the recordings.
+    those of the recordings. ``ended_early`` is keep, cut or leave-out: what is done with recordings
+    whose runs ended early.
     """
 
     diagnose: bool
@@ -51,6 +52,7 @@ class Task:
     spring: str = "gent"
     drive: str = "command"
     limits: RigFile | None = None
+    ended_early: str = "keep"
 
 
 @dataclass(frozen=True)
@@ -115,12 +117,12 @@ def study(
     if task.diagnose:
         found = diagnose_recordings(
             task.train, validation=task.validation, branches=task.branches, drive=task.drive,
-            rig_file=_rig_of(task), clock=clock, progress=progress,
+            rig_file=_rig_of(task), ended_early=task.ended_early, clock=clock, progress=progress,
         )  # fmt: skip
     else:
         found = identify_recordings(
             task.train, validation=task.validation, branches=(task.branches,), spring=task.spring,
-            drive=task.drive, clock=clock, progress=progress,
+            drive=task.drive, ended_early=task.ended_early, clock=clock, progress=progress,
         )  # fmt: skip
     where = _new_folder(folder)
     model, report = where / "model.toml", where / "report.html"

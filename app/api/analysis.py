@@ -50,6 +50,7 @@ def identify(
     rig_file: RigSource | None = None,
     seed: int = 0,
     intervals: bool = True,
+    ended_early: str = "keep",
     progress: Progress = quiet,
 ) -> IdentifyResult:
     """Fit the model to recordings.
@@ -77,6 +78,9 @@ def identify(
         Of Algorithm 1.
     intervals : bool
         Compute 95 % intervals.
+    ended_early : str
+        Of recordings whose runs ended early: ``keep`` them, ``cut`` the end that may show a fault,
+        or ``leave-out``.
     progress : callable, optional
         Called with a stage and the fraction of it that is done.
 
@@ -96,6 +100,7 @@ def identify(
         rig_file=None if rig_file is None else load_rig(rig_file)[0],
         seed=seed,
         intervals=intervals,
+        ended_early=ended_early,
         progress=progress,
     )
     return IdentifyResult(outcome)
@@ -146,6 +151,7 @@ def diagnose(
     drive: str = "command",
     rig_file: RigSource | None = None,
     thorough: bool = False,
+    ended_early: str = "keep",
     progress: Progress = quiet,
 ) -> DiagnoseResult:
     """Find the effects that the thesis's model of recordings lacks.
@@ -164,6 +170,9 @@ def diagnose(
         Film and load in place of those in the recordings, and the limits of a proposed experiment.
     thorough : bool
         Search without a time budget; otherwise for about a minute.
+    ended_early : str
+        Of recordings whose runs ended early: ``keep`` them, ``cut`` the end that may show a fault,
+        or ``leave-out``.
     progress : callable, optional
         Called with a stage and the fraction of all the work that is done.
 
@@ -180,6 +189,7 @@ def diagnose(
         drive=drive,
         rig_file=None if rig_file is None else load_rig(rig_file)[0],
         thorough=thorough,
+        ended_early=ended_early,
         progress=progress,
     )
     return DiagnoseResult(outcome)

@@ -13,6 +13,8 @@ from dearig.cli.options import (
     Branches,
     Drive,
     DriveChannel,
+    EndedEarly,
+    EndedEarlyOption,
     Force,
     Json,
     ManyToValidate,
@@ -23,7 +25,14 @@ from dearig.cli.options import (
     SpringKind,
     Validation,
 )
-from dearig.cli.output import check_files, optional, print_line, working, write_result
+from dearig.cli.output import (
+    check_files,
+    optional,
+    print_early_ends,
+    print_line,
+    working,
+    write_result,
+)
 from dearig.errors import InputError, Interrupted
 
 if TYPE_CHECKING:
@@ -145,6 +154,7 @@ def identify(
         int, typer.Option(min=0, max=10**15, help="Seed of Algorithm 1's random numbers.")
     ] = 0,
     intervals: Annotated[bool, typer.Option(help="Compute 95 % confidence intervals.")] = True,
+    ended_early: EndedEarlyOption = EndedEarly.keep,
     report: Report = None,
     json: Json = None,
     force: Force = False,
@@ -163,6 +173,7 @@ def identify(
     numbers = _branches(branches)
     check_files(force, (*train, *(validate_ or []), rig_file), out, *optional(report), json=json)
     with working(json) as (console, progress):
+        print_early_ends(console, [*train, *(validate_ or [])], ended_early.value)
         outcome = identify_recordings(
             train,
             validation=validate_ or [],
@@ -174,6 +185,7 @@ def identify(
             rig_file=None if rig_file is None else load_rig_file(rig_file),
             seed=seed,
             intervals=intervals,
+            ended_early=ended_early.value,
             progress=progress,
         )
         outcome = save_fitted_model(outcome, out, force)
@@ -250,6 +262,7 @@ def diagnose(
     experiments: Experiments = 1,
     out: ResultFolder = Path("diagnosis"),
     thorough: Thorough = False,
+    ended_early: EndedEarlyOption = EndedEarly.keep,
     seed: Seed = 0,
     json: Json = None,
     force: Force = False,
@@ -281,17 +294,20 @@ def diagnose(
         result_folder(out, force)
         report, model_out = report or out / "report.html", model_out or out / "model.toml"
     with working(json, whole=True) as (console, progress):
+        print_early_ends(console, [*given, *others], ended_early.value)
         if rig is None:
             outcome = diagnose_recordings(
                 given, validation=others, branches=branches, drive=drive.value,
-                rig_file=settings, thorough=thorough, progress=progress,
+                rig_file=settings, thorough=thorough, ended_early=ended_early.value,
+                progress=progress,
             )  # fmt: skip
         else:
             outcome = diagnose_rig(
                 rig, out, experiments=experiments, train=given, validation=others,
                 branches=branches, drive=drive.value, rig_file=settings,
                 configuration="" if rig_file is None else read_text(rig_file, "rig file"),
-                seed=seed, thorough=thorough, overwrite=force, progress=progress,
+                seed=seed, thorough=thorough, ended_early=ended_early.value, overwrite=force,
+                progress=progress,
             )  # fmt: skip
         if model_out is not None:
             outcome = save_fitted_model(outcome, model_out, force)

@@ -13,6 +13,8 @@ __all__ = [
     "Branches",
     "Drive",
     "DriveChannel",
+    "EndedEarly",
+    "EndedEarlyOption",
     "Faults",
     "FilmName",
     "Force",
@@ -53,6 +55,14 @@ class DriveChannel(StrEnum):
     monitor = "monitor"
 
 
+class EndedEarly(StrEnum):
+    """What is done with recordings whose runs ended early."""
+
+    keep = "keep"
+    cut = "cut"
+    leave_out = "leave-out"
+
+
 class Kinematics(StrEnum):
     """Ways to hold a film."""
 
@@ -84,6 +94,14 @@ Seed = Annotated[int, typer.Option(min=0, max=10**15, help="Seed of the simulate
 Drive = Annotated[
     DriveChannel,
     typer.Option(help="Voltage that drives the model: the command or the amplifier's monitor."),
+]
+EndedEarlyOption = Annotated[
+    EndedEarly,
+    typer.Option(
+        "--ended-early",
+        help="Recordings whose runs ended early: keep them, cut the end that may show a fault, or "
+        "leave them out.",
+    ),
 ]
 Branches = Annotated[
     str,

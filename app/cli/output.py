@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -90,6 +90,20 @@ def print_lines(console: Console, texts: Iterable[str], style: str | None = None
     # at once: rich takes a tenth of a millisecond for each call, and there may be 10,000 lines
     text = "\n".join(printable(text, most=MESSAGE_MAX) for text in texts)
     console.print(text, style=style, markup=False, highlight=False, emoji=False, soft_wrap=True)
+
+
+def print_early_ends(console: Console, sources: Sequence[Path], choice: str) -> None:
+    """Warn of recordings whose runs ended early, before they are used as they are."""
+    from dearig.analysis.early_ends import early_end_warnings
+
+    found = early_end_warnings(sources) if choice == "keep" else ()
+    if found:
+        print_lines(console, [f"Warning: {said}" for said in found], "yellow")
+        print_line(
+            console,
+            "Use --ended-early cut to leave out such an end, or --ended-early leave-out to leave "
+            "out the recording.",
+        )
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -53,6 +54,7 @@ class Arrays:
     ) -> None:
         self.path = path
         self.samples = samples
+        self._in_file = samples
         self.stored = stored
         known = tuple(n for n in UNITS if n in stored or n in derived)
         declared = dict.fromkeys(n for n in (*stored, *derived) if n not in UNITS)
@@ -86,6 +88,13 @@ class Arrays:
 
         return self._of_entry(cut)
 
+    def shortened(self, samples: int) -> Arrays:
+        """Return the first ``samples`` of the same values."""
+        short = copy(self)
+        short.samples = min(samples, self.samples)
+        short._read = {name: values[: short.samples] for name, values in self._read.items()}
+        return short
+
     def overview(self, name: str, points: int, start: int, stop: int) -> Overview:
         """Return ``name`` between two samples in at most about ``points`` bins."""
         start, stop = max(start, 0), min(stop, self.samples)
@@ -101,7 +110,7 @@ class Arrays:
     def lead_in(self, step: float) -> int:
         """Count the samples at 0 V at the start; ``step`` V is the resolution of the voltage."""
         if "voltage_command" in self._derived:
-            return self._of_entry(lambda entry: self._counts(entry).lead_in())
+            return min(self._of_entry(lambda entry: self._counts(entry).lead_in()), self.samples)
         return lead_in(self.read("voltage_command"), step)
 
     def _of_entry(self, look: Callable[[h5py.Group], T]) -> T:
@@ -120,14 +129,14 @@ class Arrays:
     def _row(self, entry: h5py.Group, name: str) -> h5py.Dataset:
         data = group(entry, "data")
         row = None if data is None else dataset(data, name)
-        if row is None or row.shape != (self.samples,):
+        if row is None or row.shape != (self._in_file,):
             raise InputError(
                 f"{self.path}: /entry/data/{name} has changed since the file was opened"
             )
         return row
 
     def _counts(self, entry: h5py.Group) -> Counts:
-        counts = Counts(entry, self.samples, self._rest)
+        counts = Counts(entry, self._in_file, self._rest)
         self._rest = counts.rest
         return counts
 

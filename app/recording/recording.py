@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -193,6 +193,11 @@ class Recording:
         """
         self._check_channel(channel)
         return self.arrays.window(channel, start, stop)
+
+    def until(self, end: float) -> Recording:
+        """Return the recording up to ``end`` in s, at least its first sample."""
+        samples = max(int(np.searchsorted(self.time, end, side="right")), 1)
+        return replace(self, arrays=self.arrays.shortened(samples))
 
     def _check_channel(self, channel: str) -> None:
         if channel not in self.arrays.names:

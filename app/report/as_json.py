@@ -60,6 +60,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "trials": [_trial_json(t, outcome.kind) for t in outcome.trials],
         "published_fit": _published_json(outcome.published_fit),
         "simulations": int(fit.simulations),
+        "few_data": outcome.few_data,
         "seconds": _number(outcome.seconds),
         "warnings": list(warnings_of(outcome)),
     }
@@ -112,7 +113,21 @@ def _comparison_json(comparison: Comparison) -> dict[str, Any]:
         **measures,
         **_noise_json(comparison.kind, (comparison,)),
         "published": _published_json(comparison.published),
+        "ended_early": _end_json(comparison),
         "warnings": list(comparison.warnings),
+    }
+
+
+def _end_json(comparison: Comparison) -> dict[str, Any] | None:
+    end = comparison.ended
+    if end is None:
+        return None
+    return {
+        "kind": end.kind,
+        "at_s": end.time,
+        "cause": end.cause,
+        "doubtful_from_s": end.doubtful_from,
+        "cut": end.is_cut,
     }
 
 
@@ -207,6 +222,10 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             }
             for r in finding.rounds
         ],
+        "ended_early": {
+            c.name: _end_json(c) for c in (*after.train, *after.validation) if c.ended is not None
+        },
+        "few_data": outcome.few_data,
         "performed": list(outcome.performed),
         "parameters": [_effect_number_json(e) for e in finding.final.estimates],
         "quality": list(outcome.quality),

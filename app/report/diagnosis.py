@@ -11,7 +11,7 @@ import numpy as np
 from dearig.analysis.outcomes import pooled_rms
 from dearig.model.verdict import TOLERANCE
 from dearig.report.numbers import NO_VALUE, interval, quoted, seconds, significant, symbol
-from dearig.report.sentences import listed
+from dearig.report.sentences import few_data_sentence, listed
 from dearig.report.tables import Row, Table
 from dearig.units import SHOWN, parameter_unit, readable
 
@@ -101,6 +101,11 @@ def headline(outcome: DiagnoseOutcome) -> str:
         limits.append("by which effect these data cannot tell")
     if judgement.verdict in ("explained", "nothing_missing") and not outcome.after.validation:
         limits.append("no validation recording was given")
+    ended = [c.marked_name for c in outcome.after.train if c.ended and not c.ended.is_cut]
+    if ended:
+        limits.append(f"ended early: {listed(ended)}")
+    if outcome.few_data:
+        limits.append(f"little data: {outcome.few_data}")
     if outcome.status != "complete":
         limits.append(_STATUS[outcome.status])
     return "; ".join([said or HEADLINES[judgement.verdict], *limits])
@@ -139,6 +144,8 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
             "No validation recordings were given: the errors do not show how well the model "
             "predicts other recordings."
         )
+    if outcome.few_data:
+        said.append(few_data_sentence(outcome.few_data))
     said += [_rivals_sentence(step) for step in finding.steps if step.indistinguishable_from]
     if finding.unnamed is not None:
         said.append(_unnamed(outcome))
@@ -299,7 +306,9 @@ def _pairs(
 ) -> list[tuple[str, Errors, Errors, float | None]]:
     """Return (name, errors before, errors after, noise) of every recording and of all pooled."""
     first = {c.name: c for c in before}
-    rows = [(c.name, first[c.name].errors, c.errors, c.noise) for c in after if c.name in first]
+    rows = [
+        (c.marked_name, first[c.name].errors, c.errors, c.noise) for c in after if c.name in first
+    ]
     if len(rows) > 1:
         one, two = pooled_errors(before), pooled_errors(after)
         floors = [c.noise for c in after if c.noise]

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "describe_model",
+    "few_data_sentence",
     "identify_summary",
     "listed",
     "undetermined_sentence",
@@ -92,8 +93,18 @@ def identify_summary(outcome: IdentifyOutcome) -> tuple[str, ...]:
             f"Of {tried} branches, {chosen[0].branches} were chosen by the Bayesian information "
             f"criterion of the training data."
         )
+    if outcome.few_data:
+        said.append(few_data_sentence(outcome.few_data))
     said.append(undetermined_sentence(outcome.fit))
     return tuple(said)
+
+
+def few_data_sentence(few: str) -> str:
+    """Return a sentence on ``few`` data."""
+    return (
+        f"Very little was fitted: {few}. Slow effects, and differences between loadings, do not "
+        f"show in it; add longer recordings."
+    )
 
 
 def validate_summary(outcome: ValidateOutcome) -> tuple[str, ...]:
@@ -144,6 +155,7 @@ def warnings_of(outcome: IdentifyOutcome | ValidateOutcome) -> tuple[str, ...]:
         comparisons = (*getattr(outcome, "train", ()), *getattr(outcome, "validation", ()))
     else:
         comparisons = getattr(outcome, "comparisons", ())
+    said += getattr(outcome, "quality", ())
     said += [f"{c.name}: {w}" for c in comparisons for w in c.warnings]
     return tuple(dict.fromkeys(_sentence(w) for w in said))
 

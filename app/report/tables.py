@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dearig.recording.early_end import named
 from dearig.report.numbers import NO_VALUE, interval, quoted, significant, symbol
 from dearig.report.thesis import table_3
 from dearig.units import SHOWN, parameter_unit
@@ -82,7 +83,8 @@ def by_thesis_table(
 
 def _label(comparison: Comparison) -> str:
     # the label of a row is short and does not wrap
-    return comparison.row.replace(" ", "\N{NO-BREAK SPACE}") or comparison.name
+    row = comparison.row.replace(" ", "\N{NO-BREAK SPACE}") or comparison.name
+    return named(row, comparison.ended)
 
 
 def error_table(title: str, comparisons: Sequence[Comparison]) -> Table:
