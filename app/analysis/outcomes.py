@@ -13,7 +13,6 @@ import numpy as np
 
 from dearig.errors import DearigError
 from dearig.model.verdict import BUDGET, COMPLETE, STOPPED, Judgement, judge
-from dearig.recording.early_end import EarlyEnd, named
 
 if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from dearig.model.diagnosis.results import Diagnosis
     from dearig.model.fitting import Identification
     from dearig.model.measures import Errors
+    from dearig.recording.early_end import EarlyEnd
 
 __all__ = [
     "BranchTrial",
@@ -78,7 +78,11 @@ class Comparison:
     @property
     def marked_name(self) -> str:
         """The name, marked with how the run ended if it ended early."""
-        return named(self.name, self.ended)
+        return self.marked(self.name)
+
+    def marked(self, name: str) -> str:
+        """Return another ``name`` of the recording with the same mark."""
+        return name if self.ended is None else f"{name} ({self.ended.mark})"
 
     def over_noise(self, noise: float) -> float:
         """Return the error, without events where they are known, over the recording's noise.

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from dearig.recording.recording import RecordedEvent, Recording
+if TYPE_CHECKING:
+    from dearig.recording.recording import RecordedEvent, Recording
 
-__all__ = ["FAULT_BEFORE", "EarlyEnd", "cut_end", "early_end", "named"]
+__all__ = ["FAULT_BEFORE", "EarlyEnd", "cut_end", "early_end"]
 
 #: s before an interlock that may show the fault: interlocks trip after debounce times and delays of
 #: up to some tenths of a second.
@@ -120,8 +121,3 @@ def cut_end(recording: Recording) -> Recording:
     if end is None or end.doubtful_from is None:
         return recording
     return recording.until(end.doubtful_from)
-
-
-def named(name: str, end: EarlyEnd | None) -> str:
-    """Return ``name`` marked with how its run ended."""
-    return name if end is None else f"{name} ({end.mark})"

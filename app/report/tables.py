@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dearig.recording.early_end import named
 from dearig.report.numbers import NO_VALUE, interval, quoted, significant, symbol
 from dearig.report.thesis import table_3
 from dearig.units import SHOWN, parameter_unit
@@ -84,7 +83,7 @@ def by_thesis_table(
 def _label(comparison: Comparison) -> str:
     # the label of a row is short and does not wrap
     row = comparison.row.replace(" ", "\N{NO-BREAK SPACE}") or comparison.name
-    return named(row, comparison.ended)
+    return comparison.marked(row)
 
 
 def error_table(title: str, comparisons: Sequence[Comparison]) -> Table:
