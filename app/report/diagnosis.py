@@ -128,6 +128,12 @@ def step_label(step: Step) -> str:
     return f"{step.effect} ({family}acting on the {step.acts_on})"
 
 
+def _with_rivals(step: Step) -> str:
+    """Return a step's label, and the families that explain these data as well."""
+    others = " or ".join(family_label(f) for f in step.indistinguishable_from)
+    return f"{step_label(step)}, or {others} in its place" if others else step_label(step)
+
+
 def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     """Return the verdict and its evidence as sentences."""
     finding = outcome.finding
@@ -197,7 +203,7 @@ def _doubts(outcome: DiagnoseOutcome) -> Iterator[str]:
 
 def _verdict(outcome: DiagnoseOutcome) -> str:
     finding, judgement = outcome.finding, outcome.judgement
-    names = [step_label(s) for s in finding.steps]
+    names = [_with_rivals(s) for s in finding.steps]
     lacks = f"The thesis model lacks {listed(names)}"
     if finding.interrupted and not finding.rounds:
         if finding.steps:

@@ -7,13 +7,14 @@ import shutil
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl, Signal, Slot
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import (
     QButtonGroup,
     QComboBox,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
+    QMenu,
     QProgressBar,
     QRadioButton,
     QSpinBox,
@@ -24,14 +25,12 @@ from PySide6.QtWidgets import (
 )
 
 from dearig.analysis.compatibility import BRANCHES_MAX
-from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome
-from dearig.analysis.study import Study, Task, study
+from dearig.analysis.study import Study, Task
 from dearig.errors import InputError
 from dearig.recording.files import check_output, replaced_when_done
-from dearig.report import diagnosis, sentences, tables
-from dearig.report.page import write_report
-from dearig.report.tables import Table
-from dearig.units import readable
+from dearig.report.study_file import StudyEntry, make_study, open_study, studies_in
+from dearig.report.study_view import StudyView, view_of
+from dearig.window.background import Background
 from dearig.window.before_after_plot import BeforeAfterPlot
 from dearig.window.layout_state import remember
 from dearig.window.library import shared_library
@@ -40,14 +39,20 @@ from dearig.window.residual_plots import ResidualPlots
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
 from dearig.window.training_table import TrainingTable
-from dearig.window.widgets import Message, button, card, label
+from dearig.window.widgets import Message, button, card, label, menu_button, plain_tip, set_role
 from dearig.window.worker import Job, Worker
 
 __all__ = ["StudyPage"]
 
 _SPRINGS = ("gent", "neo-hookean", "arruda-boyce")
 _DRIVES = (("commanded voltage", "command"), ("monitored voltage", "monitor"))
+_ENDED_EARLY = (
+    ("Cut the end that may show a fault", "cut"),
+    ("Leave these recordings out", "leave-out"),
+    ("Use them as they are", "keep"),
+)
 _LEFT = 330  # px, default width of the left column
+_LISTED_MAX = 30  # studies in the menu; a longer one does not fit on a screen
 
 
 class StudyPage(QWidget):
@@ -69,7 +74,13 @@ class StudyPage(QWidget):
         self._library = shared_library(session)
         self._worker = Worker(self)
         self._job: Job | None = None
-        self._shown: Study | None = None
+        self._shown: StudyView | None = None
+        self._listing = Background(self)
+        self._listing.done.connect(self._list_studies)
+        self._listing.failed.connect(self._show_trouble)
+        self._opening = Background(self)
+        self._opening.done.connect(self._reopened)
+        self._opening.failed.connect(self._show_trouble)
 
         self.split = QSplitter(Qt.Orientation.Horizontal)
         self.split.addWidget(self._make_inputs())
@@ -82,14 +93,17 @@ class StudyPage(QWidget):
         outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
         outer.addWidget(self.split)
 
+        session.folder_changed.connect(self.find_studies)
         self._kind_changed()
         self._enable()
+        self.find_studies()
 
     # layout
 
     def _make_inputs(self) -> QWidget:
         self.recordings = TrainingTable(self._library)
         self.recordings.changed.connect(self._enable)
+        self.recordings.changed.connect(self._warn)
         hint = label("Select recordings for training, and others for validation.", "muted")
         hint.setWordWrap(True)
 
@@ -111,6 +125,13 @@ class StudyPage(QWidget):
         for text, channel in _DRIVES:
             self.drive.addItem(text, channel)
         self.drive.setToolTip("Voltage that drives the model")
+        self.warning = Message()
+        self.ended_early = QComboBox()
+        for text, choice in _ENDED_EARLY:
+            self.ended_early.addItem(text, choice)
+        self.ended_early.setToolTip("What is done with the recordings whose runs ended early")
+        self.ended_early.setAccessibleName("Recordings whose runs ended early")
+        self.ended_early.hide()
         form = QFormLayout()
         form.addRow("&Branches", self.branches)
         form.addRow("S&prings", self.spring)
@@ -136,6 +157,8 @@ class StudyPage(QWidget):
         inner.addWidget(label("Recordings", "heading"))
         inner.addWidget(self.recordings, 1)
         inner.addWidget(hint)
+        inner.addWidget(self.warning)
+        inner.addWidget(self.ended_early)
         inner.addWidget(self.diagnose)
         inner.addWidget(self.identify)
         inner.addLayout(form)
@@ -164,8 +187,16 @@ class StudyPage(QWidget):
             True,
         )
         self.run_button.clicked.connect(self._run)
+        self.about = label("", "muted")
+        self.about.setWordWrap(True)
+        self.about.hide()
+        self.studies = QMenu(self)
+        self.reopen_button = menu_button(
+            "&Reopen", "Show an earlier study of this folder again", self.studies
+        )
         top = QHBoxLayout()
         top.addWidget(self.headline, 1)
+        top.addWidget(self.reopen_button, 0, Qt.AlignmentFlag.AlignTop)
         tools = QHBoxLayout()
         for made in (self.overlay_button, self.save_button, self.report_button, self.run_button):
             tools.addWidget(made)
@@ -192,6 +223,7 @@ class StudyPage(QWidget):
         outer = QVBoxLayout(side)
         outer.setContentsMargins(SPACE, 0, 0, 0)
         outer.addLayout(top)
+        outer.addWidget(self.about)
         outer.addWidget(self.message)
         outer.addWidget(self.tabs, 1)
         outer.addLayout(tools)
@@ -209,6 +241,7 @@ class StudyPage(QWidget):
             spring=self.spring.currentText(),
             drive=self.drive.currentData(),
             limits=self._session.rig_file,
+            ended_early=self.ended_early.currentData(),
         )
 
     @Slot()
@@ -222,9 +255,8 @@ class StudyPage(QWidget):
             return
         self.message.show_text("")
         task = self.task()
-        self._job = self._worker.submit(
-            study, task, self._session.folder, write_report, whole=task.diagnose
-        )
+        self._label_previous()
+        self._job = self._worker.submit(make_study, task, self._session.folder, whole=task.diagnose)
         self._job.progressed.connect(self._progressed)
         self._job.finished.connect(self._finished)
         self._job.failed.connect(self._failed)
@@ -276,8 +308,15 @@ class StudyPage(QWidget):
         found = self._shown
         for made in (self.overlay_button, self.save_button, self.report_button):
             made.setEnabled(found is not None)
-        self.overlay_button.setEnabled(found is not None and found.outcome.kind == "actuator")
+        self.overlay_button.setEnabled(found is not None and found.kind == "actuator")
         self.run_button.setEnabled(self.proposed() is not None)
+
+    @Slot()
+    def _warn(self) -> None:
+        """Warn of checked recordings whose runs ended early, and offer what to do with them."""
+        said = self.recordings.early_ends()
+        self.warning.show_text("\n".join(said), "warn")
+        self.ended_early.setVisible(bool(said))
 
     @Slot()
     def reset_layout(self) -> None:
@@ -287,6 +326,8 @@ class StudyPage(QWidget):
     def close_work(self) -> None:
         """End the job and its process."""
         self._worker.close()
+        self._listing.close()
+        self._opening.close()
         self._job = None
         self._library.close()
 
@@ -294,75 +335,76 @@ class StudyPage(QWidget):
 
     def proposed(self) -> str | None:
         """Return the sequence (TOML) of the proposed experiment; None without one."""
-        outcome = None if self._shown is None else self._shown.outcome
-        if isinstance(outcome, DiagnoseOutcome) and outcome.experiment is not None:
-            return outcome.experiment.sequence
-        return None
+        return (self._shown.sequence or None) if self._shown is not None else None
 
     def show_study(self, found: Study) -> None:
-        """Show a result."""
-        self._shown = found
-        outcome = found.outcome
-        self.residual.show_residuals(found.residuals)
-        diagnosed = isinstance(outcome, DiagnoseOutcome)
+        """Show a result that has just been made."""
+        self.show_view(view_of(found))
+        self.study_finished.emit(found)
+        self.find_studies()
+
+    def show_view(self, shown: StudyView) -> None:
+        """Show a result, new or reopened."""
+        self._shown = shown
+        self.residual.show_residuals(shown.residuals)
+        self.curves.show_pairs(shown.pairs)
+        self.verdict.show_pieces(list(shown.result), shown.warnings)
+        self.ranking.show_pieces(list(shown.ranking))
+        self.experiment.show_pieces(list(shown.experiment))
         for page in (self.ranking, self.experiment):
-            self.tabs.setTabVisible(self.tabs.indexOf(page), diagnosed)
+            self.tabs.setTabVisible(self.tabs.indexOf(page), shown.diagnosed)
         for index in range(self.tabs.count()):
             self.tabs.setTabEnabled(index, True)
-        if isinstance(outcome, DiagnoseOutcome):
-            self._show_diagnosis(outcome)
-        else:
-            self._show_fit(outcome)
+        self.headline.setText(shown.headline)
+        set_role(self.headline, "title")
+        self.about.setText(f"{shown.label}; validated on {dict(shown.about)['validated on']}")
+        set_role(self.about, "muted")
+        self.about.show()
         self.tabs.setCurrentWidget(self.verdict)
         self._enable()
-        self.study_finished.emit(found)
 
-    def _show_diagnosis(self, outcome: DiagnoseOutcome) -> None:
-        finding = outcome.finding
-        self.headline.setText(diagnosis.headline(outcome))
-        pieces: list[str | Table] = list(diagnosis.summary(outcome))
-        for heading, before, after in (
-            ("Validation recordings", outcome.before.validation, outcome.after.validation),
-            ("Training recordings", outcome.before.train, outcome.after.train),
-        ):
-            if before and after:
-                pieces.append(diagnosis.before_after_table(heading, before, after, outcome.kind))
-        pieces.append(diagnosis.step_table(outcome))
-        if finding.steps:
-            pieces.append(diagnosis.effect_table(outcome))
-        self.verdict.show_pieces(pieces, diagnosis.warnings(outcome))
-        rounds: list[str | Table] = [*diagnosis.rankings(outcome)]
-        dropped = diagnosis.dropped_effects(outcome)
-        self.ranking.show_pieces(
-            [*(rounds or ["No round of candidates is complete."]), *([dropped] if dropped else [])]
-        )
-        proposal: list[str | Table] = [readable(f"{outcome.experiment_words}.")]
-        considered = diagnosis.experiment_table(outcome)
-        if considered is not None:
-            proposal.append(considered)
-        self.experiment.show_pieces(proposal)
-        both = bool(finding.steps)
-        self.curves.show_pairs(
-            (
-                *_pairs(outcome.before.validation, outcome.after.validation if both else ()),
-                *_pairs(outcome.before.train, outcome.after.train if both else ()),
-            )
-        )
+    def _label_previous(self) -> None:
+        """Label the result on the page as the previous one; a new study begins."""
+        if self._shown is None:
+            return
+        self.headline.setText(f"Previous result: {self._shown.headline}")
+        set_role(self.headline, "muted")
+        self.about.setText(f"This is {self._shown.label}. A new study was started after it.")
+        set_role(self.about, "warn")
 
-    def _show_fit(self, outcome: IdentifyOutcome) -> None:
-        self.headline.setText(outcome.title)
-        pieces: list[str | Table] = [
-            *sentences.identify_summary(outcome),
-            tables.parameter_table(outcome.fit),
-            tables.error_table("Training", outcome.train),
-        ]
-        if outcome.validation:
-            pieces += [
-                tables.error_table(title, members)
-                for title, members in tables.by_thesis_table(outcome.validation, "Validation")
-            ]
-        self.verdict.show_pieces(pieces, sentences.warnings_of(outcome))
-        self.curves.show_pairs((*_pairs(outcome.validation, ()), *_pairs(outcome.train, ())))
+    # earlier studies
+
+    @Slot()
+    def find_studies(self) -> None:
+        """List the studies of the folder again."""
+        folder = self._session.folder
+        self._listing.start(lambda: studies_in(folder))
+
+    @Slot(object)
+    def _list_studies(self, found: tuple[StudyEntry, ...]) -> None:
+        self.studies.clear()
+        for folder, headline, name in found[:_LISTED_MAX]:
+            # & would mark a key
+            action = QAction(f"{name}: {headline}".replace("&", "&&"), self.studies)
+            action.setToolTip(plain_tip(str(folder)))
+            action.triggered.connect(lambda _=False, folder=folder: self.reopen(folder))
+            self.studies.addAction(action)
+        self.reopen_button.setEnabled(bool(found))
+
+    def reopen(self, folder: Path) -> None:
+        """Show the study in ``folder`` again, with its plots and its report."""
+        self.message.show_text("")
+        self._opening.start(lambda: open_study(folder))
+
+    @Slot(object)
+    def _reopened(self, shown: StudyView) -> None:
+        self.show_view(shown)
+        if self._job is not None:
+            self._label_previous()
+
+    @Slot(str)
+    def _show_trouble(self, sentence: str) -> None:
+        self.message.show_text(sentence)
 
     @Slot()
     def _use(self) -> None:
@@ -423,10 +465,3 @@ _INTRODUCTION = (
 def _roughly(left: float) -> str:
     """Return a rough duration; ``left`` in s."""
     return f"{max(round(left), 1)} s" if left < 100.0 else f"{round(left / 60.0)} min"
-
-
-def _pairs(
-    before: tuple[Comparison, ...], after: tuple[Comparison, ...]
-) -> tuple[tuple[Comparison, Comparison | None], ...]:
-    last = {c.name: c for c in after}
-    return tuple((c, last.get(c.name)) for c in before)

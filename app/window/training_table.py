@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from dearig.analysis.summary import RecordingSummary
+from dearig.recording.early_end import early_end
 from dearig.report.numbers import seconds
 from dearig.window.library import Library
 from dearig.window.widgets import plain_tip
@@ -74,6 +75,16 @@ class TrainingTable(QTableWidget):
             self._item(row, _TRAIN).setCheckState(_state(path in train))
             self._item(row, _VALIDATE).setCheckState(_state(path in validation))
 
+    def early_ends(self) -> list[str]:
+        """Return a sentence on each checked recording whose run ended early."""
+        said = []
+        for path in (*self.train, *self.validation):
+            summary = self._library.summaries.get(path)
+            end = None if summary is None else early_end(summary)
+            if end is not None:
+                said.append(f"{path.stem} {end.sentence}.")
+        return said
+
     @Slot()
     def refresh(self) -> None:
         """List the recordings of the library; their check marks stay."""
@@ -118,7 +129,13 @@ class TrainingTable(QTableWidget):
         item.setText(summary.name or summary.path.stem)
         film = f", {summary.film}" if summary.film else ""
         about = f"{summary.path}\n{summary.title}, {seconds(summary.duration)}{film}"
+        end = None if summary.trouble else early_end(summary)
+        if end is not None:
+            about = f"{about}\nThe run {end.sentence}"
+        self.blockSignals(True)
+        item.setText(summary.path.stem if end is None else f"{summary.path.stem} ({end.mark})")
         item.setToolTip(plain_tip(summary.trouble or about))
+        self.blockSignals(False)
         if not summary.trouble:
             return
         # signals may be blocked by the caller already: a blocker leaves them as they were

@@ -10,15 +10,24 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
+from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.outcomes import DiagnoseOutcome
 from dearig.analysis.study import Study
 from dearig.analysis.summary import assess
 from dearig.config.modelfile import load_model
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import parse_sequence
+from dearig.errors import SafetyStop
+from dearig.report.study_file import save_study
+from dearig.report.study_view import view_of
+from dearig.sim_backend.faults import FaultPlan
 from dearig.window.frame import MainWindow
 from dearig.window.hv import HighVoltage
 from dearig.window.session import Session
 from dearig.window.study_page import StudyPage
-from tests.window.recordings import SLOW_RIG, made, of_rig
+from tests.report.test_study_file import made as study_on_paper
+from tests.tools.diagnosis import EXPERIMENT, diagnose_outcome
+from tests.window.recordings import LOBES, SLOW_RIG, made, of_rig
 
 _PATIENCE = 240_000  # ms; a search on a machine that may be busy
 
@@ -26,10 +35,15 @@ Keep = Callable[[QWidget], None]
 
 
 def open_page(session: Session, keep: Keep, qtbot: QtBot) -> StudyPage:
+    page = open_page_without_recordings(session, keep)
+    listed(page, qtbot)
+    return page
+
+
+def open_page_without_recordings(session: Session, keep: Keep) -> StudyPage:
     page = StudyPage(session)
     page.resize(1190, 690)
     keep(page)
-    listed(page, qtbot)
     return page
 
 
@@ -116,6 +130,60 @@ def test_what_cannot_be_studied_is_said_and_leaves_nothing(session, keep, qtbot)
     assert page.message.text() == "Cancelled; nothing was saved."
     assert not list(session.folder.glob("study-*"))
     assert page.start.isEnabled()
+
+
+def test_a_study_is_reopened_and_the_old_result_is_labelled(session, keep, qtbot):
+    """With a result made on paper: the search has tests of its own."""
+    folder = session.folder / "study-1"
+    save_study(view_of(study_on_paper(folder, diagnose_outcome())))
+    page = open_page_without_recordings(session, keep)
+    qtbot.waitUntil(lambda: bool(page.studies.actions()), timeout=_PATIENCE)
+    (action,) = page.studies.actions()
+    assert action.text().startswith("study-1, ")
+    action.trigger()
+    qtbot.waitUntil(page.report_button.isEnabled, timeout=_PATIENCE)
+    shown = page.headline.text()
+    assert shown.startswith("Residual explained; by which effect these data cannot tell")
+    assert "cannot separate sensor lag from amplifier" in words(page.verdict)
+    assert page.curves.record.count() == 3
+    assert len(page.residual.time.listDataItems()) == 1
+    assert page.proposed() == EXPERIMENT.sequence
+    assert "study-1" in page.about.text()
+
+    # while a new study runs, and after it has failed, the result is the previous one
+    low = made(session.folder, "low", 4.0)
+    qtbot.waitUntil(lambda: page.recordings.rowCount() == 1, timeout=_PATIENCE)
+    page.recordings.check([low], [])
+    click(qtbot, page.start)
+    assert page.headline.text() == f"Previous result: {shown}"
+    assert page.about.text().startswith("This is study-1, ")
+    click(qtbot, page.cancel)
+    click(qtbot, page.cancel)
+    assert page.message.text() == "Cancelled; nothing was saved."
+    assert page.headline.text().startswith("Previous result: ")
+
+
+def test_a_recording_that_ended_in_an_arc_is_marked_and_warned_of(session, keep, qtbot):
+    arc = session.folder / "arc.h5"
+    loaded = parse_sequence(LOBES.format(top=6.0), "arc", Path())
+    with pytest.raises(SafetyStop):
+        record(loaded, "sim", RigFile(), arc, RunOptions(faults=FaultPlan.parse(["arc@1.7"])))
+    page = open_page(session, keep, qtbot)
+    name = page.recordings.item(0, 0)
+    assert not page.warning.isVisible()
+    page.recordings.check([arc], [])
+    qtbot.waitUntil(page.warning.isVisible, timeout=_PATIENCE)
+    assert name.text() == "arc (interlock)"
+    assert "arc ended in an interlock at 1.7" in page.warning.text()
+    assert "the last 0.5 s may show the fault, not the film" in page.warning.text()
+    assert "ended in an interlock" in name.toolTip()
+    assert page.ended_early.isVisible()
+    assert page.task().ended_early == "cut"
+    page.ended_early.setCurrentIndex(1)
+    assert page.task().ended_early == "leave-out"
+    page.recordings.check([], [])
+    assert not page.warning.isVisible()
+    assert not page.ended_early.isVisible()
 
 
 @pytest.mark.slow
