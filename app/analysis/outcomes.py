@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from dearig.errors import DearigError
-from dearig.model.verdict import BUDGET, COMPLETE, STOPPED, Judgement, judge
+from dearig.model.verdict import STOPPED, Judgement, judge
 
 if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
@@ -222,11 +222,8 @@ class DiagnoseOutcome:
     @property
     def status(self) -> str:
         """How the search ended: ``complete``, ``stopped`` or ``budget``."""
-        if self.finding.interrupted:
-            return STOPPED
-        return (
-            BUDGET if any("computing budget" in note for note in self.finding.notes) else COMPLETE
-        )
+        # an experiment on a rig can be stopped after a search that came to its end
+        return STOPPED if self.finding.interrupted else self.finding.status
 
     @property
     def verdict(self) -> str:

@@ -238,9 +238,8 @@ class TestHeadline:
         assert diagnosis_json(stopped)["status"] == "stopped"
 
     def test_a_search_that_ended_at_its_budget_says_so(self):
-        note = "the search stopped at its computing budget; --thorough searches further"
         clean = nothing_missing()
-        outcome = replace(clean, finding=replace(clean.finding, notes=(note,)))
+        outcome = replace(clean, finding=replace(clean.finding, status="budget"))
         assert outcome.status == "budget"
         assert "computing budget" in headline(outcome)
 
