@@ -68,8 +68,9 @@ def parameter_unit(unit: str) -> tuple[float, str]:
 
 
 def readable(text: str) -> str:
-    """Return ``text`` with um written as the sign of the micrometre."""
-    return re.sub(r"(?<=\d) um\b", " \N{MICRO SIGN}m", text)
+    """Return ``text`` with um, us and +- written as µm, µs and ±."""
+    text = re.sub(r"(?<=\d) u(?=[ms]\b)", " \N{MICRO SIGN}", text)
+    return re.sub(r"\+- ?(?=\d)", "\N{PLUS-MINUS SIGN}", text)
 
 
 def name_and_unit(key: str) -> tuple[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, Slot
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from dearig.analysis.outcomes import Comparison
 from dearig.report.numbers import significant
@@ -12,7 +12,7 @@ from dearig.window.plot_area import PlotArea
 from dearig.window.plot_item import Entry
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
-from dearig.window.widgets import label
+from dearig.window.widgets import label, name_list
 
 __all__ = ["BeforeAfterPlot"]
 
@@ -26,7 +26,7 @@ class BeforeAfterPlot(QWidget):
         super().__init__(parent)
         self._session = session
         self._pairs: tuple[_Pair, ...] = ()
-        self.record = QComboBox()
+        self.record = name_list()
         self.record.setToolTip(
             "Validation recordings, which no fit and no selection used, come first"
         )

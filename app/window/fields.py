@@ -50,9 +50,9 @@ class FormField:
 
     @property
     def tip(self) -> str:
-        """Key, description, unit and allowed values, for a tooltip."""
+        """Name, description, unit and allowed values, for a tooltip."""
         unit = f", in {self.unit}" if self.unit else ""
-        return f"{self.key}: {self.description}{unit} ({self.allowed})"
+        return f"{self.label}: {in_words(self.description)}{unit} ({self.allowed})"
 
 
 def form_fields(table: type[BaseModel], leave_out: tuple[str, ...] = ()) -> Iterator[FormField]:

@@ -8,7 +8,7 @@ from typing import Any
 from PySide6.QtCore import Signal, Slot
 from PySide6.QtWidgets import QComboBox, QGridLayout, QLineEdit, QWidget
 
-from dearig.window.fields import FormField, read_back, read_typed, shown_value
+from dearig.window.fields import FormField, in_words, read_back, read_typed, shown_value
 from dearig.window.theme import SPACE
 from dearig.window.widgets import Message, label, set_wrong
 
@@ -52,7 +52,7 @@ class Form(QWidget):
             grid.addWidget(widget, row, 1)
             grid.addWidget(label(field.unit, "muted"), row, 2)
             if explain:
-                about = label(field.description, "muted", field.tip)
+                about = label(in_words(field.description), "muted", field.tip)
                 about.setWordWrap(True)
                 grid.addWidget(about, row, 3)
             below = Message()

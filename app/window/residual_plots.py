@@ -8,7 +8,7 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QSignalBlocker, Slot
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from dearig.analysis.study import Residual
 from dearig.model.diagnosis.results import Dependence, MissingStress
@@ -17,7 +17,7 @@ from dearig.window.plot_area import PlotArea
 from dearig.window.plot_item import Entry
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
-from dearig.window.widgets import label
+from dearig.window.widgets import label, name_list
 
 __all__ = ["ResidualPlots"]
 
@@ -32,11 +32,11 @@ class ResidualPlots(QWidget):
         super().__init__(parent)
         self._session = session
         self._residuals: tuple[Residual, ...] = ()
-        self.record = QComboBox()
+        self.record = name_list()
         self.record.setToolTip("Recording whose residual is shown")
-        self.quantity = QComboBox()
+        self.quantity = name_list()
         self.quantity.setToolTip("Quantity on the horizontal axis of the lower plots")
-        self.stand = QComboBox()
+        self.stand = name_list()
         self.stand.addItems(["before", "after"])
         self.stand.setToolTip("Thesis model (before), or model with the effects found (after)")
         self.area = area = PlotArea(session, "Residual")

@@ -32,6 +32,7 @@ from dearig.config.toml_input import read_text
 from dearig.drivers.daqmx.address import Address
 from dearig.drivers.errors import AddressError
 from dearig.errors import InputError
+from dearig.units import readable
 from dearig.window.background import Background
 from dearig.window.dialogs import choose_file, save_as
 from dearig.window.document import Asked, Saved, TextFile
@@ -316,8 +317,8 @@ class RigPage(QWidget):
             if finding.advice:
                 found += f"; {finding.advice}"
             for column, text in enumerate((verdict, finding.instrument, finding.item, found)):
-                item = QTableWidgetItem(text)
-                item.setToolTip(plain_tip(finding.sentence))
+                item = QTableWidgetItem(readable(in_words(text)))
+                item.setToolTip(plain_tip(readable(in_words(finding.sentence))))
                 item.setFlags(Qt.ItemFlag.ItemIsSelectable | Qt.ItemFlag.ItemIsEnabled)
                 if column == 0:
                     item.setForeground(QColor(colours[finding.verdict]))

@@ -288,7 +288,7 @@ class SequencePage(QWidget):
              self._ask_open),
             ("&Save", "Write the sequence to its file", "Ctrl+S", self.save),
             ("Save &as …", "Write the sequence to another file", "Ctrl+Shift+S", self._ask_save),
-            ("Import &CSV …", "Add a waveform (columns time_s and voltage_kV) as a segment",
+            ("Import &CSV …", "Add a waveform (columns of time and voltage) as a segment",
              "Ctrl+I", self._ask_csv),
         ):  # fmt: skip
             made = button(words, f"{tip} ({key})")
@@ -325,7 +325,7 @@ class SequencePage(QWidget):
     @Slot()
     def _ask_csv(self) -> None:
         path = choose_file(
-            self, self.session, "Waveform with the columns time_s and voltage_kV",
+            self, self.session, "Waveform with columns of time and voltage",
             self.draft.file.folder, "Waveforms (*.csv)",
         )  # fmt: skip
         if path is not None:

@@ -8,6 +8,7 @@ from html import escape
 from PySide6 import QtGui
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
+    QComboBox,
     QFrame,
     QHBoxLayout,
     QLabel,
@@ -29,10 +30,13 @@ __all__ = [
     "card",
     "label",
     "menu_button",
+    "name_list",
     "plain_tip",
     "set_role",
     "set_wrong",
 ]
+
+_NAME_WIDTH = 420  # px of a list of names, at most
 
 
 def label(text: str, role: str = "", tip: str = "") -> QLabel:
@@ -77,6 +81,14 @@ def button(text: str, tip: str, primary: bool = False) -> QPushButton:
     made.setToolTip(tip)
     if primary:
         made.setProperty("role", "primary")
+    return made
+
+
+def name_list() -> QComboBox:
+    """Make a list of names that grows with the longest, up to a width."""
+    made = QComboBox()
+    made.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
+    made.setMaximumWidth(_NAME_WIDTH)
     return made
 
 

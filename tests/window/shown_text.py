@@ -126,11 +126,14 @@ def cut_off(window: QWidget) -> list[str]:
             bad = _button_is_cut(widget)
             text = widget.text()
         elif isinstance(widget, QTabBar):
-            bad, text = any(
-                widget.tabRect(i).width() < widget.tabSizeHint(i).width()
-                for i in range(widget.count())
-                if widget.isTabVisible(i)
-            ), "tabs"
+            bad, text = (
+                any(
+                    widget.tabRect(i).width() < widget.tabSizeHint(i).width()
+                    for i in range(widget.count())
+                    if widget.isTabVisible(i)
+                ),
+                "tabs",
+            )
         elif isinstance(widget, QComboBox):
             room = widget.width() - _ARROW
             bad, text = _wide(widget, widget.currentText()) > room, widget.currentText()
