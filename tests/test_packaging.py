@@ -135,6 +135,34 @@ def test_it_is_the_installed_package_that_runs(installed: Path, folder: Path) ->
     assert Path(ended.stdout.strip()).is_relative_to(installed.parents[1])
 
 
+_PICTURES = """
+import re
+from PySide6.QtCore import QUrl
+from PySide6.QtGui import QTextDocument
+from PySide6.QtWidgets import QApplication
+application = QApplication([])
+from dearig.window.guide import Guide
+guide = Guide()
+kind = QTextDocument.ResourceType.ImageResource.value
+names = re.findall('<img src="([^"]+)"', guide.text.document().toHtml())
+at = guide.text.source()
+sizes = [guide.text.loadResource(kind, at.resolved(QUrl(name))).width() for name in names]
+print(len(names), min(sizes))
+"""
+
+
+def test_the_guide_of_the_installed_window_has_its_pictures(installed: Path, folder: Path) -> None:
+    """F1 opens the documents of the package; a picture that is missing is one pixel wide."""
+    ended = subprocess.run(
+        [str(installed), "-P", "-c", _PICTURES], capture_output=True, text=True, check=False,
+        cwd=folder, env=environment(folder) | {"QT_QPA_PLATFORM": "offscreen"}, timeout=200,
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
+    count, smallest = map(int, ended.stdout.split())
+    assert count >= 6
+    assert smallest > 300
+
+
 @pytest.mark.parametrize("way", ["command", "python -m"])
 def test_it_records_beside_files_named_after_modules(
     installed: Path, folder: Path, way: str
