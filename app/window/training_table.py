@@ -121,6 +121,7 @@ class TrainingTable(QTableWidget):
         row = self._row.get(path)
         if row is not None:
             self._describe(row, self._library.summaries.get(path))
+            self.changed.emit()  # how the run of a checked recording ended is known now
 
     def _describe(self, row: int, summary: RecordingSummary | None) -> None:
         if summary is None:
@@ -132,14 +133,12 @@ class TrainingTable(QTableWidget):
         end = None if summary.trouble else early_end(summary)
         if end is not None:
             about = f"{about}\nThe run {end.sentence}"
-        self.blockSignals(True)
-        item.setText(summary.path.stem if end is None else f"{summary.path.stem} ({end.mark})")
-        item.setToolTip(plain_tip(summary.trouble or about))
-        self.blockSignals(False)
-        if not summary.trouble:
-            return
         # signals may be blocked by the caller already: a blocker leaves them as they were
         with QSignalBlocker(self):
+            item.setText(summary.path.stem if end is None else f"{summary.path.stem} ({end.mark})")
+            item.setToolTip(plain_tip(summary.trouble or about))
+            if not summary.trouble:
+                return
             item.setFlags(Qt.ItemFlag.NoItemFlags)
             for column in (_TRAIN, _VALIDATE):
                 box = self._item(row, column)
