@@ -10,7 +10,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QSettings, QTimer
+from PySide6.QtCore import QCoreApplication, QEvent, QSettings, QTimer
 from PySide6.QtWidgets import QApplication, QLineEdit, QMessageBox, QWidget
 
 from dearig.window.frame import MainWindow
@@ -116,6 +116,9 @@ def main() -> None:
     window.leave()  # as a signal does
     saw["kept"] = [path.read_text() for path in (folder / "unsaved").glob("*.json")]
     print(json.dumps(saw))
+    # as the program does, while Python's objects are whole
+    window.deleteLater()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
 
 
 def rig_only(session: Session) -> bool:
