@@ -29,6 +29,7 @@ _SEGMENTS = 10  # of time, each predicted by a fit to the others
 _RIDGE = 1e-3  # of a parameter's own curvature, so that no segment alone determines it
 _NORMAL_95 = 1.96
 _AT_BOUND = 1e-9  # of a coordinate
+_FLAT = 1e-4  # relative singular value: polynomials that nearly cancel are left out
 
 
 def stage_of(
@@ -138,7 +139,7 @@ def drift_values(fit: Fit) -> list[np.ndarray]:
         if isinstance(record, ActuatorRecord):
             basis = record.seen(basis_of(record.time).T).T
             scale = np.maximum(np.linalg.norm(basis, axis=0), 1e-300)
-            amplitudes, *_ = np.linalg.lstsq(basis / scale, mean[a:b] * record.noise, rcond=1e-10)
+            amplitudes, *_ = np.linalg.lstsq(basis / scale, mean[a:b] * record.noise, rcond=_FLAT)
             found.append(amplitudes / scale)
     return found
 
