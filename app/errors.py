@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dearig.output_state import OutputState
+
 __all__ = [
     "DearigError",
     "DiskFault",
@@ -14,9 +16,14 @@ __all__ = [
 
 
 class DearigError(Exception):
-    """An error whose text tells the operator what happened, where, and what to do."""
+    """An error whose text tells the operator what happened, where, and what to do.
+
+    ``output_state`` is what is known of the rig's output where the error ended a run, and None
+    where no rig was contacted.
+    """
 
     exit_code = 1
+    output_state: OutputState | None = None
 
 
 class InputError(DearigError):

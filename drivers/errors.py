@@ -6,6 +6,7 @@ __all__ = [
     "AddressError",
     "ChangedWaveform",
     "LinkRefused",
+    "NotAtZero",
     "RefusedWaveform",
     "RigError",
     "RigStateError",
@@ -18,6 +19,14 @@ class RigError(Exception):
     def __init__(self, message: str, code: int | None = None) -> None:
         super().__init__(message)
         self.code = code
+
+
+class NotAtZero(RigError):  # noqa: N818  (the name says what was measured)
+    """Voltage monitor that reads ``voltage`` V at the film after the output was set to 0 V."""
+
+    def __init__(self, message: str, voltage: float) -> None:
+        super().__init__(message)
+        self.voltage = voltage
 
 
 class RigStateError(RigError):

@@ -12,7 +12,15 @@ from dearig.drivers.channels import Channel
 from dearig.drivers.errors import RigStateError
 from dearig.drivers.gate import GatedWaveform
 
-__all__ = ["Block", "Event", "Instrument", "Rig", "RigIdentity", "RigState", "expect"]
+__all__ = [
+    "Block",
+    "Event",
+    "Instrument",
+    "Rig",
+    "RigIdentity",
+    "RigState",
+    "expect",
+]
 
 
 class RigState(Enum):
@@ -78,6 +86,10 @@ class Rig(Protocol):
 
     Calls out of order raise ``RigStateError``; faults of instruments raise ``RigError``.
     ``make_safe`` may be called in any state, at any time and more than once.
+
+    A rig may have a property ``zero_reading``: the ``ZeroReading`` of its last ``make_safe``, None
+    where the monitor could not be read. Without it, the end of a run counts as confirmed only by
+    the last samples.
     """
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from dearig.drivers.gate import GatedWaveform
 from dearig.drivers.identity import instruments
 from dearig.drivers.rig import Block, Event, RigIdentity, RigState
 from dearig.drivers.settings import RigSettings
+from dearig.drivers.zero_reading import ZeroReading
 from dearig.sim_backend.card import INPUT_OVERWRITTEN, Card
 from dearig.sim_backend.clock import Clock
 from dearig.sim_backend.faults import Fault, FaultKind, FaultPlan
@@ -24,6 +26,8 @@ from dearig.sim_backend.streams import Streams
 __all__ = ["OUTPUT_STARVED", "SimulatedRig"]
 
 OUTPUT_STARVED = -200290  #: DAQmx: the output ran out of written samples
+
+_ZERO_AVERAGED = 10  # values of the monitor whose mean is its reading at 0 V
 
 # tolerance of the clock's rounding when ticks are counted
 _TICK_TOLERANCE = 1e-6
@@ -147,11 +151,17 @@ class SimulatedRig:
         self._run: _Run | None = None
         self._runs = 0
         self._rate = 0.0
+        self._zero_reading: ZeroReading | None = None
 
     @property
     def state(self) -> RigState:
         """Return the state of the rig."""
         return self._state
+
+    @property
+    def zero_reading(self) -> ZeroReading | None:
+        """Return the voltage monitor's reading after ``make_safe``, None before the first call."""
+        return self._zero_reading
 
     @property
     def output(self) -> float:
@@ -295,6 +305,7 @@ class SimulatedRig:
                 return
             self._run = None
             self._state = RigState.SAFE
+            self._zero_reading = self._read_zero()
             self._wake.set()
 
     def close(self) -> None:
@@ -302,6 +313,18 @@ class SimulatedRig:
         with self._lock:
             self.make_safe()
             self._state = RigState.CLOSED
+
+    def _read_zero(self) -> ZeroReading:
+        """Return a reading of the voltage monitor at 0 V, with its noise."""
+        settings = self._settings
+        noise = self._streams.before_run("amplifier", self._runs).standard_normal(_ZERO_AVERAGED)
+        counts = self._card.convert(
+            "voltage_monitor", noise * settings.amplifier.monitor_noise_mV * 1e-3
+        )
+        monitor = next(c for c in self._card.channels if c.name == "voltage_monitor")
+        voltage = float(monitor.scaling.physical(counts).mean())
+        allowed = settings.limits.zero_tolerance_kV * 1e3
+        return ZeroReading(voltage, time.time(), abs(voltage) <= allowed)
 
     def _deliver(self, run: _Run, end: int) -> Block:
         start = run.delivered

@@ -17,12 +17,13 @@ from dearig.acquisition.check import check_rig
 from dearig.acquisition.event_log import EventLog
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.marks import RunMarks
+from dearig.acquisition.output import LastSamples, after_run, unknown
 from dearig.acquisition.overlay import Overlay, OverlayModel
 from dearig.acquisition.plan import Plan, plan
 from dearig.acquisition.rigs import is_simulated, kind_of, options_of
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
-from dearig.drivers.errors import AddressError, RefusedWaveform, RigError
+from dearig.drivers.errors import AddressError, NotAtZero, RefusedWaveform, RigError
 from dearig.drivers.gate import Margin
 from dearig.drivers.interlocks import Interlocks, Trip
 from dearig.drivers.rig import Block, Event, Rig, RigIdentity
@@ -36,6 +37,7 @@ from dearig.errors import (
 )
 from dearig.model.actuator import Actuator
 from dearig.model.errors import ModelError
+from dearig.output_state import Known, OutputState
 from dearig.progress import Progress, quiet
 from dearig.recording.disk_space import check_room
 from dearig.recording.files import check_output
@@ -50,8 +52,9 @@ log = logging.getLogger(__name__)
 
 #: s at 0 V after which the operator is told that the program still waits for the disk.
 _TELL_AFTER = 5.0
-#: Number of ctrl-C after which the run stops waiting for the disk.
+#: Number of ctrl-C after which the run stops waiting for the disk, or for the guardian.
 _GIVE_UP = 2
+_GUARDIAN_POLL = 0.25  # s between two looks at what the operator asks
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,8 @@ class RunResult:
     ``path`` is not the wanted one where another program has deleted, moved or replaced that file;
     the ``events`` say so.
 
-    ``margins`` are the distances of the plan from each limit of the gate.
+    ``margins`` are the distances of the plan from each limit of the gate, and ``output_state`` is
+    what was known of the rig's output after the run.
     """
 
     path: Path
@@ -99,6 +103,7 @@ class RunResult:
     outcome: str
     events: tuple[str, ...]
     margins: tuple[Margin, ...]
+    output_state: OutputState
 
 
 class RunObserver:
@@ -116,6 +121,12 @@ class RunObserver:
 
     def event(self, event: Event) -> None:
         """Receive an event that is in the recording."""
+
+    def output(self, state: OutputState) -> None:
+        """Receive what is known of the output after the run.
+
+        It comes a second time where the guardian goes on trying after the run could not set 0 V.
+        """
 
 
 def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) -> Rig:
@@ -153,7 +164,10 @@ def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) ->
     except ValueError as error:  # a film without a rest state
         raise InputError(f"rig {address!r} with this rig file: {error}") from error
     except RigError as error:
-        raise InstrumentFault(str(error)) from error
+        fault = InstrumentFault(str(error))
+        if isinstance(error, NotAtZero):
+            fault.output_state = unknown(monitor=error.voltage)
+        raise fault from error
     if not isinstance(rig, Rig):
         raise InstrumentFault(
             f"rig {address!r}: its driver returned a {type(rig).__name__}, which is not a rig; "
@@ -243,14 +257,20 @@ def record(
                 clock=clock,
             )
             with EventLog() as event_log:
+                last = LastSamples(identity.channels, rig_file.limits.zero_tolerance_kV * 1e3)
                 run = _Run(
                     rig, recorder, interlocks, interrupts, marks or RunMarks(), observer,
-                    event_log, progress, clock,
+                    event_log, last, progress, clock,
                 )  # fmt: skip
-                events = run.follow(waveform.samples)
+                try:
+                    events = run.follow(waveform.samples)
+                except DearigError as error:
+                    error.output_state = run.output_state
+                    raise
         return RunResult(
-            recorder.path, recorder.samples, rate, "finished", events, waveform.margins
-        )
+            recorder.path, recorder.samples, rate, "finished", events, waveform.margins,
+            run.output_state,
+        )  # fmt: skip
     finally:
         _close(rig, sys.exc_info()[1])
 
@@ -267,6 +287,7 @@ class _Run:
         marks: RunMarks,
         observer: RunObserver,
         event_log: EventLog,
+        last: LastSamples,
         progress: Progress,
         clock: Callable[[], float],
     ) -> None:
@@ -277,6 +298,8 @@ class _Run:
         self._marks = marks
         self._observer = observer
         self._event_log = event_log
+        self._last = last
+        self.output_state = unknown()  # until it is at 0 V
         self._progress = progress
         self._clock = clock
         self._events: list[str] = []
@@ -288,15 +311,16 @@ class _Run:
         """Play and record; every exit takes the rig to 0 V first and then closes the file."""
         recorder = self._recorder
         try:
+            played = False
             try:
                 self._play(samples)
+                played = self._trip is None and not self._interrupts.asked()
             finally:
                 # 0 V first: a disk that is slow or full must not keep the voltage up
                 self._interrupts.close()
                 try:
-                    _make_safe(self._rig)
+                    self._bring_to_zero(played)
                 finally:
-                    self._note_guardian()
                     self._note_events(self._marks.close())
             if self._trip is not None:
                 kept = self._end(f"stopped by an interlock: {self._trip.message}")
@@ -379,6 +403,7 @@ class _Run:
             raise
 
     def _take(self, block: Block) -> None:
+        self._last.take(block)
         self._recorder.append(block)
         self._observer.block(block)
         for event in block.events:
@@ -452,11 +477,53 @@ class _Run:
             )  # fmt: skip
         return asked - self._asked_before >= _GIVE_UP
 
-    def _note_guardian(self) -> None:
-        """Record what the guardian did, if the rig has one and it acted."""
-        acted = getattr(self._rig, "taken_over", None)
+    def _bring_to_zero(self, played: bool) -> None:
+        """Take the rig to 0 V, and record what is known of its output then.
+
+        ``played`` is True for a waveform that was played to its end. Raises ``NotSafe`` where 0 V
+        could not be set, and ``InstrumentFault`` where the guardian alone could.
+        """
+        rig, failure = self._rig, None
+        try:
+            _make_safe(rig)
+        except NotSafe as error:
+            failure = error
+            self._show_output(unknown(rig))
+            self._await_guardian()
+        acted = getattr(rig, "taken_over", None)
+        at = max(self._recorder.received - 1, 0)
         if acted is not None:
-            self._note(max(self._recorder.received - 1, 0), "fault", acted.sentence)
+            self._note(at, "fault", acted.sentence)
+        state = after_run(rig, self._last, failed=failure is not None)
+        self._show_output(state)
+        event = Event(at, _LEVELS[state.known], f"output: {state.sentence}")
+        if played and state.confirmed:
+            self._event_log.add(event)  # the recording has it as attributes
+        else:
+            self._note(event.sample, event.level, event.message)
+        if failure is not None:
+            if not state.confirmed:
+                raise failure
+            raise InstrumentFault(f"{failure.__cause__}; {state.sentence}") from failure
+
+    def _show_output(self, state: OutputState) -> None:
+        self.output_state = self._recorder.output_state = state
+        self._observer.output(state)
+
+    def _await_guardian(self) -> None:
+        """Wait for a guardian that goes on trying, until the operator has asked for the end twice.
+
+        Its outcome belongs in the recording, which is closed after this.
+        """
+        rig, asked = self._rig, self._interrupts.count
+        if not getattr(rig, "guardian_tries", False):
+            return
+        log.warning(
+            "0 V IS NOT CONFIRMED: switch the amplifier's high voltage off by hand; the guardian "
+            "goes on trying; press ctrl-C twice to stop waiting for it"
+        )
+        while rig.guardian_tries and self._interrupts.count - asked < _GIVE_UP:  # type: ignore[attr-defined]
+            rig.await_guardian(_GUARDIAN_POLL)  # type: ignore[attr-defined]
 
     def _tell_notices(self) -> None:
         for event in self._recorder.notices():
@@ -494,8 +561,14 @@ def _close(rig: Rig, ended_by: BaseException | None) -> None:
             log.warning("the rig could not be closed either: %s", error)
             return
         also = f"; {ended_by}" if isinstance(ended_by, DearigError) else ""
-        raise NotSafe(f"THE RIG COULD NOT BE CLOSED ({error}): {_NOT_CONFIRMED}{also}") from error
+        fault = NotSafe(f"THE RIG COULD NOT BE CLOSED ({error}): {_NOT_CONFIRMED}{also}")
+        fault.output_state = unknown(rig)
+        raise fault from error
+    if isinstance(ended_by, DearigError) and ended_by.output_state is None:
+        # the run ended before its first sample: opening and closing the rig has set 0 V
+        ended_by.output_state = after_run(rig)
 
 
 _NOT_CONFIRMED = "0 V IS NOT CONFIRMED, switch the amplifier's high voltage off by hand"
+_LEVELS = {Known.CONFIRMED: "info", Known.COMMANDED: "warning", Known.UNKNOWN: "fault"}
 _DONE = {"ramp": "the voltage was ramped down", "at once": "the output was taken at once"}

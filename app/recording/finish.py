@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 
 from dearig.errors import InputError
+from dearig.output_state import OutputState
 from dearig.recording.checksums import complete_checksums
 from dearig.recording.files import in_words
 from dearig.recording.flushes import flush_notes
@@ -45,6 +46,7 @@ def finish(
     lock: FileLock,
     complete: bool,
     outcome: str,
+    output_state: OutputState | None = None,
     ended: float | None,
     identifier: str = "",
     repair: Callable[[Patched], None] | None = None,
@@ -79,10 +81,21 @@ def finish(
                     put_text(entry, "end_time", iso_time(ended))
                 entry.attrs["samples"] = samples
                 entry.attrs["outcome"] = fixed(clip_text(outcome, MESSAGE_BYTES).decode())
+                if output_state is not None:
+                    _note_output(entry, output_state)
                 entry.attrs["complete"] = complete
     except (OSError, RuntimeError) as error:
         raise InputError(f"{path} cannot be written: {in_words(error)}") from error
     return samples
+
+
+def _note_output(entry: h5py.Group, state: OutputState) -> None:
+    """Keep what was known of the rig's output after the run, as attributes of ``entry``."""
+    entry.attrs["output_state"] = fixed(state.known.value)
+    entry.attrs["output_state_time"] = fixed(iso_time(state.at))
+    entry.attrs["output_set_by"] = fixed("guardian" if state.by_guardian else "run")
+    if state.monitor is not None:
+        entry.attrs["output_monitor_V"] = state.monitor
 
 
 def _check_identifier(path: Path, identifier: str) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 
 from dearig.drivers.rig import Block, Event
 from dearig.errors import DearigError, DiskFault, InstrumentFault
+from dearig.output_state import OutputState
 from dearig.progress import Progress, quiet
 from dearig.recording.lost_file import LostFile
 from dearig.recording.writer import RecordingWriter
@@ -100,6 +101,8 @@ class Recorder:
         self._ended = False
         self._end_fault: BaseException | None = None
         self._given_up: DiskFault | None = None
+        #: what is known of the rig's output after the run; kept with the recording by ``close``
+        self.output_state: OutputState | None = None
         self._thread = threading.Thread(target=self._work, name=_THREAD, daemon=True)
         self._thread.start()
 
@@ -355,7 +358,7 @@ class Recorder:
                 self._writer = self._earlier.pop()
         for writer in (*self._earlier, self._writer):
             try:
-                writer.close(end.outcome)
+                writer.close(end.outcome, self.output_state)
             except LostFile as lost:
                 if not (lost.intact and self._new_file):
                     troubles.append(lost)

@@ -25,6 +25,7 @@ import numpy as np
 
 from dearig.drivers.rig import Block, Event, RigIdentity
 from dearig.errors import DearigError, DiskFault, InputError
+from dearig.output_state import OutputState
 from dearig.recording.check_written import check_written
 from dearig.recording.checksums import ChecksumWriter
 from dearig.recording.disk_space import advice
@@ -495,10 +496,11 @@ class RecordingWriter:
             os.fsync(self._file.id.get_vfd_handle())
         self._size = os.fstat(self._lock.fd).st_size
 
-    def close(self, outcome: str = "finished") -> None:
+    def close(self, outcome: str = "finished", output_state: OutputState | None = None) -> None:
         """Finish the recording: physical values, end time, sample count; calling it again is fine.
 
-        ``outcome`` is a sentence on how the run ended. A file that is no more in its place is
+        ``outcome`` is a sentence on how the run ended, ``output_state`` what was known of the rig's
+        output after it. A file that is no more in its place is
         finished where it is, or as a copy beside; ``path`` is that one then. Raises ``DiskFault``
         if the physical values cannot be written, with the counts in the file, and if the finished
         file is not what was written; ``LostFile`` if ``look`` has not told of it.
@@ -511,11 +513,11 @@ class RecordingWriter:
                 lost = self._newly_lost()
                 if lost is not None and not lost.intact:
                     raise lost
-            self._finish(outcome)
+            self._finish(outcome, output_state)
         if lost is not None:
             raise LostFile(f"{lost}; it is saved as {self._path}")
 
-    def _finish(self, outcome: str) -> None:
+    def _finish(self, outcome: str, output_state: OutputState | None) -> None:
         moment = self._now()
         with self._writing():
             self._write_pending(moment)
@@ -539,6 +541,7 @@ class RecordingWriter:
                     identifier=self._identifier,
                     complete=True,
                     outcome=outcome,
+                    output_state=output_state,
                     ended=moment,
                     fsync=self._fsync,
                 )

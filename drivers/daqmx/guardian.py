@@ -50,13 +50,15 @@ class TakeOver:
     """Guardian's report: it took the output to 0 V, or failed to.
 
     ``why`` is the reason, ``at`` the time in s since 1970, ``seconds`` the time that it took.
-    ``error`` is empty if the voltage monitor confirmed 0 V.
+    ``error`` is empty if the voltage monitor confirmed 0 V; ``monitor`` is its reading in V at the
+    film, None where it could not be read.
     """
 
     why: str
     at: float
     seconds: float
     error: str = ""
+    monitor: float | None = None
 
     @property
     def confirmed(self) -> bool:
@@ -115,6 +117,15 @@ class Guardian(Protocol):
         """Request 0 V now, where the run cannot set it."""
         ...
 
+    @property
+    def tries(self) -> bool:
+        """Return True from a ``take_over`` that was not answered in time until its outcome."""
+        ...
+
+    def outcome(self, within: float) -> TakeOver | None:
+        """Return the outcome of such a ``take_over``, waiting up to ``within`` s for it."""
+        ...
+
     def close(self) -> None:
         """End it."""
         ...
@@ -138,7 +149,8 @@ class GuardianProcess:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._clock = clock
-        self._guards = self._trying = False
+        self._guards = self._trying = self._failed = False
+        self._reports_before = 0  # those before the last ``take_over``
         self._news = threading.Condition()  # guards what the listener changes, down to _ended
         self._unheard: deque[float] = deque()  # times of the words that are not acknowledged
         self._overdue = False  # True after a word was not acknowledged in time
@@ -255,21 +267,37 @@ class GuardianProcess:
         """Request 0 V now. Raises ``RigError`` where the guardian does not set it."""
         if self._trying:
             raise RigError("the guardian process is still trying to reach the card")
-        reports = self._reports
+        if self._failed:
+            raise RigError("the guardian process could not take the output to 0 V either")
+        self._reports_before = self._reports
         if not self._ask("take over"):
             raise RigError(f"the guardian process gives no answer either ({self.fault()})")
         self._trying = True
-        with self._news:
-            self._news.wait_for(lambda: self._reports > reports or self._ended, _TAKES_OVER_WITHIN)
-            report = self._report if self._reports > reports else None
+        report = self.outcome(_TAKES_OVER_WITHIN)
         if report is None:
             raise RigError(
                 f"the guardian process has not taken the output to 0 V within "
                 f"{_TAKES_OVER_WITHIN:g} s, and goes on trying"
             )
-        self._trying = False
         if not report.confirmed:
             raise RigError(report.sentence)
+        return report
+
+    @property
+    def tries(self) -> bool:
+        """Return True from a ``take_over`` that was not answered in time until its outcome."""
+        return self._trying
+
+    def outcome(self, within: float) -> TakeOver | None:
+        """Return the outcome of the last ``take_over``, waiting up to ``within`` s for it."""
+        before = self._reports_before
+        with self._news:
+            self._news.wait_for(lambda: self._reports > before or self._ended, within)
+            report = self._report if self._reports > before else None
+            if report is not None or self._ended:
+                self._trying = False
+        if report is not None:
+            self._failed = not report.confirmed
         return report
 
     def close(self) -> None:

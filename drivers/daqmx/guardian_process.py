@@ -23,24 +23,23 @@ from dearig.drivers import priority, sources
 from dearig.drivers.daqmx.guardian import WORD, TakeOver
 from dearig.drivers.daqmx.link import Link
 from dearig.drivers.daqmx.outputs import Outputs
-from dearig.drivers.errors import RigError
+from dearig.drivers.errors import NotAtZero, RigError
 from dearig.drivers.settings import RigSettings
+from dearig.drivers.zero_reading import ZeroReading
 
 __all__ = ["Guard", "main"]
-
-_GIVE_UP = 20.0  # s of trying to reach a card that does not answer
 
 
 @dataclass
 class Guard:
-    """Guardian's response to each word and to silence; ``zero`` takes the output to 0 V.
+    """Guardian's response to each word and to silence.
 
-    ``say`` replies to the run, ``tell`` informs the operator at the terminal. After a take-over it
-    is not armed until the run arms it again: a run that continues finds its tasks cleared and makes
-    itself safe.
+    ``zero`` takes the output to 0 V and returns the voltage monitor's reading. ``say`` replies to
+    the run, ``tell`` informs the operator at the terminal. After a take-over it is not armed until
+    the run arms it again: a run that continues finds its tasks cleared and makes itself safe.
     """
 
-    zero: Callable[[], None]
+    zero: Callable[[], ZeroReading | None]
     say: Callable[[str], None]
     tell: Callable[[str], None]
     armed: bool = field(default=False)
@@ -69,11 +68,15 @@ class Guard:
         """Set 0 V and the enable line low, then report it to the run and to the operator."""
         self.armed = False
         at, start, error = time.time(), time.monotonic(), ""
+        monitor = None
         try:
-            self.zero()
+            reading = self.zero()
+            monitor = None if reading is None else reading.voltage
+        except NotAtZero as failed:
+            error, monitor = str(failed), failed.voltage
         except RigError as failed:
             error = str(failed)
-        report = TakeOver(why, at, time.monotonic() - start, error)
+        report = TakeOver(why, at, time.monotonic() - start, error, monitor)
         self.say(f"acted {json.dumps(asdict(report))}")
         self.tell(report.sentence)
 
@@ -94,7 +97,7 @@ def main(configuration: str) -> int:
         _say(f"cannot {error}")
         return 1
 
-    guard = Guard(lambda: _insist(outputs), _say, _tell)
+    guard = Guard(lambda: _insist(outputs, settings.guardian.retry_s), _say, _tell)
     words: queue.SimpleQueue[str | None] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(words,), daemon=True).start()
     _say(f"ready {json.dumps(_ready())}")
@@ -125,9 +128,9 @@ def _ready() -> dict[str, object]:
     }
 
 
-def _insist(outputs: Outputs) -> None:
-    """Set 0 V, and repeat it while the card or its server does not answer."""
-    until = time.monotonic() + _GIVE_UP
+def _insist(outputs: Outputs, seconds: float) -> ZeroReading | None:
+    """Set 0 V, and repeat it for ``seconds`` while the card or its server does not answer."""
+    until = time.monotonic() + seconds
     while True:
         try:
             outputs.shut()
@@ -136,7 +139,7 @@ def _insist(outputs: Outputs) -> None:
                 raise
             time.sleep(0.05)
         else:
-            return
+            return outputs.zero_reading
 
 
 def _listen(words: queue.SimpleQueue[str | None]) -> None:

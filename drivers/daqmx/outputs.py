@@ -6,6 +6,7 @@ The run and its guardian both use this, each with its own connection.
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
@@ -13,8 +14,9 @@ import numpy as np
 
 from dearig.drivers.daqmx.explain import RESERVED, instrument_errors
 from dearig.drivers.daqmx.link import Link
-from dearig.drivers.errors import RigError
+from dearig.drivers.errors import NotAtZero, RigError
 from dearig.drivers.settings import RigSettings
+from dearig.drivers.zero_reading import ZeroReading
 
 if TYPE_CHECKING:
     import nidaqmx
@@ -43,6 +45,8 @@ class Outputs:
         self._settings = settings
         self._tasks: dict[str, nidaqmx.Task] = {}
         self._card: Device | None = None
+        #: reading of the monitor after the last call that set 0 V, None where there is none
+        self.zero_reading: ZeroReading | None = None
 
     def prepare(self) -> None:
         """Make every call of ``shut`` once: it then has nothing left to import, load or make.
@@ -66,6 +70,7 @@ class Outputs:
         With ``force``, a card that is in use is reset, which aborts every task and
         takes outputs and lines down in one step.
         """
+        self.zero_reading = None
         if force:
             self._forced(self._write_zero)
         else:
@@ -74,6 +79,7 @@ class Outputs:
 
     def shut(self) -> None:
         """Set 0 V and the enable line low, also on a card in use, and check the monitor."""
+        self.zero_reading = None
         try:
             self._forced(self._write_zero)
         finally:
@@ -94,17 +100,23 @@ class Outputs:
             self._card.reset_device()
 
     def check_zero(self) -> None:
-        """Raise ``RigError`` unless the voltage monitor reads 0 within the limits' tolerance."""
+        """Raise ``NotAtZero`` unless the voltage monitor reads 0 within the limits' tolerance.
+
+        ``zero_reading`` has the reading in both cases.
+        """
         tolerance = self._settings.limits.zero_tolerance_kV
         per_volt = 1.0 / self._settings.amplifier.monitor_V_per_kV
         reading = 0.0
         for _ in range(_MONITOR_READINGS):
             reading = self.read("voltage_monitor") * per_volt
-            if abs(reading) <= tolerance:
+            confirmed = abs(reading) <= tolerance
+            self.zero_reading = ZeroReading(reading * 1e3, time.time(), confirmed)
+            if confirmed:
                 return
-        raise RigError(
+        raise NotAtZero(
             f"the output was set to 0 V, but the voltage monitor still reads {reading:.3g} kV "
-            f"({tolerance:g} kV is allowed): switch the amplifier's high voltage off by hand"
+            f"({tolerance:g} kV is allowed): switch the amplifier's high voltage off by hand",
+            reading * 1e3,
         )
 
     def read(self, channel: str) -> float:

@@ -22,6 +22,7 @@ from dearig.drivers.gate import GatedWaveform
 from dearig.drivers.identity import instruments
 from dearig.drivers.rig import Block, Event, RigIdentity, RigState, expect
 from dearig.drivers.settings import RigSettings
+from dearig.drivers.zero_reading import ZeroReading
 
 __all__ = ["DaqmxRig", "open_daqmx_rig"]
 
@@ -96,6 +97,20 @@ class DaqmxRig:
     def taken_over(self) -> TakeOver | None:
         """Return what the guardian did since the rig was armed, None if it did nothing."""
         return self._guardian.report()
+
+    @property
+    def zero_reading(self) -> ZeroReading | None:
+        """Return the voltage monitor's reading after 0 V was set last, None where it failed."""
+        return self._outputs.zero_reading
+
+    @property
+    def guardian_tries(self) -> bool:
+        """Return True while the guardian goes on trying to set 0 V, after ``make_safe`` failed."""
+        return self._guardian.tries
+
+    def await_guardian(self, within: float) -> TakeOver | None:
+        """Return the outcome of these tries, waiting up to ``within`` s for it."""
+        return self._guardian.outcome(within)
 
     @property
     def waiting(self) -> float:

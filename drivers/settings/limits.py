@@ -216,3 +216,10 @@ class GuardianSettings(Section):
         le=60.0,
         description="time without an answer after which the server counts as lost",
     )
+    retry_s: float = Field(
+        default=20.0,
+        ge=0.2,
+        le=600.0,
+        description="time for which the guardian repeats its attempts to set 0 V, where the card "
+        "does not answer",
+    )

@@ -23,6 +23,7 @@ from dearig.config.modelfile import save_model
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
 from dearig.drivers import gate
+from dearig.drivers.daqmx.guardian import TakeOver
 from dearig.drivers.errors import RigError
 from dearig.drivers.gate import GatedWaveform
 from dearig.drivers.rig import Block, Event, RigIdentity, RigState
@@ -38,6 +39,7 @@ from dearig.errors import (
 from dearig.model.actuator import Actuator
 from dearig.model.excitation import Sampled
 from dearig.model.material import TABLE_3
+from dearig.output_state import OutputState
 from dearig.recording import open_recording
 from dearig.recording.recorder import Recorder, is_writing
 from dearig.recording.writer import RecordingWriter
@@ -284,7 +286,8 @@ def test_an_instrument_fault(command, tmp_path: Path) -> None:
     rig = Troubled("read", fault)
     answer = command(rig)
     assert answer.code == 4
-    assert answer.err.startswith("dearig: the card gave no sample for 10 s (-200284)")
+    assert "0 V commanded at" in answer.err.splitlines()[0]  # this rig reads no monitor afterwards
+    assert "dearig: the card gave no sample for 10 s (-200284)" in answer.err
     assert "the rig was made safe, and what was recorded is in" in answer.err
     assert closed_at_zero(rig)
     run = open_recording(tmp_path / "run.h5")
@@ -352,7 +355,7 @@ def test_a_rig_that_cannot_be_closed_is_not_confirmed_either(command) -> None:
 
 def test_what_the_guardian_did_is_in_the_recording(command, tmp_path: Path) -> None:
     rig = Troubled("read", fault)
-    acted = SimpleNamespace(sentence="the guardian acted: the output was taken to 0 V")
+    acted = TakeOver("the run is frozen", 0.0, 0.1, monitor=0.4)
     rig.taken_over = acted  # type: ignore[attr-defined]
     assert command(rig).code == 4
     messages = [e.message for e in open_recording(tmp_path / "run.h5").events]
@@ -492,9 +495,9 @@ def test_a_full_disk_does_not_keep_the_voltage_up(
             full_disk()
         append(self, block, modelled)
 
-    def noted(self: RecordingWriter, outcome: str) -> None:
+    def noted(self: RecordingWriter, outcome: str, state: OutputState | None = None) -> None:
         rig.diary.append(f"file closed with the rig {rig.state.value}")
-        close(self, outcome)
+        close(self, outcome, state)
 
     monkeypatch.setattr(RecordingWriter, "append", failing)
     monkeypatch.setattr(RecordingWriter, "close", noted)

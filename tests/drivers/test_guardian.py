@@ -7,6 +7,7 @@ import pytest
 from dearig.drivers.daqmx.guardian import TakeOver
 from dearig.drivers.daqmx.guardian_process import Guard
 from dearig.drivers.errors import RigError
+from dearig.drivers.zero_reading import ZeroReading
 
 
 class Bench:
@@ -23,10 +24,11 @@ class Bench:
         acted = [word.removeprefix("acted ") for word in self.said if word.startswith("acted ")]
         return [TakeOver(**json.loads(report)) for report in acted]
 
-    def _zero(self) -> None:
+    def _zero(self) -> ZeroReading | None:
         self.zeroed += 1
         if self._fails:
             raise RigError(self._fails)
+        return ZeroReading(0.3, 0.0, True)
 
 
 @pytest.mark.parametrize(
