@@ -5,18 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol, cast
 
-from PySide6.QtCore import QEvent, QObject, QSize, Qt, Slot
-from PySide6.QtGui import QAction, QCloseEvent, QGuiApplication, QKeyEvent, QKeySequence
+from PySide6.QtCore import QPoint, QSize, Qt, QTimer, Slot
+from PySide6.QtGui import QAction, QCloseEvent, QGuiApplication, QKeySequence, QShowEvent
 from PySide6.QtWidgets import (
     QApplication,
-    QComboBox,
+    QFrame,
     QHBoxLayout,
-    QLineEdit,
     QListWidget,
     QMainWindow,
     QMenu,
     QMessageBox,
-    QPlainTextEdit,
+    QScrollArea,
     QStackedWidget,
     QToolButton,
     QVBoxLayout,
@@ -25,19 +24,20 @@ from PySide6.QtWidgets import (
 
 from dearig.window.banners import Banners
 from dearig.window.compilation import Compilation, CompilationBar
+from dearig.window.dialogs import run_dialog
 from dearig.window.error_panel import ErrorPanel
 from dearig.window.guide import Guide
-from dearig.window.hv import HighVoltage, HighVoltageBadge
+from dearig.window.hv_bar import HighVoltageBar
 from dearig.window.layout_state import GROUP
 from dearig.window.planner import Planner
 from dearig.window.questions import may_close, offer_unsaved
 from dearig.window.recordings_page import RecordingsPage
 from dearig.window.rig_page import RigPage
 from dearig.window.run_page import RunPage
-from dearig.window.running import simulated
 from dearig.window.sequence_page import SequencePage
 from dearig.window.session import Session
 from dearig.window.settings import kept_bytes, kept_number, kept_text
+from dearig.window.stop_keys import StopKeys
 from dearig.window.study_page import StudyPage
 from dearig.window.theme import DARK, LIGHT, SPACE, apply, system_theme
 from dearig.window.widgets import label, plain_tip
@@ -61,7 +61,6 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.session = session
         self.setWindowTitle("dearig[*]")  # Qt shows a mark there while something is not saved
-        self.setMinimumHeight(680)  # px; the pages set the minimum width, which depends on fonts
         self.planner = Planner(session, self)
         self.compilation = Compilation(self)
         self.rig_page = RigPage(session)
@@ -76,6 +75,7 @@ class MainWindow(QMainWindow):
             self.recordings_page,
             self.study_page,
         )
+        self.stop_keys = StopKeys(self.run_page.stop, lambda: session.busy, self)
         self._guide: Guide | None = None
         self._closing = False
         self._by_signal = False  # closed by a signal: nobody is there to be asked
@@ -123,17 +123,11 @@ class MainWindow(QMainWindow):
         self._closing = self._by_signal = True
         self.close()
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
-        """Stop the run on Esc or Space, whatever has the focus; fields still accept a space."""
-        if event.type() == QEvent.Type.KeyPress and self.run_page.runner.running:
-            pressed = cast(QKeyEvent, event)
-            key = pressed.key()
-            typing = isinstance(QApplication.focusWidget(), QLineEdit | QPlainTextEdit | QComboBox)
-            if key == Qt.Key.Key_Escape or (key == Qt.Key.Key_Space and not typing):
-                if not pressed.isAutoRepeat():  # a second press goes to 0 V without a ramp
-                    self.run_page.stop()
-                return True
-        return super().eventFilter(watched, event)
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Fit the window, with its frame, into the screen: the bar with STOP must be visible."""
+        super().showEvent(event)
+        # the frame of the window manager is known only after the window is shown
+        QTimer.singleShot(0, self._fit_screen)
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
         """Ask during a run, and make the rig safe whatever the answer."""
@@ -153,9 +147,10 @@ class MainWindow(QMainWindow):
             return
         self.session.recovery.close(keep=self._by_signal)
         self._save_state()
-        self._filter_keys(running=False)
+        self.stop_keys.watch(False)
         self.run_page.close_work()
         self.compilation.close()
+        self.bar.close_work()
         self.planner.close()
         for page in (
             self.rig_page, self.sequence_page, self.recordings_page, self.study_page
@@ -191,7 +186,7 @@ class MainWindow(QMainWindow):
         asked.setInformativeText("The recording is kept. Close the window at 0 V?")
         close = asked.addButton("Close", QMessageBox.ButtonRole.AcceptRole)
         asked.addButton("Keep open", QMessageBox.ButtonRole.RejectRole)
-        asked.exec()
+        run_dialog(asked, self.session)
         return asked.clickedButton() is close
 
     # layout
@@ -206,7 +201,7 @@ class MainWindow(QMainWindow):
             known = cast(Page, page)
             self.list.addItem(known.title)
             self.list.item(number - 1).setToolTip(f"{known.title} ({known.shortcut})")
-            self.stack.addWidget(page)
+            self.stack.addWidget(_scrollable(page))
             key = QAction(self)
             key.setShortcut(QKeySequence(known.shortcut))
             key.triggered.connect(lambda _=False, page=page: self.show_page(page))
@@ -229,6 +224,8 @@ class MainWindow(QMainWindow):
         self._top = QVBoxLayout()
         self._top.setContentsMargins(0, 0, 0, 0)
         self._top.setSpacing(SPACE // 2)
+        self.bar = HighVoltageBar(self.run_page.runner.status, self.session)
+        self._top.addWidget(self.bar)
         self._top.addWidget(self.banners)
         self._top.addWidget(CompilationBar(self.compilation))
         self.error_panel = ErrorPanel(self.session.program_errors)
@@ -239,9 +236,6 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(middle)
         bar = self.statusBar()
         bar.setSizeGripEnabled(False)
-        self.badge = HighVoltageBadge(self.session, large=False)
-        self.badge.setFixedWidth(270)
-        bar.addWidget(self.badge)
         self.status = label("")
         bar.addWidget(self.status, 1)
         self.rig_and_folder = label("", "muted")
@@ -279,7 +273,8 @@ class MainWindow(QMainWindow):
 
     def _connect(self) -> None:
         session, run = self.session, self.run_page
-        run.runner.state_changed.connect(self._state_changed)
+        self.bar.stop_pressed.connect(run.stop)
+        run.runner.state_changed.connect(self._watch_keys)
         run.runner.ended.connect(self._run_ended, Qt.ConnectionType.QueuedConnection)
         session.recovery.changed.connect(self._unsaved_changed)
         self._unsaved_changed()
@@ -296,32 +291,21 @@ class MainWindow(QMainWindow):
         self.study_page.open_sequence.connect(self._play_sequence)
         self.study_page.show_model.connect(self._show_model)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_colour_scheme)
-        session.running_changed.connect(self._filter_keys)
+        session.running_changed.connect(self._watch_keys)
         self.addActions(run.display.mark_bar.actions())  # the key M on every page
         session.blocks_changed.connect(lambda: self.banners.show_blocks(session.blocks))
         self.banners.show_blocks(session.blocks)
         self._rig_or_folder_changed()
 
-    @Slot(bool)
-    def _filter_keys(self, running: bool) -> None:
-        """Filter key presses during a run only: all events of the program pass the filter."""
-        application = QApplication.instance()
-        if application is not None:
-            application.removeEventFilter(self)
-            if running:
-                application.installEventFilter(self)
-
-    @Slot(object)
-    def _state_changed(self, state: HighVoltage) -> None:
-        words = "simulated" if simulated(self.session.address) else ""
-        self.badge.show_state(state, words)
+    @Slot()
+    def _watch_keys(self) -> None:
+        self.stop_keys.watch(self.session.busy)
 
     @Slot()
     def _rig_or_folder_changed(self) -> None:
         folder = self.session.folder
         self.rig_and_folder.setText(f"rig {self.session.address}   ·   {folder.name or folder}  ")
         self.rig_and_folder.setToolTip(plain_tip(f"Folder of the recordings: {folder}"))
-        self._state_changed(self.run_page.runner.state)
 
     @Slot(int)
     def _page_changed(self, row: int) -> None:
@@ -378,3 +362,27 @@ class MainWindow(QMainWindow):
     def _default_geometry(self) -> None:
         available = QGuiApplication.primaryScreen().availableSize()
         self.resize(available.boundedTo(QSize(1600, 980)))
+
+    @Slot()
+    def _fit_screen(self) -> None:
+        if self.isMaximized() or self.isFullScreen():
+            return
+        available = self.screen().availableGeometry()
+        frame = self.frameGeometry()
+        borders = frame.size() - self.size()
+        self.resize(self.size().boundedTo(available.size() - borders))
+        frame = self.frameGeometry()
+        left = max(available.left(), min(frame.left(), available.right() + 1 - frame.width()))
+        top = max(available.top(), min(frame.top(), available.bottom() + 1 - frame.height()))
+        if (left, top) != (frame.left(), frame.top()):
+            self.move(QPoint(left, top))
+
+
+def _scrollable(page: QWidget) -> QScrollArea:
+    """Return ``page`` in an area that scrolls it where the window is smaller than the page."""
+    area = QScrollArea()
+    area.setFrameShape(QFrame.Shape.NoFrame)
+    area.setWidgetResizable(True)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    area.setWidget(page)
+    return area

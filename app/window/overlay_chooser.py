@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker, Qt, Slot
-from PySide6.QtWidgets import QComboBox, QFileDialog, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QWidget
 
 from dearig.acquisition.overlay import OverlayModel
 from dearig.config.modelfile import load_actuator, load_model
 from dearig.config.toml_input import read_text
 from dearig.window.background import Background
+from dearig.window.dialogs import choose_file
 from dearig.window.session import Session
 from dearig.window.widgets import Message, label, plain_tip
 
@@ -92,11 +93,11 @@ class OverlayChooser(QWidget):
         chosen = self.models[place].currentData()
         if chosen == _OPEN:
             self.refresh()  # the previous model stays until the new one is read
-            name, _ = QFileDialog.getOpenFileName(
-                self, "Overlay model", str(self._session.folder), "Models (*.toml)"
+            path = choose_file(
+                self, self._session, "Overlay model", self._session.folder, "Models (*.toml)"
             )
-            if name:
-                self.load(Path(name), place)
+            if path is not None:
+                self.load(path, place)
             return
         self._place(place, chosen)
 

@@ -9,7 +9,6 @@ from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
-    QFileDialog,
     QHBoxLayout,
     QLabel,
     QLineEdit,
@@ -34,6 +33,7 @@ from dearig.report.tables import Row, Table
 from dearig.units import SHOWN
 from dearig.window.conditions_table import ConditionsTable
 from dearig.window.curves_plot import CurvesPlot
+from dearig.window.dialogs import choose_file, choose_folder, save_as
 from dearig.window.folder_table import FolderModel
 from dearig.window.layout_state import remember
 from dearig.window.library import shared_library
@@ -404,17 +404,17 @@ class RecordingsPage(QWidget):
         chosen = self.chosen()
         if len(chosen) == 1:
             proposed = chosen[0].with_suffix(f".{form}")
-            name, _ = QFileDialog.getSaveFileName(
-                self, f"Export {chosen[0].name}", str(proposed), f"*.{form}"
+            out = save_as(
+                self, self._session, f"Export {chosen[0].name}", proposed, f"*.{form}", f".{form}"
             )
-            if name:
-                self.export(chosen[0], form, Path(name))
+            if out is not None:
+                self.export(chosen[0], form, out)
             return
-        name = QFileDialog.getExistingDirectory(
-            self, f"Folder for {len(chosen)} exported recordings", str(self._session.folder)
-        )
-        for path in chosen if name else ():
-            self.export(path, form, Path(name) / f"{path.stem}.{form}")
+        title = f"Folder for {len(chosen)} exported recordings"
+        folder = choose_folder(self, self._session, title, self._session.folder)
+        if folder is not None:
+            for path in chosen:
+                self.export(path, form, folder / f"{path.stem}.{form}")
 
     @Slot()
     def recover(self) -> None:
@@ -438,11 +438,9 @@ class RecordingsPage(QWidget):
 
     @Slot()
     def _ask_folder(self) -> None:
-        name = QFileDialog.getExistingDirectory(
-            self, "Folder of recordings", str(self._session.folder)
-        )
-        if name:
-            self._session.set_folder(Path(name))
+        folder = choose_folder(self, self._session, "Folder of recordings", self._session.folder)
+        if folder is not None:
+            self._session.set_folder(folder)
 
     @Slot()
     def _name_folder(self) -> None:
@@ -466,10 +464,11 @@ class RecordingsPage(QWidget):
     @Slot(int)
     def _model_chosen(self, index: int) -> None:
         if self.model_box.itemText(index) == _OPEN_MODEL:
-            name, _ = QFileDialog.getOpenFileName(
-                self, "Model to compare with", str(self._session.folder), "Models (*.toml)"
-            )
-            self.compare_with(Path(name) if name else self._library.model)
+            model = choose_file(
+                self, self._session, "Model to compare with", self._session.folder,
+                "Models (*.toml)",
+            )  # fmt: skip
+            self.compare_with(model or self._library.model)
         else:
             self.compare_with(self.model_box.itemData(index))
 

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from PySide6.QtGui import QFont
-from PySide6.QtWidgets import (
-    QHBoxLayout,
-    QProgressBar,
-    QPushButton,
-    QSizePolicy,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtCore import Qt, Slot
+from PySide6.QtGui import QKeyEvent, QKeySequence, QShortcut
+from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
-from dearig.window.hv import HighVoltage, HighVoltageBadge
+from dearig.window.hv import HighVoltageBadge
+from dearig.window.hv_bar import label_stop, stop_button
+from dearig.window.hv_status import HighVoltageStatus
 from dearig.window.live import RunSnapshot
 from dearig.window.session import Session
-from dearig.window.theme import SPACE, digits
-from dearig.window.widgets import Message, Readout, button, card, label
+from dearig.window.theme import SPACE
+from dearig.window.widgets import Message, Readout, card, label, set_role
 
 __all__ = ["RunControls"]
 
 _WIDTH = 268  # px
-_STOP = "⬣  STOP"
-_STOP_AGAIN = "⬣  0 V NOW"
+_STOP_HEIGHT = 92  # px
 
 #: Signal to (factor from SI to the readout's unit, decimals).
 _SIGNALS = {
@@ -33,22 +28,48 @@ _SIGNALS = {
 }
 
 
+class StepButton(QPushButton):
+    """Button of a step towards voltage: clicked, or by its own key, pressed once.
+
+    It takes no focus, and no other key acts on it: Space is a stop key, and a key that is held
+    repeats itself.
+    """
+
+    def __init__(self, text: str, tip: str, key: str, page: QWidget) -> None:
+        super().__init__(text)
+        self.setProperty("role", "primary")
+        self.setToolTip(f"{tip} ({key})")
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        shortcut = QShortcut(QKeySequence(key), page)
+        shortcut.setAutoRepeat(False)
+        shortcut.activated.connect(self.click)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        event.ignore()
+
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        event.ignore()
+
+
 class RunControls(QWidget):
     """Buttons and readouts of a run. The page connects the buttons and says what to show."""
 
-    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, session: Session, status: HighVoltageStatus, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
         self._session = session
-        self.badge = HighVoltageBadge(session, large=True)
-        self.arm_button = button("1  &Arm", "First step: no voltage yet (F5)", primary=True)
+        self._status = status
+        self.badge = HighVoltageBadge(large=True)
+        self.arm_button = StepButton("1  Arm", "First step: no voltage yet", "F5", self)
         self.arm_button.setCheckable(True)
-        self.arm_button.setShortcut("F5")
-        self.start_button = button("2  &Start", "Second step: play and record the sequence (F6)")
-        self.start_button.setProperty("role", "primary")
-        self.start_button.setShortcut("F6")
-        self.stop_button = _stop_button()
+        self.start_button = StepButton(
+            "2  Start", "Second step: play and record the sequence", "F6", self
+        )
+        self.stop_button = stop_button(26, _STOP_HEIGHT)
         self.time_left = label("", "title")
-        self.time_left.setFont(digits(15))
+        self.time_left.setWordWrap(True)
+        self.of_sample = label("", "muted", "Time of the sample that the readouts show")
         self.segment = label("", "muted", "Segment that is playing")
         self.progress = QProgressBar()
         self.progress.setRange(0, 1000)
@@ -73,14 +94,23 @@ class RunControls(QWidget):
         column.addWidget(card(self._readouts()))
         column.addStretch(1)
         self.setFixedWidth(_WIDTH)
+        status.changed.connect(self._refresh)
+        self._refresh()
 
-    def show_state(self, state: HighVoltage, detail: str) -> None:
-        """Show the high-voltage state, with ``detail`` such as 7.9 kV beside it."""
-        self.badge.show_state(state, detail)
-
-    def show_stop(self, ramping: bool) -> None:
-        """Label the STOP button with what its next press does."""
-        self.stop_button.setText(_STOP_AGAIN if ramping else _STOP)
+    @Slot()
+    def _refresh(self) -> None:
+        """Show the high voltage, and whether the readouts are those of this moment."""
+        status, reading = self._status, self._status.reading
+        self.badge.show_state(status.state, status.detail)
+        label_stop(self.stop_button, status.state)
+        past = reading is not None and not status.live
+        if reading is not None and past:
+            self.of_sample.setText(f"last sample, {reading.seconds:.2f} s")
+        else:
+            self.of_sample.setText("now" if status.live else "")
+        set_role(self.of_sample, "muted")
+        for readout in self.numbers.values():
+            readout.show_past(past)
 
     def show_numbers(self, now: RunSnapshot) -> None:
         """Show the signals and the errors of the overlay models."""
@@ -106,6 +136,7 @@ class RunControls(QWidget):
     def _readouts(self) -> QVBoxLayout:
         column = QVBoxLayout()
         column.setSpacing(0)
+        column.addWidget(self.of_sample)
         self.numbers = {
             "command": Readout("Command", "kV", "Voltage that the card commands, in kV"),
             "monitor": Readout("Monitor", "kV", "Voltage that the amplifier reports, in kV"),
@@ -140,28 +171,3 @@ class RunControls(QWidget):
             self._model_titles.append(title)
             self._model_groups.append(holder)
         return column
-
-
-def _stop_button() -> QPushButton:
-    """Large, red, with an octagon in its text: nothing else in the window looks like it."""
-    made = QPushButton(_STOP)
-    made.setObjectName("stop")
-    made.setMinimumHeight(92)
-    made.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-    font = QFont(made.font())
-    font.setPointSize(26)
-    font.setBold(True)
-    made.setFont(font)
-    made.setToolTip(
-        "Ramp down to 0 V and end the run (Esc or Space); press again for 0 V at once, without "
-        "a ramp"
-    )
-    made.setAccessibleName("STOP: ramp down to 0 V")
-    made.setStyleSheet(
-        "QPushButton { background: #b3001b; color: white; border: 3px solid #7a0012;"
-        " border-radius: 10px; }"
-        " QPushButton:hover { background: #cc1a33; }"
-        " QPushButton:pressed { background: #7a0012; }"
-        " QPushButton:focus { border: 3px solid #f0e442; }"
-    )
-    return made

@@ -15,14 +15,16 @@ from PySide6.QtWidgets import (
 
 from dearig.acquisition.marks import RunMarks
 from dearig.acquisition.overlay import OverlayModel
+from dearig.acquisition.rigs import is_simulated
 from dearig.drivers.daqmx.watchdog import watchdog_words
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.hv import HighVoltage
+from dearig.window.hv_status import Reading
 from dearig.window.live import Live
 from dearig.window.overlay_chooser import OverlayChooser
 from dearig.window.run_controls import RunControls
 from dearig.window.run_display import RunDisplay
-from dearig.window.running import RunEnd, Runner, RunRequest, simulated
+from dearig.window.running import RunEnd, Runner, RunRequest
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
 from dearig.window.widgets import Message, button, label
@@ -30,7 +32,6 @@ from dearig.window.widgets import Message, button, label
 __all__ = ["RunPage"]
 
 _NUMBERS = 100  # ms between two updates of the readouts: faster ones cannot be read
-_ARMED = 30_000  # ms after which a rig that was armed and not started is disarmed
 
 
 class RunPage(QWidget):
@@ -45,14 +46,14 @@ class RunPage(QWidget):
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.session = session
-        self.runner = Runner(self)
+        self.runner = Runner(session, self)
         self.faults: FaultPlan | None = None  #: faults of the next simulated run
         self.live: Live | None = None
         self._runs = 0
         self._segments: tuple[tuple[str, float, float], ...] = ()
         self._last_recording: Path | None = None
 
-        self.controls = RunControls(session)
+        self.controls = RunControls(session, self.runner.status)
         self.badge = self.controls.badge
         self.arm_button = self.controls.arm_button
         self.start_button = self.controls.start_button
@@ -64,8 +65,6 @@ class RunPage(QWidget):
         self.alarms = self.display.alarms
         self._build()
         self._connect()
-        self._disarm = QTimer(self, singleShot=True, interval=_ARMED)
-        self._disarm.timeout.connect(self._disarmed)
         self._numbers = QTimer(self, interval=_NUMBERS)
         self._numbers.timeout.connect(self._update_readouts)
         self._overlays_changed()
@@ -100,7 +99,6 @@ class RunPage(QWidget):
         self._numbers.start()
         session.set_running(True)
         self._refresh()
-        self.stop_button.setFocus()
 
     def _refuse_unseen(self) -> None:
         """Disarm: what would be played is not what the plots show."""
@@ -109,18 +107,13 @@ class RunPage(QWidget):
             "that they show now, then arm it again.",
             "bad",
         )
-        self._disarmed()
+        self.runner.arm(armed=False)
         self.display.show_planned()
 
     @Slot()
     def stop(self) -> None:
         """Ramp down to 0 V; during the ramp, go to 0 V at once; before a run, disarm."""
-        if self.runner.state is HighVoltage.RAMPING:
-            self.runner.stop_without_ramp()
-            return
         self.runner.stop()
-        if not self.runner.running:
-            self._disarmed()
 
     def show_model(self, path: Path, place: int = 0) -> None:
         """Use the model in the file ``path`` as overlay model ``place``, 0 or 1."""
@@ -131,7 +124,6 @@ class RunPage(QWidget):
         self.runner.stop()
         self.runner.wait()
         self._numbers.stop()
-        self._disarm.stop()
         self.display.forget_run()
         self.overlays.close_work()
         if self.live is not None:
@@ -141,41 +133,17 @@ class RunPage(QWidget):
     @Slot(bool)
     def _arm(self, armed: bool) -> None:
         preview = self.session.preview
-        refused = preview is None or not preview.playable or bool(self.session.blocks)
-        if self.runner.running or (armed and refused):
-            self.arm_button.setChecked(False)
-            return
-        self.runner.arm(armed)
-        if armed:
-            self._disarm.start()
-            self.start_button.setEnabled(True)
-            self.start_button.setFocus()
-        else:
-            self._disarmed()
-
-    @Slot()
-    def _disarmed(self) -> None:
-        self._disarm.stop()
-        self.runner.arm(armed=False)
+        playable = preview is not None and preview.playable
+        if playable or not armed:
+            self.runner.arm(armed)  # refused during a run, and while something blocks it
         self._refresh()
 
     # display
 
     @Slot(object)
     def _state_changed(self, state: HighVoltage) -> None:
-        self.session.set_armed(state is HighVoltage.ARMED)
         if state is HighVoltage.ARMED:
             self.display.show_planned()
-        self.controls.show_state(state, self._simulated_label())
-        self.controls.show_stop(ramping=state is HighVoltage.RAMPING)
-
-    def _simulated_label(self) -> str:
-        return "simulated" if simulated(self.session.address) else ""
-
-    @Slot()
-    def _sequence_changed(self) -> None:
-        if self.runner.state is HighVoltage.ARMED:
-            self._disarmed()  # another sequence was armed
         self._refresh()
 
     @Slot()
@@ -183,21 +151,19 @@ class RunPage(QWidget):
         session, running = self.session, self.runner.running
         preview = session.preview
         ready = preview is not None and preview.playable and not running and not session.blocks
-        armed = self.runner.state is HighVoltage.ARMED
+        armed = self.runner.armed
         if not ready and armed:
-            self.runner.arm(armed=False)
-            armed = False
+            armed = self.runner.arm(armed=False)
         self.arm_button.setEnabled(ready)
         self.arm_button.setChecked(armed)
         self.start_button.setEnabled(ready and armed)
         for field in (self.operator, self.film, self.notes, self.paced):
             field.setEnabled(not running)
-        self.paced.setVisible(simulated(session.address))
+        self.paced.setVisible(is_simulated(session.address))
         self.blocked.show_text("\n".join(b.sentence for b in session.blocks.values()), "warn")
         self._describe_watchdog()
         if running:
             return
-        self.controls.show_state(self.runner.state, self._simulated_label())
         self._describe_plan()
         self.to_sequence.setVisible(preview is not None and not preview.playable)
 
@@ -244,21 +210,19 @@ class RunPage(QWidget):
             if reason
         ]
         self.overlay_failures.show_text("; ".join(failures), "warn")
+        seconds, total = now.samples / now.rate, now.total / now.rate
+        monitor = now.values.get("monitor", float("nan"))
+        self.runner.status.show_reading(Reading(monitor, seconds, total))
         if self.runner.running:
-            seconds = now.samples / now.rate
-            left = max(0.0, now.total / now.rate - seconds)
+            left = max(0.0, total - seconds)
             self.controls.time_left.setText(f"{left:.1f} s left")
             self.controls.progress.setValue(round(1000 * now.samples / max(now.total, 1)))
             playing = next((s for s in self._segments if s[1] <= seconds < s[2]), None)
             self.controls.segment.setText(f"playing: {playing[0]}" if playing else "")
-            kilovolts = now.values.get("monitor", float("nan")) * 1e-3
-            detail = f"{kilovolts:.2f} kV  {self._simulated_label()}".rstrip()
-            self.controls.show_state(self.runner.state, detail)
 
     @Slot(object)
     def _run_ended(self, end: RunEnd) -> None:
         self._update_readouts()
-        self.controls.show_state(self.runner.state, self._simulated_label())
         self.controls.time_left.setText(end.headline)
         if end.result is not None:
             self.controls.progress.setValue(1000)
@@ -319,12 +283,12 @@ class RunPage(QWidget):
         session = self.session
         self.arm_button.clicked.connect(self._arm)
         self.start_button.clicked.connect(self.start)
-        self.stop_button.clicked.connect(self.stop)
+        self.stop_button.pressed.connect(self.stop)
         self.runner.state_changed.connect(self._state_changed)
         self.runner.ended.connect(self._run_ended)
         session.preview_changed.connect(self._refresh)
         session.preview_changed.connect(self.display.show_planned)
-        session.sequence_changed.connect(self._sequence_changed)
+        session.sequence_changed.connect(self._refresh)
         session.sequence_changed.connect(self.display.show_planned)
         session.rig_changed.connect(self._refresh)
         session.rig_changed.connect(self.display.show_planned)

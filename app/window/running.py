@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,22 +13,25 @@ from PySide6.QtCore import QObject, QThread, Signal, Slot
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.marks import RunMarks
 from dearig.acquisition.overlay import OverlayModel
-from dearig.acquisition.rigs import is_simulated
-from dearig.acquisition.run import RunOptions, RunResult, record
+from dearig.acquisition.plan import Plan
+from dearig.acquisition.run import RunObserver, RunOptions, RunResult, record
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
+from dearig.drivers.rig import Block, Event, RigIdentity
 from dearig.errors import (
     DearigError,
     DiskFault,
     InputError,
     InstrumentFault,
     Interrupted,
-    NotSafe,
     SafetyStop,
 )
+from dearig.output_state import Known, OutputState
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.hv import HighVoltage
+from dearig.window.hv_status import Alarm, HighVoltageStatus
 from dearig.window.live import Live
+from dearig.window.session import Session
 
 __all__ = ["RunEnd", "RunRequest", "Runner", "next_recording_path"]
 
@@ -35,6 +39,7 @@ _PROGRAM_FAULT = (
     "an error in the program ended the run: check that the amplifier is at 0 V; the log has the "
     "details of the error"
 )
+_ALARM_MAX = 1000  # characters of an alarm; the settings keep it
 _ENDS: dict[type[DearigError], str] = {
     Interrupted: "Stopped",
     SafetyStop: "Stopped by an interlock",
@@ -73,79 +78,101 @@ class RunRequest:
 class RunEnd:
     """How a run ended: a ``headline``, a ``sentence``, and the recording if there is one.
 
-    ``safe`` is True if the program knows that its output is at 0 V, False if it does not, and None
-    if nothing was played: then the output is as it was before.
+    ``output`` is what was measured of the output after it, None where the rig was not contacted:
+    then it is as it was before. ``alarming`` is True where the operator must acknowledge the end.
     """
 
     headline: str
     sentence: str
     path: Path | None
-    safe: bool | None
+    output: OutputState | None
     result: RunResult | None = None
+    alarming: bool = False
 
 
 class Runner(QObject):
     """Plays one run after another, never two at once.
 
-    ``state_changed`` carries the ``HighVoltage``, ``ended`` the ``RunEnd``; both come in the
-    interface thread. Only ``wait`` blocks it.
+    ``status`` has the state of the high voltage. ``state_changed`` carries the ``HighVoltage``,
+    ``ended`` the ``RunEnd``; both come in the interface thread. Only ``wait`` blocks it.
     """
 
     state_changed = Signal(object)
     ended = Signal(object)
 
-    def __init__(self, parent: QObject | None = None) -> None:
+    def __init__(self, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
+        self._session = session
         self._thread: _RunThread | None = None
-        self._state = HighVoltage.SAFE
-        self._before = HighVoltage.SAFE  # state before it was armed
+        self.status = HighVoltageStatus(session, self)
+        self.status.state_changed.connect(self.state_changed)
+        self.status.disarm_due.connect(self.stop)
+        session.blocks_changed.connect(self._blocks_changed)
+        session.rig_changed.connect(self._disarm)  # another rig was armed
+        session.sequence_changed.connect(self._disarm)  # another sequence was armed
 
     @property
     def state(self) -> HighVoltage:
         """Voltage that may be on the electrodes."""
-        return self._state
+        return self.status.state
 
     @property
     def running(self) -> bool:
         """True from ``start`` until ``ended``."""
         return self._thread is not None
 
-    def arm(self, armed: bool) -> None:
-        """Arm or disarm the rig."""
-        if self.running or armed == (self._state is HighVoltage.ARMED):
-            return
-        if armed:
-            self._before = self._state
-        self._set_state(HighVoltage.ARMED if armed else self._before)
+    @property
+    def armed(self) -> bool:
+        """True while ``start`` would begin a run."""
+        return self.state is HighVoltage.ARMED
+
+    def arm(self, armed: bool) -> bool:
+        """Arm or disarm the rig; return whether it is armed. What blocks arming is obeyed."""
+        if not self.running and armed != self.armed and not (armed and self._session.blocks):
+            self.status.set_phase(HighVoltage.ARMED if armed else None)
+        return self.armed
 
     def start(self, order: RunRequest, live: Live) -> bool:
         """Begin a run; return False if the rig is not armed."""
-        if self.running or self._state is not HighVoltage.ARMED:
+        if self.running or not self.armed:
             return False
+        self.status.run_begins()
         self._thread = _RunThread(order, live, self)
+        self._thread.output_known.connect(self.status.set_output)
         self._thread.finished.connect(self._finished)
-        self._set_state(HighVoltage.ON)
+        self.status.set_phase(HighVoltage.ON)
         # the samples of the rig must be read in time, whatever the interface draws
         self._thread.start(QThread.Priority.TimeCriticalPriority)
         return True
 
+    @Slot()
     def stop(self) -> None:
-        """Ramp down to 0 V and end the run; without a run, disarm."""
+        """Ramp down to 0 V and end the run, or go to 0 V at once in a ramp; without a run, disarm.
+
+        After the run is at 0 V, or cannot be: stop waiting for the guardian or the disk.
+        """
         if self._thread is None:
             self.arm(armed=False)
-            return
-        self._thread.interrupts.ask()
-        self._set_state(HighVoltage.RAMPING)
-
-    def stop_without_ramp(self) -> None:
-        """Set 0 V without a ramp; for an operator who finds the ramp too slow."""
-        if self._thread is not None:
+        elif self.state is HighVoltage.RAMPING:
             self._thread.interrupts.ask_at_once()
+        else:
+            self._thread.interrupts.ask()
+            if self.status.live:
+                self.status.set_phase(HighVoltage.RAMPING)
 
     def wait(self) -> None:
         """Wait until the run has ended; used when the window closes."""
         if self._thread is not None:
             self._thread.wait()
+
+    @Slot()
+    def _disarm(self) -> None:
+        self.arm(armed=False)
+
+    @Slot()
+    def _blocks_changed(self) -> None:
+        if self._session.blocks:
+            self.arm(armed=False)
 
     @Slot()
     def _finished(self) -> None:
@@ -154,23 +181,51 @@ class Runner(QObject):
             return
         thread.deleteLater()
         end = thread.end
-        after = {None: self._before, True: HighVoltage.SAFE, False: HighVoltage.UNCONFIRMED}
-        self._set_state(after[end.safe])
+        if end.output is not None:
+            self.status.set_output(end.output)
+        self.status.set_phase(None)
+        self.status.run_ended(_alarm(end, self._session.address) if end.alarming else None)
         self.ended.emit(end)
 
-    def _set_state(self, state: HighVoltage) -> None:
-        if state is not self._state:
-            self._state = state
-            self.state_changed.emit(state)
+
+def _alarm(end: RunEnd, address: str) -> Alarm:
+    known = Known.UNKNOWN if end.output is None else end.output.known
+    at = time.time() if end.output is None else end.output.at
+    recording = "" if end.path is None else str(end.path)
+    return Alarm(end.headline, end.sentence[:_ALARM_MAX], at, address, recording, known.value)
+
+
+class _Observed(RunObserver):
+    """Hands everything on to ``live``, and what is known of the output to ``tell`` too."""
+
+    def __init__(self, live: Live, tell: Callable[[OutputState], None]) -> None:
+        self._live = live
+        self._tell = tell
+        self.output_state: OutputState | None = None
+
+    def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:
+        self._live.started(planned, identity, rate)
+
+    def block(self, block: Block) -> None:
+        self._live.block(block)
+
+    def event(self, event: Event) -> None:
+        self._live.event(event)
+
+    def output(self, state: OutputState) -> None:
+        self.output_state = state
+        self._tell(state)
 
 
 class _RunThread(QThread):
+    output_known = Signal(object)
+
     def __init__(self, order: RunRequest, live: Live, parent: QObject) -> None:
         super().__init__(parent)
         self._order = order
         self._live = live
         self.interrupts = Interrupts()
-        self.end = RunEnd("Ended", _PROGRAM_FAULT, None, safe=False)
+        self.end = RunEnd("Ended", _PROGRAM_FAULT, None, None)
 
     def run(self) -> None:
         order = self._order
@@ -183,9 +238,10 @@ class _RunThread(QThread):
                 f"the folder {order.folder} cannot be used: {error.strerror or error}; nothing was "
                 f"played; choose another one",
                 None,
-                safe=None,
+                None,
             )
             return
+        observer = _Observed(self._live, self.output_known.emit)
         try:
             options = RunOptions(
                 order.configuration, order.operator, order.film, order.notes,
@@ -194,29 +250,37 @@ class _RunThread(QThread):
             )  # fmt: skip
             result = record(
                 order.loaded, order.address, order.rig_file, out, options, overlay=order.overlay,
-                observer=self._live, interrupts=self.interrupts, marks=order.marks,
+                observer=observer, interrupts=self.interrupts, marks=order.marks,
                 clock=time.monotonic,
             )  # fmt: skip
         except DearigError as error:
             played = self._live.now() is not None
             self.end = _early_end(error, out, played)
+        except BaseException:
+            # an error of the program may leave a voltage
+            known = observer.output_state or OutputState(Known.UNKNOWN, time.time())
+            self.end = RunEnd("Ended", _PROGRAM_FAULT, None, known, alarming=True)
+            raise
         else:
             seconds = result.samples / result.rate_Hz
             self.end = RunEnd(
                 "Finished",
                 f"{result.samples:,} samples, {seconds:.1f} s at {result.rate_Hz:g} Hz",
                 result.path,
-                safe=True,
+                result.output_state,
                 result=result,
+                alarming=not result.output_state.confirmed,
             )
 
 
 def _early_end(error: DearigError, out: Path, played: bool) -> RunEnd:
-    """Describe a run that ended early; ``NotSafe`` says that 0 V is not confirmed."""
-    safe = not isinstance(error, NotSafe) if played else None
+    """Describe a run that ended early; ``played`` is True where its rig was ready to start."""
     headline = next((words for kind, words in _ENDS.items() if isinstance(error, kind)), "Ended")
     sentence = str(error).removeprefix("interrupted: ")
-    return RunEnd(headline, sentence, out if out.exists() else None, safe)
+    output = error.output_state
+    fault = played and isinstance(error, SafetyStop | InstrumentFault)
+    alarming = fault or (output is not None and not output.confirmed)
+    return RunEnd(headline, sentence, out if out.exists() else None, output, alarming=alarming)
 
 
 def next_recording_path(folder: Path, name: str) -> Path:
@@ -229,8 +293,3 @@ def next_recording_path(folder: Path, name: str) -> Path:
         if (found := re.fullmatch(re.escape(stem) + r"-(\d{3,6})\.h5", path.name))
     ]
     return folder / f"{stem}-{max(taken, default=0) + 1:03d}.h5"
-
-
-def simulated(address: str) -> bool:
-    """Return True for a rig without real instruments."""
-    return is_simulated(address)

@@ -11,7 +11,6 @@ from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import (
     QButtonGroup,
     QComboBox,
-    QFileDialog,
     QFormLayout,
     QHBoxLayout,
     QMenu,
@@ -32,6 +31,7 @@ from dearig.report.study_file import StudyEntry, make_study, open_study, studies
 from dearig.report.study_view import StudyView, view_of
 from dearig.window.background import Background
 from dearig.window.before_after_plot import BeforeAfterPlot
+from dearig.window.dialogs import save_as
 from dearig.window.layout_state import remember
 from dearig.window.library import shared_library
 from dearig.window.report_page import ReportPage
@@ -417,11 +417,9 @@ class StudyPage(QWidget):
         if self._shown is None:
             return
         proposed = self._session.folder / f"{self._shown.model.parent.name}.toml"
-        name, _ = QFileDialog.getSaveFileName(
-            self, "Save the model", str(proposed), "Models (*.toml)"
-        )
-        if name:
-            self.save(Path(name))
+        path = save_as(self, self._session, "Save the model", proposed, "Models (*.toml)", ".toml")
+        if path is not None:
+            self.save(path)
 
     def save(self, path: Path) -> None:
         """Copy the model file to ``path``; an existing file is replaced."""

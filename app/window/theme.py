@@ -161,6 +161,7 @@ def _sheet(t: Theme) -> str:
     QFrame[role="card"] {{
         background: {t.surface}; border: 1px solid {t.line}; border-radius: 6px;
     }}
+    QFrame[role="bar"] {{ background: {t.surface}; border-bottom: 1px solid {t.line}; }}
     QFrame[role="banner"] {{
         background: {t.surface}; border: 2px solid {t.warn}; border-radius: 4px;
     }}

@@ -31,6 +31,7 @@ __all__ = [
     "label",
     "menu_button",
     "name_list",
+    "number_text",
     "plain_tip",
     "set_role",
     "set_wrong",
@@ -160,6 +161,14 @@ class ElidedLabel(QLabel):
         )
 
 
+def number_text(value: float, decimals: int) -> str:
+    """Return ``value`` with its decimals, or a dash where it is NaN; never "-0.00"."""
+    if math.isnan(value):
+        return "—"
+    # + 0.0 turns a negative zero, which a small negative value is rounded to, into zero
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"
+
+
 class Readout(QWidget):
     """A number in large digits, with its name and its unit."""
 
@@ -181,10 +190,13 @@ class Readout(QWidget):
 
     def show_number(self, value: float, decimals: int) -> None:
         """Show ``value``, or a dash where it is NaN."""
-        # + 0.0 turns a negative zero, which a small negative value is rounded to, into zero
-        text = "—" if math.isnan(value) else f"{round(value, decimals) + 0.0:.{decimals}f}"
+        text = number_text(value, decimals)
         if self._value.text() != text:
             self._value.setText(text)
+
+    def show_past(self, past: bool) -> None:
+        """Show the number in grey: it is that of the last sample of a run that has ended."""
+        set_role(self._value, "muted" if past else "")
 
     @property
     def text(self) -> str:

@@ -108,10 +108,10 @@ def main() -> None:
     saw["planned"] = page.display.view.words.text()
     click(page.arm_button)
     until(page.start_button.isEnabled, "armed")
-    saw["armed"] = window.badge.state.name
+    saw["armed"] = window.bar.badge.state.name
     click(page.start_button)
     until(lambda: page.runner.running, "started")
-    saw["started"] = window.badge.state.name
+    saw["started"] = window.bar.badge.state.name
 
     def seconds() -> float:
         now = None if page.live is None else page.live.now()
@@ -132,7 +132,7 @@ def main() -> None:
     saw["stop"] = screen.pixelColor(corner).name()
     hand.key("Escape")
     until(lambda: not page.runner.running, "stopped by the key")
-    saw["ended"] = window.badge.state.name
+    saw["ended"] = window.bar.badge.state.name
     saw["result"] = page.result.text()
     # and once more, stopped with the mouse
     click(page.arm_button)

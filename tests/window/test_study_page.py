@@ -216,12 +216,12 @@ def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
     # the experiment, filled in and not armed
     assert session.address == address
     click(qtbot, page.run_button)
-    assert window.stack.currentWidget() is run
+    assert run.isVisible()
     qtbot.waitUntil(
         lambda: session.preview is not None and session.preview.toml == outcome.experiment.sequence,
         timeout=_PATIENCE,
     )
-    assert run.runner.state is HighVoltage.SAFE
+    assert run.runner.state is HighVoltage.NOT_CONTACTED
     click(qtbot, run.arm_button)
     with qtbot.waitSignal(session.recorded, timeout=_PATIENCE) as told:
         click(qtbot, run.start_button)

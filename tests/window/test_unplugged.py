@@ -21,7 +21,10 @@ from tests.tools.daqmx import served
 from tests.window.conftest import SHORT
 
 RIG_FILE = RigFile.model_validate(
-    {"film": {"name": "film 3"}, "guardian": {"link_timeout_s": 1.0, "timeout_s": 1.0}}
+    {
+        "film": {"name": "film 3"},
+        "guardian": {"link_timeout_s": 0.5, "timeout_s": 1.0, "retry_s": 0.5},
+    }
 )
 WAIT = 120_000
 
@@ -64,8 +67,8 @@ def test_a_run_on_a_card(qtbot: QtBot, run_page: RunPage) -> None:
     with served(RIG_FILE, clock=PacedClock()) as there:
         play(qtbot, run_page, there.server.port)
     assert run_page.result.text().startswith("Finished"), run_page.result.text()
-    assert run_page.runner.state is HighVoltage.SAFE
-    assert run_page.badge.state is HighVoltage.SAFE
+    assert run_page.runner.state is HighVoltage.CONFIRMED
+    assert run_page.badge.state is HighVoltage.CONFIRMED
     recording = open_recording(next(run_page.session.folder.glob("*.h5")))
     assert recording.outcome == "finished"
 
@@ -76,9 +79,9 @@ def test_a_rig_that_is_unplugged_in_mid_run(qtbot: QtBot, run_page: RunPage, fau
         play(qtbot, run_page, there.server.port)
     assert run_page.result.text().startswith("Instrument fault"), run_page.result.text()
     # nobody can say what is on the wire now
-    assert run_page.runner.state is HighVoltage.UNCONFIRMED
+    assert run_page.runner.state is HighVoltage.UNKNOWN
     assert "by hand" in run_page.badge.toolTip()
     # and it is not known any better because somebody armed and thought again
     for _ in range(2):
         qtbot.mouseClick(run_page.arm_button, Qt.MouseButton.LeftButton)
-    assert run_page.runner.state is HighVoltage.UNCONFIRMED
+    assert run_page.runner.state is HighVoltage.UNKNOWN
