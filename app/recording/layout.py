@@ -2,6 +2,8 @@
 
 /                       format, default="entry"
 /entry                  NXentry: format, kind, complete, outcome, samples, default="data"
+                        after a run: output_state (confirmed, commanded, unknown), with
+                        output_state_time, output_set_by (run, guardian), output_monitor_V
 /entry/title, start_time, end_time
 /entry/entry_identifier_uuid   identifies the recording, whatever its file is called
 /entry/data             NXdata: time and the physical values, and beside them NAME_counts

@@ -29,6 +29,7 @@ from dearig.window.error_panel import ErrorPanel
 from dearig.window.guide import Guide
 from dearig.window.hv_bar import HighVoltageBar
 from dearig.window.layout_state import GROUP
+from dearig.window.main import NO_SCREEN
 from dearig.window.planner import Planner
 from dearig.window.questions import may_close, offer_unsaved
 from dearig.window.recordings_page import RecordingsPage
@@ -201,7 +202,7 @@ class MainWindow(QMainWindow):
             known = cast(Page, page)
             self.list.addItem(known.title)
             self.list.item(number - 1).setToolTip(f"{known.title} ({known.shortcut})")
-            self.stack.addWidget(_scrollable(page))
+            self.stack.addWidget(page)
             key = QAction(self)
             key.setShortcut(QKeySequence(known.shortcut))
             key.triggered.connect(lambda _=False, page=page: self.show_page(page))
@@ -219,7 +220,7 @@ class MainWindow(QMainWindow):
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(0)
         row.addWidget(column)
-        row.addWidget(self.stack, 1)
+        row.addWidget(_scrollable(self.stack), 1)
         self.banners = Banners(self._show_page_titled)
         self._top = QVBoxLayout()
         self._top.setContentsMargins(0, 0, 0, 0)
@@ -367,6 +368,8 @@ class MainWindow(QMainWindow):
     def _fit_screen(self) -> None:
         if self.isMaximized() or self.isFullScreen():
             return
+        if QGuiApplication.platformName() in NO_SCREEN:
+            return
         available = self.screen().availableGeometry()
         frame = self.frameGeometry()
         borders = frame.size() - self.size()
@@ -378,11 +381,11 @@ class MainWindow(QMainWindow):
             self.move(QPoint(left, top))
 
 
-def _scrollable(page: QWidget) -> QScrollArea:
-    """Return ``page`` in an area that scrolls it where the window is smaller than the page."""
+def _scrollable(pages: QWidget) -> QScrollArea:
+    """Return ``pages`` in an area that scrolls them where the window is smaller than they are."""
     area = QScrollArea()
     area.setFrameShape(QFrame.Shape.NoFrame)
     area.setWidgetResizable(True)
     area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    area.setWidget(page)
+    area.setWidget(pages)
     return area

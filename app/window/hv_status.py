@@ -114,19 +114,23 @@ class HighVoltageStatus(QObject):
         return max(0, int(self._deadline - _now() + 0.999))
 
     @property
-    def detail(self) -> str:
-        """Sentence on the state: the voltage, the countdown, or what was measured and when."""
-        state = self._state
-        if state is HighVoltage.ARMED:
+    def words(self) -> str:
+        """Sentence on the state: the countdown, or what was measured and when."""
+        words = ""
+        if self._state is HighVoltage.ARMED:
             words = f"no voltage yet; disarms in {self.seconds_to_start} s"
-        elif state in (HighVoltage.ON, HighVoltage.RAMPING):
-            words = "" if self.reading is None else kilovolts(self.reading.monitor)
-        elif self.output is None:
-            words = f"rig {self._session.address}: its voltage was not read"
-        else:
-            words = self.output.sentence
+        elif not self.live:
+            output = self.output
+            words = "the voltage was not read yet" if output is None else output.sentence
         simulated = is_simulated(self._session.address)
         return " · ".join(part for part in (words, "simulated" if simulated else "") if part)
+
+    @property
+    def detail(self) -> str:
+        """The same, with the voltage during a run."""
+        if self.live and self.reading is not None:
+            return f"{kilovolts(self.reading.monitor)}  {self.words}".rstrip()
+        return self.words
 
     # what the runner reports
 

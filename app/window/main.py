@@ -11,7 +11,7 @@ from pathlib import Path
 from dearig.drivers.processes import child_environment
 from dearig.errors import InputError
 
-__all__ = ["require_qt", "require_screen", "run_window"]
+__all__ = ["NO_SCREEN", "require_qt", "require_screen", "run_window"]
 
 # a closed terminal or a stopped service must not leave a voltage on
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
@@ -23,7 +23,8 @@ _TRY = (
     "from PySide6.QtGui import QGuiApplication; QGuiApplication([])"
 )
 _TRY_FOR = 30.0  # s; a remote screen may be slow
-_NO_SCREEN = ("offscreen", "minimal")
+#: platforms of Qt whose windows nobody sees
+NO_SCREEN = ("offscreen", "minimal")
 
 
 def run_window(
@@ -127,7 +128,7 @@ def require_qt() -> None:
 def require_screen() -> None:
     """Raise ``InputError`` if Qt would abort the program because there is no screen."""
     asked = os.environ.get("QT_QPA_PLATFORM", "")
-    if asked.startswith(_NO_SCREEN) or not sys.platform.startswith("linux"):
+    if asked.startswith(NO_SCREEN) or not sys.platform.startswith("linux"):
         return
     instead = "run dearig gui in a graphical session, or use dearig record"
     screens = [os.environ[n] for n in ("WAYLAND_DISPLAY", "DISPLAY") if os.environ.get(n)]

@@ -251,6 +251,14 @@ def test_fault_of_an_unguarded_run_names_the_guardian_too():
             drain(bench.rig)
 
 
+def test_the_monitor_is_read_after_zero_volts_were_set(bench: Bench) -> None:
+    bench.rig.make_safe()
+    reading = bench.rig.zero_reading
+    assert reading is not None
+    assert reading.confirmed
+    assert abs(reading.voltage) < 200.0  # V, with the noise and the offsets of the converter
+
+
 REPORT = TakeOver("the run is frozen", 0.0, 0.06)
 
 

@@ -135,6 +135,18 @@ def test_take_over_reports_what_was_done(bench):
     assert bench.guardian.report() == report
 
 
+def test_the_outcome_of_a_take_over_that_took_too_long_is_told_later(bench, monkeypatch):
+    monkeypatch.setattr("dearig.drivers.daqmx.guardian._TAKES_OVER_WITHIN", 0.0)
+    with pytest.raises(RigError, match="goes on trying"):
+        bench.guardian.take_over()
+    assert bench.guardian.tries
+    report = bench.guardian.outcome(REPORTS_WITHIN)
+    assert report is not None
+    assert report.confirmed
+    assert report.monitor is not None  # the reading that confirmed it
+    assert not bench.guardian.tries
+
+
 def test_guardian_of_other_sources_is_refused(bench, monkeypatch):
     changed = {**sources.AT_START, "daqmx/outputs.py": "another"}
     monkeypatch.setattr(sources, "AT_START", changed)

@@ -20,8 +20,15 @@ from dearig.window.session import Session
 from dearig.window.theme import LIGHT, prepare_plots
 
 PATIENCE = 120_000  # ms
-KEYSYMS = {"Escape": 0xFF1B, "Control": 0xFFE3, "Alt": 0xFFE9, "Tab": 0xFF09, " ": 0x20,
-           "Return": 0xFF0D}  # fmt: skip
+KEYSYMS = {
+    "Escape": 0xFF1B,
+    "Control": 0xFFE3,
+    "Alt": 0xFFE9,
+    "Tab": 0xFF09,
+    " ": 0x20,
+    "Return": 0xFF0D,
+    "F5": 0xFFC2,
+}
 
 
 class Hand:

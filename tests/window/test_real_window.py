@@ -65,7 +65,7 @@ def test_a_run_by_mouse_and_keys(display: str, tmp_path: Path) -> None:
     assert saw["operator"] == "ada"
     assert saw["planned"] == "Planned: thesis identification, peak 8.00 kV, 25.8 s"
     assert saw["current drawn"]
-    assert (saw["armed"], saw["started"], saw["ended"]) == ("ARMED", "ON", "SAFE")
+    assert (saw["armed"], saw["started"], saw["ended"]) == ("ARMED", "ON", "CONFIRMED")
     assert saw["stop"] == "#b3001b"  # large and red, on the screen
     assert "ramped down to 0 V" in saw["result"]
     runs = [name for name in saw["recordings"] if name != "letter.h5"]
@@ -102,3 +102,64 @@ def test_edits_by_mouse_and_keys(display: str, tmp_path: Path) -> None:
     assert "segment 1 dwell (s)" in saw["asked"][0]
     (kept,) = saw["kept"]
     assert "dwell_s = 0.25" in kept
+
+
+def story(display: str, folder: Path, *more: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "tests.window.real_window_safety", str(folder), *more],
+        env={**os.environ, "DISPLAY": display, "QT_QPA_PLATFORM": "xcb"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_stop_is_everywhere_and_its_keys_start_nothing(display: str, tmp_path: Path) -> None:
+    out, err = story(display, tmp_path).communicate(timeout=280)
+    assert out, err
+    saw = json.loads(out)
+    assert saw["first"] == "NOT_CONTACTED"
+    assert saw["stop on every page"] == ["#b3001b"]  # the same red at its place on each page
+    assert not saw["a stop key has started"]
+    assert not saw["Space on Start has started"]
+    assert saw["ends"] == ["Stopped"] * 3
+    assert saw["after"] == "CONFIRMED"
+    assert saw["beside a dialog"] == ["not modal", "Stopped"]
+
+
+def test_a_killed_server_leaves_an_unknown_output_and_a_latched_alarm(
+    display: str, tmp_path: Path
+) -> None:
+    server = subprocess.Popen(
+        [sys.executable, "-m", "dearig", "serve-daqmx", "--port", "0"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert server.stdout is not None
+        port = server.stdout.readline().split(":")[1].split(";")[0]
+        window = story(display, tmp_path, port)
+        assert window.stderr is not None
+        said = []
+        for line in window.stderr:
+            said.append(line)
+            if line.strip() == "running":
+                break
+    finally:
+        server.kill()
+        server.wait()
+    out, err = window.communicate(timeout=280)
+    assert out, "".join(said) + err
+    saw = json.loads(out)
+    assert saw["end"] == "Instrument fault"
+    assert saw["state"] == "UNKNOWN"
+    assert "switch the amplifier off" in saw["detail"]
+    assert "COULD NOT BE MADE SAFE" in saw["alarm"]
+    assert saw["time"].startswith("last sample,")
+    assert saw["kept"] == [True] * 6  # F5 on every page, and a click on Arm
+    assert saw["acknowledged"] == "UNKNOWN"
+    recording = open_recording(next(tmp_path.glob("*.h5")))
+    messages = [event.message for event in recording.events]
+    assert any(message.startswith("output: unknown since") for message in messages)
+    assert any("COULD NOT BE TAKEN TO 0 V" in message for message in messages)  # the guardian
+    assert messages[-1].startswith("Grace acknowledged: Instrument fault")

@@ -216,7 +216,7 @@ def test_from_a_diagnosis_to_the_proposed_experiment_and_a_better_overlay(
     # the experiment, filled in and not armed
     assert session.address == address
     click(qtbot, page.run_button)
-    assert run.isVisible()
+    assert window.stack.currentWidget() is run
     qtbot.waitUntil(
         lambda: session.preview is not None and session.preview.toml == outcome.experiment.sequence,
         timeout=_PATIENCE,
