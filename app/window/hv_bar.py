@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal, Slot
-from PySide6.QtGui import QFont, QFontMetrics, QResizeEvent
+from PySide6.QtGui import QFont, QFontMetrics
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
     QFrame,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QPushButton,
     QSizePolicy,
@@ -24,13 +23,14 @@ from dearig.window.hv import HighVoltage, HighVoltageBadge, kilovolts
 from dearig.window.hv_status import HighVoltageStatus, recording_of
 from dearig.window.session import Session
 from dearig.window.theme import SPACE, digits
-from dearig.window.widgets import button, label, plain_tip, set_role
+from dearig.window.widgets import ElidedLabel, button, label, plain_tip, set_role
 
 __all__ = ["HighVoltageBar", "label_stop", "stop_button"]
 
 _STOP = "⬣  STOP"
 _STOP_AGAIN = "⬣  0 V NOW"
 _HEIGHT = 44  # px
+_WORDS = 200  # px of the sentence on the state, in two or three lines
 
 
 def stop_button(points: int, height: int) -> QPushButton:
@@ -68,38 +68,6 @@ def label_stop(stop: QPushButton, state: HighVoltage) -> None:
         stop.setText(words)
 
 
-class _Elided(QLabel):
-    """One line that is cut with an ellipsis where it is too long; the tooltip has all of it."""
-
-    def __init__(self, role: str = "") -> None:
-        super().__init__()
-        self.setTextFormat(Qt.TextFormat.PlainText)
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self._whole = ""
-        if role:
-            self.setProperty("role", role)
-
-    @property
-    def whole(self) -> str:
-        """Text that is shown, or cut."""
-        return self._whole
-
-    def show_text(self, text: str) -> None:
-        self._whole = text
-        self.setToolTip(plain_tip(text))
-        self._cut()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
-        super().resizeEvent(event)
-        self._cut()
-
-    def _cut(self) -> None:
-        metrics = self.fontMetrics()
-        cut = metrics.elidedText(self._whole, Qt.TextElideMode.ElideRight, max(self.width(), 0))
-        if self.text() != cut:
-            self.setText(cut)
-
-
 class HighVoltageBar(QFrame):
     """State, monitor voltage, sequence time, latched alarm with its acknowledgement, and STOP.
 
@@ -126,8 +94,12 @@ class HighVoltageBar(QFrame):
         )
         self.monitor.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.time = label("", "muted", "Time in the sequence, of its whole length")
-        self.detail = _Elided()
-        self.alarm = _Elided("bad")
+        self.detail = label("")
+        self.detail.setWordWrap(True)  # "switch the amplifier off" must not be cut
+        self.detail.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
+        self.detail.setMinimumWidth(_WORDS)
+        self.alarm = ElidedLabel()
+        set_role(self.alarm, "bad")
         self.acknowledge_button = button(
             "Ac&knowledge …", "Release the alarm in the name of a person who has looked at the rig"
         )
@@ -172,7 +144,8 @@ class HighVoltageBar(QFrame):
     def _refresh(self) -> None:
         status = self._status
         self.badge.show_state(status.state, status.detail)
-        self.detail.show_text(status.words)
+        self.detail.setText(status.words)
+        self.detail.setToolTip(plain_tip(status.words))
         label_stop(self.stop_button, status.state)
         reading = status.reading
         if reading is None:

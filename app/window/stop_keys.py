@@ -2,6 +2,9 @@
 
 The whole stroke of a key that has stopped is taken: neither its repetitions nor its release reach
 a button or a field.
+
+One field takes a space in a run: that of a note on the run, and there only one space after a word.
+A space in an empty note, a second one in a row, or one that is held, stops as everywhere.
 """
 
 from __future__ import annotations
@@ -11,9 +14,12 @@ from typing import cast
 
 from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QInputMethodEvent, QKeyEvent
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLineEdit
 
-__all__ = ["StopKeys"]
+__all__ = ["WRITES_SPACES", "StopKeys"]
+
+#: Property of a field for notes on the run.
+WRITES_SPACES = "writes_spaces"
 
 _KEYS = (Qt.Key.Key_Escape, Qt.Key.Key_Space)
 _STROKES = (QEvent.Type.KeyPress, QEvent.Type.KeyRelease, QEvent.Type.ShortcutOverride)
@@ -45,7 +51,7 @@ class StopKeys(QObject):
         if kind == QEvent.Type.InputMethod:
             # an input method delivers the space of a text field as text
             typed = cast(QInputMethodEvent, event).commitString()
-            if typed == " " and self._busy():
+            if typed == " " and self._busy() and not _between_words():
                 self._stop()
                 return True
         elif kind in _STROKES and cast(QKeyEvent, event).key() in _KEYS:
@@ -55,7 +61,7 @@ class StopKeys(QObject):
     def _stroke(self, kind: QEvent.Type, event: QKeyEvent) -> bool:
         key, repeated = event.key(), event.isAutoRepeat()
         if kind == QEvent.Type.ShortcutOverride:
-            if self._busy() or key in self._held:
+            if key in self._held or self._busy():
                 event.accept()  # it comes as a key press then, not as a shortcut
                 return True
             return False
@@ -72,6 +78,8 @@ class StopKeys(QObject):
         if not self._busy():
             self._install()
             return False
+        if key == Qt.Key.Key_Space and not repeated and _between_words():
+            return False
         self._held.add(key)
         self._stop()
         return True
@@ -86,3 +94,12 @@ class StopKeys(QObject):
             application.installEventFilter(self)
         else:
             application.removeEventFilter(self)
+
+
+def _between_words() -> bool:
+    """Return whether a space would follow a word in a field for notes on the run."""
+    field = QApplication.focusWidget()
+    if not isinstance(field, QLineEdit) or not field.property(WRITES_SPACES):
+        return False
+    before = field.text()[: field.cursorPosition()]
+    return bool(before) and not before.endswith(" ")

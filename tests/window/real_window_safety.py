@@ -181,8 +181,8 @@ def on_a_card(story: Story, port: int) -> None:
     print("running", file=sys.stderr, flush=True)
     saw["end"] = story.ended()
     saw["state"] = bar.badge.state.name
-    saw["detail"] = bar.detail.whole
-    saw["alarm"] = bar.alarm.whole
+    saw["detail"] = bar.detail.text()
+    saw["alarm"] = bar.alarm.full_text
     saw["time"] = bar.time.text()
     story.on_screen(bar.stop_button, "card")
 

@@ -81,13 +81,13 @@ def test_a_state_at_rest_is_a_measurement_with_its_time(
 ) -> None:
     page, bar = window.run_page, window.bar
     assert bar.badge.state is HighVoltage.NOT_CONTACTED
-    assert "was not read" in bar.detail.whole
+    assert "was not read" in bar.detail.text()
     plan_of(SHORT)
     play(qtbot, page)
     output = page.runner.status.output
     assert output is not None
     assert bar.badge.state is HighVoltage.CONFIRMED
-    assert bar.detail.whole.startswith(f"0 V confirmed by the monitor at {output.time}")
+    assert bar.detail.text().startswith(f"0 V confirmed by the monitor at {output.time}")
     # it is that of this rig, not of another one
     window.session.set_address("sim:7")
     assert bar.badge.state is HighVoltage.NOT_CONTACTED
@@ -105,7 +105,7 @@ def test_an_interlock_latches_until_somebody_acknowledges_it(
     play(qtbot, page)
     page.faults = None
     path = next(session.folder.glob("*.h5"))
-    assert "Stopped by an interlock" in bar.alarm.whole
+    assert "Stopped by an interlock" in bar.alarm.full_text
     assert bar.badge.state is HighVoltage.CONFIRMED  # the monitor was read after it
     for _ in range(2):
         for other in window.pages:

@@ -94,7 +94,7 @@ def test_start_is_refused_where_other_curves_are_drawn_than_would_be_played(
     run_page.plots.show_prediction(other)  # by whatever error
     run_page.start()
     assert not run_page.runner.running
-    assert run_page.runner.state is HighVoltage.SAFE
+    assert run_page.runner.state is HighVoltage.NOT_CONTACTED
     assert "the plots did not show what would have been played" in run_page.result.text()
     assert drawn(run_page, "planned voltage").max() == pytest.approx(6.0, abs=0.01)
     assert not list(run_page.session.folder.iterdir())
@@ -107,7 +107,7 @@ def test_start_is_refused_where_other_curves_are_drawn_than_would_be_played(
         run_page.start()
     assert run_page.result.text().startswith("Refused")
     assert "not the one that was armed" in run_page.result.text()
-    assert run_page.runner.state is HighVoltage.SAFE
+    assert run_page.runner.state is HighVoltage.NOT_CONTACTED
 
 
 def test_a_refused_plan_is_drawn_and_said_to_be_refused(

@@ -86,6 +86,25 @@ def test_a_space_of_an_input_method_stops_too(qtbot: QtBot, window: MainWindow) 
     assert " " not in page.operator.text()
 
 
+@pytest.mark.parametrize("text", ["", "two "])
+def test_a_note_takes_a_space_after_a_word_and_no_other(
+    qtbot: QtBot, quick_ramp: Session, window: MainWindow, text: str
+) -> None:
+    page = window.run_page
+    page.paced.setChecked(True)
+    qtbot.mouseClick(page.arm_button, LEFT)
+    qtbot.mouseClick(page.start_button, LEFT)
+    note = page.display.mark_bar.note
+    note.setFocus()
+    qtbot.keyClicks(note, "lamp on")
+    assert note.text() == "lamp on"
+    assert page.runner.state is HighVoltage.ON
+    note.setText(text)
+    with qtbot.waitSignal(page.runner.ended, timeout=RUN_MS) as ended:
+        qtbot.keyClick(note, Qt.Key.Key_Space)
+    assert ended.args[0].headline == "Stopped"
+
+
 def test_a_field_takes_spaces_while_nothing_is_armed(qtbot: QtBot, window: MainWindow) -> None:
     page = window.run_page
     page.operator.setFocus()
