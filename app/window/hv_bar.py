@@ -101,7 +101,7 @@ class HighVoltageBar(QFrame):
         self.alarm = ElidedLabel()
         set_role(self.alarm, "bad")
         self.acknowledge_button = button(
-            "Ac&knowledge …", "Release the alarm in the name of a person who has looked at the rig"
+            "Acknowledge …", "Release the alarm in the name of a person who has looked at the rig"
         )
         self.stop_button = stop_button(17, _HEIGHT)
         row = QHBoxLayout()

@@ -19,7 +19,7 @@ from dearig.window.hv import HighVoltage, kilovolts, state_at_rest
 from dearig.window.session import Session
 from dearig.window.settings import kept_text
 
-__all__ = ["ARMED_FOR", "Alarm", "HighVoltageStatus", "Reading", "recording_of"]
+__all__ = ["ARMED_FOR", "HighVoltageStatus", "LatchedAlarm", "Reading", "recording_of"]
 
 log = logging.getLogger(__name__)
 
@@ -30,7 +30,7 @@ _BLOCK = "alarm"  # of the session
 
 
 @dataclass(frozen=True)
-class Alarm:
+class LatchedAlarm:
     """What ended a run at ``at`` s since 1970, on the rig ``address``; latched until acknowledged.
 
     ``recording`` is the path of the run's recording, empty where there is none. ``known`` says how
@@ -71,6 +71,7 @@ class HighVoltageStatus(QObject):
     changed = Signal()
     state_changed = Signal(object)
     disarm_due = Signal()
+    acknowledged = Signal(str)  #: name of the person
 
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -84,7 +85,7 @@ class HighVoltageStatus(QObject):
         self._ticks = QTimer(self, interval=_TICK)
         self._ticks.timeout.connect(self._tick)
         self.reading: Reading | None = None
-        self.alarm: Alarm | None = None
+        self.alarm: LatchedAlarm | None = None
         session.rig_changed.connect(self._rig_changed)
         self._restore()
 
@@ -160,7 +161,7 @@ class HighVoltageStatus(QObject):
     def run_begins(self) -> None:
         """Keep a note of the run, for a start of the program after this one has died in it."""
         self._keep(
-            Alarm(
+            LatchedAlarm(
                 "The program ended during a run",
                 "what is on the output is unknown: switch the amplifier off, and read the log",
                 time.time(),
@@ -168,12 +169,12 @@ class HighVoltageStatus(QObject):
             )
         )
 
-    def run_ended(self, alarm: Alarm | None) -> None:
+    def run_ended(self, alarm: LatchedAlarm | None) -> None:
         """Latch ``alarm``; None for a run that ended as it should."""
         self._keep(alarm)
         self._latch(alarm)
 
-    def acknowledge(self, name: str) -> Alarm | None:
+    def acknowledge(self, name: str) -> LatchedAlarm | None:
         """Release the latch in the ``name`` of a person; return the alarm that was latched."""
         alarm = self.alarm
         if alarm is None or not name.strip():
@@ -181,9 +182,10 @@ class HighVoltageStatus(QObject):
         log.warning("%s acknowledged the alarm: %s", name.strip(), alarm.text)
         self._keep(None)
         self._latch(None)
+        self.acknowledged.emit(name.strip())
         return alarm
 
-    def _latch(self, alarm: Alarm | None) -> None:
+    def _latch(self, alarm: LatchedAlarm | None) -> None:
         self.alarm = alarm
         if alarm is None:
             self._session.unblock(_BLOCK)
@@ -228,7 +230,7 @@ class HighVoltageStatus(QObject):
 
     # the settings
 
-    def _keep(self, alarm: Alarm | None) -> None:
+    def _keep(self, alarm: LatchedAlarm | None) -> None:
         address = self._session.address if self.alarm is None else self.alarm.address
         if is_simulated(address):
             return
@@ -246,10 +248,10 @@ class HighVoltageStatus(QObject):
         if not kept or is_simulated(address):
             return
         try:
-            alarm = Alarm(**json.loads(kept))
+            alarm = LatchedAlarm(**json.loads(kept))
         except (TypeError, ValueError):
             log.warning("the alarm that is kept in the settings cannot be read: %r", kept)
-            alarm = Alarm(
+            alarm = LatchedAlarm(
                 "An alarm of an earlier run", "it cannot be read any more", time.time(), address
             )
         if alarm.known != Known.CONFIRMED.value:
@@ -265,7 +267,7 @@ def _clock(at: float) -> str:
     return time.strftime("%H:%M:%S", time.localtime(at))
 
 
-def recording_of(alarm: Alarm) -> Path | None:
+def recording_of(alarm: LatchedAlarm) -> Path | None:
     """Return the recording of the run that ``alarm`` ended, where there is one."""
     path = Path(alarm.recording)
     return path if alarm.recording and path.is_file() else None

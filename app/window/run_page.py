@@ -286,6 +286,7 @@ class RunPage(QWidget):
         self.stop_button.pressed.connect(self.stop)
         self.runner.state_changed.connect(self._state_changed)
         self.runner.ended.connect(self._run_ended)
+        self.runner.status.acknowledged.connect(self.alarms.acknowledge)
         session.preview_changed.connect(self._refresh)
         session.preview_changed.connect(self.display.show_planned)
         session.sequence_changed.connect(self._refresh)

@@ -29,7 +29,7 @@ from dearig.errors import (
 from dearig.output_state import Known, OutputState
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.hv import HighVoltage
-from dearig.window.hv_status import Alarm, HighVoltageStatus
+from dearig.window.hv_status import HighVoltageStatus, LatchedAlarm
 from dearig.window.live import Live
 from dearig.window.session import Session
 
@@ -188,11 +188,13 @@ class Runner(QObject):
         self.ended.emit(end)
 
 
-def _alarm(end: RunEnd, address: str) -> Alarm:
+def _alarm(end: RunEnd, address: str) -> LatchedAlarm:
     known = Known.UNKNOWN if end.output is None else end.output.known
     at = time.time() if end.output is None else end.output.at
     recording = "" if end.path is None else str(end.path)
-    return Alarm(end.headline, end.sentence[:_ALARM_MAX], at, address, recording, known.value)
+    return LatchedAlarm(
+        end.headline, end.sentence[:_ALARM_MAX], at, address, recording, known.value
+    )
 
 
 class _Observed(RunObserver):

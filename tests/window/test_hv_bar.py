@@ -17,7 +17,7 @@ from dearig.recording.verify import verify
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.frame import MainWindow
 from dearig.window.hv import HighVoltage, kilovolts
-from dearig.window.hv_status import Alarm, HighVoltageStatus
+from dearig.window.hv_status import HighVoltageStatus, LatchedAlarm
 from dearig.window.run_page import RunPage
 from dearig.window.session import Session
 from tests.window.conftest import SHORT
@@ -133,6 +133,7 @@ def test_an_interlock_latches_until_somebody_acknowledges_it(
     with caplog.at_level(logging.WARNING):
         qtbot.mouseClick(bar.acknowledge_button, LEFT)
     assert not bar.alarm.isVisible()
+    assert page.alarms.pending == 0  # the list of alarms has it too
     assert "Grace acknowledged the alarm: Stopped by an interlock" in caplog.text
     qtbot.waitUntil(lambda: page.arm_button.isEnabled(), timeout=RUN_MS)
     bar.close_work()
@@ -183,7 +184,7 @@ def test_the_alarm_of_a_real_rig_outlives_the_program(session: Session) -> None:
 
 def test_an_alarm_is_not_released_without_a_name(session: Session) -> None:
     status = HighVoltageStatus(session)
-    status.run_ended(Alarm("Stopped by an interlock", "arc", 0.0, "sim"))
+    status.run_ended(LatchedAlarm("Stopped by an interlock", "arc", 0.0, "sim"))
     assert status.acknowledge("  ") is None
     assert status.alarm is not None
     assert session.blocks
@@ -201,7 +202,7 @@ def test_the_bar_is_inside_the_smallest_screen(qtbot: QtBot, window: MainWindow)
     assert smallest.height() <= 440
     window.resize(910, 440)
     bar = window.bar
-    for alarm in (None, Alarm("Stopped by an interlock", "arc " * 100, 0.0, "sim")):
+    for alarm in (None, LatchedAlarm("Stopped by an interlock", "arc " * 100, 0.0, "sim")):
         window.run_page.runner.status.run_ended(alarm)
         for state in HighVoltage:
             bar.badge.show_state(state)
