@@ -315,6 +315,10 @@ class _Run:
             try:
                 self._play(samples)
                 played = self._trip is None and not self._interrupts.asked()
+            except RigError:
+                # setting 0 V may take seconds on a link that is lost: the last reading is old
+                self._show_output(unknown())
+                raise
             finally:
                 # 0 V first: a disk that is slow or full must not keep the voltage up
                 self._interrupts.close()

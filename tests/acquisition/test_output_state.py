@@ -181,6 +181,19 @@ def test_a_guardian_that_succeeds_later_is_told_and_recorded(
     assert acted.sentence in caplog.text
 
 
+def test_a_fault_of_the_instrument_makes_the_output_unknown_at_once(run) -> None:
+    rig = Wrapped()
+
+    def fails() -> Block:
+        raise RigError("the link is lost")
+
+    rig.read = fails  # type: ignore[method-assign]
+    ended, states = run(rig)
+    assert isinstance(ended, InstrumentFault)
+    # unknown while 0 V is being set, which may take seconds; then what was found
+    assert [state.known for state in states] == [Known.UNKNOWN, Known.COMMANDED]
+
+
 def test_the_operator_need_not_wait_for_the_guardian(run, tmp_path: Path) -> None:
     interrupts = Interrupts()
     rig = Unreachable([])
