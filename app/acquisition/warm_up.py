@@ -21,7 +21,7 @@ from dearig.model.jit import cache_folder, is_enabled
 from dearig.model.material import TABLE_3
 from dearig.progress import Progress, quiet
 
-__all__ = ["compile_kernels", "is_warm", "kernels_compiled"]
+__all__ = ["compile_kernels", "has_cache", "is_warm", "kernels_compiled"]
 
 #: Rigs whose kernels a window needs: a plan, an overlay model, and both simulated films.
 _RIGS = ("sim", "sim:1")
@@ -40,6 +40,11 @@ def is_warm() -> bool:
     """Return True if the kernels of exactly these sources need no compilation."""
     note = _note()
     return not is_enabled() or (note is not None and note.exists())
+
+
+def has_cache() -> bool:
+    """Return True if kernels that one process compiles can be used by another."""
+    return cache_folder() is not None
 
 
 def kernels_compiled() -> int:

@@ -9,7 +9,8 @@ from typing import Any
 from PySide6.QtCore import QObject, QTimer, Signal, Slot
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QProgressBar, QSizePolicy, QWidget
 
-from dearig.acquisition.warm_up import compile_kernels, is_warm, kernels_compiled
+from dearig.acquisition.warm_up import compile_kernels, has_cache, is_warm, kernels_compiled
+from dearig.window.background import Background
 from dearig.window.theme import SPACE
 from dearig.window.widgets import label
 from dearig.window.worker import Job, Worker
@@ -24,7 +25,8 @@ class Compilation(QObject):
 
     ``running_changed`` carries whether it goes on; ``progressed`` follows every half second.
     ``failed`` carries a sentence: then each kernel is compiled at its first use, in this process.
-    ``work`` is called in the other process; ``needed`` returns whether there is something to do.
+    ``work`` is called in the other process, or in a thread where no cache can carry its result to
+    this one (``has_cache``); ``needed`` returns whether there is something to do.
     """
 
     running_changed = Signal(bool)
@@ -37,22 +39,28 @@ class Compilation(QObject):
         *,
         work: Callable[..., Any] = compile_kernels,
         needed: Callable[[], bool] = lambda: not is_warm(),
+        has_cache: Callable[[], bool] = has_cache,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         super().__init__(parent)
         self._work = work
         self._needed = needed
+        self._has_cache = has_cache
         self._clock = clock
         self._began = 0.0
+        self._running = False
         self._job: Job | None = None
         self._worker = Worker(self)
+        self._thread = Background(self)
+        self._thread.done.connect(self._finished)
+        self._thread.failed.connect(self._failed)
         self._look = QTimer(self, interval=_LOOK)
         self._look.timeout.connect(self.progressed)
 
     @property
     def running(self) -> bool:
         """True while kernels are compiled."""
-        return self._job is not None
+        return self._running
 
     @property
     def seconds(self) -> float:
@@ -61,12 +69,15 @@ class Compilation(QObject):
 
     def start(self) -> bool:
         """Begin, and return True; return False where nothing is to be compiled."""
-        if self._job is not None or not self._needed():
+        if self._running or not self._needed():
             return False
-        self._began = self._clock()
-        self._job = job = self._worker.submit(self._work)
-        job.finished.connect(self._finished)
-        job.failed.connect(self._failed)
+        self._running, self._began = True, self._clock()
+        if self._has_cache():
+            self._job = job = self._worker.submit(self._work)
+            job.finished.connect(self._finished)
+            job.failed.connect(self._failed)
+        else:
+            self._thread.start(self._work)
         self._look.start()
         self.running_changed.emit(True)
         return True
@@ -74,8 +85,9 @@ class Compilation(QObject):
     def close(self) -> None:
         """End the process."""
         self._look.stop()
-        self._job = None
+        self._running, self._job = False, None
         self._worker.close()
+        self._thread.close()
 
     @Slot(object)
     def _finished(self, result: object = None) -> None:  # noqa: ARG002

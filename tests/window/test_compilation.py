@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 import pytest
@@ -107,6 +108,20 @@ def test_what_cannot_be_compiled_is_an_alarm_and_the_plan_is_made_all_the_same(
     qtbot.waitUntil(lambda: session.preview is not None, timeout=SOON)
     assert "could not be compiled" in window.run_page.alarms.alarms[0].message
     window.close()
+
+
+def test_without_a_cache_the_model_is_compiled_in_a_thread_of_the_window(qtbot: QtBot):
+    threads: list[str] = []
+    compilation = Compilation(
+        work=lambda: threads.append(threading.current_thread().name),
+        needed=lambda: True,
+        has_cache=lambda: False,
+    )
+    with qtbot.waitSignal(compilation.running_changed, timeout=SOON):
+        assert compilation.start()
+    qtbot.waitUntil(lambda: not compilation.running, timeout=SOON)
+    assert threads != []
+    assert threads[0] != threading.main_thread().name
 
 
 def test_a_later_start_compiles_nothing(
