@@ -48,6 +48,7 @@ class Compilation(QObject):
         self._has_cache = has_cache
         self._clock = clock
         self._began = 0.0
+        self._before = 0  # kernels that were in the cache
         self._running = False
         self._job: Job | None = None
         self._worker = Worker(self)
@@ -67,11 +68,17 @@ class Compilation(QObject):
         """Time in s since the compilation began."""
         return self._clock() - self._began
 
+    @property
+    def kernels(self) -> int:
+        """Number of kernels that were compiled since then."""
+        return kernels_compiled() - self._before
+
     def start(self) -> bool:
         """Begin, and return True; return False where nothing is to be compiled."""
         if self._running or not self._needed():
             return False
         self._running, self._began = True, self._clock()
+        self._before = kernels_compiled()
         if self._has_cache():
             self._job = job = self._worker.submit(self._work)
             job.finished.connect(self._finished)
@@ -135,6 +142,6 @@ class CompilationBar(QFrame):
         if running:
             self.words.setText(
                 f"Compiling the model once, about a minute: {self._compilation.seconds:.0f} s, "
-                f"{kernels_compiled()} functions. Everything that needs no model can be used: "
+                f"{self._compilation.kernels} functions. Everything that needs no model can be used: "
                 f"Sequence, Rig, Recordings. The plan follows."
             )
