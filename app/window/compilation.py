@@ -142,6 +142,6 @@ class CompilationBar(QFrame):
         if running:
             self.words.setText(
                 f"Compiling the model once, about a minute: {self._compilation.seconds:.0f} s, "
-                f"{self._compilation.kernels} functions. Everything that needs no model can be used: "
-                f"Sequence, Rig, Recordings. The plan follows."
+                f"{self._compilation.kernels} functions. Everything that needs no model can be "
+                f"used: Sequence, Rig, Recordings. The plan follows."
             )

@@ -64,6 +64,7 @@ class RunDisplay(QWidget):
         self.alarms.acknowledged.connect(self._acknowledged)
         session.program_errors.changed.connect(self._program_errors)
         self._span_changed()
+        self.show_planned()
 
     # before a run
 

@@ -66,7 +66,7 @@ class RunPlots(QWidget):
         self.digest = ""
         self.trips_in_view = True  #: the range of the current holds its trip levels
         self._duration = 1.0
-        self._planned_shown = False
+        self._planned_shown = self._run_shown = False
         self._live: Live | None = None
         self._low: dict[str, float] = {}
         self._high: dict[str, float] = {}
@@ -185,8 +185,8 @@ class RunPlots(QWidget):
             curve.title = words if planned else ""
             curve.setVisible(planned)  # hidden ones cost nothing in a frame
         for signal, curve in self._curves.items():
-            curve.title = "" if planned else self._words(signal)
-            curve.setVisible(not planned and self._exists(signal))
+            curve.title = self._words(signal) if self._run_shown else ""
+            curve.setVisible(self._run_shown and self._exists(signal))
         tolerance = self._settings.interlocks.monitor_tolerance_kV
         self._band[0].title = f"trip of the monitor, ±{tolerance:g} kV"
         for plot in self._plots.values():
@@ -218,7 +218,7 @@ class RunPlots(QWidget):
                 self._include(name, y)
                 self._planned[name].set_points(x, y * _SCALE[name])
             self._draw_band(*preview.curves["voltage"])
-        self._planned_shown = plan is not None
+        self._planned_shown, self._run_shown = plan is not None, False
         for name in _UNPREDICTED:
             self.overlays[name].show_words("measured during the run" if plan is not None else "")
         self._show_levels()
@@ -236,7 +236,7 @@ class RunPlots(QWidget):
         """Prepare for a run: remove the prediction, whose drawing would cost frames."""
         for curve in self._planned.values():
             curve.set_points(np.empty(0), np.empty(0))
-        self._planned_shown = False
+        self._planned_shown, self._run_shown = False, True
         self.digest = ""
         for name in _UNPREDICTED:
             self.overlays[name].show_words("")
