@@ -274,6 +274,7 @@ class Library(QObject):
             names = [path.relative_to(self.folder).as_posix() for path in paths]
             self._job = self._worker.submit(read_entries, self.folder, names)
             self._job.finished.connect(lambda entries: self._take_entries(entries, of))
+            self._job.cancelled.connect(lambda: self._again(paths, of))
             self._job.failed.connect(
                 lambda words: self._take_entries(
                     tuple(Entry(name, 0, trouble=words, passing=True) for name in names), of
@@ -285,11 +286,19 @@ class Library(QObject):
             drive = self._session.overlay_drive
             self._job = self._worker.submit(assess, path, self.model, drive)
             self._job.finished.connect(lambda found: self._take_errors(found, of, kept=True))
+            self._job.cancelled.connect(lambda: self._again([], of))
             self._job.failed.connect(
                 lambda words: self._take_errors(Assessment(path, unfit=words), of, kept=False)
             )
         else:
             self._keep()
+
+    def _again(self, paths: list[Path], of: int) -> None:
+        """Go on after a job that an interrupt of another job has ended: it came too late."""
+        if of == self._round:
+            self._job = None
+            self._unread += reversed(paths)
+            self._next()
 
     def _take_entries(self, entries: tuple[Entry, ...], of: int) -> None:
         if of != self._round:

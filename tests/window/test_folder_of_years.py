@@ -20,6 +20,7 @@ from dearig.recording.recording import RecordedEvent
 from dearig.recording.tags import TAGS_FILE
 from dearig.window.conditions_table import ConditionsTable
 from dearig.window.folder_table import COLUMNS, FolderModel
+from dearig.window.library import Library
 from dearig.window.recordings_page import RecordingsPage
 from dearig.window.recordings_table import RecordingsTable
 from dearig.window.session import Session
@@ -189,7 +190,7 @@ def test_every_bad_file_has_one_row_with_words(
     page.resize(1190, 690)
     keep(page)
     library = page._library
-    qtbot.waitUntil(lambda: len(library.summaries) == 6 and not library.left, timeout=_PATIENCE)
+    qtbot.waitUntil(lambda: len(library.summaries) == 6, timeout=_PATIENCE)
     ended = dict(
         zip(column(page.files, "Recording"), column(page.files, "How it ended"), strict=True)
     )
@@ -204,6 +205,19 @@ def test_every_bad_file_has_one_row_with_words(
     page.subfolders.click()
     qtbot.waitUntil(lambda: page.files.rowCount() == 5, timeout=_PATIENCE)
     running.discard()
+
+
+def test_an_interrupt_that_comes_too_late_does_not_stop_the_reading(
+    session: Session, shelf: Path, qtbot: QtBot
+) -> None:
+    library = Library(session)
+    qtbot.waitUntil(lambda: library._job is not None, timeout=_PATIENCE)
+    job = library._job
+    assert job is not None
+    library._worker.cancel(job)
+    library._worker.cancel(job)  # its process is gone
+    qtbot.waitUntil(lambda: len(library.summaries) == 5, timeout=_PATIENCE)
+    library.close()
 
 
 def test_tags_are_given_to_several_and_kept_beside_the_recordings(
