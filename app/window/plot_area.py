@@ -147,15 +147,17 @@ class PlotArea(QWidget):
         least: int = 60,
         rows: int = 1,
         own_range: bool = False,
+        dates: bool = False,
         log: tuple[bool, bool] = (False, False),
     ) -> Plot:
         """Add a plot with the labels ``left`` and ``bottom``, at least ``least`` px high.
 
         ``rows`` is the number of rows that it takes, ``weight`` the share of each in the height.
         Below another plot of its group in the same column, only the lower one has numbers on the
-        horizontal axis. With ``own_range`` the owner sets the vertical range.
+        horizontal axis. With ``own_range`` the owner sets the vertical range. With ``dates`` the
+        horizontal axis is Unix time in s, shown as local time.
         """
-        plot = Plot(left, bottom, log, own_range)
+        plot = Plot(left, bottom, log, own_range, dates)
         self.canvas.addItem(plot, row, column, rowspan=rows)
         for taken in range(row, row + rows):
             self._sizes[taken] = (weight, least)

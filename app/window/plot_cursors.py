@@ -158,8 +158,8 @@ class Group:
         if self.cursors is not None:
             plot = self.plots[0]
             a, b = (self.value(plot, x) for x in self.cursors)
-            texts = [plot.text_of("bottom", v) for v in (a, b, b - a)]
-            text = f"A {texts[0]}   B {texts[1]}   {_DELTA} {texts[2]}"
+            texts = [plot.text_of("bottom", a), plot.text_of("bottom", b)]
+            text = f"A {texts[0]}   B {texts[1]}   {_DELTA} {plot.difference('bottom', b - a)}"
             if plot.axis_texts["bottom"].unit == "s" and not math.isclose(a, b):
                 text += f"   1/({_DELTA}) {1.0 / abs(b - a):.4g} Hz"
             return text

@@ -6,6 +6,7 @@ import csv
 import io
 import re
 from collections.abc import Sequence
+from datetime import UTC, datetime
 
 import numpy as np
 from PySide6.QtCore import QBuffer, QMimeData, QRectF
@@ -83,7 +84,8 @@ def csv_text(plots: Sequence[Plot], visible: bool, delimiter: str = ",") -> str:
 
     The first row names the columns with their units. Numbers have all their digits. Curves with
     increasing x share one column of x, with empty cells where a curve has no point; others have a
-    column of x each. ``visible``: only points in the range of x that is shown.
+    column of x each. Dates are local time in ISO 8601. ``visible``: only points in the range of x
+    that is shown.
     """
     columns: list[tuple[str, np.ndarray, np.ndarray]] = []
     for plot in plots:
@@ -105,11 +107,12 @@ def csv_text(plots: Sequence[Plot], visible: bool, delimiter: str = ",") -> str:
         table = _joined(head_x, columns)
     else:
         table = [part for name, x, y in columns for part in ((head_x, x), (name, y))]
+    dates = plots[0].dates
     text = io.StringIO()
     writer = csv.writer(text, delimiter=delimiter, lineterminator="\n")
     writer.writerow(name for name, _ in table)
     for row in range(max(values.size for _, values in table)):
-        writer.writerow(_cell(values, row) for _, values in table)
+        writer.writerow(_cell(values, row, dates and name == head_x) for name, values in table)
     return text.getvalue()
 
 
@@ -130,7 +133,9 @@ def _joined(
     return table
 
 
-def _cell(values: np.ndarray, row: int) -> str:
+def _cell(values: np.ndarray, row: int, date: bool) -> str:
     if row >= values.size or np.isnan(values[row]):
         return ""
+    if date:
+        return datetime.fromtimestamp(float(values[row]), UTC).astimezone().isoformat()
     return repr(float(values[row]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from html import escape
 
 import pyqtgraph as pg
@@ -21,6 +22,7 @@ _SAMPLE = 18.0  # px, length of a line in the key
 _GAP = 5.0  # px between the line and its name
 _BETWEEN = 16.0  # px between two entries
 _KEY_POINTS = 9.0  # pt, size of the text of keys and labels
+_DAY = 86_400.0  # s
 _FEW_DECADES = 2.5  # below this, powers of ten alone are too few labels
 _LABEL = re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)$")
 
@@ -85,14 +87,18 @@ class Plot(pg.PlotItem):
         bottom: str,
         log: tuple[bool, bool] = (False, False),
         own_range: bool = False,
+        dates: bool = False,
     ) -> None:
         axes = {
             side: DecadeAxis(side) if logarithmic else pg.AxisItem(side)
             for side, logarithmic in (("bottom", log[0]), ("left", log[1]))
         }
+        if dates:
+            axes["bottom"] = pg.DateAxisItem("bottom")
         view = pg.ViewBox(enableMenu=False)
         super().__init__(viewBox=view, axisItems=axes, enableMenu=False)
         self.log = log
+        self.dates = dates  #: the horizontal axis is Unix time in s, shown as local time
         self.axis_texts: dict[str, AxisText] = {}
         self._labels: dict[str, str] = {}
         self.drawn: list[Curve] = []
@@ -154,6 +160,11 @@ class Plot(pg.PlotItem):
 
     def text_of(self, side: str, value: float) -> str:
         """Return ``value`` of the axis ``bottom`` or ``left`` with its unit, rounded."""
+        if self.dates and side == "bottom":
+            try:
+                return f"{datetime.fromtimestamp(value, UTC).astimezone():%Y-%m-%d %H:%M}"
+            except (ValueError, OverflowError, OSError):
+                return "\N{EM DASH}"  # beyond the years that this system knows
         along = 0 if side == "bottom" else 1
         size = math.inf if self.log[along] else self.pixel()[along]
         return self.axis_texts[side].number(value, size)
@@ -164,6 +175,12 @@ class Plot(pg.PlotItem):
         shared = _SharedBounds(tuple(plot for plot in plots if plot is not self))
         shared.of_tools = True
         self.addItem(shared)
+
+    def difference(self, side: str, value: float) -> str:
+        """Return the difference ``value`` of two places on an axis, with its unit."""
+        if self.dates and side == "bottom":
+            return f"{value / _DAY:.4g} days".replace("-", "\N{MINUS SIGN}")
+        return self.text_of(side, value)
 
     # contents
 

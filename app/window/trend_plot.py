@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
-import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QSignalBlocker, Qt, Signal, Slot
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from dearig.analysis.summary import QUANTITIES, RecordingSummary, how_it_ended, numbers
 from dearig.report.numbers import significant
 from dearig.window.plot_area import PlotArea
-from dearig.window.plot_item import AxisText, Plot
+from dearig.window.plot_item import Plot
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
 from dearig.window.widgets import label
@@ -28,16 +27,6 @@ _NEAR = 12.0  # px from a point within which a click selects it
 #: Symbol and name of a point by how the run ended: told apart without colours.
 _ENDS = {"": ("o", "finished"), "warning": ("t", "with a warning"), "fault": ("x", "with a fault")}
 _BOTTOM = "Start of the run (local time)"
-
-
-class _DateText(AxisText):
-    """Texts of an axis of Unix times."""
-
-    def number(self, value: float, pixel: float) -> str:  # noqa: ARG002
-        try:
-            return f"{datetime.fromtimestamp(value, UTC).astimezone():%Y-%m-%d %H:%M}"
-        except (ValueError, OverflowError, OSError):
-            return "\N{EM DASH}"  # beyond the years that this system knows
 
 
 class TrendPlot(QWidget):
@@ -63,11 +52,7 @@ class TrendPlot(QWidget):
         self.quantity.setCurrentIndex(self.quantity.findData("peak_mm"))
         self.words = label("", "muted")
         self.area = PlotArea(session, "Trend of the recordings")
-        self.plot = self.area.add_plot(0, left="Number", bottom=_BOTTOM, group="date")
-        self.plot.setAxisItems({"bottom": pg.DateAxisItem(orientation="bottom")})
-        self.plot.set_axis("bottom", _BOTTOM)
-        self.plot.axis_texts["bottom"] = _DateText(_BOTTOM, "")
-        self.plot.restyle(session.theme)
+        self.plot = self.area.add_plot(0, left="Number", bottom=_BOTTOM, group="date", dates=True)
         self.area.canvas.clicked.connect(self._clicked)
         top = QHBoxLayout()
         for text, box in (("&Film", self.film), ("&Quantity", self.quantity)):

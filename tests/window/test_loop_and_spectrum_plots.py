@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from dearig.analysis.loops import Loops, loops_of
 from dearig.analysis.spectrum import amplitude_density
 from dearig.analysis.summary import Curves
 from dearig.window.curves_plot import CurvesPlot
+from dearig.window.live_analysis import ANALYSES, LiveAnalysis
 from dearig.window.loop_plot import LoopPlot
 from dearig.window.spectrum_plot import Density, SpectrumPlot
 from dearig.window.theme import DARK
@@ -128,3 +130,52 @@ def test_keys_name_the_curves_of_one_recording_and_the_recordings_of_several(ses
     view.show_model(shown=False)
     assert not view.plots[2].isVisible()
     assert view.plots[1].getAxis("bottom").style["showValues"]
+
+
+# a run
+
+
+class GivenRun:
+    """Two lobes at 500 Hz, of which the newest samples are kept."""
+
+    rate = 500.0
+
+    def __init__(self) -> None:
+        phase = np.linspace(0.0, 4.0 * np.pi, 4001)
+        noise = np.random.default_rng(2).normal(0.0, 1e-6, phase.size)
+        self.signals = {
+            "command": 3e3 * (1.0 - np.cos(phase)),
+            "displacement": 1e-3 * (1.0 - np.cos(phase - 0.2)),
+            "residual 0": noise,
+        }
+
+    def now(self) -> SimpleNamespace:
+        return SimpleNamespace(rate=self.rate, total=4001, samples=4001)
+
+    def newest(self, name: str, seconds: float) -> np.ndarray:
+        return self.signals.get(name, np.empty(0))[-round(seconds * self.rate) :]
+
+
+def test_a_run_shows_loop_and_spectra_of_its_newest_samples(session, qtbot):
+    view = LiveAnalysis(session)
+    qtbot.addWidget(view)
+    view.draw(GivenRun(), 4.0)  # nothing is shown, so nothing is computed
+    assert view.loop.plot.drawn == []
+    for name in ANALYSES:
+        view.show_view(name, shown=True)
+    view.draw(GivenRun(), None)
+    assert view.loop.plot.key.texts[0].startswith("last 8 s: area 1.87")
+    assert "(2 cycles" in view.loop.plot.key.texts[0]
+    assert view.spectrum.plot.key.texts == ["measured, last 8 s", "residual of thesis (Table 3)"]
+    assert np.median(view.spectrum.plot.drawn[1].points[1]) == pytest.approx(
+        1.0 / math.sqrt(250.0), rel=0.1
+    )
+    # a range that the operator chose stays, while the samples change
+    view.loop.area.canvas.zoomed.emit(view.loop.plot, (1.0, 2.0), None)
+    view.draw(GivenRun(), 4.0)
+    assert view.loop.area.span("voltage") == (1.0, 2.0)
+    assert view.loop.plot.key.texts[0].startswith("last 4 s: area ")
+    view.clear()
+    assert view.loop.plot.key.texts == view.spectrum.plot.key.texts == []
+    view.show_view("loop", shown=False)
+    assert view.shown == ("spectrum",)

@@ -6,6 +6,7 @@ import csv
 import io
 import math
 from collections.abc import Callable
+from datetime import datetime
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -174,6 +175,22 @@ def test_numbers_have_units_and_no_negative_zero(
 ) -> None:
     assert AxisText.of(label).number(value, pixel) == text
     assert str(AxisText.of(label)) == label
+
+
+def test_axis_of_dates_reads_local_time_and_days(session: Session, qtbot) -> None:
+    area = PlotArea(session, "dates")
+    qtbot.addWidget(area)
+    plot = area.add_plot(0, left="Peak (kV)", bottom="Start", group="start", dates=True)
+    start = datetime(2026, 11, 20, 9, 30).astimezone().timestamp()
+    plot.add_curve("runs").set_points(start + 86_400.0 * np.arange(4), np.arange(4.0))
+    area.auto_range()
+    area.tools.cursors.setChecked(True)
+    area.group("start").move_cursor(0, start)
+    area.group("start").move_cursor(1, start + 86_400.0 * 2.5)
+    area.tools.crosshair.toggled.emit(False)  # renews the readout
+    assert area.readout == ("A 2026-11-20 09:30   B 2026-11-22 21:30   B\N{MINUS SIGN}A 2.5 days")
+    _, rows = table(area.csv_text())
+    assert datetime.fromisoformat(rows[0][0]).timestamp() == start
 
 
 # zoom
@@ -349,10 +366,10 @@ def test_key_stands_above_the_curves_and_names_are_not_html(shown: Shown) -> Non
 
 def test_low_plot_has_its_label_in_two_lines(shown: Shown) -> None:
     label = shown.residual.getAxis("left").label
-    assert label.toPlainText() == "Residual (\N{MICRO SIGN}m)"
+    assert label.toPlainText().strip() == "Residual (\N{MICRO SIGN}m)"
     shown.area.resize(900, 260)
     QApplication.processEvents()
-    assert label.toPlainText() == "Residual\n(\N{MICRO SIGN}m)"
+    assert label.toPlainText().strip() == "Residual\n(\N{MICRO SIGN}m)"
 
 
 def test_note_follows_the_entries_of_the_key(shown: Shown) -> None:
