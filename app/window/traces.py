@@ -14,73 +14,61 @@ import numpy as np
 __all__ = ["ErrorsSoFar", "Newest", "Pyramid", "RunningErrors"]
 
 
-@dataclass(frozen=True)
-class _Bins:
-    """Extremes of consecutive bins: their values and the numbers of their samples, (n,) each."""
+# Bins are (4, n) arrays: the lowest value of each bin, the highest, and the numbers of their
+# samples, which float64 holds exactly below 2**53
+_LOW, _HIGH, _LOW_AT, _HIGH_AT = range(4)
 
-    low: np.ndarray
-    high: np.ndarray
-    low_at: np.ndarray
-    high_at: np.ndarray
 
-    @classmethod
-    def of_samples(cls, values: np.ndarray, first: int) -> _Bins:
-        """Return bins of one sample each; ``first`` is the number of the first sample."""
-        at = np.arange(first, first + values.size, dtype=np.int64)
-        return cls(values, values, at, at)
+def _of_samples(values: np.ndarray, first: int) -> np.ndarray:
+    """Return bins of one sample each; ``first`` is the number of the first of ``values`` (n,)."""
+    bins = np.empty((4, values.size))
+    bins[_LOW] = bins[_HIGH] = values
+    bins[_LOW_AT] = bins[_HIGH_AT] = np.arange(first, first + values.size)
+    return bins
 
-    @classmethod
-    def none(cls) -> _Bins:
-        return cls.of_samples(np.empty(0), 0)
 
-    def __len__(self) -> int:
-        return int(self.low.size)
+def _paired_samples(values: np.ndarray, first: int) -> np.ndarray:
+    """Return bins of two samples each; as ``_paired`` of bins of one sample, and faster."""
+    a, b = values[0::2], values[1::2]
+    pairs = np.empty((4, a.size))
+    np.fmin(a, b, out=pairs[_LOW])
+    np.fmax(a, b, out=pairs[_HIGH])
+    at = np.arange(first, first + values.size, 2)
+    np.add(at, pairs[_LOW] != a, out=pairs[_LOW_AT])
+    np.add(at, pairs[_HIGH] == b, out=pairs[_HIGH_AT])
+    return pairs
 
-    def __getitem__(self, part: slice) -> _Bins:
-        return _Bins(self.low[part], self.high[part], self.low_at[part], self.high_at[part])
 
-    def followed_by(self, other: _Bins) -> _Bins:
-        """Return these bins and then those of ``other``."""
-        if not len(self):
-            return other
-        return _Bins(
-            np.concatenate((self.low, other.low)),
-            np.concatenate((self.high, other.high)),
-            np.concatenate((self.low_at, other.low_at)),
-            np.concatenate((self.high_at, other.high_at)),
-        )
+def _paired(bins: np.ndarray) -> np.ndarray:
+    """Return the bins (4, n/2) that consist of two of ``bins`` (4, n) each; n is even.
 
-    def paired(self) -> _Bins:
-        """Return the bins that consist of two of these each; their number must be even.
+    Of equal samples the first is the lowest and the last is the highest. NaN is left out where the
+    other bin has a value.
+    """
+    a, b = bins[:, 0::2], bins[:, 1::2]
+    pairs = np.empty((4, a.shape[1]))
+    np.fmin(a[_LOW], b[_LOW], out=pairs[_LOW])
+    np.fmax(a[_HIGH], b[_HIGH], out=pairs[_HIGH])
+    # a comparison with NaN is false: the place is then that of the other bin
+    pairs[_LOW_AT] = np.where(pairs[_LOW] == a[_LOW], a[_LOW_AT], b[_LOW_AT])
+    pairs[_HIGH_AT] = np.where(pairs[_HIGH] == b[_HIGH], b[_HIGH_AT], a[_HIGH_AT])
+    return pairs
 
-        Of equal samples the first is the lowest and the last is the highest. NaN is left out where
-        the other bin has a value.
-        """
-        a, b = self[0::2], self[1::2]
-        second_low = (b.low < a.low) | np.isnan(a.low)
-        second_high = ~(b.high < a.high) & ~np.isnan(b.high)
-        return _Bins(
-            np.where(second_low, b.low, a.low),
-            np.where(second_high, b.high, a.high),
-            np.where(second_low, b.low_at, a.low_at),
-            np.where(second_high, b.high_at, a.high_at),
-        )
 
-    def points(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return sample numbers and values of both extremes of each bin, in the order of time."""
-        low_first = self.low_at <= self.high_at
-        x = np.empty(2 * len(self))
-        y = np.empty(2 * len(self))
-        x[0::2] = np.where(low_first, self.low_at, self.high_at)
-        x[1::2] = np.where(low_first, self.high_at, self.low_at)
-        y[0::2] = np.where(low_first, self.low, self.high)
-        y[1::2] = np.where(low_first, self.high, self.low)
-        once = self.low_at == self.high_at
-        if once.any():  # one sample is both
-            kept = np.ones(x.size, dtype=bool)
-            kept[1::2] = ~once
-            x, y = x[kept], y[kept]
-        return x, y
+def _points(bins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return sample numbers and values (m,) of both extremes of each bin, in the order of time."""
+    low_first = bins[_LOW_AT] <= bins[_HIGH_AT]
+    x, y = np.empty((2, 2 * bins.shape[1]))
+    x[0::2] = np.where(low_first, bins[_LOW_AT], bins[_HIGH_AT])
+    x[1::2] = np.where(low_first, bins[_HIGH_AT], bins[_LOW_AT])
+    y[0::2] = np.where(low_first, bins[_LOW], bins[_HIGH])
+    y[1::2] = np.where(low_first, bins[_HIGH], bins[_LOW])
+    once = bins[_LOW_AT] == bins[_HIGH_AT]
+    if once.any():  # one sample is both
+        kept = np.ones(x.size, dtype=bool)
+        kept[1::2] = ~once
+        x, y = x[kept], y[kept]
+    return x, y
 
 
 class _Level:
@@ -90,26 +78,24 @@ class _Level:
         self.size = size
         self.capacity = capacity
         self.count = 0  # bins ever filled
-        self.low = np.full(capacity, np.nan)
-        self.high = np.full(capacity, np.nan)
-        self.low_at = np.zeros(capacity, dtype=np.int64)
-        self.high_at = np.zeros(capacity, dtype=np.int64)
+        self.kept = np.full((4, capacity), np.nan)
 
     @property
     def oldest(self) -> int:
         """Number of the first bin that is still kept."""
         return max(0, self.count - self.capacity)
 
-    def push(self, bins: _Bins) -> None:
-        self.count += len(bins)
-        bins = bins[-self.capacity :]
-        places = np.arange(self.count - len(bins), self.count) % self.capacity
-        self.low[places], self.high[places] = bins.low, bins.high
-        self.low_at[places], self.high_at[places] = bins.low_at, bins.high_at
+    def push(self, bins: np.ndarray, count: int) -> None:
+        """Add ``count`` bins, of which the last ones are ``bins``."""
+        self.count += count
+        bins = bins[:, -self.capacity :]
+        start = (self.count - bins.shape[1]) % self.capacity
+        before_end = min(bins.shape[1], self.capacity - start)
+        self.kept[:, start : start + before_end] = bins[:, :before_end]
+        self.kept[:, : bins.shape[1] - before_end] = bins[:, before_end:]
 
-    def bins(self, first: int, last: int) -> _Bins:
-        places = np.arange(first, max(first, last)) % self.capacity
-        return _Bins(self.low[places], self.high[places], self.low_at[places], self.high_at[places])
+    def bins(self, first: int, last: int) -> np.ndarray:
+        return self.kept[:, np.arange(first, max(first, last)) % self.capacity]
 
 
 class Pyramid:
@@ -124,8 +110,9 @@ class Pyramid:
         while self._levels[-1].size * capacity < total:
             self._levels.append(_Level(self._levels[-1].size * 2, capacity))
         self._samples = 0
-        # bins that do not fill a bin of the next level yet, for each level
-        self._rest = [_Bins.none() for _ in self._levels]
+        self._odd = np.empty(0)  # a sample that does not fill a bin of two yet
+        # bins of each level, but the finest, that do not fill one of the next level yet
+        self._rest = [np.empty((4, 0)) for _ in self._levels[1:]]
 
     @property
     def samples(self) -> int:
@@ -134,15 +121,22 @@ class Pyramid:
 
     def push(self, values: np.ndarray) -> None:
         """Add ``values`` (n,), the next samples; NaN is not drawn."""
-        bins = _Bins.of_samples(np.asarray(values, dtype=np.float64), self._samples)
-        self._samples += len(bins)
-        self._levels[0].push(bins)
-        for k in range(1, len(self._levels)):
-            bins = self._rest[k].followed_by(bins)
-            whole = len(bins) // 2 * 2
-            self._rest[k] = bins[whole:]
-            bins = bins[:whole].paired()
-            self._levels[k].push(bins)
+        values = np.asarray(values, dtype=np.float64)
+        first, finest = self._samples, self._levels[0]
+        self._samples += values.size
+        newest = values[-finest.capacity :]
+        finest.push(_of_samples(newest, self._samples - newest.size), values.size)
+        first -= self._odd.size
+        values = np.concatenate((self._odd, values))
+        whole = values.size // 2 * 2
+        self._odd = values[whole:]
+        bins = _paired_samples(values[:whole], first)
+        for k, level in enumerate(self._levels[1:]):
+            level.push(bins, bins.shape[1])
+            bins = np.concatenate((self._rest[k], bins), axis=1)
+            whole = bins.shape[1] // 2 * 2
+            self._rest[k] = bins[:, whole:].copy()
+            bins = _paired(bins[:, :whole])
 
     def view(self, first: int, last: int) -> tuple[np.ndarray, np.ndarray]:
         """Return sample numbers and values (m,) of a polyline for samples ``first`` to ``last``.
@@ -159,12 +153,12 @@ class Pyramid:
         )  # fmt: skip
         begin = max(first // level.size, level.oldest)
         end = min(-(-last // level.size), level.count)
-        x, y = level.bins(begin, end).points()
+        x, y = _points(level.bins(begin, end))
         finest = self._levels[0]
         newest = max(level.count * level.size, finest.oldest)
         if level.size > 1 and newest < last:
             x = np.concatenate((x, np.arange(newest, last, dtype=np.float64)))
-            y = np.concatenate((y, finest.bins(newest, last).low))
+            y = np.concatenate((y, finest.bins(newest, last)[_LOW]))
         return x, y
 
 
