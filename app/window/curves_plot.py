@@ -51,8 +51,7 @@ class CurvesPlot(QWidget):
         outer = QVBoxLayout(self)
         outer.setContentsMargins(0, 0, 0, 0)
         outer.addWidget(self.area, 1)
-        self.channels = ChannelPlots(session)
-        outer.addWidget(self.channels)
+        self.channels = ChannelPlots(session, self.area, len(self.plots))
         session.theme_changed.connect(self._draw)
         self._draw()
 
@@ -95,7 +94,7 @@ class CurvesPlot(QWidget):
         self.area.show_plot(residual, self._with_model)
         self.area.show_plot(current, self._with_current)
         declared = self._shown[0].declared if len(self._shown) == 1 else ()
-        self.channels.show_channels([(name, unit) for name, unit, _ in declared], self.plots[0])
+        self.channels.show_channels([(name, unit) for name, unit, _ in declared])
         for place, (_, _, values) in enumerate(declared):
             self.channels.show_values(place, *values)
         if not self._shown:

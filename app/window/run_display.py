@@ -46,7 +46,7 @@ class RunDisplay(QWidget):
         self._run_channels: tuple[ChannelSettings, ...] = ()
         self.plots = RunPlots(session)
         self.analysis = LiveAnalysis(session)
-        self.channel_plots = ChannelPlots(session)
+        self.channel_plots = ChannelPlots(session, self.plots.area, self.plots.rows)
         self.view = RunView(session, self.plots, self.analysis)
         self.alarms = AlarmLog(self)
         self.table = AlarmTable(self.alarms, session)
@@ -174,8 +174,7 @@ class RunDisplay(QWidget):
         end = now.samples / now.rate
         self.plots.draw(live, end)
         names = [channel.name for channel in self._channels]
-        first, last = self.plots.x_range()
-        self.channel_plots.draw(live, names, last - first, last)
+        self.channel_plots.draw(live, names, *self.plots.x_range())
 
     def _start_drawing(self) -> None:
         self._frames.start()
@@ -237,7 +236,6 @@ class RunDisplay(QWidget):
         beside.addWidget(self.analysis)
         beside.setStretchFactor(0, 1)
         above.addWidget(beside, 1)
-        above.addWidget(self.channel_plots)
         upper = QWidget()
         upper.setLayout(above)
         row = QHBoxLayout()

@@ -39,6 +39,7 @@ _NAMES = {
     "current": "current monitor",
     "displacement": "measured",
 }
+_SECOND = "second residual"
 _UNPREDICTED = ("current", "residual")
 # Smallest range in SI units of the plots that follow what is in view, so that noise does not fill
 # them: 50 uA, five times the noise of a current monitor; 5 um
@@ -78,10 +79,17 @@ class RunPlots(QWidget):
             name: self.area.add_plot(row, left=label, weight=_SHARES[name], own_range=True)
             for row, (name, (label, _)) in enumerate(_SIGNALS.items())
         }
+        # the residual of a second model has a plot of its own, which has the range of the first:
+        # in one plot it would hide the first
+        words, share = _SIGNALS["residual"][0], _SHARES["residual"]
+        self._second = self.area.add_plot(len(_SIGNALS), left=words, weight=share, own_range=True)
+        for plot in (self._plots["residual"], self._second):
+            plot.same_y = (self._plots["residual"], self._second)
+        self.rows = len(_SIGNALS) + 1  #: rows of the area that are taken
         self._planned = {n: self._plots[n].add_curve() for n in ("voltage", "displacement")}
         self._band = [self._plots["voltage"].add_curve() for _ in range(2)]
         self._curves: dict[str, Curve] = {
-            signal: self._plots[name].add_curve()
+            signal: self._plot_of(name, signal).add_curve()
             for name, (_, signals) in _SIGNALS.items()
             for signal in signals
         }
@@ -89,6 +97,7 @@ class RunPlots(QWidget):
             name: PlotOverlay(plot, _SCALE[name], session.theme)
             for name, plot in self._plots.items()
         }
+        self.overlays[_SECOND] = PlotOverlay(self._second, _SCALE["residual"], session.theme)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.area)
@@ -117,8 +126,21 @@ class RunPlots(QWidget):
         self.area.show_plot(self._plots[name], shown)
         row = list(self._plots).index(name)
         self.area.canvas.ci.layout.setRowStretchFactor(row, _SHARES[name] if shown else 0)
+        self._show_second()
         self._draw_marks()
         self.shown_changed.emit()
+
+    def _show_second(self) -> None:
+        """Show the plot of the second residual, if there is one."""
+        shown = len(self._session.overlays) > 1 and self._plots["residual"].isVisible()
+        self.area.show_plot(self._second, shown)
+        share = _SHARES["residual"] if shown else 0
+        self.area.canvas.ci.layout.setRowStretchFactor(len(_SIGNALS), share)
+
+    def _plot_of(self, name: str, signal: str) -> Plot:
+        """Return the plot of ``signal``, which belongs to ``name``."""
+        second = name == "residual" and signal.endswith(" 1")
+        return self._second if second else self._plots[name]
 
     def curve(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Return time in s and values in the unit of the plot of a curve that is drawn.
@@ -137,8 +159,9 @@ class RunPlots(QWidget):
         return self.area.span()
 
     def y_range(self, name: str) -> tuple[float, float]:
-        """Return the range of a plot in its unit."""
-        low, high = self._plots[name].vb.viewRange()[1]
+        """Return the range of a plot, or of the "second residual", in its unit."""
+        plot = self._second if name == _SECOND else self._plots[name]
+        low, high = plot.vb.viewRange()[1]
         return low, high
 
     @property
@@ -168,6 +191,7 @@ class RunPlots(QWidget):
             curve.set_colour(colours[signal], dashed)
         for overlay in self.overlays.values():
             overlay.set_theme(theme)
+        self._show_second()
         self._show_levels()
         self._name()
         self._draw_marks()
@@ -189,7 +213,7 @@ class RunPlots(QWidget):
             curve.setVisible(self._run_shown and self._exists(signal))
         tolerance = self._settings.interlocks.monitor_tolerance_kV
         self._band[0].title = f"trip of the monitor, ±{tolerance:g} kV"
-        for plot in self._plots.values():
+        for plot in (*self._plots.values(), self._second):
             plot.renew_key()
 
     # a plan
@@ -224,7 +248,7 @@ class RunPlots(QWidget):
         self._show_levels()
         self._name()
         self._draw_marks()
-        for plot in self._plots.values():
+        for plot in (*self._plots.values(), self._second):
             plot.set_auto_y(auto=True)
         self.area.follow()
         self.area.roll(0.0, self._duration)
@@ -257,12 +281,10 @@ class RunPlots(QWidget):
                 if not self._exists(signal):
                     continue
                 x, y = live.view(signal, begin, until)
-                known = np.isfinite(y)
-                if not known.all():
-                    x, y = x[known], y[known]
                 self._curves[signal].set_points(x, y * _SCALE[name], thinned=True)
-                if y.size:
-                    low, high = min(low, float(y.min())), max(high, float(y.max()))
+                known = y[np.isfinite(y)]
+                if known.size:
+                    low, high = min(low, float(known.min())), max(high, float(known.max()))
                 if signal == "command":
                     self._draw_band(x, y)
             if low <= high:
@@ -323,7 +345,7 @@ class RunPlots(QWidget):
             return ""
         name = overlays[int(number)].name
         if kind == "rms":
-            return "RMS, last 1 s" if number == "0" else ""
+            return "RMS, last 1 s"
         return name if kind == "model" else f"residual of {name}"
 
     def _exists(self, signal: str) -> bool:
@@ -361,16 +383,15 @@ class RunPlots(QWidget):
     @Slot()
     def _scale(self) -> None:
         """Set the ranges of the plots whose range the operator has not chosen."""
-        for name, plot in self._plots.items():
-            if not plot.auto_y:
-                continue
+        for name, first in self._plots.items():
             low, high = self._low[name], self._high[name]
             if name == "current" and self.trips_in_view:
                 for level in self.overlays[name].levels:
                     low, high = min(low, level.value), max(high, level.value)
             room = _ROOM * (high - low)
             scale = _SCALE[name]
-            plot.vb.setYRange((low - room) * scale, (high + room) * scale, padding=0.0)
+            for plot in first.same_y:
+                plot.show_y((low - room) * scale, (high + room) * scale)
 
     def rescale(self) -> None:
         """Set the ranges again after ``trips_in_view`` was changed."""

@@ -15,6 +15,7 @@ from dearig.recording import open_recording
 from dearig.window.channel_plots import ChannelPlots
 from dearig.window.curves_plot import CurvesPlot
 from dearig.window.live import Live
+from dearig.window.plot_area import PlotArea
 from tests.window.conftest import SHORT
 
 RIG = RigFile.model_validate(
@@ -41,17 +42,18 @@ def recorded(tmp_path: Path) -> tuple[Path, Live]:
 def test_live_curves_of_a_run_are_what_was_recorded(recorded, session, qtbot):
     path, live = recorded
     recording = open_recording(path)
-    plots = ChannelPlots(session)
-    qtbot.addWidget(plots)
+    area = PlotArea(session, "Run")
+    qtbot.addWidget(area)
+    plots = ChannelPlots(session, area, 0)
     plots.show_channels([(c.shown, c.unit) for c in RIG.channel])
-    plots.draw(live, [c.name for c in RIG.channel], None, recording.duration)
-    assert [p.getAxis("left").labelText for p in plots.plots] == ["Load cell (N)", "monitor (V)"]
-    _, force = plots.curves[0].getData()
+    plots.draw(live, [c.name for c in RIG.channel], 0.0, recording.duration)
+    assert [str(p.axis_texts["left"]) for p in plots.plots] == ["Load cell (N)", "monitor (V)"]
+    _, force = plots.curves[0].points
     assert force.min() >= recording.values["load_cell"].min()
     assert force.max() <= recording.values["load_cell"].max()
     assert force.mean() == pytest.approx(1.96, abs=0.02)
     # a channel may have the name of a curve of the run
-    _, other = plots.curves[1].getData()
+    _, other = plots.curves[1].points
     np.testing.assert_allclose(other, 0.0, atol=0.01)
     assert np.abs(live.view("monitor", 0.0, recording.duration)[1]).max() > 100.0
 
@@ -59,18 +61,22 @@ def test_live_curves_of_a_run_are_what_was_recorded(recorded, session, qtbot):
 def test_recording_shows_them_below_the_others(recorded, session, qtbot):
     plot = CurvesPlot(session)
     qtbot.addWidget(plot)
-    assert not plot.channels.isVisibleTo(plot)
+    assert not plot.channels.plots
     plot.show_curves([curves(recorded[0], None)])
-    assert plot.channels.isVisibleTo(plot)
-    time, force = plot.channels.curves[0].getData()
+    assert plot.channels.plots
+    time, force = plot.channels.curves[0].points
     assert time[-1] == pytest.approx(open_recording(recorded[0]).duration, rel=0.01)
     assert force.mean() == pytest.approx(1.96, abs=0.02)
     plot.show_curves([])
-    assert not plot.channels.isVisibleTo(plot)
+    assert not plot.channels.plots
 
 
-def test_rig_without_declared_channels_shows_no_such_plots(session, qtbot):
-    plots = ChannelPlots(session)
-    qtbot.addWidget(plots)
+def test_channels_of_another_rig_replace_the_first(session, qtbot):
+    area = PlotArea(session, "Run")
+    qtbot.addWidget(area)
+    area.add_plot(0, left="Voltage (kV)")
+    plots = ChannelPlots(session, area, 1)
+    plots.show_channels([("A", "N"), ("B", "V")])
+    assert len(area.plots) == 3
     plots.show_channels([])
-    assert not plots.isVisible()
+    assert len(area.plots) == 1

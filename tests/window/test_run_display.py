@@ -219,6 +219,28 @@ def test_the_residual_axis_shrinks_again(session: Session, qtbot: QtBot) -> None
     assert plots.y_range("residual")[1] < 10.0
 
 
+def test_two_residuals_have_a_plot_each_with_one_range(session: Session, qtbot: QtBot) -> None:
+    from dearig.window.run_plots import RunPlots
+
+    plots = RunPlots(session)
+    qtbot.addWidget(plots)
+    plots.show()
+    one, two = plots._plots["residual"], plots._second
+    assert not two.isVisible()
+    session.set_overlays((session.thesis_model,) * 2)
+    plots.start()
+    plots.draw(_Given(residual=4e-5), 1.0)  # type: ignore[arg-type]
+    assert two.isVisible()
+    assert [c.title for c in one.curves_in_key()] == [
+        f"residual of {session.thesis_model.name}", "RMS, last 1 s",
+    ]  # fmt: skip
+    assert len(two.curves_in_key()) == 2
+    assert plots.y_range("residual") == plots.y_range("second residual")
+    assert plots.y_range("residual")[1] >= 40.0
+    plots.show_plot("residual", shown=False)
+    assert not two.isVisible()
+
+
 class _Given:
     """Curves of one size each."""
 
