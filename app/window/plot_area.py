@@ -62,7 +62,6 @@ class PlotArea(QWidget):
     """
 
     view_changed = Signal()  #: the operator has changed a range
-    following_changed = Signal(bool)
 
     def __init__(
         self, session: Session, name: str, live: bool = False, parent: QWidget | None = None
@@ -270,19 +269,12 @@ class PlotArea(QWidget):
         self._set_following(following=True)
         self.view_changed.emit()
 
-    def look_at(self, first: float, last: float) -> None:
-        """Show ``first`` to ``last`` s, and do not follow the run."""
-        self._set_following(following=False)
-        self.show_span(first, last)
-        self.view_changed.emit()
-
     def set_live(self, live: bool) -> None:
         """Say whether the plots show a run, which is followed at first."""
         self._live = live
         self._history.clear()
         self.tools.back.setEnabled(False)
-        self._following = not live  # so that a change is announced
-        self._set_following(following=live)
+        self._following = live
         self.tools.show_follow(shown=False)
 
     def data_changed(self) -> None:
@@ -296,7 +288,6 @@ class PlotArea(QWidget):
         if following != self._following:
             self._following = following
             self.tools.show_follow(shown=self._live and not following)
-            self.following_changed.emit(following)
 
     # readouts
 

@@ -116,7 +116,7 @@ class RunPlots(QWidget):
 
     @property
     def following(self) -> bool:
-        """True while the plots show the newest samples, or the whole plan."""
+        """True while the plots show the newest samples of a run."""
         return self.area.following
 
     def show_plot(self, name: str, shown: bool) -> None:
@@ -250,8 +250,8 @@ class RunPlots(QWidget):
         self._draw_marks()
         for plot in (*self._plots.values(), self._second):
             plot.set_auto_y(auto=True)
-        self.area.follow()
-        self.area.roll(0.0, self._duration)
+        self.area.set_live(live=False)  # a plan has all of its time at once
+        self.area.show_span(0.0, self._duration)
         self._scale()
 
     # a run
@@ -265,7 +265,7 @@ class RunPlots(QWidget):
         for name in _UNPREDICTED:
             self.overlays[name].show_words("")
         self._name()
-        self.area.follow()
+        self.area.set_live(live=True)
         self.area.roll(*self._span(0.0))
 
     def draw(self, live: Live, end: float) -> None:
@@ -400,8 +400,6 @@ class RunPlots(QWidget):
     @Slot()
     def _view_changed(self) -> None:
         self._scale()
-        if self._planned_shown and self.area.following:
-            self.area.roll(0.0, self._duration)
         self.view_changed.emit()
 
     def _span(self, end: float) -> tuple[float, float]:

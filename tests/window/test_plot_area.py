@@ -301,6 +301,18 @@ def test_live_area_follows_until_the_operator_looks_back(show) -> None:
     assert area.following
 
 
+def test_area_that_shows_no_run_any_more_offers_no_following(show) -> None:
+    area = show(live=True).area
+    area.set_live(live=False)
+    area.canvas.zoomed.emit(area.plots[0], (2.0, 3.0), None)
+    assert not area.following
+    assert not area.tools.buttons[area.tools.follow].isVisible()
+    area.tools.auto.trigger()
+    assert area.span() == (0.0, pytest.approx(19.999))
+    area.set_live(live=True)
+    assert area.following
+
+
 def test_zoom_of_another_axis_does_not_end_following(show) -> None:
     shown = show(live=True)
     shown.wheel(shown.density, 1.0, -0.7, 1)
