@@ -72,7 +72,8 @@ class PlotArea(QWidget):
         self.file_stem = name  #: proposed name of saved files, without an ending
         self.canvas = Canvas()
         self.canvas.setAccessibleName(name)
-        self._sizes: dict[int, tuple[int, int]] = {}  # of rows: share and least height in px
+        self._rows: dict[int, tuple[int, int]] = {}  # weight and least height in px
+        self._rows_of: dict[Plot, range] = {}
         self._groups: dict[str, Group] = {}
         self._group_of: dict[Plot, Group] = {}
         self._active: Group | None = None  # the pointer was on it last
@@ -159,7 +160,8 @@ class PlotArea(QWidget):
         plot = Plot(left, bottom, log, own_range, dates)
         self.canvas.addItem(plot, row, column, rowspan=rows)
         for taken in range(row, row + rows):
-            self._sizes[taken] = (weight, least)
+            self._rows[taken] = (weight, least)
+        self._rows_of[plot] = range(row, row + rows)
         self.canvas.area_plots.append(plot)
         chosen = self._groups.setdefault(group, Group(group))
         chosen.add(plot)
@@ -179,9 +181,11 @@ class PlotArea(QWidget):
 
     def remove_plot(self, plot: Plot) -> None:
         """Remove ``plot``."""
+        self.show_plot(plot, shown=True)  # only then is it in the layout
         self._group_of.pop(plot).remove(plot)
         self.canvas.area_plots.remove(plot)
         self.canvas.removeItem(plot)
+        del self._rows_of[plot]
         self._history.clear()
         self.arrange()
 
@@ -192,32 +196,35 @@ class PlotArea(QWidget):
             self.arrange()
 
     def arrange(self) -> None:
-        """Number the lowest horizontal axis of each group in each column, and set the height."""
+        """Give no height to rows without a plot, and number the lowest axis of each group."""
         lowest: dict[tuple[int, str], Plot] = {}
         shown: set[int] = set()
         for plot in self.plots:
             if not plot.isVisible():
                 continue
-            cells = self.canvas.ci.items[plot]
-            row, column = cells[0]
+            shown |= set(self._rows_of[plot])
+            column = self.canvas.ci.items[plot][0][1]
             place = (column, self._group_of[plot].name)
-            if place not in lowest or self._row(lowest[place]) < row:
+            below = lowest.setdefault(place, plot)
+            if self._rows_of[below][0] < self._rows_of[plot][0]:
                 lowest[place] = plot
-            shown.update(taken for taken, _ in cells)
         for plot in self.plots:
             bottom = plot in lowest.values()
             plot.getAxis("bottom").setStyle(showValues=bottom)
             plot.getAxis("bottom").showLabel(bottom)
         layout = self.canvas.ci.layout
-        for taken, (weight, least) in self._sizes.items():
-            # the row of a hidden or removed plot takes no height
-            layout.setRowStretchFactor(taken, weight if taken in shown else 0)
-            layout.setRowMinimumHeight(taken, float(least) if taken in shown else 0.0)
-        self.canvas.setMinimumHeight(sum(self._sizes[taken][1] for taken in shown))
-
-    def _row(self, plot: Plot) -> int:
-        row: int = self.canvas.ci.items[plot][0][0]
-        return row
+        for plot in self.plots:
+            # a hidden item keeps its least height in a layout of Qt
+            taken = plot.parentLayoutItem() is layout
+            if plot.isVisible() and not taken:
+                row, column = self.canvas.ci.items[plot][0]
+                layout.addItem(plot, row, column, len(self._rows_of[plot]), 1)
+            elif taken and not plot.isVisible():
+                layout.removeItem(plot)
+        for row, (weight, least) in self._rows.items():
+            layout.setRowStretchFactor(row, weight if row in shown else 0)
+            layout.setRowMinimumHeight(row, least if row in shown else 0.0)
+        self.canvas.setMinimumHeight(sum(self._rows[row][1] for row in shown))
 
     # ranges
 

@@ -132,7 +132,7 @@ class Plot(pg.PlotItem):
         """Show the label of an axis; beside a plot that is too low for it, in two lines."""
         text = self.axis_texts[side]
         words = str(text)
-        room = self.vb.height() + self.key.minimumHeight()
+        room = self.vb.height()
         if side == "left" and text.unit and self.key.width_of(words) > room > 0.0:
             words = f"{escape(text.name)}<br>{escape(f'({text.unit})')}"
         else:

@@ -124,8 +124,6 @@ class RunPlots(QWidget):
         if shown == self._plots[name].isVisible() or self.shown == (name,):
             return
         self.area.show_plot(self._plots[name], shown)
-        row = list(self._plots).index(name)
-        self.area.canvas.ci.layout.setRowStretchFactor(row, _SHARES[name] if shown else 0)
         self._show_second()
         self._draw_marks()
         self.shown_changed.emit()
@@ -134,8 +132,6 @@ class RunPlots(QWidget):
         """Show the plot of the second residual, if there is one."""
         shown = len(self._session.overlays) > 1 and self._plots["residual"].isVisible()
         self.area.show_plot(self._second, shown)
-        share = _SHARES["residual"] if shown else 0
-        self.area.canvas.ci.layout.setRowStretchFactor(len(_SIGNALS), share)
 
     def _plot_of(self, name: str, signal: str) -> Plot:
         """Return the plot of ``signal``, which belongs to ``name``."""

@@ -393,6 +393,20 @@ def test_note_follows_the_entries_of_the_key(shown: Shown) -> None:
     assert len(shown.voltage.key.texts) == 1
 
 
+def test_hidden_plot_leaves_its_height_to_the_others(shown: Shown) -> None:
+    before = shown.voltage.vb.height()
+    shown.area.show_plot(shown.residual, shown=False)
+    QApplication.processEvents()
+    assert shown.voltage.vb.height() > before + 60.0
+    assert shown.voltage.getAxis("bottom").style["showValues"]  # the lowest over time now
+    shown.area.show_plot(shown.residual, shown=True)
+    QApplication.processEvents()
+    assert shown.voltage.vb.height() == pytest.approx(before, abs=2.0)
+    shown.area.show_plot(shown.residual, shown=False)
+    shown.area.remove_plot(shown.residual)
+    assert shown.residual not in shown.area.plots
+
+
 def test_long_names_break_into_rows(shown: Shown) -> None:
     before = shown.voltage.vb.height()
     for i in range(8):
