@@ -68,7 +68,8 @@ def loop_area(x: np.ndarray, y: np.ndarray) -> float:
 def cycles(drive: np.ndarray) -> list[tuple[int, int]]:
     """Return first and last row of each cycle of ``drive`` (n,): from one valley to the next.
 
-    A rest between two cycles is divided in its middle. A drive that does not vary has no cycles.
+    A rest between two cycles is divided in its middle. A part that does not come back, such as the
+    end of a run that was stopped, is no cycle, and a drive that does not vary has none.
     """
     known = np.nan_to_num(drive, nan=float(np.nanmin(drive)) if np.isfinite(drive).any() else 0.0)
     span = float(np.ptp(known)) if known.size else 0.0
@@ -78,7 +79,11 @@ def cycles(drive: np.ndarray) -> list[tuple[int, int]]:
     walled = np.concatenate(([known.max()], known, [known.max()]))
     valleys, _ = find_peaks(-walled, prominence=_VALLEY * span)
     rows = (valleys - 1).tolist()
-    return list(pairwise(rows))
+    return [
+        (first, last)
+        for first, last in pairwise(rows)
+        if abs(known[last] - known[first]) < _VALLEY * span
+    ]
 
 
 def loops_of(
