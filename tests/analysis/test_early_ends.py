@@ -11,7 +11,7 @@ from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.early_ends import choose, early_end_warnings
 from dearig.analysis.identify import identify_recordings
 from dearig.analysis.quality import few_data
-from dearig.analysis.summary import summarise
+from dearig.analysis.summary import read_entries, summary_of
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import parse_sequence
 from dearig.errors import InputError, SafetyStop
@@ -58,7 +58,8 @@ def test_an_arc_is_told_with_its_time_and_what_it_means(folder):
     )
     assert "arc" in end.cause
     # the summary of a listing says the same
-    assert early_end(summarise(folder / "arc.h5", None)) == end
+    (entry,) = read_entries(folder, ["arc.h5"])
+    assert early_end(summary_of(folder, entry)) == end
     assert early_end(open_recording(folder / "whole.h5")) is None
     assert early_end_warnings([folder / "arc.h5", folder / "whole.h5"]) == (f"arc {end.sentence}",)
 
