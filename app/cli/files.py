@@ -50,21 +50,37 @@ def _check_export_format(to: str) -> str:
 
 @commands.command("import", rich_help_panel=_PANEL)
 def import_(
-    source: Annotated[
-        Path,
-        typer.Argument(metavar="IN.csv|IN.mat|IN.tdms|IN.parquet", help="The measured data."),
-    ],
+    source: Annotated[Path, typer.Argument(metavar="FILE", help="The measured data.")],
     out: Annotated[
-        Path, typer.Option("--out", metavar="FILE.h5", help="Write the recording to this file.")
-    ],
+        Path | None, typer.Option("--out", metavar="FILE.h5", help="Write the recording here.")
+    ] = None,
     column: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME=SOURCE",
-            help="Read the column NAME, such as voltage_kV, from the column that the file calls "
-            "SOURCE. Can be repeated.",
+            help="Read NAME, such as voltage_kV, from the column that the file calls SOURCE, or "
+            "from its third column with #3. A scale may follow: displacement_mm='Laser (V)*4'. "
+            "Can be repeated.",
         ),
     ] = None,
+    columns: Annotated[
+        bool,
+        typer.Option("--columns", help="List the columns and their first values; import nothing."),
+    ] = False,
+    rate: Annotated[
+        float | None,
+        typer.Option("--rate-Hz", help="Sample rate of a file without a column for time."),
+    ] = None,
+    names_line: Annotated[
+        int | None, typer.Option(help="Line of the names in a text file, from 1.")
+    ] = None,
+    skip_bad_rows: Annotated[
+        bool,
+        typer.Option(
+            "--skip-bad-rows",
+            help="Leave out rows that cannot be read or go back in time; they become events.",
+        ),
+    ] = False,
     gauge_length_mm: Annotated[
         float | None,
         typer.Option(help="Gauge length of a film, to convert its displacement to stretch."),
@@ -76,48 +92,78 @@ def import_(
     kinematics: Annotated[
         Kinematics | None, typer.Option(help="How the film was held.", show_default="uniaxial")
     ] = None,
+    film_length_mm: Annotated[
+        float | None, typer.Option(help="Length of an actuator's film along the motion.")
+    ] = None,
+    film_width_mm: Annotated[
+        float | None, typer.Option(help="Width of an actuator's film.")
+    ] = None,
+    film_thickness_um: Annotated[
+        float | None, typer.Option(help="Thickness of an actuator's film before it is loaded.")
+    ] = None,
+    permittivity: Annotated[
+        float | None, typer.Option(help="Relative permittivity of an actuator's film.")
+    ] = None,
+    load_g: Annotated[float | None, typer.Option(help="Mass that hangs on an actuator.")] = None,
     rig_file: RigFileOption = None,
     film: FilmName = "",
     notes: Notes = "",
     json: Json = None,
     force: Force = False,
 ) -> None:
-    """Convert measured data (CSV, MAT, TDMS, Parquet) to a recording."""
+    """Convert measured data (text, Excel, MAT, TDMS, HDF5, JSON, Parquet) to a recording."""
+    from dearig.config.imports import imported_metadata, raw_scales
     from dearig.config.rigfile import load_rig_file
-    from dearig.config.toml_input import read_text
-    from dearig.recording.importers import import_file
-    from dearig.recording.metadata import RunMetadata
+    from dearig.recording.importers import ImportOptions, import_file
     from dearig.recording.reader import open_recording
     from dearig.recording.summary import describe
 
-    columns = _columns(column or [])
+    if columns:
+        _list_columns(source, names_line, json)
+        return
+    if out is None:
+        raise InputError("name the recording with --out FILE.h5, or list the columns: --columns")
     check_files(force, (source, rig_file), out, json=json, recording=out)
     settings = None if rig_file is None else load_rig_file(rig_file)
+    options = ImportOptions(
+        _columns(column or []), gauge_length_mm, area_mm2,
+        None if kinematics is None else kinematics.value, rate, names_line, skip_bad_rows,
+        {} if settings is None else raw_scales(settings),
+    )  # fmt: skip
+    metadata = imported_metadata(
+        rig_file, settings, film, notes,
+        length_mm=film_length_mm, width_mm=film_width_mm, thickness_um=film_thickness_um,
+        permittivity=permittivity, load_g=load_g,
+    )  # fmt: skip
     with working(json, computes=False) as (console, _):
-        doubts = import_file(
-            source,
-            out,
-            columns,
-            gauge_length_mm=gauge_length_mm,
-            area_mm2=area_mm2,
-            kinematics=None if kinematics is None else kinematics.value,
-            metadata=RunMetadata(
-                film=None if settings is None else settings.as_film(),
-                load=None if settings is None else settings.as_load(),
-                film_id=film,
-                notes=notes,
-                configuration="" if rig_file is None else read_text(rig_file, "rig file"),
-            ),
-            overwrite=force,
-        )
+        done = import_file(source, out, options, metadata=metadata, overwrite=force)
     recording = open_recording(out)
     print_line(
         console,
         f"{out}: {recording.samples} samples, {recording.duration:.1f} s of {recording.kind} data",
     )
-    for doubt in doubts:
+    for took in done.took:
+        print_line(console, f"  {took}")
+    for note in done.notes:
+        print_line(console, f"Note: {note}")
+    for doubt in done.doubts:
         print_line(console, f"Check this: {doubt}", style="yellow")
-    write_result({**describe(recording), "doubts": doubts}, json)
+    told = {"took": list(done.took), "notes": list(done.notes), "doubts": list(done.doubts)}
+    write_result({**describe(recording), **told}, json)
+
+
+def _list_columns(source: Path, names_line: int | None, json: str | None) -> None:
+    """Print the columns of a file of measured data, what they seem to be, and first values."""
+    from dearig.recording.importers.listing import preview
+
+    found = preview(source, names_line)
+    console = console_for(json)
+    for one in found:
+        like = " or ".join(q.replace("_", " ") for q in one.quantities) or "?"
+        values = ", ".join(f"{value:.6g}" for value in one.values) or "no numbers"
+        unit = f" in {one.unit}" if one.unit else ""
+        print_line(console, f"#{one.number} {one.name}: {like}{unit}; {one.count} values: {values}")
+    write_result({"format": "dearig-columns/1", "columns": [asdict(one) for one in found]}, json)
 
 
 def _columns(pairs: list[str]) -> dict[str, str]:

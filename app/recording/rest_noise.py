@@ -15,19 +15,42 @@ MIN_QUIET = 20
 
 #: Part of the largest voltage that counts as 0: the force goes with the square, a millionth.
 NEGLIGIBLE = 1e-3
+#: Part of the largest voltage up to which a steady reading is the offset of a monitor at rest, not
+#: a voltage that is held: a percent of offset is four times what amplifiers are specified with.
+OFFSET_MAX = 1e-2
+#: Standard deviations of the noise at rest beyond which the voltage has left its rest: one sample
+#: in 5e8 of Gaussian noise.
+LEAVES = 6.0
+#: Least von Neumann ratio (mean square of successive differences over the variance) of readings
+#: that do not drift. It is 2 for white noise, with a standard deviation of 2/sqrt(n), 0.45 for 20.
+STEADY = 1.0
 
 
 def lead_in(voltage: np.ndarray, step: float = 0.0) -> int:
-    """Count the samples of ``voltage`` (N,) V at 0 V before the first one that is not.
+    """Count the samples of ``voltage`` (N,) V at rest before the first one that is not.
 
-    ``step`` V is the resolution of the converter; a measured voltage may differ from 0 by a
-    thousandth of its largest value.
+    ``step`` V is the resolution of the converter. A voltage is at rest within a thousandth of its
+    largest value around 0 V, or where it is steady in its own noise around the offset of a monitor.
     """
     size = np.abs(voltage)
     if size.size == 0:
         return 0
-    loud = size > max(step, NEGLIGIBLE * float(size.max()))
-    return int(np.argmax(loud)) if loud.any() else int(size.size)
+    largest = float(size.max())
+    loud = size > max(step, NEGLIGIBLE * largest)
+    quiet = int(np.argmax(loud)) if loud.any() else int(size.size)
+    return max(quiet, _steady(voltage, largest))
+
+
+def _steady(voltage: np.ndarray, largest: float) -> int:
+    """Count the samples before ``voltage`` leaves the noise of its first ``MIN_QUIET`` ones."""
+    first = voltage[:MIN_QUIET]
+    if first.size < MIN_QUIET or abs(float(first.mean())) > OFFSET_MAX * largest:
+        return 0
+    spread = float(first.std(ddof=1))
+    if spread > 0.0 and float(np.mean(np.diff(first) ** 2)) < STEADY * spread**2:
+        return 0
+    away = np.abs(voltage - first.mean()) > max(LEAVES * spread, NEGLIGIBLE * largest)
+    return int(np.argmax(away)) if away.any() else int(voltage.size)
 
 
 def noise_floor(time: np.ndarray, values: np.ndarray) -> float | None:

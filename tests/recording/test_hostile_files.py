@@ -14,7 +14,7 @@ from dearig.config.sequencefile import load_sequence
 from dearig.drivers.rig import Block
 from dearig.errors import InputError
 from dearig.recording import open_recording
-from dearig.recording.importers.csv_file import CsvFile
+from dearig.recording.importers.text_file import TextFile
 from dearig.recording.verify import verify
 from tests.fuzz.__main__ import run as fuzz
 from tests.fuzz.targets import TARGETS, seeds_of
@@ -137,7 +137,7 @@ def test_a_sequence_reads_nothing_but_what_lies_by_it(tmp_path: Path, file: str)
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="there is no such device here")
 def test_a_device_is_no_table() -> None:
     with pytest.raises(InputError, match="/dev/zero is a device, not a file"):
-        CsvFile(Path("/dev/zero"))
+        TextFile(Path("/dev/zero"))
 
 
 def test_a_killed_run_that_claims_more_than_it_has(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from scipy.io import loadmat, savemat
 from dearig.errors import InputError
 from dearig.model.material import THESIS_FILM, THESIS_LOAD
 from dearig.recording import Recording, RunMetadata, export_recording, import_file, open_recording
+from dearig.recording.importers import ImportOptions
 from tests.tools.recordings import Clock, measured_data
 
 
@@ -24,9 +25,15 @@ def csv(folder: Path, content: str | bytes, name: str = "in.csv") -> Path:
     return path
 
 
-def taken(path: Path, *args: object, **kwargs: object) -> Recording:
+def taken(
+    path: Path,
+    columns: dict[str, str] | None = None,
+    metadata: RunMetadata | None = None,
+    **options: object,
+) -> Recording:
     out = path.parent / "out.h5"
-    import_file(path, out, *args, overwrite=True, now=Clock(), **kwargs)
+    chosen = ImportOptions(columns or {}, **options)
+    import_file(path, out, chosen, metadata=metadata, overwrite=True, now=Clock())
     return open_recording(out)
 
 
@@ -65,7 +72,10 @@ def test_an_actuators_csv(tmp_path: Path) -> None:
         (ACTUATOR.replace("\n", ",ok\n").replace("mm,ok", "mm,remark"), {}),
         (ACTUATOR.replace("time_s", "t"), {"time_s": "t"}),
         (ACTUATOR.replace("voltage_kV", "U"), {"voltage_kV": "U"}),
-        (ACTUATOR.replace("voltage_kV", "voltage_V"), {"voltage_kV": "voltage_V"}),
+        (ACTUATOR.replace("voltage_kV", "voltage_V"), {"voltage_kV": "voltage_V*1"}),
+        (ACTUATOR.replace("time_s", "Zeit [s]"), {}),
+        (ACTUATOR.replace("voltage_kV", "Spannung / kV"), {}),
+        (ACTUATOR.replace("displacement_mm", "Déplacement (mm)"), {}),
         (ACTUATOR.replace("0.25", "250").replace(",1\n", ",1000\n").replace("mm", "um"), {}),
         (ACTUATOR.replace("0.25", "2.5e-4").replace(",1\n", ",0.001\n").replace("mm", "m"), {}),
         (ACTUATOR.replace("\n", ",7\n").replace("mm,7", "mm,µ").encode("latin-1"), {}),
@@ -112,20 +122,14 @@ def test_film_data(tmp_path: Path) -> None:
         ("", {}, r"in\.csv is empty"),
         ("# only words\n\n", {}, r"in\.csv is empty"),
         ("time_s,voltage_V,displacement_mm\n", {}, "a line of names and no data"),
-        ("0,0,0\n1,2,3\n", {}, "line 1: there are numbers where the names"),
+        ("0,0,0\n1,2,3\n", {}, "the names #1, #2, #3 do not say .* --column 'time_s=#1' --column"),
         ("time_s,voltage_V,displacement_mm\n0,0,0\n", {}, "has 1 row of data; at least 2"),
         (b"\x00\x01\x02" * 50, {}, "is not a text file"),
-        (b"\xff\xfe\x00\xd8\x00", {}, "begins as UTF-16 text but is not"),
-        (ACTUATOR.replace("time_s", "seconds"), {}, "no column for time .time_s.; there are: sec"),
-        (ACTUATOR.replace("time_s", "Time_s"), {}, "did you mean 'Time_s'"),
-        (
-            ACTUATOR.replace("time_s", "time_ms"),
-            {},
-            "'time_ms' is not a known name: time may be in s",
-        ),
-        (ACTUATOR.replace("kV", "mV"), {}, "'voltage_mV' .* voltage may be in V or kV"),
-        (ACTUATOR.replace("_kV", " [V]"), {}, "voltage may be in V or kV"),
-        (ACTUATOR.replace("_mm", "_cm"), {}, "displacement may be in mm or um or m"),
+        (b"\xff\xfe\x00\xd8\x00", {}, "begins as utf-16 text but is not"),
+        (ACTUATOR.replace("time_s", "seconds"), {}, "no column for time .time_s.*; there are: sec"),
+        (ACTUATOR.replace("time_s", "Time"), {}, "'Time' names no unit.* --column time_s=Time"),
+        (ACTUATOR.replace("kV", "pV"), {}, "'voltage_pV' names no unit.*voltage_kV=voltage_pV"),
+        (ACTUATOR.replace("_mm", " out (V)"), {}, "is the output of an instrument in V, up to 1"),
         ("a,b\n0,1\n1,2\n", {}, "no column for voltage .* nor for film data .* there are: a, b"),
         (ACTUATOR.replace("0.25", "high"), {}, "line 3, column 'displacement_mm': 'high' is not a"),
         (ACTUATOR.replace("0.25", ""), {}, "line 3, column 'displacement_mm': there is no value"),
@@ -138,26 +142,32 @@ def test_film_data(tmp_path: Path) -> None:
         (ACTUATOR.replace("0.75", "0.25"), {}, "line 4, column 'time_s': time goes back, from 0.5"),
         (ACTUATOR.replace("0.75", "0.5"), {}, "line 4, column 'time_s': time stands still"),
         ("#\n\n" + ACTUATOR.replace("0.5,", "\n0.5,").replace("0.75", "0.5"), {}, "line 7, "),
-        (ACTUATOR.replace("0.25", "0.25,7"), {}, "line 3: 4 values under 3 column names"),
-        (ACTUATOR.replace(",0.25", ""), {}, "line 3: 2 values under 3 column names"),
-        (ACTUATOR.replace(",", ";").replace("0.25", "1.000,5"), {}, "both a comma and a point"),
+        (ACTUATOR.replace("0.25", "0.25,7"), {}, "line 3: 4 values, and the table has 3 columns"),
+        (ACTUATOR.replace(",0.25", ""), {}, "line 3: 2 values, and the table has 3 columns"),
+        (ACTUATOR.replace(",", ";").replace("0.25", "1,0.5"), {}, "both a comma and a point"),
         (
             ACTUATOR.replace("kV", "kV,voltage_V").replace("\n0", "\n0,0"),
             {},
-            "voltage is there 2 t",
+            "voltage may be voltage_kV, voltage_V",
         ),
         (
-            "time_s,time_s,voltage_V,displacement_m\n0,0,0,0\n1,1,1,1\n",
+            "time_s,time_s,voltage_V,displacement_m\n0,0,0,0\n1,2,1,1\n",
             {},
-            "time is there 2 times",
+            "time may be time_s, time_s #2",
         ),
-        ("t,t,voltage_V,displacement_m\n0,0,0,0\n", {"columns": {"time_s": "t"}}, "2 columns are"),
+        (
+            "t,x,x,voltage_V,displacement_m\n0,0,0,0,0\n1,1,1,1,1\n",
+            {"columns": {"time_s": "x*2"}, "rate_Hz": 10.0},
+            "both a rate and a column for time",
+        ),
         (ACTUATOR, {"columns": {"time_s": "tme_s"}}, "no column 'tme_s'; .* did you mean 'time_s'"),
-        (ACTUATOR, {"columns": {"voltage_mV": "x"}}, "'voltage_mV' is not .* may be in V or kV"),
+        (ACTUATOR, {"columns": {"voltage_pV": "x"}}, "'voltage_pV' is not .* may be voltage_V, "),
+        (ACTUATOR, {"columns": {"voltage_V": "voltage_kV"}}, "is in kV by its name, and voltage_V"),
+        (ACTUATOR, {"columns": {"displacement_mm": "voltage_kV"}}, "asks for mm; if it is the out"),
         (ACTUATOR, {"columns": {"tine_s": "x"}}, "'tine_s' is not .* did you mean 'time_s'"),
         (
             ACTUATOR,
-            {"columns": {"voltage_V": "voltage_kV", "voltage_kV": "voltage_kV"}},
+            {"columns": {"voltage_V": "voltage_kV*1", "voltage_kV": "voltage_kV"}},
             "voltage is given twice, as voltage_V and as voltage_kV",
         ),
         ("time_s,voltage_V,stretch\n0,0,1\n1,1,2\n", {}, "has both voltage and stretch: actuator"),
@@ -242,7 +252,7 @@ def test_displacement_is_counted_from_the_lead_in(tmp_path: Path) -> None:
 def test_a_mean_within_the_noise_is_left_alone(tmp_path: Path) -> None:
     run = taken(csv(tmp_path, lead_in(0.0)))
     assert run.rest_reading == 0.0
-    assert run.events == ()
+    assert [event.message for event in run.events if "counted" in event.message] == []
 
 
 @pytest.mark.parametrize(
@@ -259,7 +269,6 @@ def test_a_mean_within_the_noise_is_left_alone(tmp_path: Path) -> None:
         (ACTUATOR.replace(",2,", ",2000,"), {}, "reaches 2000 kV; is it in V and not in kV"),
         (ACTUATOR.replace(",2,", ",0,").replace(",1,", ",0,"), {}, "voltage never leaves 0 V"),
         (ACTUATOR.replace("\n", ",7\n").replace("mm,7", "mm,current_A"), {}, "current reaches 7 A"),
-        (ACTUATOR.replace("\n", ",7\n").replace("mm,7", "mm,current_mA"), {}, "was not imported"),
         (
             ACTUATOR.replace("\n", ",295\n").replace("mm,295", "mm,temperature_C"),
             {},
@@ -280,16 +289,21 @@ def test_what_looks_wrong_is_told(
     tmp_path: Path, content: str, given: dict[str, object], match: str
 ) -> None:
     out = tmp_path / "out.h5"
-    warnings = import_file(csv(tmp_path, content), out, now=Clock(), **given)
+    given, metadata = dict(given), given.get("metadata")
+    given.pop("metadata", None)
+    done = import_file(
+        csv(tmp_path, content), out, ImportOptions(**given), metadata=metadata, now=Clock()
+    )
     run = open_recording(out)
-    assert [e.message for e in run.events] == warnings
-    assert any(re.search(match, w) for w in warnings), warnings
+    assert [e.message for e in run.events] == [*done.notes, *done.doubts]
+    assert any(re.search(match, w) for w in done.doubts), done
 
 
 def test_good_data_raise_no_doubts(tmp_path: Path) -> None:
     path = csv(tmp_path, lead_in(0.0))
     metadata = RunMetadata(film=THESIS_FILM)
-    assert import_file(path, tmp_path / "out.h5", metadata=metadata, now=Clock()) == []
+    done = import_file(path, tmp_path / "out.h5", metadata=metadata, now=Clock())
+    assert done.doubts == ()
 
 
 @pytest.mark.parametrize("volts", [4000.0, -4000.0])
@@ -301,7 +315,7 @@ def test_a_displacement_with_the_other_sign_raises_a_doubt(tmp_path: Path, volts
         rows = np.column_stack([0.01 * np.arange(1500), volts * lobes, sign * 1e-4 * lobes + noise])
         path = tmp_path / "in.csv"
         np.savetxt(path, rows, delimiter=",", comments="", header="time_s,voltage_V,displacement_m")
-        found = import_file(path, tmp_path / f"{sign:g}.h5", now=Clock())
+        found = import_file(path, tmp_path / f"{sign:g}.h5", now=Clock()).doubts
         said = [s for s in found if "falls where the voltage rises: is its sign right?" in s]
         assert bool(said) is doubtful
 
@@ -313,7 +327,7 @@ def test_noise_alone_raises_no_doubt_about_its_sign(tmp_path: Path) -> None:
         rows = np.column_stack([0.01 * np.arange(1500), 4000.0 * lobes, noise])
         path = tmp_path / "in.csv"
         np.savetxt(path, rows, delimiter=",", comments="", header="time_s,voltage_V,displacement_m")
-        found = import_file(path, tmp_path / f"{seed}.h5", now=Clock())
+        found = import_file(path, tmp_path / f"{seed}.h5", now=Clock()).doubts
         assert not any("sign" in sentence for sentence in found)
 
 
@@ -438,7 +452,8 @@ def test_tdms_files_that_cannot_be_read(tmp_path: Path) -> None:
 def test_measured_csv(tmp_path: Path, name: str, rows: int, highest: float) -> None:
     source = measured_data() / name
     out = tmp_path / "out.h5"
-    assert import_file(source, out, gauge_length_mm=80, area_mm2=22, now=Clock()) == []
+    options = ImportOptions(gauge_length_mm=80, area_mm2=22)
+    assert import_file(source, out, options, now=Clock()).doubts == ()
     run = open_recording(out)
     raw = np.loadtxt(source, delimiter=",", skiprows=1)
     assert run.samples == rows == len(raw)
@@ -457,7 +472,7 @@ def test_measured_mat(tmp_path: Path) -> None:
         "nominal_stress_kPa": "data.ydata",
     }
     out = tmp_path / "out.h5"
-    assert import_file(source, out, columns, now=Clock()) == []
+    assert import_file(source, out, ImportOptions(columns), now=Clock()).doubts == ()
     run = open_recording(out)
     data = loadmat(source)["data"][0, 0]
     np.testing.assert_array_equal(run.time, data["xdata"][:, 0])

@@ -108,7 +108,7 @@ def _import_commands() -> None:
     import dearig.analysis.simulate
     import dearig.api
     import dearig.cli.main
-    import dearig.recording.importers.csv_file
+    import dearig.recording.importers.text_file
     import dearig.recording.importers.mat_file
     import dearig.recording.importers.tdms_file
     import dearig.recording.verify

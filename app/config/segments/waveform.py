@@ -13,8 +13,8 @@ from dearig.config.toml_input import NAME_MAX, shown
 from dearig.errors import InputError
 from dearig.model import excitation
 from dearig.model.excitation import Segment
-from dearig.recording.importers.csv_file import CsvFile
 from dearig.recording.importers.source import listing
+from dearig.recording.importers.text_file import TextFile
 from dearig.recording.timestamps import not_forward
 
 __all__ = ["Csv"]
@@ -54,7 +54,7 @@ class Csv(SegmentTable):
                 f"file = {shown(self.file)} is a link that leads out of the sequence's folder; "
                 f"put the waveform itself beside the sequence"
             )
-        source = CsvFile(folder / place)
+        source = TextFile(folder / place)
         scale = next((k for k in ("voltage_kV", "voltage_V") if k in source.names), None)
         if scale is None or "time_s" not in source.names:
             raise InputError(

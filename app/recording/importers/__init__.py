@@ -7,7 +7,7 @@ Another distribution adds a format through an entry point in the group ``dearig.
 from __future__ import annotations
 
 from dearig.recording.importers.importer import Importer
-from dearig.recording.importers.importing import import_file
+from dearig.recording.importers.importing import Imported, ImportOptions, import_file
 from dearig.recording.importers.registry import IMPORTERS
 
-__all__ = ["IMPORTERS", "Importer", "import_file"]
+__all__ = ["IMPORTERS", "ImportOptions", "Imported", "Importer", "import_file"]

@@ -1,200 +1,388 @@
-"""Choice of the column for each quantity, and the values of a recording from them."""
+"""Choice of the column for each quantity: as the user says it, or as the names say it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 
 from dearig.errors import InputError
-from dearig.recording.importers.columns import (
-    QUANTITIES,
-    TARGETS,
-    Scale,
-    misnamed,
-    names_of,
-    suggestion,
+from dearig.recording.importers.labels import (
+    DIMENSIONS,
+    RAW,
+    Label,
+    Target,
+    label_of,
+    target_name,
+    target_of,
 )
-from dearig.recording.importers.source import Source, listing
-from dearig.recording.timestamps import not_forward
+from dearig.recording.importers.source import Source, listing, no_such_column
+from dearig.recording.importers.units import UNITS, Scale
 
-__all__ = ["Chosen"]
+__all__ = ["Chosen", "Pick", "choose", "own_name"]
 
-#: Where the optional columns go, by quantity.
-OPTIONAL = MappingProxyType(
-    {
-        "voltage_monitor": "voltage_monitor",
-        "current": "current_monitor",
-        "temperature": "temperature",
-    }
+#: Largest output in V of a monitor of an amplifier or of a laser: the range of the card's inputs.
+MONITOR_MAX = 10.0
+#: Largest voltage in kV of a film, and largest displacement in mm, in a proposal.
+FILM_MAX = 30.0
+#: Unit of a column whose name has none, in a proposal.
+_LIKELY = MappingProxyType(
+    {"time": "s", "voltage": "kV", "length": "mm", "force": "N", "stress": "MPa", "current": "mA",
+     "temperature": "C", "strain": "1", "stretch": "1"}
+)  # fmt: skip
+_SCALE = re.compile(
+    r"(?P<column>.+?)\s*(?:(?P<sign>[*/])\s*(?P<factor>[\d.]+(?:[eE][+-]?\d+)?))?"
+    r"\s*(?P<plus>[+-]\s*[\d.]+(?:[eE][+-]?\d+)?)?"
 )
 
 
+@dataclass(frozen=True)
+class Pick:
+    """A column that was chosen for a quantity, and the scale to the unit of a recording."""
+
+    target: Target
+    column: str
+    scale: Scale
+    behind: str = ""  # what stands behind the column in a command line, such as *FACTOR
+
+    @property
+    def said(self) -> str:
+        """What was taken for what, for a message."""
+        target = self.target
+        unit = "V at the card" if target.raw else "no unit" if target.unit == "1" else target.unit
+        return f"{target.quantity.replace('_', ' ')} in {unit} from {self.column!r}"
+
+
+@dataclass
 class Chosen:
-    """The columns of ``source`` that hold each quantity."""
+    """Columns of a source by quantity, and what was not sure.
 
-    def __init__(self, source: Source, mapping: Mapping[str, str]) -> None:
-        self.source = source
-        #: quantity: name with unit, column of the source, scale
-        self.picked: dict[str, tuple[str, str, Scale]] = {}
-        for name, column in mapping.items():
-            if name not in TARGETS:
-                hints = [hint for q in QUANTITIES if (hint := misnamed(q, [name]))]
-                raise InputError(
-                    f"{name!r} is not a column of a recording"
-                    + (f" ({hints[0]})" if hints else suggestion([name], TARGETS))
-                    + f"; there are: {', '.join(TARGETS)}"
-                )
-            quantity = TARGETS[name]
-            if quantity in self.picked:
-                raise InputError(
-                    f"{quantity} is given twice, as {self.picked[quantity][0]} and as {name}"
-                )
-            source.check(column)
-            self.picked[quantity] = (name, column, QUANTITIES[quantity][name])
-        for quantity, names in QUANTITIES.items():
-            if quantity in self.picked:
-                continue
-            found = [(name, column) for name in names for column in source.named(name)]
-            if len(found) > 1:
-                raise InputError(
-                    f"{source.path}: {quantity} is there {len(found)} times "
-                    f"({listing([column for _, column in found])}); choose one with "
-                    f"--column {found[0][0]}={found[0][1]}, or rename the others"
-                )
-            if found:
-                name, column = found[0]
-                source.check(column)
-                self.picked[quantity] = (name, column, names[name])
+    ``unsure`` are sentences: while there is one, nothing may be imported. ``notes`` say what was
+    found without being asked for.
+    """
 
-    def kind(self, warnings: list[str]) -> str:
-        """Return the kind of the data: ``actuator`` or ``film``."""
-        there = self.picked.keys()
-        film = [q for q in ("stretch", "nominal_stress") if q in there]
-        if "voltage" in there and film:
-            raise InputError(
-                f"{self.source.path} has both voltage and {' and '.join(film)}: actuator data are "
-                f"driven by voltage, film data by stretch; import a file with the columns of one"
-            )
-        if "voltage" in there:
-            if "force" in there:
-                warnings.append("the force was not used: actuator data have none")
-            return "actuator"
-        if film or "force" in there:
-            return "film"
-        hints = [
-            h for q in ("voltage", "stretch", "nominal_stress", "force") if (h := self._hint(q))
-        ]
-        raise InputError(
-            f"{self.source.path} has no column for voltage ({names_of('voltage')}), nor for film "
-            f"data ({names_of('stretch')}, {names_of('nominal_stress')}, {names_of('force')}); "
-            f"there are: {listing(self.source.names)}{hints[0] if hints else ''}"
+    source: Source
+    picked: dict[str, Pick] = field(default_factory=dict)
+    unsure: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def command(self, out: Path, more: Sequence[str] = ()) -> str:
+        """Return the command line that imports what was chosen."""
+        words = ["dearig", "import", str(self.source.path), "--out", str(out)]
+        given = dict.fromkeys(
+            f"{pick.target.name}={pick.column}{pick.behind}" for pick in self.picked.values()
         )
+        for pair in given:
+            words += ["--column", pair]
+        return shlex.join([*words, *more])
 
-    def actuator(self) -> dict[str, np.ndarray]:
-        """Return the values of a recording of kind actuator."""
-        for quantity in ("time", "displacement"):
-            self._need(quantity)
-        found = self._read(["time", "voltage", "displacement", *OPTIONAL])
-        return {
-            "time": found["time"],
-            "displacement": found["displacement"],
-            "voltage_command": found["voltage"],
-        } | {OPTIONAL[q]: found[q] for q in OPTIONAL if q in found}
 
-    def film(
-        self, gauge_length_mm: float | None, area_mm2: float | None, warnings: list[str]
-    ) -> dict[str, np.ndarray]:
-        """Return the values of a recording of kind film."""
-        self._need("time")
-        path = self.source.path
-        there = self.picked.keys()
-        wanted = ["time", "temperature"]
-        if "stretch" in there:
-            wanted.append("stretch")
-            if gauge_length_mm is not None:
-                warnings.append("the gauge length was not used: there is a column of stretch")
-        elif "displacement" in there:
-            wanted.append("displacement")
-            if gauge_length_mm is None:
-                raise InputError(
-                    f"{path} has displacement and no stretch; give the specimen's length at rest "
-                    f"with --gauge-length-mm"
-                )
-        else:
-            self._need("stretch", "or displacement with --gauge-length-mm")
-        if "nominal_stress" in there:
-            wanted.append("nominal_stress")
-            if area_mm2 is not None:
-                warnings.append("the area was not used: there is a column of nominal stress")
-        elif "force" in there:
-            wanted.append("force")
-            if area_mm2 is None:
-                raise InputError(
-                    f"{path} has force and no nominal stress; give the specimen's cross-section "
-                    f"at rest with --area-mm2"
-                )
-        else:
-            self._need("nominal_stress", "or force_N with --area-mm2")
-        found = self._read(wanted)
-        if gauge_length_mm is not None and "displacement" in found:
-            found["stretch"] = 1.0 + found.pop("displacement") / (gauge_length_mm / 1e3)
-        if area_mm2 is not None and "force" in found:
-            found["nominal_stress"] = found.pop("force") / (area_mm2 / 1e6)
-        low = np.flatnonzero(found["stretch"] <= 0.0)
-        if low.size:
+def own_name(source: Source, column: str) -> str:
+    """Return the name of ``column`` without the group or path that its format puts before it."""
+    strip = getattr(source, "own_name", None)
+    name = column if strip is None else strip(column)
+    return re.sub(r" #\d+$", "", name)  # of a name that is there twice
+
+
+def choose(
+    source: Source, mapping: Mapping[str, str], raw: Mapping[str, Scale], *, timed: bool
+) -> Chosen:
+    """Return the columns of ``source`` that a recording needs.
+
+    ``mapping`` has the column, with its scale if need be, by the name of the target; ``raw`` the
+    scales of the rig file from volts at the card, by quantity, empty without one. A time column is
+    not looked for if ``timed``. Raises ``InputError`` for a wrong ``mapping``.
+    """
+    chosen = Chosen(source)
+    units: Mapping[str, str] = getattr(source, "units", {})
+    labels = {name: label_of(own_name(source, name), units.get(name, "")) for name in source.names}
+    for name, text in mapping.items():
+        pick = _asked(source, labels, raw, target_of(name), text)
+        before = chosen.picked.get(pick.target.quantity)
+        if before is not None:
             raise InputError(
-                f"{path}, {self.source.row(int(low[0]))}: stretch is "
-                f"{found['stretch'][low[0]]:.6g}; it is length over length at rest, and above 0"
+                f"{pick.target.quantity} is given twice, as {before.target.name} and as {name}"
             )
-        return found
+        chosen.picked[pick.target.quantity] = pick
+    _Guess(chosen, labels, raw, timed).fill()
+    return chosen
 
-    def left_out(self) -> list[str]:
-        """Return a sentence for each optional column that was not read for its unknown unit."""
-        hints = [misnamed(q, self.source.names) for q in OPTIONAL if q not in self.picked]
-        return [f"{hint}; it was not imported" for hint in hints if hint]
 
-    def _hint(self, quantity: str) -> str:
-        hint = misnamed(quantity, self.source.names)
-        return f"; {hint}" if hint else suggestion(QUANTITIES[quantity], self.source.names)
+def _asked(
+    source: Source, labels: Mapping[str, Label], raw: Mapping[str, Scale], target: Target, text: str
+) -> Pick:
+    """Return the pick of ``--column target=text``. Raises ``InputError`` if it cannot be."""
+    column, own = _column(source, text)
+    source.check(column)
+    if target.raw and target.quantity not in raw:
+        raise InputError(
+            f"{target.name} takes volts at the card: give their scaling with --rig-file, or as "
+            f"{target_name(target.quantity, _LIKELY[DIMENSIONS[target.quantity]])}={column}*FACTOR"
+        )
+    scale = raw[target.quantity] if target.raw else target.scale
+    if own is not None:
+        return Pick(target, column, _both(own, scale))
+    label = labels[column]
+    if not label.unit:
+        return Pick(target, column, scale)
+    wanted = "voltage" if target.raw else DIMENSIONS[target.quantity]
+    if wanted not in label.dimensions:
+        raise InputError(
+            f"{source.path}: {column!r} is in {label.unit} by its name, and {target.name} asks for "
+            f"{target.unit}; if it is the output of an instrument, give its scale, such as "
+            f"{shlex.quote(f'{target.name}={column}*4')}, or --rig-file"
+        )
+    if label.unit != target.unit:
+        right = target.name if target.raw else target_name(target.quantity, label.unit)
+        raise InputError(
+            f"{source.path}: {column!r} is in {label.unit} by its name, and {target.name} asks for "
+            f"{target.unit}; give {shlex.quote(f'{right}={column}')}, or a scale if its name is "
+            f"wrong, such as {shlex.quote(f'{target.name}={column}*1')}"
+        )
+    return Pick(target, column, scale)
 
-    def _need(self, quantity: str, otherwise: str = "") -> None:
-        if quantity in self.picked:
+
+def _column(source: Source, text: str) -> tuple[str, Scale | None]:
+    """Return the column that ``text`` names, and the scale behind its name if there is one."""
+    if (found := _place(source, text)) is not None:
+        return found, None
+    match = _SCALE.fullmatch(text.strip())
+    if match and (match["factor"] or match["plus"]):
+        column = _place(source, match["column"])
+        if column is not None:
+            try:
+                factor = float(match["factor"] or 1.0)
+                plus = float((match["plus"] or "0").replace(" ", ""))
+            except ValueError as error:
+                raise InputError(f"{text!r}: {error}") from error
+            if factor == 0.0:
+                raise InputError(f"{text!r}: a scale of 0 leaves nothing")
+            divides = match["sign"] == "/"
+            return column, Scale(1.0 if divides else factor, factor if divides else 1.0, plus)
+    source.check(text)  # its error may say more
+    raise no_such_column(source, text)
+
+
+def _place(source: Source, text: str) -> str | None:
+    if text in source.names:
+        return text
+    if text.startswith("#") and text[1:].isdigit():
+        places = getattr(source, "places", None) or dict(enumerate(source.names, 1))
+        return places.get(int(text[1:]))
+    named = source.named(text)
+    if len(named) > 1:
+        raise InputError(
+            f"{source.path}: {len(named)} columns are called {text!r}: {listing(named)}; give one"
+        )
+    return named[0] if named else None
+
+
+def _both(first: Scale, then: Scale) -> Scale:
+    """Return the scale that applies ``first`` and ``then``."""
+    return Scale(
+        first.times * then.times,
+        first.over * then.over,
+        first.plus * then.times / then.over + then.plus,
+    )
+
+
+class _Guess:
+    """Fills what ``chosen`` still needs from the names of the columns."""
+
+    def __init__(
+        self, chosen: Chosen, labels: Mapping[str, Label], raw: Mapping[str, Scale], timed: bool
+    ) -> None:
+        self._chosen, self._labels, self._raw, self._timed = chosen, labels, raw, timed
+        taken = {pick.column for pick in chosen.picked.values()}
+        self._free = [name for name in labels if name not in taken]
+
+    def fill(self) -> None:
+        """Choose a column for every quantity that the kind of the data needs."""
+        there = self._chosen.picked
+        if not self._timed:
+            self._take("time")
+        for quantity in ("voltage", "voltage_monitor"):
+            self._take(quantity)
+        actuator = "voltage" in there or "voltage_monitor" in there
+        if actuator:
+            for quantity in ("displacement", "current", "temperature"):
+                self._take(quantity)
+            if not {"stretch", "strain", "nominal_stress"} & there.keys():
+                for quantity in ("stretch", "nominal_stress", "force"):
+                    self._take(quantity, only_own=True)
+            if "voltage" not in there:
+                pick = there["voltage_monitor"]
+                name = pick.target.name.replace("voltage_monitor", "voltage")
+                there["voltage"] = replace(
+                    pick, target=replace(pick.target, name=name, quantity="voltage")
+                )
+                if pick.behind:
+                    del there["voltage_monitor"]
+                self._chosen.notes.append(
+                    f"there is no voltage command; the voltage is that of the monitor "
+                    f"{pick.column!r}"
+                )
             return
-        raise InputError(
-            f"{self.source.path} has no column for {quantity} "
-            f"({names_of(quantity)}{', ' if otherwise else ''}{otherwise}); there are: "
-            f"{listing(self.source.names)}{self._hint(quantity)}"
+        if not {"stretch", "strain", "nominal_stress", "force"} & there.keys() and not any(
+            self._like(q) for q in ("stretch", "strain", "nominal_stress", "force")
+        ):
+            self._propose()
+            return
+        self._take_one(("stretch", "strain", "displacement"))
+        self._take_one(("nominal_stress", "force"))
+        self._take("temperature")
+
+    def _propose(self) -> None:
+        """Propose columns by their order, for an actuator: time, voltage, displacement."""
+        source, there = self._chosen.source, self._chosen.picked
+        names = [n for n in self._free if not re.search(r" #\d+$", n)]
+        try:
+            values = source.read(names)
+        except InputError:
+            return
+        names = [n for n in names if values[n].size]
+        step = getattr(source, "step_s", None)
+        timed = self._timed or (step is not None and step(names) is not None)
+        if "time" not in there and timed:
+            names = [n for n in names if not _counts(values[n])]
+        elif "time" not in there:
+            rising = [n for n in names if bool((np.diff(values[n]) > 0.0).all())]
+            if rising:
+                self._offer("time_s", rising[0])
+                names.remove(rising[0])
+        wanted = [q for q in ("voltage", "displacement") if q not in there]
+        if len(names) < len(wanted):
+            return
+        for quantity, column in zip(wanted, names, strict=False):
+            largest = float(np.nanmax(np.abs(values[column])))
+            small, large = ("kV", "V") if quantity == "voltage" else ("mm", "um")
+            # a film takes some kV and moves some mm
+            name = f"{quantity}_{small if largest < FILM_MAX else large}"
+            output = quantity == "voltage" and self._labels[column].unit == "V"
+            self._offer(name, column, output and largest <= MONITOR_MAX)
+        self._chosen.unsure.append(
+            f"the names {listing(source.names)} do not say what the columns are; the order does, "
+            f"perhaps"
         )
 
-    def _read(self, quantities: list[str]) -> dict[str, np.ndarray]:
-        """Return the checked values of ``quantities`` that exist, in the recording's units."""
-        path, row = self.source.path, self.source.row
-        picked = {q: self.picked[q] for q in quantities if q in self.picked}
-        raw = self.source.read([column for _, column, _ in picked.values()])
-        sizes = {column: raw[column].size for _, column, _ in picked.values()}
-        if len(set(sizes.values())) > 1:
-            different = ", ".join(f"{column} {size}" for column, size in sizes.items())
-            raise InputError(f"{path}: the columns have different lengths: {different}")
-        found = {}
-        for quantity, (_, column, (times, over)) in picked.items():
-            values = raw[column]
-            finite = np.isfinite(values)
-            if not finite.all():
-                at = int(np.argmin(finite))
-                raise InputError(
-                    f"{path}, {row(at)}, column {column!r}: {values[at]} is not a finite number; "
-                    f"leave the row out or correct it"
+    def _offer(self, name: str, column: str, output: bool = False) -> None:
+        """Propose ``column`` for the target ``name``; ``output``: in volts of an instrument."""
+        target = target_of(name)
+        label = self._labels[column]
+        foreign = output or (
+            bool(label.unit) and DIMENSIONS[target.quantity] not in label.dimensions
+        )
+        if label.unit and not foreign:
+            target = target_of(target_name(target.quantity, label.unit))
+        self._chosen.picked[target.quantity] = Pick(
+            target, column, target.scale, behind="*FACTOR" if foreign else ""
+        )
+        self._free.remove(column)
+
+    def _take_one(self, quantities: Sequence[str]) -> None:
+        if any(q in self._chosen.picked for q in quantities):
+            return
+        for quantity in quantities:
+            self._take(quantity)
+            if quantity in self._chosen.picked:
+                return
+
+    def _take(self, quantity: str, only_own: bool = False) -> None:
+        """Pick the one column that is ``quantity``, or note why none is sure."""
+        if quantity in self._chosen.picked:
+            return
+        own = [n for n in self._free if _is_own(self._own(n), quantity)]
+        found = own or ([] if only_own else self._like(quantity))
+        found = found if len(found) < 2 else self._different(found)
+        if not found:
+            return
+        if len(found) > 1:
+            self._chosen.unsure.append(f"{quantity.replace('_', ' ')} may be {listing(found)}")
+        column = found[0]
+        label = self._labels[column]
+        if own:
+            target = target_of(self._own(column))
+            self._pick(target, column, target.scale)
+        elif label.raw == quantity:
+            self._pick_raw(quantity, column, label)
+        elif not label.unit and DIMENSIONS[quantity] not in ("strain", "stretch"):
+            likely = _LIKELY[DIMENSIONS[quantity]]
+            target = target_of(target_name(quantity, likely))
+            self._chosen.unsure.append(f"{column!r} names no unit")
+            self._pick(target, column, target.scale)
+        else:
+            target = target_of(target_name(quantity, label.unit or "1"))
+            if quantity == "strain" and not label.unit:
+                self._chosen.notes.append(
+                    f"{column!r} names no unit: it is taken as a part of the length, not as %"
                 )
-            found[quantity] = values * times / over
-        seconds, name = found["time"], picked["time"][1]
-        if seconds.size < 2:
-            raise InputError(f"{path} has {seconds.size} row of data; at least 2 are needed")
-        if (back := not_forward(seconds)) is not None:
-            at, how = back
-            raise InputError(
-                f"{path}, {row(at)}, column {name!r}: time {how}, from {seconds[at - 1]:.9g} s to "
-                f"{seconds[at]:.9g} s; leave the rows out or correct them"
-            )
-        return found
+            self._pick(target, column, target.scale)
+
+    def _own(self, name: str) -> str:
+        return own_name(self._chosen.source, name)
+
+    def _like(self, quantity: str) -> list[str]:
+        """Return the columns whose names are like ``quantity``; those with a unit come first."""
+        found = [
+            n
+            for n in self._free
+            if quantity in self._labels[n].quantities or self._labels[n].raw == quantity
+        ]
+        with_unit = [n for n in found if self._labels[n].unit]
+        return with_unit or found
+
+    def _different(self, names: list[str]) -> list[str]:
+        """Return ``names`` without columns that repeat another one's values."""
+        try:
+            values = self._chosen.source.read(names)
+        except InputError:
+            return names
+        kept: list[str] = []
+        for name in names:
+            if not any(np.array_equal(values[name], values[k], equal_nan=True) for k in kept):
+                kept.append(name)
+        return kept
+
+    def _pick_raw(self, quantity: str, column: str, label: Label) -> None:
+        """Pick an instrument's output in volts; without a rig file its scale is not known."""
+        volts = self._chosen.source.read([column])[column]
+        largest = float(np.nanmax(np.abs(volts))) if volts.size else 0.0
+        at_film = UNITS["voltage"][label.unit].times * largest > MONITOR_MAX
+        if quantity == "voltage_monitor" and at_film:
+            target = target_of(target_name(quantity, label.unit))
+            self._pick(target, column, target.scale)
+            return
+        target = target_of(next(name for name, q in RAW.items() if q == quantity))
+        if quantity in self._raw and label.unit == "V":
+            self._chosen.notes.append(f"the rig file scales {column!r} from volts at the card")
+            self._pick(target, column, self._raw[quantity])
+            return
+        likely = target_name(quantity, _LIKELY[DIMENSIONS[quantity]])
+        self._chosen.unsure.append(
+            f"{column!r} is the output of an instrument in {label.unit}, up to {largest:.3g}: its "
+            f"scale is needed, in --rig-file or as {shlex.quote(f'{likely}={column}*FACTOR')}"
+        )
+        self._chosen.source.check(column)
+        proposed = Pick(target_of(likely), column, Scale(), behind="*FACTOR")
+        self._chosen.picked[quantity] = proposed
+        self._free.remove(column)
+
+    def _pick(self, target: Target, column: str, scale: Scale) -> None:
+        self._chosen.source.check(column)
+        self._chosen.picked[target.quantity] = Pick(target, column, scale)
+        self._free.remove(column)
+
+
+def _counts(values: np.ndarray) -> bool:
+    """Return True if ``values`` number the rows."""
+    return bool((np.diff(values) == 1.0).all())
+
+
+def _is_own(name: str, quantity: str) -> bool:
+    """Return True if ``name`` is this program's name of a column of ``quantity``."""
+    return any(name == target_name(quantity, unit) for unit in UNITS[DIMENSIONS[quantity]])

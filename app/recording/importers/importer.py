@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 from dearig.recording.importers.source import Source
 
@@ -29,9 +28,13 @@ class Importer:
         sentence for a file that it cannot read; no other exception.
     sniff : callable
         Returns True if the first ``HEAD_BYTES`` of a file are of this format.
+    text : bool
+        True for text tables, which are tried last; ``open`` then takes ``names_line`` and
+        ``skip_bad_rows`` by keyword too.
     """
 
     title: str
     suffixes: tuple[str, ...]
-    open: Callable[[Path], Source]
+    open: Callable[..., Source]
     sniff: Callable[[bytes], bool]
+    text: bool = False

@@ -4,138 +4,232 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-
-import numpy as np
 
 from dearig.drivers.rig import Event
 from dearig.errors import InputError
-from dearig.model.specimen import KINEMATICS
+from dearig.model.material import THESIS_FILM, THESIS_LOAD
+from dearig.model.specimen import KINEMATICS, Film
 from dearig.recording.files import check_output, file_sha256
-from dearig.recording.importers.chosen import Chosen
+from dearig.recording.importers.chosen import Chosen, choose
 from dearig.recording.importers.exported import exported
 from dearig.recording.importers.plausible import doubts
 from dearig.recording.importers.registry import source_at
+from dearig.recording.importers.units import Scale
+from dearig.recording.importers.values import Specimen, Values, values_of
 from dearig.recording.metadata import RunMetadata
-from dearig.recording.rest_noise import lead_in, mean_beyond_noise
+from dearig.recording.rest_noise import MIN_QUIET, lead_in, mean_beyond_noise
 from dearig.recording.save import save_recording
 
-__all__ = ["import_file"]
+__all__ = ["ImportOptions", "Imported", "import_file"]
+
+_EVENTS_MAX = 50  # events of rows that were left out, at most
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """How a file of measured data is read.
+
+    Attributes
+    ----------
+    columns : mapping of str to str
+        Column of the file, by the name with unit that a recording gives it: ``voltage_kV``. A
+        scale may stand behind the column: ``Laser out (V)*4``. Columns whose names say what they
+        are may be left out.
+    gauge_length_mm, area_mm2 : float, optional
+        Size of a film's specimen, to convert displacement and force.
+    kinematics : str, optional
+        How the film was held; uniaxial for film data by default.
+    rate_Hz : float, optional
+        Sample rate of a file without a column for time.
+    names_line : int, optional
+        Line of the names in a text file, from 1.
+    skip_bad_rows : bool
+        Leave out rows that cannot be used; their places become events of the recording.
+    raw : mapping of str to Scale
+        Scales of a rig file from volts at the card, by quantity.
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    gauge_length_mm: float | None = None
+    area_mm2: float | None = None
+    kinematics: str | None = None
+    rate_Hz: float | None = None
+    names_line: int | None = None
+    skip_bad_rows: bool = False
+    raw: Mapping[str, Scale] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.kinematics is not None and self.kinematics not in KINEMATICS:
+            known = ", ".join(KINEMATICS)
+            raise InputError(f"kinematics {self.kinematics!r} is not one of {known}")
+        for name, given in (("gauge length", self.gauge_length_mm), ("area", self.area_mm2)):
+            if given is not None and not 0.0 < given < float("inf"):
+                raise InputError(f"the {name} is {given!r}; it must be a finite number above 0")
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What an import did: the columns it took, ``notes`` on what it did, ``doubts`` to check."""
+
+    took: tuple[str, ...]
+    notes: tuple[str, ...]
+    doubts: tuple[str, ...]
 
 
 def import_file(
     source: str | Path,
     out: str | Path,
-    columns: Mapping[str, str] | None = None,
+    options: ImportOptions | None = None,
     *,
-    gauge_length_mm: float | None = None,
-    area_mm2: float | None = None,
-    kinematics: str | None = None,
     metadata: RunMetadata | None = None,
     overwrite: bool = False,
     now: Callable[[], float] = time.time,
-) -> list[str]:
-    """Import the CSV, MAT, Parquet or TDMS file ``source`` as the recording ``out``.
+) -> Imported:
+    """Import a file of measured data as the recording ``out``.
 
-    ``columns`` maps names such as ``voltage_kV`` to what the file calls them: a CSV column, a MAT
-    path (``data.xdata[0]``), a TDMS ``group/channel``; columns that already have such a name
-    may be left out. Film data with a displacement take ``gauge_length_mm``, those with a force
-    ``area_mm2``; they are uniaxial unless ``kinematics`` says otherwise. Time is kept as it is,
-    even or not.
-    Displacement of an actuator is counted from the mean of its lead-in at 0 V, if it has one. A
-    recording that was exported to MAT or Parquet keeps the metadata of that file: film, load,
+    Time is kept as it is, even or not; a date or the time of a clock is counted from the first one.
+    Displacement and voltage of an actuator are counted from their means over the lead-in at rest,
+    if there is one. A recording that was exported keeps the metadata of that file: film, load,
     kinematics, sequence, and how its voltage was held. ``metadata`` has precedence; its title is
     the file's name by default.
 
-    Returns warnings about values that are possible but look wrong. Raises ``InputError``, with
-    nothing written, for data that cannot be a recording.
+    Raises ``InputError``, with nothing written, for data that cannot be a recording, and where it
+    is not sure which column is which: then with the command that imports what seems right.
     """
-    path = Path(source)
-    out = check_output(out, overwrite, path)
-    _check_film_settings(gauge_length_mm, area_mm2, kinematics)
-    opened = source_at(path)
-    was = exported(opened.about)
-    chosen = Chosen(opened, columns or {})
-    warnings: list[str] = []
-    kind = chosen.kind(warnings)
-    kinematics = kinematics or was.kinematics
-    metadata = metadata or RunMetadata()
-    film = metadata.film or was.film
-    if kind == "actuator":
-        values = chosen.actuator()
-        if gauge_length_mm is not None or area_mm2 is not None:
-            warnings.append("gauge length and area are for film data, and were not used")
-        rest, events = _from_rest(values)
+    options = options or ImportOptions()
+    path, metadata = Path(source), metadata or RunMetadata()
+    out = check_output(out, overwrite)
+    if out.exists() and path.exists() and out.samefile(path):
+        raise InputError(f"{out} is the input file; choose another output")
+    table = source_at(path, names_line=options.names_line, skip_bad_rows=options.skip_bad_rows)
+    chosen = choose(table, options.columns, options.raw, timed=options.rate_Hz is not None)
+    if chosen.unsure:
+        raise InputError(
+            f"{path}: it is not sure what its columns are ({'; '.join(chosen.unsure)}). If this is "
+            f"right, or after correcting it, run: {chosen.command(Path(out), _typed(options))}"
+        )
+    specimen = Specimen(options.gauge_length_mm, options.area_mm2)
+    values = values_of(chosen, specimen, options.rate_Hz, options.skip_bad_rows)
+    was = exported(table.about)
+    film, kinematics = metadata.film or was.film, options.kinematics or was.kinematics
+    rest = 0.0
+    if values.kind == "actuator":
+        rest = _from_rest(values)
+        _say_assumed(values, film is None, (metadata.load or was.load) is None)
         if film is not None and kinematics is not None:
             film = replace(film, kinematics=kinematics)
-    else:
-        values = chosen.film(gauge_length_mm, area_mm2, warnings)
-        rest, events = 0.0, ()
-        kinematics = kinematics or "uniaxial"
-    warnings += chosen.left_out()
-    warnings += doubts(values, film)
+    values.warnings += doubts(values.columns, film)
     save_recording(
         out,
-        kind,
-        values,
+        values.kind,
+        values.columns,
         replace(
             metadata,
             title=metadata.title or path.stem,
             film=film,
             load=metadata.load or was.load,
             sequence_toml=metadata.sequence_toml or was.sequence,
-            provenance={
-                **_provenance(path, chosen, gauge_length_mm, area_mm2),
-                **metadata.provenance,
-            },
+            provenance={**_provenance(path, chosen, options), **metadata.provenance},
         ),
-        hold=was.hold and kind == "actuator",
-        kinematics=kinematics,
+        hold=was.hold and values.kind == "actuator",
+        kinematics=kinematics or (None if values.kind == "actuator" else "uniaxial"),
         rest_reading=rest,
-        events=(*events, *(Event(0, "warning", sentence) for sentence in warnings)),
+        events=_events(values),
         overwrite=overwrite,
         now=now,
     )
-    return warnings
+    took = tuple(pick.said for pick in chosen.picked.values())
+    return Imported(took, tuple(values.notes), tuple(values.warnings))
 
 
-def _check_film_settings(
-    gauge_length_mm: float | None, area_mm2: float | None, kinematics: str | None
-) -> None:
-    """Raise ``InputError`` for settings that no film can have."""
-    if kinematics is not None and kinematics not in KINEMATICS:
-        raise InputError(f"kinematics {kinematics!r} is not one of {', '.join(KINEMATICS)}")
-    for name, given in (("gauge length", gauge_length_mm), ("area", area_mm2)):
-        if given is not None and not 0.0 < given < float("inf"):
-            raise InputError(f"the {name} is {given!r}; it must be a finite number above 0")
+def _typed(options: ImportOptions) -> list[str]:
+    """Return ``options`` as words of a command line."""
+    words = []
+    for name, value in (
+        ("--gauge-length-mm", options.gauge_length_mm),
+        ("--area-mm2", options.area_mm2),
+        ("--kinematics", options.kinematics),
+        ("--rate-Hz", options.rate_Hz),
+        ("--names-line", options.names_line),
+    ):
+        if value is not None:
+            words += [name, f"{value:g}" if isinstance(value, float) else str(value)]
+    return [*words, "--skip-bad-rows"] if options.skip_bad_rows else words
 
 
-def _provenance(
-    path: Path, chosen: Chosen, gauge_length_mm: float | None, area_mm2: float | None
-) -> dict[str, object]:
+def _provenance(path: Path, chosen: Chosen, options: ImportOptions) -> dict[str, object]:
     """Return the file, the columns and the settings that the values come from."""
     found: dict[str, object] = {
         "source": path.name,
         "source_sha256": file_sha256(path),
-        "columns": ", ".join(f"{n}={where}" for n, where, _ in chosen.picked.values()),
+        "columns": ", ".join(f"{p.target.name}={p.column}" for p in chosen.picked.values()),
     }
-    if gauge_length_mm is not None:
-        found["gauge_length_mm"] = float(gauge_length_mm)
-    if area_mm2 is not None:
-        found["area_mm2"] = float(area_mm2)
+    for name in ("gauge_length_mm", "area_mm2", "rate_Hz"):
+        if (value := getattr(options, name)) is not None:
+            found[name] = float(value)
     return found
 
 
-def _from_rest(values: dict[str, np.ndarray]) -> tuple[float, tuple[Event, ...]]:
-    """Count the displacement from its mean over the lead-in, changing ``values``."""
-    quiet = lead_in(values["voltage_command"])
-    rest = mean_beyond_noise(values["displacement"][:quiet])
-    if rest == 0.0:
-        return 0.0, ()
-    values["displacement"] = values["displacement"] - rest
-    message = (
-        f"displacement is counted from its mean over the {quiet} samples at 0 V at the start, "
-        f"which was {rest * 1e6:.6g} um"
+def _from_rest(values: Values) -> float:
+    """Count voltage and displacement from their means over the lead-in; return the latter's.
+
+    A voltage that a monitor measured has an offset at rest, which is taken off. Changes ``values``.
+    """
+    columns = values.columns
+    quiet = lead_in(columns["voltage_command"])
+    if quiet < MIN_QUIET:
+        values.warnings.append(
+            "there is no quiet lead-in at 0 V: displacement is taken as it is, and its noise at "
+            "rest is not known; record a second at 0 V before the voltage rises"
+        )
+        return 0.0
+    if offset := mean_beyond_noise(columns["voltage_command"][:quiet]):
+        columns["voltage_command"] = columns["voltage_command"] - offset
+        values.notes.append(
+            f"the voltage has an offset of {offset:.4g} V over the {quiet} samples at rest at the "
+            f"start, which was taken off"
+        )
+    rest = mean_beyond_noise(columns["displacement"][:quiet])
+    if rest:
+        columns["displacement"] = columns["displacement"] - rest
+        values.notes.append(
+            f"displacement is counted from its mean over the {quiet} samples at 0 V at the start, "
+            f"which was {rest * 1e6:.6g} um"
+        )
+    return rest
+
+
+def _say_assumed(values: Values, no_film: bool, no_load: bool) -> None:
+    """Say which film and which load every fit of these data will take."""
+    assumed = []
+    if no_film:
+        assumed.append(f"the film ({film_words(THESIS_FILM)})")
+    if no_load:
+        assumed.append(f"the load ({THESIS_LOAD.mass * 1e3:g} g)")
+    if assumed:
+        values.notes.append(
+            f"fits of these data take {' and '.join(assumed)} of the thesis: give yours with "
+            f"--rig-file or the options of the film"
+        )
+
+
+def film_words(film: Film) -> str:
+    """Return the size of ``film`` in words."""
+    return (
+        f"{film.length * 1e3:g} mm long, {film.width * 1e3:g} mm wide, "
+        f"{film.thickness * 1e6:g} um thick, relative permittivity {film.permittivity:g}, "
+        f"{film.kinematics}"
     )
-    return rest, (Event(0, "info", message),)
+
+
+def _events(values: Values) -> list[Event]:
+    """Return the events of the recording: what was done, what is doubtful, which rows are left."""
+    last = values.columns["time"].size - 1
+    found = [Event(0, "info", sentence) for sentence in values.notes]
+    found += [Event(0, "warning", sentence) for sentence in values.warnings]
+    for sample, places in sorted(values.left.items())[:_EVENTS_MAX]:
+        shown = ", ".join(places[:5]) + (f" and {len(places) - 5} more" if len(places) > 5 else "")
+        found.append(Event(min(sample, last), "warning", f"left out before this sample: {shown}"))
+    return sorted(found, key=lambda event: event.sample)

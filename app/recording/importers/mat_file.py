@@ -50,6 +50,10 @@ class MatFile:
         """Return the columns whose path is ``name`` or ends with ``.name``."""
         return [n for n in self._columns if n == name or n.endswith(f".{name}")]
 
+    def own_name(self, name: str) -> str:
+        """Return ``name`` without its path and its index."""
+        return re.sub(r"\[\d+\]$", "", name.rpartition(".")[2])
+
     def row(self, index: int) -> str:
         """Return the row of sample ``index``, counted from 1 as in MATLAB."""
         return f"row {index + 1}"

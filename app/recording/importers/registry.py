@@ -17,7 +17,7 @@ __all__ = ["IMPORTERS", "source_at"]
 
 _OWN = MappingProxyType(
     {
-        "csv": "dearig.recording.importers.csv_file:IMPORTER",
+        "csv": "dearig.recording.importers.text_file:IMPORTER",
         "mat": "dearig.recording.importers.mat_file:IMPORTER",
         "parquet": "dearig.recording.importers.parquet_file:IMPORTER",
         "tdms": "dearig.recording.importers.tdms_file:IMPORTER",
@@ -38,11 +38,15 @@ def _check(name: str, importer: Any) -> None:  # noqa: ARG001  (one signature fo
 IMPORTERS: Registry[Importer] = Registry("dearig.importers", _OWN, _check)
 
 
-def source_at(path: Path) -> Source:
+def _is_text(importer: Importer) -> bool:
+    return importer.text
+
+
+def source_at(path: Path, **options: object) -> Source:
     """Return the columns of the file at ``path``. Raises ``InputError``.
 
-    The suffix chooses the importer. Where several take it, or none does, the one that recognises
-    the first bytes is used.
+    The importer is the one that recognises the first bytes; those that take the suffix come first. ``options`` are those of text files: ``names_line`` and
+    ``skip_bad_rows``; other formats have no use for them.
     """
     try:
         with open_input(path) as stream:
@@ -53,7 +57,9 @@ def source_at(path: Path) -> Source:
         raise InputError(f"{path} is empty")
     suffix = path.suffix.lower()
     named = [importer for importer in IMPORTERS.values() if suffix in importer.suffixes]
-    candidates = named or list(IMPORTERS.values())
+    others = [importer for importer in IMPORTERS.values() if importer not in named]
+    # text comes last: it is what is no other format
+    candidates = sorted(named, key=_is_text) + sorted(others, key=_is_text)
     chosen = next((importer for importer in candidates if importer.sniff(head)), None)
     if chosen is None and named:
         chosen = named[0]  # its error says what is wrong with the file
@@ -62,4 +68,4 @@ def source_at(path: Path) -> Source:
         raise InputError(
             f"{path}: files named {', '.join(most)} and {last} can be imported, not {suffix!r}"
         )
-    return chosen.open(path)
+    return chosen.open(path, **options) if chosen.text else chosen.open(path)

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from dearig.errors import InputError
-from dearig.recording.importers.columns import suggestion
+from dearig.recording.importers.labels import suggestion
 
 __all__ = ["PARSER_FAILURES", "Source", "listing", "no_such_column", "printable"]
 
@@ -38,7 +38,14 @@ LISTED = 12
 
 
 class Source(Protocol):
-    """Columns of numbers in a file."""
+    """Columns of numbers in a file.
+
+    A source may have more, which is used where it is there: ``units``, those that the file gives,
+    by column; ``own_name(column)``, its name without a group or path; ``places``, columns by their
+    numbers from 1; ``step_s(columns)``, the time in s from row to row, or None; ``block``, the
+    cells of the lines above a table; ``skipped``, the rows before each one that was left out, and
+    its place in words; ``cut_short``, True if columns may end early.
+    """
 
     @property
     def path(self) -> Path:

@@ -54,6 +54,10 @@ class TdmsChannels:
         """Return the channels called ``name``, in any group."""
         return [n for n in self._columns if n == name or n.endswith(f"/{name}")]
 
+    def own_name(self, name: str) -> str:
+        """Return ``name`` without its group."""
+        return name.partition("/")[2] or name
+
     def row(self, index: int) -> str:
         """Return the row of sample ``index``, counted from 1."""
         return f"row {index + 1}"

@@ -1,0 +1,75 @@
+"""What a rig file and the options of a film say of imported data."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from dearig.config.rigfile import RigFile
+from dearig.config.toml_input import read_text
+from dearig.errors import InputError
+from dearig.model.errors import ModelError
+from dearig.model.material import THESIS_FILM, THESIS_LOAD
+from dearig.model.specimen import Film, Load
+from dearig.recording.importers.units import Scale
+from dearig.recording.metadata import RunMetadata
+
+__all__ = ["imported_metadata", "raw_scales"]
+
+
+def raw_scales(rig: RigFile) -> dict[str, Scale]:
+    """Return the scales from volts at the card to the film, by quantity."""
+    amplifier, laser = rig.amplifier, rig.laser
+    monitor = Scale(1e3, amplifier.monitor_V_per_kV)
+    return {
+        "voltage": Scale(amplifier.gain_V_per_V),
+        "voltage_monitor": monitor,
+        "current": Scale(1e-3, amplifier.current_monitor_V_per_mA),
+        "displacement": Scale(laser.mm_per_V, 1e3),
+    }
+
+
+def imported_metadata(
+    rig_file: Path | None,
+    settings: RigFile | None,
+    film_name: str,
+    notes: str,
+    *,
+    length_mm: float | None = None,
+    width_mm: float | None = None,
+    thickness_um: float | None = None,
+    permittivity: float | None = None,
+    load_g: float | None = None,
+) -> RunMetadata:
+    """Return the film, load and remarks of imported data.
+
+    Sizes that are given replace those of the rig file; without one, those of the thesis. Nothing
+    given leaves the film and the load open. Raises ``InputError`` for a size that none can have.
+    """
+    given = {
+        "length": _scaled(length_mm, 1e3),
+        "width": _scaled(width_mm, 1e3),
+        "thickness": _scaled(thickness_um, 1e6),
+        "permittivity": permittivity,
+    }
+    changed = {name: value for name, value in given.items() if value is not None}
+    film: Film | None = None if settings is None else settings.as_film()
+    load: Load | None = None if settings is None else settings.as_load()
+    try:
+        if changed:
+            film = replace(film or THESIS_FILM, **changed)  # type: ignore[arg-type]
+        if load_g is not None:
+            load = replace(load or THESIS_LOAD, mass=load_g / 1e3)
+    except ModelError as error:
+        raise InputError(str(error)) from error
+    return RunMetadata(
+        film=film,
+        load=load,
+        film_id=film_name,
+        notes=notes,
+        configuration="" if rig_file is None else read_text(rig_file, "rig file"),
+    )
+
+
+def _scaled(value: float | None, over: float) -> float | None:
+    return None if value is None else value / over

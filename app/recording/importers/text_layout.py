@@ -1,0 +1,355 @@
+"""Layout of a table of numbers in a text file, found from its first lines.
+
+The lines of data decide: several in a row with as many numbers each. What stands above them are
+names, units, or a block of parameters of the machine.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+
+from dearig.errors import InputError
+from dearig.recording.importers.units import unit_of
+
+__all__ = [
+    "HEAD_CHARACTERS",
+    "Column",
+    "Layout",
+    "cells_of",
+    "encoding_of",
+    "holds_data",
+    "layout_of",
+    "moment_of",
+]
+
+#: Characters from the start in which the layout is looked for: blocks of parameters are short.
+HEAD_CHARACTERS = 2**16
+#: Columns, at most. Data loggers write some hundred; each name is compared with those known.
+COLUMNS_MAX = 2000
+
+_COMMENTS = ("#", "%", "//", ";#")
+_MARKS = {
+    codecs.BOM_UTF8: "utf-8-sig",
+    codecs.BOM_UTF32_LE: "utf-32",  # before UTF-16, whose mark it begins with
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
+_DELIMITERS = ("\t", ";", ",", "|", None)  # None: any white space
+_POINT = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf|infinity)", re.I)
+_COMMA = re.compile(r"[+-]?(?:\d+,?\d*|,\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf|infinity)", re.I)
+_GROUPED = re.compile(r"[+-]?\d{1,3}(?:([.,' ])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")
+_SAMPLE = 400  # lines of data that are looked at
+_LEAST = 2  # lines of data in a row that begin a table
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a text table: its name, the unit below the name, and its place from 0.
+
+    ``decimal`` is the sign before decimals, ``thousands`` that between groups of digits, or empty.
+    ``since`` is the first moment of a column of dates and times of day, which is read in s from it.
+    """
+
+    name: str
+    place: int
+    unit: str = ""
+    decimal: str = "."
+    thousands: str = ""
+    since: datetime | None = None
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Layout of a text table.
+
+    ``first`` is the number, from 0, of the first line of data; ``names_line`` that of the names,
+    -1 if there is none. ``cells`` are the cells of a line of data, ``block`` those of the lines
+    above the names, ``step_s`` the time from row to row where the file says it.
+    """
+
+    encoding: str
+    delimiter: str | None
+    first: int
+    names_line: int
+    cells: int
+    columns: tuple[Column, ...]
+    block: tuple[tuple[str, ...], ...] = ()
+    step_s: float | None = None
+
+
+def encoding_of(raw: bytes, path: Path) -> str:
+    """Return the encoding of a text that begins with ``raw``; ``InputError`` if it is none."""
+    for mark, encoding in _MARKS.items():
+        if raw.startswith(mark):
+            return encoding
+    if b"\0" in raw:
+        # text of ASCII characters as UTF-16 has a zero in every other byte
+        even, odd = raw[::2].count(0), raw[1::2].count(0)
+        half = len(raw) / 2
+        if odd > 0.8 * half and even < 0.1 * half:
+            return "utf-16-le"
+        if even > 0.8 * half and odd < 0.1 * half:
+            return "utf-16-be"
+        raise InputError(
+            f"{path} is not a text file, and of no other kind that can be imported; export it as "
+            f"text from the program that made it"
+        )
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(raw)
+    except UnicodeDecodeError:
+        # numbers are ASCII in any case; only a name may be decoded wrongly
+        return "cp1252" if not set(raw) & {0x81, 0x8D, 0x8F, 0x90, 0x9D} else "latin-1"
+    return "utf-8"
+
+
+def cells_of(line: str, delimiter: str | None) -> list[str]:
+    """Return the cells of ``line`` without quotes and surrounding blanks."""
+    if delimiter is None:
+        return line.split()
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(delimiter)]
+    reader = csv.reader([line], delimiter=delimiter, skipinitialspace=True)
+    return [cell.strip() for cell in next(reader)]
+
+
+def moment_of(cell: str) -> datetime | None:
+    """Return the date and time of day in ``cell``; None if it is something else."""
+    if ":" not in cell or not cell[:1].isdigit():
+        return None
+    text = cell.replace(",", ".")
+    try:
+        return datetime.fromisoformat(text.replace("/", "-"))
+    except ValueError:
+        pass
+    for form in _MOMENTS:
+        try:
+            return datetime.strptime(text, form)
+        except ValueError:
+            continue
+    return None
+
+
+_MOMENTS = (
+    "%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%H:%M:%S.%f", "%H:%M:%S",
+    "%Y-%m-%d %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S",
+)  # fmt: skip
+
+
+def layout_of(head: str, encoding: str, path: Path, names_line: int | None = None) -> Layout:
+    """Return the layout of the text that begins with ``head``.
+
+    ``names_line`` is the number of the line of names, from 1, where the user says it. Raises
+    ``InputError`` if there is no table of numbers.
+    """
+    lines = head.splitlines()
+    if not any(map(str.strip, lines)):
+        raise InputError(f"{path} is empty")
+    forced = re.fullmatch(r'"?sep=(.)"?\s*', lines[0])
+    start = 1 if forced else 0
+    labview = lines[0].startswith("LabVIEW Measurement")
+    options = (forced[1],) if forced else _DELIMITERS
+    found = [t for d in options if (t := _Table.find(lines, start, d, labview))]
+    if not found:
+        raise _no_table(lines, start, path)
+    table = max(found, key=lambda t: (t.rows > 0, t.cells > 1, t.rows * t.cells, t.cells))
+    return table.layout(encoding, path, None if names_line is None else names_line - 1)
+
+
+def _no_table(lines: Sequence[str], start: int, path: Path) -> InputError:
+    data = [line for line in lines[start:] if holds_data(line)]
+    if not data:
+        return InputError(f"{path} is empty")
+    if len(data) == 1:
+        return InputError(f"{path} has a line of names and no data")
+    return InputError(
+        f"{path}: no two lines in a row are numbers; name the line of names with --names-line, and "
+        f"see that it is the right file"
+    )
+
+
+def holds_data(line: str) -> bool:
+    """Return True unless ``line`` is blank or a comment."""
+    text = line.strip()
+    return bool(text) and not text.startswith(_COMMENTS)
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Lines of data from ``first`` on: ``rows`` lines of ``cells`` cells in the sample."""
+
+    lines: Sequence[str]
+    start: int
+    delimiter: str | None
+    labview: bool
+    first: int
+    cells: int
+    rows: int
+    sample: tuple[tuple[str, ...], ...]
+
+    @classmethod
+    def find(
+        cls, lines: Sequence[str], start: int, delimiter: str | None, labview: bool
+    ) -> _Table | None:
+        """Return the table that ``delimiter`` splits ``lines`` into; None if there is none."""
+        places = [i for i in range(start, len(lines)) if holds_data(lines[i])]
+        rows = [cells_of(lines[i], delimiter) for i in places]
+        # numbers only, then mostly numbers, then one row of numbers below a line of names
+        for strict, least in ((True, _LEAST), (False, _LEAST), (True, 1)):
+            good = [_is_data(row, delimiter, strict) for row in rows]
+            for at in range(len(rows) - least + 1):
+                run = rows[at : at + least]
+                same = len({len(row) for row in (run if least > 1 else rows[at - 1 : at + 1])}) == 1
+                if not (all(good[at : at + least]) and same):
+                    continue
+                like = [
+                    tuple(row)
+                    for row, fine in zip(rows[at:], good[at:], strict=True)
+                    if fine and len(row) == len(run[0])
+                ][:_SAMPLE]
+                return cls(
+                    lines, start, delimiter, labview, places[at], len(run[0]), len(like),
+                    tuple(like),
+                )  # fmt: skip
+        return None
+
+    def layout(self, encoding: str, path: Path, names_line: int | None) -> Layout:
+        """Return the layout of the file, with the names that stand above the table."""
+        if self.cells > COLUMNS_MAX:
+            raise InputError(
+                f"{path} has {self.cells:,} columns; {COLUMNS_MAX:,} are read at most: see that it "
+                f"is the right file"
+            )
+        line, names, units = self._names(path, names_line)
+        columns = tuple(
+            column
+            for place in range(self.cells)
+            if (column := self._column(place, names, units)) is not None
+        )
+        used = self.first if line < 0 else line
+        block = tuple(
+            tuple(c for c in cells_of(_bare(text), self.delimiter) if c)
+            for text in self.lines[self.start : used]
+            if text.strip()
+        )
+        return Layout(
+            encoding, self.delimiter, self.first, line, self.cells, _unique(columns), block,
+            self._step(names, units, block),
+        )  # fmt: skip
+
+    def _names(self, path: Path, given: int | None) -> tuple[int, list[str], list[str]]:
+        """Return the line of the names, the names, and the units below them."""
+        above = [i for i in range(self.first - 1, self.start - 1, -1) if self.lines[i].strip()]
+        if given is not None:
+            if given not in above:
+                raise InputError(
+                    f"{path}: line {given + 1} is no line of names: the numbers begin in line "
+                    f"{self.first + 1}"
+                )
+            between = [i for i in above if i > given]
+            units = self._split(between[0]) if between else []
+            return given, self._split(given), units if _are_units(units) else []
+        if not above:
+            return -1, [], []
+        cells = self._split(above[0])
+        if len(above) > 1 and _are_units(cells):
+            names = self._split(above[1])
+            if self._are_names(names):
+                return above[1], names, cells
+        return (above[0], cells, []) if self._are_names(cells) else (-1, [], [])
+
+    def _split(self, line: int) -> list[str]:
+        text = _bare(self.lines[line])
+        cells = cells_of(text, self.delimiter)
+        if text != self.lines[line].strip() and len(cells) != self.cells:
+            # names in a comment may be separated in another way
+            for other in _DELIMITERS:
+                if len(split := cells_of(text, other)) == self.cells:
+                    return split
+        return cells
+
+    def _are_names(self, cells: list[str]) -> bool:
+        used = max(i for row in self.sample for i, cell in enumerate(row) if cell) + 1
+        named = [cell for cell in cells if cell]
+        numbers = sum(_is_number(cell, ",") for cell in named)
+        return len(cells) >= used and len(named) > 0 and numbers == 0
+
+    def _column(self, place: int, names: list[str], units: list[str]) -> Column | None:
+        cells = [row[place] for row in self.sample if row[place]]
+        if not cells:
+            return None
+        name = names[place] if place < len(names) and names[place] else f"#{place + 1}"
+        unit = units[place] if place < len(units) else ""
+        if moments := [m for cell in cells if (m := moment_of(cell))]:
+            return Column(name, place, "s", since=moments[0])
+        decimal, thousands = ".", ""
+        if self.delimiter != ",":
+            both = [c for c in cells if "," in c and "." in c and _GROUPED.fullmatch(c)]
+            if both:
+                decimal = max(",.", key=both[0].rfind)
+                thousands = "." if decimal == "," else ","
+            elif any("," in cell for cell in cells):
+                decimal = ","
+        return Column(name, place, unit, decimal, thousands)
+
+    def _step(
+        self, names: list[str], units: list[str], block: tuple[tuple[str, ...], ...]
+    ) -> float | None:
+        """Return the time from row to row that the head of an instrument's file gives."""
+        lowered = [name.lower() for name in names]
+        if "increment" in lowered and (at := lowered.index("increment")) < len(units):
+            return _positive(units[at])
+        steps = [row[1] for row in block if len(row) > 1 and row[0] == "Delta_X"]
+        return _positive(steps[-1]) if self.labview and steps else None
+
+
+def _positive(text: str) -> float | None:
+    try:
+        value = float(text.replace(",", "."))
+    except ValueError:
+        return None
+    return value if 0.0 < value < float("inf") else None
+
+
+def _bare(line: str) -> str:
+    """Return ``line`` without the sign of a comment before it."""
+    return line.strip().lstrip("#%/;").strip() if line.strip().startswith(_COMMENTS) else line
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Return True if ``cells`` are a line of units; an oscilloscope has numbers beside them."""
+    named = [c for c in cells if c and not _is_number(c, ",")]
+    known = [c for c in named if unit_of(c) is not None]
+    return len(known) > 0 and len(known) >= len(named) - 1
+
+
+def _unique(columns: tuple[Column, ...]) -> tuple[Column, ...]:
+    """Return ``columns`` with the place behind names that repeat an earlier one."""
+    seen: Counter[str] = Counter()
+    found = []
+    for column in columns:
+        seen[column.name] += 1
+        again = seen[column.name] > 1
+        name = f"{column.name} #{column.place + 1}" if again else column.name
+        found.append(replace(column, name=name))
+    return tuple(found)
+
+
+def _is_number(cell: str, delimiter: str | None) -> bool:
+    return bool(
+        _POINT.fullmatch(cell)
+        or (delimiter != "," and (_COMMA.fullmatch(cell) or _GROUPED.fullmatch(cell)))
+    )
+
+
+def _is_data(cells: Sequence[str], delimiter: str | None, strict: bool) -> bool:
+    """Return True if ``cells`` are a row of numbers; if not ``strict``, mostly numbers."""
+    numbers = sum(_is_number(cell, delimiter) or moment_of(cell) is not None for cell in cells)
+    words = sum(bool(cell) for cell in cells) - numbers
+    return numbers > words if not strict else numbers > 0 and words == 0

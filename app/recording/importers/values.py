@@ -1,0 +1,290 @@
+"""Values of a recording from the columns that were chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from dearig.errors import InputError
+from dearig.recording.importers.chosen import Chosen
+from dearig.recording.importers.labels import names_of, suggestion
+from dearig.recording.importers.source import listing
+from dearig.recording.timestamps import not_forward
+
+__all__ = ["Specimen", "Values", "values_of"]
+
+#: Where the optional columns go, by quantity.
+OPTIONAL = MappingProxyType(
+    {
+        "voltage_monitor": "voltage_monitor",
+        "current": "current_monitor",
+        "temperature": "temperature",
+    }
+)
+#: Time in s above which a first time stamp counts from a fixed day, not from the start of a run.
+LONG_AGO = 1e7
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """Size of a film's specimen at rest, to convert displacement and force; None: not given."""
+
+    gauge_length_mm: float | None = None
+    area_mm2: float | None = None
+
+
+@dataclass
+class Values:
+    """Values (n,) of a recording of some ``kind``, by their names in it.
+
+    ``left`` are the places of rows that were left out, by the sample before which they stood.
+    ``warnings`` are doubts and ``notes`` what was done to the values.
+    """
+
+    kind: str
+    columns: dict[str, np.ndarray]
+    left: dict[int, list[str]] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def values_of(
+    chosen: Chosen, specimen: Specimen, rate_Hz: float | None, skip_bad_rows: bool
+) -> Values:
+    """Return the values of the columns in ``chosen``, in the units of a recording.
+
+    ``rate_Hz`` makes the time of a file that has none. Raises ``InputError`` for what no recording
+    can be.
+    """
+    values = Values(_kind(chosen), {}, notes=list(chosen.notes))
+    if values.kind == "actuator":
+        if "force" in chosen.picked:
+            values.warnings.append("the force was not used: actuator data have none")
+        if specimen != Specimen():
+            values.warnings.append("gauge length and area are for film data, and were not used")
+        _need(chosen, "displacement")
+        found = _read(chosen, values, ["time", "voltage", "displacement", *OPTIONAL], rate_Hz,
+                      skip_bad_rows)  # fmt: skip
+        values.columns = {
+            "time": found["time"],
+            "displacement": found["displacement"],
+            "voltage_command": found["voltage"],
+        } | {OPTIONAL[q]: found[q] for q in OPTIONAL if q in found}
+        return values
+    wanted = ["time", "temperature", _length(chosen, specimen, values),
+              _pull(chosen, specimen, values)]  # fmt: skip
+    found = _read(chosen, values, wanted, rate_Hz, skip_bad_rows)
+    if "strain" in found:
+        found["stretch"] = 1.0 + found.pop("strain")
+    if specimen.gauge_length_mm is not None and "displacement" in found:
+        found["stretch"] = 1.0 + found.pop("displacement") / (specimen.gauge_length_mm / 1e3)
+    if specimen.area_mm2 is not None and "force" in found:
+        found["nominal_stress"] = found.pop("force") / (specimen.area_mm2 / 1e6)
+    low = np.flatnonzero(found["stretch"] <= 0.0)
+    if low.size:
+        raise InputError(
+            f"{chosen.source.path}, {chosen.source.row(int(low[0]))}: stretch is "
+            f"{found['stretch'][low[0]]:.6g}; it is length over length at rest, and above 0"
+        )
+    values.columns = found
+    return values
+
+
+def _kind(chosen: Chosen) -> str:
+    there = chosen.picked.keys()
+    path = chosen.source.path
+    film = [q for q in ("stretch", "strain", "nominal_stress") if q in there]
+    if "voltage" in there and film:
+        raise InputError(
+            f"{path} has both voltage and {' and '.join(film)}: actuator data are driven by "
+            f"voltage, film data by stretch; import a file with the columns of one"
+        )
+    if "voltage" in there:
+        if "displacement" not in there and "force" in there:
+            raise InputError(
+                f"{path} has voltage and force and no displacement: the force of a blocked film is "
+                f"not modelled here; actuator data need the displacement"
+            )
+        return "actuator"
+    if film or "force" in there:
+        return "film"
+    raise InputError(
+        f"{path} has no column for voltage ({names_of('voltage')}), nor for film data "
+        f"({names_of('stretch')}, {names_of('strain')}, {names_of('nominal_stress')}, "
+        f"{names_of('force')}); there are: {listing(chosen.source.names)}"
+        f"{suggestion(['voltage_kV', 'stretch'], chosen.source.names)}"
+    )
+
+
+def _length(chosen: Chosen, specimen: Specimen, values: Values) -> str:
+    for quantity in ("stretch", "strain"):
+        if quantity in chosen.picked:
+            if specimen.gauge_length_mm is not None:
+                values.warnings.append(
+                    f"the gauge length was not used: there is a column of {quantity}"
+                )
+            return quantity
+    if "displacement" not in chosen.picked:
+        _need(chosen, "stretch", "or displacement with --gauge-length-mm")
+    if specimen.gauge_length_mm is None:
+        raise InputError(
+            f"{chosen.source.path} has displacement and no stretch; give the specimen's length at "
+            f"rest with --gauge-length-mm{_hint(chosen, 'length')}"
+        )
+    return "displacement"
+
+
+def _pull(chosen: Chosen, specimen: Specimen, values: Values) -> str:
+    if "nominal_stress" in chosen.picked:
+        if specimen.area_mm2 is not None:
+            values.warnings.append("the area was not used: there is a column of nominal stress")
+        return "nominal_stress"
+    if "force" not in chosen.picked:
+        _need(chosen, "nominal_stress", "or force_N with --area-mm2")
+    if specimen.area_mm2 is None:
+        raise InputError(
+            f"{chosen.source.path} has force and no nominal stress; give the specimen's "
+            f"cross-section at rest with --area-mm2{_hint(chosen, 'width', 'thickness', 'section')}"
+        )
+    return "force"
+
+
+def _hint(chosen: Chosen, *words: str) -> str:
+    """Return what the lines above the table say of the specimen, for a message."""
+    block: Sequence[Sequence[str]] = getattr(chosen.source, "block", ())
+    said = [" ".join(row) for row in block if row and any(word in row[0].lower() for word in words)]
+    return f"; the file says: {listing(said)}" if said else ""
+
+
+def _need(chosen: Chosen, quantity: str, otherwise: str = "") -> None:
+    if quantity in chosen.picked:
+        return
+    raise InputError(
+        f"{chosen.source.path} has no column for {quantity} "
+        f"({names_of(quantity)}{', ' if otherwise else ''}{otherwise}); there are: "
+        f"{listing(chosen.source.names)}"
+        f"{suggestion([quantity], chosen.source.names)}"
+    )
+
+
+def _read(
+    chosen: Chosen,
+    values: Values,
+    quantities: list[str],
+    rate_Hz: float | None,
+    skip: bool,
+) -> dict[str, np.ndarray]:
+    """Return the checked values of ``quantities`` that exist, in the recording's units."""
+    source = chosen.source
+    path = source.path
+    picked = {q: chosen.picked[q] for q in quantities if q in chosen.picked}
+    columns = [pick.column for pick in picked.values()]
+    step = _step(chosen, columns, rate_Hz)
+    raw = source.read(columns)
+    sizes = {column: raw[column].size for column in columns}
+    size = min(sizes.values())
+    if len(set(sizes.values())) > 1:
+        if not getattr(source, "cut_short", False):
+            different = ", ".join(f"{column} {n}" for column, n in sizes.items())
+            raise InputError(f"{path}: the columns have different lengths: {different}")
+        values.warnings.append(
+            f"the file was not closed: its columns have {min(sizes.values())} to "
+            f"{max(sizes.values())} values, and the first {size} of each are imported"
+        )
+    table = {q: raw[pick.column][:size] for q, pick in picked.items()}
+    if step is not None:
+        table["time"] = step * np.arange(size)
+        values.notes.append(f"time is counted from the first row, {step:.9g} s from row to row")
+    names = (
+        {q: pick.column for q, pick in picked.items()}
+        | {"time": "time"}
+        | {q: pick.column for q, pick in picked.items() if q == "time"}
+    )
+    good = _good_rows(chosen, table, names, skip)
+    if not good.all():
+        table = {q: column[good] for q, column in table.items()}
+    found = {
+        q: picked[q].scale.apply(column) if q in picked else column for q, column in table.items()
+    }
+    if found["time"].size < 2:
+        raise InputError(f"{path} has {found['time'].size} row of data; at least 2 are needed")
+    first = float(found["time"][0])
+    if abs(first) > LONG_AGO:
+        found["time"] = found["time"] - first
+        values.notes.append(f"time is counted from the first time stamp, {first:.3f} s")
+    _note_left_out(chosen, values, good)
+    return found
+
+
+def _step(chosen: Chosen, columns: Sequence[str], rate_Hz: float | None) -> float | None:
+    """Return the time from row to row where no column has the time. Raises ``InputError``."""
+    if rate_Hz is not None:
+        if not 0.0 < rate_Hz < float("inf"):
+            raise InputError(f"the rate is {rate_Hz!r} Hz; it must be a finite number above 0")
+        if "time" in chosen.picked:
+            raise InputError("both a rate and a column for time are given; give one of them")
+        return 1.0 / rate_Hz
+    if "time" in chosen.picked:
+        return None
+    given = getattr(chosen.source, "step_s", None)
+    step = given(columns) if given is not None else None
+    if step is None:
+        raise InputError(
+            f"{chosen.source.path} has no column for time ({names_of('time')}); there are: "
+            f"{listing(chosen.source.names)}{suggestion(['time_s'], chosen.source.names)}; give "
+            f"--rate-Hz if the samples are evenly spaced"
+        )
+    return float(step)
+
+
+def _good_rows(
+    chosen: Chosen, table: dict[str, np.ndarray], names: dict[str, str], skip: bool
+) -> np.ndarray:
+    """Return which rows are finite and go forward in time, (n,) bool.
+
+    Raises ``InputError`` for the first other one unless ``skip``.
+    """
+    source = chosen.source
+    good = np.ones(table["time"].size, dtype=bool)
+    for quantity, column in table.items():
+        finite = np.isfinite(column)
+        if not finite.all() and not skip:
+            at = int(np.argmin(finite))
+            raise InputError(
+                f"{source.path}, {source.row(at)}, column {names[quantity]!r}: {column[at]} is not "
+                f"a finite number; --skip-bad-rows leaves such rows out"
+            )
+        good &= finite
+    seconds = table["time"]
+    if not skip:
+        if (back := not_forward(seconds)) is not None:
+            at, how = back
+            raise InputError(
+                f"{source.path}, {source.row(at)}, column {names['time']!r}: time {how}, from "
+                f"{seconds[at - 1]:.9g} to {seconds[at]:.9g}; --skip-bad-rows leaves such rows out"
+            )
+        return good
+    latest = np.maximum.accumulate(np.where(good, seconds, -np.inf))
+    good[1:] &= seconds[1:] > latest[:-1]
+    return good
+
+
+def _note_left_out(chosen: Chosen, values: Values, good: np.ndarray) -> None:
+    """Note which rows were left out, at the sample before which they stood."""
+    skipped: Sequence[tuple[int, str]] = getattr(chosen.source, "skipped", ())
+    kept = np.cumsum(good)
+    places = [(int(kept[min(at, good.size) - 1]) if at else 0, where) for at, where in skipped]
+    places += [
+        (int(kept[at]), chosen.source.row(int(at))) for at in np.flatnonzero(~good)[:_LISTED]
+    ]
+    for sample, where in places:
+        values.left.setdefault(sample, []).append(where)
+    count = len(skipped) + int((~good).sum())
+    if count:
+        values.warnings.append(f"{count} rows were left out because they could not be used")
+
+
+_LISTED = 100  # rows whose places are looked up; each takes a pass through the file
