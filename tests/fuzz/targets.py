@@ -18,8 +18,9 @@ from dearig.config.rigfile import load_rig_file, write_default
 from dearig.config.sequencefile import load_sequence
 from dearig.drivers.rig import Block
 from dearig.recording import RunMetadata, export_recording, open_recording, save_recording
-from dearig.recording.importers.chosen import Chosen
+from dearig.recording.importers.chosen import choose
 from dearig.recording.importers.registry import source_at
+from dearig.recording.importers.values import Specimen, values_of
 from tests.fuzz.mutate import mutated_bytes, mutated_hdf5, mutated_text
 from tests.tools.command import LOBE, film_model, thesis_model
 from tests.tools.recordings import Clock, run_counts, write_run, writer
@@ -51,11 +52,8 @@ def read_recording(path: Path) -> None:
 
 
 def read_table(path: Path) -> None:
-    chosen = Chosen(source_at(path), {})
-    if chosen.kind([]) == "actuator":
-        chosen.actuator()
-    else:
-        chosen.film(80.0, 22.0, [])
+    chosen = choose(source_at(path), {}, {}, timed=False)
+    values_of(chosen, Specimen(80.0, 22.0), None, skip_bad_rows=False)
 
 
 def recordings(folder: Path) -> list[bytes]:

@@ -108,9 +108,9 @@ def _import_commands() -> None:
     import dearig.analysis.simulate
     import dearig.api
     import dearig.cli.main
-    import dearig.recording.importers.text_file
     import dearig.recording.importers.mat_file
     import dearig.recording.importers.tdms_file
+    import dearig.recording.importers.text_file
     import dearig.recording.verify
     import dearig.report.html  # noqa: F401
 

@@ -45,8 +45,9 @@ def _is_text(importer: Importer) -> bool:
 def source_at(path: Path, **options: object) -> Source:
     """Return the columns of the file at ``path``. Raises ``InputError``.
 
-    The importer is the one that recognises the first bytes; those that take the suffix come first. ``options`` are those of text files: ``names_line`` and
-    ``skip_bad_rows``; other formats have no use for them.
+    The importer is the one that recognises the first bytes; those that take the suffix come
+    first. ``options`` are those of text files: ``names_line`` and ``skip_bad_rows``; other formats
+    have no use for them.
     """
     try:
         with open_input(path) as stream:
