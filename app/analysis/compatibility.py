@@ -52,10 +52,14 @@ def base_model(
         held = {r.kinematics for r in recordings}
         if len(held) > 1:
             raise InputError(
-                f"films held in different ways ({', '.join(sorted(held))}) are fitted one by one"
+                f"these films were held in different ways ({', '.join(sorted(held))}): fit each "
+                f"way by itself"
             )
         if rest_length_mm is not None:
-            raise InputError("a rest length is of an actuator; these recordings are of films")
+            raise InputError(
+                "a rest length applies to an actuator, and these recordings are of films: leave "
+                "it out"
+            )
         return Strip(network, recordings[0].kinematics)
     films = {r.film for r in recordings if r.film is not None}
     loads = {r.load for r in recordings if r.load is not None}

@@ -147,7 +147,7 @@ def diagnose_rig(
         others = open_all(recorder.made[recorded:])
     if ended is not None:
         stopped = finding.interrupted or isinstance(ended, Interrupted)
-        notes = (*finding.notes, f"No more was recorded: {ended}")
+        notes = (*finding.notes, f"Recording ended before all runs were made: {ended}")
         finding = replace(finding, interrupted=stopped, notes=notes)
     _, quality = _prepared(recordings, others, settings)
     outcome = _outcome(
@@ -339,7 +339,10 @@ def _outcome(
         for stage in models
     )
     noise = _noise(recordings, drive)
-    experiment, words = None, "The recordings are of films: sequences of voltage do not apply."
+    experiment, words = (
+        None,
+        "No experiment is proposed: the recordings are of films, which no voltage sequence drives.",
+    )
     if recordings[0].kind == "actuator":
         experiment, words = _experiment(finding, noise, settings.rig)
     seconds = clock() - started

@@ -234,20 +234,20 @@ def _check_driven(recording: Recording, moved: np.ndarray) -> None:
     if recording.kind == "film":
         if span == 0.0:
             raise InputError(
-                f"{recording.path}: the stretch never changes from {moved[0]:.4g}; nothing can be "
-                f"learned from it"
+                f"{recording.path}: the stretch never changes from {moved[0]:.4g}; import the "
+                f"column that holds the stretch, or record again"
             )
         return
     if span > recording.voltage_step and span > 0.0:
         return
     if float(np.max(np.abs(moved))) <= recording.voltage_step:
         raise InputError(
-            f"{recording.path}: the voltage never leaves 0 V; nothing can be learned from it: see "
-            f"that the amplifier was on and the right column was imported"
+            f"{recording.path}: the voltage never leaves 0 V; check that the "
+            f"amplifier was on and that the right column was imported"
         )
     raise InputError(
         f"{recording.path}: the voltage stands at {moved[0]:.4g} V throughout, and the film at "
-        f"rest is not seen; let the recording begin before the voltage"
+        f"rest is not seen; start the recording before the voltage is applied"
     )
 
 
@@ -341,7 +341,7 @@ def _gaps(recording: Recording, moved: np.ndarray) -> Iterator[str]:
                 f"{recording.path}: {jump}, and what drove the film meanwhile is not known; cut "
                 f"the recording in two there, at rest"
             )
-        yield f"{jump}; the drive is taken to have stood meanwhile"
+        yield f"{jump}; the drive is assumed constant meanwhile"
 
 
 # ---------------------------------------------------------------- masked

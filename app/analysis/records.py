@@ -73,15 +73,14 @@ def open_all(sources: Sequence[Source]) -> list[Recording]:
         path = _path(source)
         where = Path(os.path.realpath(path))
         if where in named:
-            raise InputError(f"{path} is named twice; each recording counts once")
+            raise InputError(f"{path} is given twice; give each recording once")
         named.add(where)
     recordings = [s if isinstance(s, Recording) else open_recording(s) for s in sources]
     seen: dict[str, Path] = {}
     for recording in recordings:
         if recording.sha256 in seen:
             raise InputError(
-                f"{recording.path} is a copy of {seen[recording.sha256]}; each recording counts "
-                f"once: leave one of them out"
+                f"{recording.path} is a copy of {seen[recording.sha256]}; leave one of them out"
             )
         seen[recording.sha256] = recording.path
     kinds = {r.kind for r in recordings}
@@ -195,8 +194,8 @@ def _noise(values: np.ndarray) -> float:
     if noise > 0.0:
         return noise
     raise ModelError(
-        "the signal never changes, or on a straight line only: nothing can be learned from it; see "
-        "that the sensor was connected and the right column was imported"
+        "the signal never changes, or on a straight line only: check that "
+        "the sensor was connected and that the right column was imported"
     )
 
 

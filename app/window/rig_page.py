@@ -226,7 +226,7 @@ class RigPage(QWidget):
         try:
             faults = faults_of(text)
         except InputError as error:
-            self.trouble.show_text(f"{error}. The rig file is the one of before.")
+            self.trouble.show_text(f"{error}. The previous rig file stays in use.")
             return
         self.text, self.file = text, file
         if not faults:

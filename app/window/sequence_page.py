@@ -163,7 +163,7 @@ class SequencePage(QWidget):
         try:
             self.editor.replace(toml, file)
         except InputError as error:
-            self.trouble.show_text(f"{error}. The sequence is the one of before.")
+            self.trouble.show_text(f"{error}. The previous sequence stays in use.")
             return False
         self.trouble.show_text("")
         self._edited()

@@ -410,7 +410,9 @@ class StudyPage(QWidget):
     def _use(self) -> None:
         if self._shown is not None:
             self.show_model.emit(self._shown.model)
-            self.message.show_text("This model is an overlay model of the next run.", "good")
+            self.message.show_text(
+                "The next run shows this model as an overlay. Remove it on the page Run.", "good"
+            )
 
     @Slot()
     def _ask_save(self) -> None:
@@ -440,7 +442,7 @@ class StudyPage(QWidget):
             return
         report = self._shown.report
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(report))):
-            self.message.show_text(f"No browser was found to open the report {report}", "warn")
+            self.message.show_text(f"No browser was found. Open {report} in one.", "warn")
 
     @Slot()
     def _run(self) -> None:

@@ -218,10 +218,14 @@ class Worker(QObject):
             self._kill()
             self._current = None
             if job is not None:
-                words = f"the process of this work ended unexpectedly (exit code {code})"
+                words = f"this work ended unexpectedly (exit code {code}) and nothing was saved"
                 doing = getattr(job.request.function, "__name__", "")
                 log.error("%s", words, exc_info=ErrorInProcess(f"{words} in {doing}"))
-                self._end(job, "failed", f"{words}; start the work again")
+                self._end(
+                    job,
+                    "failed",
+                    f"{words}; start it again, with fewer recordings if memory is short",
+                )
             self._next()
             return
         if job is None or answer.number not in (CURRENT, job.request.number):

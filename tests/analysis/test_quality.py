@@ -214,11 +214,11 @@ UNITS = {
     ),
     "no voltage": (
         scaled(lobes(), "voltage_command", 0.0),
-        ["voltage never leaves 0 V", "nothing can be learned", "amplifier was on"],
+        ["voltage never leaves 0 V", "amplifier was on"],
     ),
     "a constant voltage": (
         {**lobes(), "voltage_command": np.full(2500, 5e3)},
-        ["voltage stands at 5000 V throughout", "begin before the voltage"],
+        ["voltage stands at 5000 V throughout", "start the recording before the voltage"],
     ),
     "stretch in per cent": (
         scaled(cycles(), "stretch", 100.0),

@@ -333,11 +333,14 @@ class TestRig:
         assert "the results found before that were kept" in answer.err.splitlines()[-1]
         kept = strict_json((tmp_path / "d.json").read_text())
         assert kept["interrupted"] is interrupted
-        assert f"No more was recorded: {ends}" in kept["notes"]
+        assert f"Recording ended before all runs were made: {ends}" in kept["notes"]
         assert kept["steps"]
         validation = kept["records"]["validation"]
         assert validation == (["validation-a-0.6"] if at.startswith("validation") else [])
-        assert "No more was recorded" in check(tmp_path / "d" / "report.html").words
+        assert (
+            "Recording ended before all runs were made"
+            in check(tmp_path / "d" / "report.html").words
+        )
         assert load_model(tmp_path / "d" / "model.toml").model.effects
 
     @pytest.mark.parametrize(

@@ -106,11 +106,11 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     ),
     "the same file twice": (
         "identify {s}/run.h5 {s}/run.h5 --out m.toml",
-        ["run.h5 is named twice", "counts once"],
+        ["run.h5 is given twice", "give each recording once"],
     ),
     "a copy": (
         "identify {s}/run.h5 {s}/copy.h5 --out m.toml",
-        ["copy.h5 is a copy of", "counts once"],
+        ["copy.h5 is a copy of", "leave one of them out"],
     ),
     "the same to fit and to validate": (
         "identify {s}/run.h5 --validate {s}/run.h5 --out m.toml",
@@ -135,7 +135,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     ),
     "films held in two ways": (
         "identify {s}/film.h5 {s}/wide.h5 --out m.toml",
-        ["films held in different ways (equibiaxial, uniaxial)"],
+        ["films were held in different ways (equibiaxial, uniaxial): fit each way by itself"],
     ),
     "branches in words": (
         "identify {s}/run.h5 --out m.toml --branches three",
@@ -187,7 +187,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
         "validate {s}/actuator.toml {s}/film.h5",
         ["film.h5 is of a film (stretch)", "the model is of an actuator"],
     ),
-    "validated twice": ("validate {s}/actuator.toml {s}/run.h5 {s}/run.h5", ["is named twice"]),
+    "validated twice": ("validate {s}/actuator.toml {s}/run.h5 {s}/run.h5", ["is given twice"]),
     "a report over the model": (
         "validate {s}/actuator.toml {s}/run.h5 --report {s}/actuator.toml --force",
         ["the input file"],
@@ -197,7 +197,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
         "diagnose --json o.json",
         ["give recordings to diagnose, or a rig to record on with --rig"],
     ),
-    "diagnosed twice": ("diagnose {s}/run.h5 {s}/run.h5", ["is named twice"]),
+    "diagnosed twice": ("diagnose {s}/run.h5 {s}/run.h5", ["is given twice"]),
     "several after one --validate": (
         "diagnose {s}/run.h5 --validate {s}/film.h5 {s}/run.h5 --json o.json",
         ["run.h5 is given both to fit and to validate", "proves nothing"],
