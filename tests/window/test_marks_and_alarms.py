@@ -36,7 +36,7 @@ def going(
     click(qtbot, page.start_button)
     qtbot.waitUntil(lambda: seconds(page) > 0.2, timeout=RUN_MS)
     yield page
-    page.runner.stop_without_ramp()
+    page.stop()  # once more: 0 V at once
     page.stop()
     qtbot.waitUntil(lambda: not page.runner.running, timeout=RUN_MS)
 
