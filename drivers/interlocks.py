@@ -211,8 +211,8 @@ class Interlocks:
                     "monitor",
                     at,
                     locks.monitor_action,
-                    f"the voltage monitor read {shown[at] * 1e-3:.2f} kV with "
-                    f"{now[at] * 1e-3:.2f} kV commanded: {locks.monitor_tolerance_kV:.3g} kV "
+                    f"the voltage monitor read {shown[at] * 1e-3:z.2f} kV with "
+                    f"{now[at] * 1e-3:z.2f} kV commanded: {locks.monitor_tolerance_kV:.3g} kV "
                     f"between them is allowed; the amplifier does not follow, or its monitor is "
                     f"not wired and scaled as the rig file says",
                 )
@@ -235,8 +235,8 @@ class Interlocks:
                     "breakdown",
                     at,
                     locks.breakdown_action,
-                    f"the voltage monitor read {shown[at] * 1e-3:.2f} kV with "
-                    f"{now[at] * 1e-3:.2f} kV commanded, less than {fraction:.0%} of it, while "
+                    f"the voltage monitor read {shown[at] * 1e-3:z.2f} kV with "
+                    f"{now[at] * 1e-3:z.2f} kV commanded, less than {fraction:.0%} of it, while "
                     f"{flowing * 1e3:.2f} mA flowed: {cause}",
                 )
 
