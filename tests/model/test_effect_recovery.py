@@ -29,6 +29,7 @@ RATE = 125.0  # at 200 Hz the third harmonic of the mains would look like the fi
 LARGER = {
     "elastoplastic friction": 0.3,  # a film that squeals more has a valley for every phase
     "distributed hysteresis": 5.0,
+    "general polarisation": 6.0,
     "sheet electrode": 5.0,
     "ageing": 3.0,
     "temperature": 3.0,
