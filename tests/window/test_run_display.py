@@ -133,7 +133,7 @@ def test_current_and_trip_levels_of_the_rig_file_are_drawn(
     plan_of(SHORT)
     plots = run_page.plots
     assert plots.overlays["current"].shown == ["trip 5 mA", "trip -5 mA"]
-    assert "limit 7.5 kV" in plots.overlays["voltage"].shown
+    assert "↑ limit 7.5 kV" in plots.overlays["voltage"].shown  # the plan goes to 6 kV
     assert "↓ limit -2 kV" in plots.overlays["voltage"].shown  # out of view: named at the edge
     assert plots.overlays["displacement"].shown == ["trip 0.3 mm", "↓ trip -20 mm"]
     play(qtbot, run_page)
