@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from dearig.model.actuator import Actuator
-from dearig.model.diagnosis.engine import Found, Race
+from dearig.model.diagnosis.engine import MUCH_LESS, Found, Race
 from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter
 from dearig.model.diagnosis.residual import signatures
@@ -110,8 +110,18 @@ class _Conclusion:
         return min(s.form_error**2 * explained, s.form_error)
 
     def predicting(self, fit: Fit, careful: Fit) -> Actuator | Strip:
-        """Return the model that predicts other recordings: without what may not happen again."""
-        once = [n for n in fit.effects if not EFFECTS[n].is_reproducible]
+        """Return the model that predicts other recordings: without what may not happen again.
+
+        The rest is refitted without it, so that whoever has found nothing else predicts as before.
+        Only where it leaves half of what any fit without it leaves, the rest stays as it is beside
+        it: then no law plays it, and the others would be bent by it.
+        """
+        once = {m for m in fit.members if m == DRIFT or not EFFECTS[m].is_reproducible}
+        if not once:
+            return careful.model
+        lawful = [f.cost for members, f in self.found.fits.items() if not members & once]
+        if MUCH_LESS * fit.cost > min(lawful, default=math.inf):
+            return self.with_only(fit.members - once).model
         kept = tuple(e for e in careful.model.effects if e[0] not in once)
         return replace(careful.model, effects=kept)
 

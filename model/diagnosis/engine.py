@@ -15,10 +15,11 @@ from dearig.model.diagnosis.shapes import Extent, extent_of, strongest_line
 from dearig.model.effects import EFFECTS
 from dearig.model.records import ActuatorRecord, Record
 
-__all__ = ["Found", "Race", "Search"]
+__all__ = ["MUCH_LESS", "Found", "Race", "Search"]
 
 _DRIFT_TURNS = 3  # of fitting the model and the drift's variance in turn
-_MUCH_LESS = 2.0  # of the cost: drift is believed before laws where it leaves so much less
+#: Ratio of costs from which drift is believed before laws.
+MUCH_LESS = 2.0
 
 Progress = Callable[[str, float], None]
 
@@ -142,7 +143,7 @@ class Search:
         judge.see([baseline, *first, *([drifting] if drifting else [])])
         if drifting is None or judge.gain(baseline, drifting) < self.settings.odds:
             return self._grown(baseline, first)
-        if _MUCH_LESS * drifting.cost < first[0].cost:
+        if MUCH_LESS * drifting.cost < first[0].cost:
             beside = self._grown(drifting, None)
             if judge.is_settled(beside):
                 return beside
@@ -250,7 +251,15 @@ class Search:
             self.judge,
             parent,
             regression.misfit,
-            [Candidate((name,), tuple(some)) for name, some in starts.items()],
+            [
+                Candidate(
+                    (name,),
+                    tuple(some),
+                    # the grid of springs imitates it: the misfit does not show what it explains
+                    regression.springs_explain and EFFECTS[name].is_viscoelastic,
+                )
+                for name, some in starts.items()
+            ],
         )
         if pairs and fits and not self.judge.is_noise(fits[0]):
             both = race(

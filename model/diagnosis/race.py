@@ -29,10 +29,14 @@ _TINY = 1e-3  # of the typical amplitude: an effect that hardly acts, and has a 
 
 @dataclass(frozen=True)
 class Candidate:
-    """Effects that are added to a parent together, and the starts of their fit, best first."""
+    """Effects that are added to a parent together, and the starts of their fit, best first.
+
+    One that is ``certain`` runs in any case.
+    """
 
     effects: tuple[str, ...]
     starts: tuple[Start, ...]
+    certain: bool = False
 
     @property
     def misfit(self) -> float:
@@ -77,7 +81,9 @@ def _contending(
         return []
     limit = contention(misfit, ranked[0].misfit, settings)
     least, most = settings.rungs[-2].effects, settings.rungs[0].effects
-    return [c for i, c in enumerate(ranked[:most]) if i < least or c.misfit < limit]
+    certain = [c for c in ranked if c.certain]
+    others = [c for c in ranked if not c.certain][:most]
+    return [*certain, *(c for i, c in enumerate(others) if i < least or c.misfit < limit)]
 
 
 def _leading(ranked: Sequence[Fit], effects: int, abreast: bool) -> list[Fit]:

@@ -253,6 +253,14 @@ class Regression:
             rows.append(one.through(mu @ (parts - parts[:, :1])) - one.target())
         return self._joined(rows)
 
+    @property
+    def springs_explain(self) -> bool:
+        """Whether springs at other times explain the better part of what the model leaves."""
+        if not self._residuals.size:
+            return False
+        left = float(np.mean(self._residuals**2))
+        return left - self.misfit**2 > self.settings.share * max(left - 1.0, 0.0)
+
     # -- least squares
 
     def _rms(self, norm: float) -> float:
