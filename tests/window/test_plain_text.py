@@ -113,9 +113,10 @@ def test_the_look_at_the_window_sees_what_is_wrong(qtbot: QtBot) -> None:
     assert len(rendered_markup(_shown(QLabel(HOSTILE), qtbot), WITHIN, TAG)) == 1
     assert rendered_markup(_shown(label(HOSTILE), qtbot), WITHIN, TAG) == []
     for widget in (label("a long text"), QPushButton("a long text")):
-        assert cut_off(_shown(widget, qtbot)) == []
+        window = _shown(widget, qtbot)
+        assert cut_off(window) == []
         widget.setFixedWidth(20)
-        assert len(cut_off(_shown(widget, qtbot))) == 1
+        assert len(cut_off(window)) == 1
 
 
 def _shown(widget: QWidget, qtbot: QtBot) -> QWidget:

@@ -146,7 +146,7 @@ def test_a_study_is_reopened_and_the_old_result_is_labelled(session, keep, qtbot
     assert shown.startswith("Residual explained; by which effect these data cannot tell")
     assert "cannot separate sensor lag from amplifier" in words(page.verdict)
     assert page.curves.record.count() == 3
-    assert len(page.residual.time.listDataItems()) == 1
+    assert len(page.residual.time[0].drawn) == 1
     assert page.proposed() == EXPERIMENT.sequence
     assert "study-1" in page.about.text()
 
