@@ -59,12 +59,14 @@ def test_the_bar_shows_the_monitor_and_the_time_and_greys_the_last_sample(
     qtbot: QtBot, window: MainWindow, plan_of: Callable[[str], None]
 ) -> None:
     page, bar = window.run_page, window.bar
-    plan_of(SHORT.replace("lead_in_s = 0.3", "lead_in_s = 0.1"))
+    plan_of(SHORT.replace("frequency_Hz = 2.0", "frequency_Hz = 0.2"))  # above 1 kV for 2 s
     page.paced.setChecked(True)
     qtbot.mouseClick(page.arm_button, LEFT)
     qtbot.mouseClick(page.start_button, LEFT)
     window.show_page(window.rig_page)
-    qtbot.waitUntil(lambda: float(bar.monitor.text().split()[0].replace("—", "0")) > 1.0)
+    qtbot.waitUntil(
+        lambda: float(bar.monitor.text().split()[0].replace("—", "0")) > 1.0, timeout=RUN_MS
+    )
     assert bar.time.text().endswith("s")
     assert bar.monitor.property("role") != "muted"
     qtbot.waitUntil(lambda: not page.runner.running, timeout=RUN_MS)

@@ -24,8 +24,8 @@ def places(window: MainWindow) -> list[QWidget]:
     """Widgets of each kind, on each page, which can have the focus."""
     run = window.run_page
     return [
-        run.start_button, run.arm_button, run.operator, run.paced, run.span,
-        run.overlays.models[0], run.log, run.plots, window.list,
+        run.start_button, run.arm_button, run.operator, run.paced, run.overlays.models[0],
+        run.display.table, run.display.mark_bar.button, run.plots, window.list,
         window.sequence_page.editor.table, window.rig_page.tabs,
         window.recordings_page, window.study_page, window,
     ]  # fmt: skip
