@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import QPoint, QSettings, Qt, QTimer
+from PySide6.QtCore import QPoint, QSettings, QTimer
 from PySide6.QtWidgets import QApplication, QDialog, QWidget
 
 from dearig.config.rigfile import RigFile
@@ -55,7 +55,12 @@ class Story:
         until(self.window.isActiveWindow, "the window becomes active")
 
     def click(self, widget: QWidget) -> None:
-        self.hand.click(widget.mapToGlobal(widget.rect().center()))
+        self.hand.click(self.pixel(widget, widget.rect().center()))
+
+    def pixel(self, widget: QWidget, at: QPoint) -> QPoint:
+        """Pixel of the screen at a place of ``widget``; a scaled screen has more of them."""
+        place, scale = widget.mapToGlobal(at), widget.devicePixelRatioF()
+        return QPoint(round(place.x() * scale), round(place.y() * scale))
 
     def arm(self) -> None:
         self.window.show_page(self.page)
@@ -80,7 +85,7 @@ class Story:
         """Colour of a corner of ``widget`` on the screen; the picture is kept as ``name``."""
         screen = self.application.primaryScreen().grabWindow(0).toImage()
         screen.save(str(self.folder / f"{name}.png"))
-        return str(screen.pixelColor(widget.mapToGlobal(QPoint(12, 10))).name())
+        return str(screen.pixelColor(self.pixel(widget, QPoint(12, 10))).name())
 
 
 def on_a_simulated_rig(story: Story) -> None:
@@ -210,7 +215,6 @@ def main() -> None:
         on_a_card(story, int(sys.argv[2]))
     else:
         on_a_simulated_rig(story)
-    story.window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     story.window.close()
     print(json.dumps(story.saw))
 
