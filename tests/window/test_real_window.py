@@ -147,7 +147,7 @@ def test_a_killed_server_leaves_an_unknown_output_and_a_latched_alarm(
                 break
     finally:
         server.kill()
-        server.wait()
+        server.communicate()  # which closes its pipe too
     out, err = window.communicate(timeout=280)
     assert out, "".join(said) + err
     saw = json.loads(out)
