@@ -12,7 +12,7 @@ def main() -> None:
     """Run the command ``dearig``."""
     from dearig.analysis import diagnose
     from dearig.cli import main as command
-    from dearig.model.diagnosis.diagnose import diagnose_by_evidence
+    from dearig.model.diagnosis.by_evidence import diagnose_by_evidence
 
     diagnose.diagnose = diagnose_by_evidence
     command.main()

@@ -64,7 +64,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     "no recording there": ("info no.h5", ["no.h5 is not there"]),
     "a folder for a recording": ("info {s}", ["is a folder"]),
     "not HDF5": ("info {s}/text.h5", ["text.h5 is not an HDF5 file", "dearig import"]),
-    "an empty recording": ("info {s}/empty.h5", ["empty.h5 is not an HDF5 file"]),
+    "an empty recording": ("info {s}/empty.h5", ["empty.h5 is empty", "before it wrote anything"]),
     "HDF5 of others": ("info {s}/foreign.h5", ["is an HDF5 file but not a recording"]),
     "a truncated recording": ("info {s}/cut.h5", ["cut.h5 is truncated", "copied"]),
     "export of none": ("export no.h5 --to csv", ["no.h5 is not there"]),

@@ -206,12 +206,16 @@ class _Guess:
         there = self._chosen.picked
         if not self._timed:
             self._take("time")
-        for quantity in ("voltage", "voltage_monitor"):
-            self._take(quantity)
+        self._take("voltage")
+        if "voltage" in there:
+            self._take_if_sure("voltage_monitor")
+        else:
+            self._take("voltage_monitor")
         actuator = "voltage" in there or "voltage_monitor" in there
         if actuator:
-            for quantity in ("displacement", "current", "temperature"):
-                self._take(quantity)
+            self._take("displacement")
+            for quantity in ("current", "temperature"):
+                self._take_if_sure(quantity)
             if not {"stretch", "strain", "nominal_stress"} & there.keys():
                 for quantity in ("stretch", "nominal_stress", "force"):
                     self._take(quantity, only_own=True)
@@ -235,7 +239,7 @@ class _Guess:
             return
         self._take_one(("stretch", "strain", "displacement"))
         self._take_one(("nominal_stress", "force"))
-        self._take("temperature")
+        self._take_if_sure("temperature")
 
     def _propose(self) -> None:
         """Propose columns by their order, for an actuator: time, voltage, displacement."""
@@ -291,6 +295,16 @@ class _Guess:
             self._take(quantity)
             if quantity in self._chosen.picked:
                 return
+
+    def _take_if_sure(self, quantity: str) -> None:
+        """Pick the column of a quantity that a recording can do without, if it is sure."""
+        chosen, before = self._chosen, len(self._chosen.unsure)
+        self._take(quantity)
+        if len(chosen.unsure) > before:
+            why = "; ".join(chosen.unsure[before:])
+            del chosen.unsure[before:]
+            self._free.append(chosen.picked.pop(quantity).column)
+            chosen.notes.append(f"the {quantity.replace('_', ' ')} was not imported: {why}")
 
     def _take(self, quantity: str, only_own: bool = False) -> None:
         """Pick the one column that is ``quantity``, or note why none is sure."""

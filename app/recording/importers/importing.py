@@ -9,7 +9,6 @@ from pathlib import Path
 
 from dearig.drivers.rig import Event
 from dearig.errors import InputError
-from dearig.model.material import THESIS_FILM, THESIS_LOAD
 from dearig.model.specimen import KINEMATICS, Film
 from dearig.recording.files import check_output, file_sha256
 from dearig.recording.importers.chosen import Chosen, choose
@@ -203,6 +202,9 @@ def _from_rest(values: Values) -> float:
 
 def _say_assumed(values: Values, no_film: bool, no_load: bool) -> None:
     """Say which film and which load every fit of these data will take."""
+    # imports the effects and their compiler, which other commands on recordings do without
+    from dearig.model.material import THESIS_FILM, THESIS_LOAD
+
     assumed = []
     if no_film:
         assumed.append(f"the film ({film_words(THESIS_FILM)})")

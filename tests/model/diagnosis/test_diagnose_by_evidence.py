@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from dearig.model.diagnosis import Diagnosis
-from dearig.model.diagnosis.diagnose import diagnose_by_evidence
+from dearig.model.diagnosis.by_evidence import diagnose_by_evidence
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from tests.tools.diagnoses import HIDDEN, plant
 from tests.tools.engine import PLAIN, STRIP, effect, film_record_of, record_of

@@ -55,7 +55,7 @@ def test_another_modulus_is_followed_through_the_rest_stretch() -> None:
     stiffer = replace(network.equilibrium, modulus=1.03 * network.equilibrium.modulus)
     model = replace(PLAIN, network=replace(network, equilibrium=stiffer))
     start = starts(record, model, "linear drag")["linear drag"][0]
-    assert start.moduli[0] == pytest.approx(45e3, rel=2e-3)
+    assert start.moduli[0] == pytest.approx(45e3, rel=3e-3)
 
 
 @pytest.mark.parametrize(
