@@ -56,7 +56,7 @@ class Comparison:
     is A, B, or "" for a run that is in neither of the thesis's validation tables, ``row`` its label
     there (f = 0.2 Hz). ``rms_without_events`` is the error in the measured unit without the
     recording's own drift and events, None where these were not looked for. ``ended`` says how the
-    run ended if it ended early.
+    run ended if it ended early. ``quiet_count`` are the readings at rest that ``noise`` is from.
     """
 
     name: str
@@ -74,6 +74,7 @@ class Comparison:
     warnings: tuple[str, ...] = field(default=())
     rms_without_events: float | None = None
     ended: EarlyEnd | None = None
+    quiet_count: int = 0
 
     @property
     def marked_name(self) -> str:
@@ -88,8 +89,9 @@ class Comparison:
         """Return the error, without events where they are known, over the recording's noise.
 
         ``noise`` is that of the training recordings. It counts where the recording's own is not
-        known or smaller: a lead-in of 2 s gives the noise floor within some 10 % only. A film's
-        noise includes the error that its model is allowed.
+        known or smaller. The upper bound of the noise is taken (two standard deviations of a
+        standard deviation from ``quiet_count`` readings): 200 readings give it within 10 % only. A
+        film's noise includes the error that its model is allowed.
         """
         error = self.errors.rms if self.rms_without_events is None else self.rms_without_events
         allowed = 0.0
@@ -97,7 +99,8 @@ class Comparison:
             from dearig.model.diagnosis.preparation import FILM_MODEL_ERROR
 
             allowed = FILM_MODEL_ERROR * float(np.nanmax(np.abs(self.measured)))
-        return error / math.hypot(max(self.noise or 0.0, noise), allowed)
+        bound = 1.0 + 2.0 / math.sqrt(2.0 * self.quiet_count) if self.quiet_count else 1.0
+        return error / math.hypot(bound * max(self.noise or 0.0, noise), allowed)
 
 
 @dataclass(frozen=True)

@@ -233,7 +233,7 @@ def compare(
             noise: float | None = _noise(signal[usable])
         except ModelError as error:
             raise InputError(f"{recording.path}: {error}") from error
-        table, row, published = "", "", None
+        table, row, published, count = "", "", None, 0
     else:
         if not isinstance(model, Actuator):
             raise InputError(
@@ -250,6 +250,7 @@ def compare(
         predicted = counted(response.displacement, _lead_in(recording))
         quiet = recording.quiet & usable
         driven, noise = drive_of.voltage, noise_floor(recording.time[quiet], signal[quiet])
+        count = int(quiet.sum())
         table, row, published = _place(recording)
     ended = early_end(recording)
     if ended is not None:
@@ -269,6 +270,7 @@ def compare(
         published=published,
         warnings=tuple(warnings),
         ended=ended,
+        quiet_count=count,
     )
 
 
