@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import TextIO
 
 import numpy as np
-import pandas as pd
 
 from dearig.errors import InputError
 from dearig.input_file import open_input
@@ -154,6 +153,8 @@ class TextFile:
 
     def _read_fast(self, text: str, wanted: Sequence[Column]) -> np.ndarray | None:
         """Return the columns as pandas parses them, (columns, rows); None if they are not whole."""
+        import pandas as pd  # takes a second to import, and most commands read no table
+
         layout = self.layout
         plain = wanted[0].decimal
         if any(c.since or c.thousands or c.decimal != plain for c in wanted):
