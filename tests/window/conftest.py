@@ -44,6 +44,13 @@ frequency_Hz = 2.0
 """
 
 
+@pytest.fixture(autouse=True, scope="module")
+def _old_objects_are_not_searched() -> None:
+    """What libraries and compiled kernels keep is millions of objects: a second for each test."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture(autouse=True)
 def _garbage_is_collected_here(qapp: QApplication) -> Iterator[None]:
     """As in the program: never in another thread, where a widget must not be destroyed."""
