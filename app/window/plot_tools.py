@@ -98,13 +98,16 @@ class PlotTools(QWidget):
 
     def _fit(self) -> None:
         """Show the buttons for which there is room beside the readout."""
-        left = self.width() - _READOUT_LEAST - self.opener.sizeHint().width()
+        left = self.width() - _READOUT_LEAST - self.opener.sizeHint().width() - SPACE // 2
         for action, button in self.buttons.items():
             wanted = action.isVisible()
             if wanted:
                 left -= button.sizeHint().width() + SPACE // 2
             # to follow the run is offered however narrow the bar is
             button.setVisible(wanted and (left >= 0 or action is self.follow))
+        layout = self.layout()
+        if layout is not None:
+            layout.activate()
 
 
 class _Maker:

@@ -182,7 +182,7 @@ class StudyPage(QWidget):
         self.report_button = button("&Open report", "Open the full report in the browser")
         self.report_button.clicked.connect(self._open_report)
         self.run_button = button(
-            "Go to the proposed e&xperiment",
+            "Go to the e&xperiment",
             "Show its sequence on the Run page, to arm and start it there",
             True,
         )

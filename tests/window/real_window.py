@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import QEventLoop, QPoint, QSettings, QTimer
+from PySide6.QtCore import QCoreApplication, QEvent, QEventLoop, QPoint, QSettings, QTimer
 from PySide6.QtWidgets import QApplication, QWidget
 
 from dearig.window.frame import MainWindow
@@ -83,6 +83,13 @@ def until(condition: Callable[[], bool], what: str) -> None:
         raise SystemExit(f"waited in vain: {what}")
 
 
+def end(window: MainWindow) -> None:
+    """Close ``window`` and destroy it while Python's objects are whole, as the program does."""
+    window.close()
+    window.deleteLater()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
+
+
 def main() -> None:
     application = QApplication(sys.argv[:1])
     prepare_plots()
@@ -149,7 +156,7 @@ def main() -> None:
     click(page.stop_button)
     until(lambda: not page.runner.running, "stopped by the mouse")
     saw["recordings"] = sorted(path.name for path in folder.glob("*.h5"))
-    window.close()
+    end(window)
     print(json.dumps(saw))
 
 

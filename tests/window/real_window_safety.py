@@ -21,7 +21,7 @@ from dearig.window.hv import HighVoltage
 from dearig.window.session import Session
 from dearig.window.theme import LIGHT, prepare_plots
 from tests.window.conftest import SHORT
-from tests.window.real_window import Hand, until
+from tests.window.real_window import Hand, end, until
 
 LONG = SHORT.replace("lead_in_s = 0.3", "lead_in_s = 1.0").replace(
     "frequency_Hz = 2.0", "frequency_Hz = 0.1"
@@ -215,7 +215,7 @@ def main() -> None:
         on_a_card(story, int(sys.argv[2]))
     else:
         on_a_simulated_rig(story)
-    story.window.close()
+    end(story.window)
     print(json.dumps(story.saw))
 
 

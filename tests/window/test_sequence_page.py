@@ -222,7 +222,7 @@ def test_a_segment_kind_of_another_distribution_has_a_form(tmp_path: Path) -> No
     first, row, field, labels, duration = found.splitlines()
     assert first == "A slow rise and a fast fall."
     assert row == "sawtooth | amplitude 3 kV"
-    assert field.startswith("0.5 rise_s: time of the rise, in s")
+    assert field.startswith("0.5 rise: time of the rise, in s")
     assert all(
         f"{text!r}" in labels for text in ("amplitude", "kV", "top of the rise", "rise", "s")
     )
