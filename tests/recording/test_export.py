@@ -24,6 +24,7 @@ from dearig.recording import (
     import_file,
     open_recording,
 )
+from dearig.recording.importers import ImportOptions
 from tests.tools.recordings import Clock, measured_data, write_run, writer
 
 
@@ -152,7 +153,7 @@ def test_where_an_export_goes(tmp_path: Path, run: Path) -> None:
 def test_measured_data_make_the_round(tmp_path: Path, name: str, to: str) -> None:
     source = measured_data() / name
     first, second = tmp_path / "first.h5", tmp_path / "second.h5"
-    import_file(source, first, gauge_length_mm=80, area_mm2=22, now=Clock())
+    import_file(source, first, ImportOptions(gauge_length_mm=80, area_mm2=22), now=Clock())
     assert import_file(export_recording(first, to), second, now=Clock()) == []
     same(open_recording(first), open_recording(second))
     assert open_recording(second).kinematics == "uniaxial"
