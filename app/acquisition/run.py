@@ -50,7 +50,7 @@ __all__ = ["RunObserver", "RunOptions", "RunResult", "open_rig", "record"]
 
 log = logging.getLogger(__name__)
 
-#: s at 0 V after which the operator is told that the program still waits for the disk.
+#: Time in s at 0 V after which a message says that the program still waits for the disk.
 _TELL_AFTER = 5.0
 #: Number of ctrl-C after which the run stops waiting for the disk, or for the guardian.
 _GIVE_UP = 2

@@ -50,9 +50,9 @@ def parse_rig_file(text: str, folder: Path | None = None) -> RigFile:
 def faults_of(text: str) -> dict[tuple[str, str], str]:
     """Return all errors in ``text``: a sentence for each (table, key).
 
-    The key is ("", "") where no single key is at fault. Checks of several keys follow once each key
-    is right, so what is wrong is left out and the rest is checked again; what those checks say of a
-    key that was left out does not count. Raises ``InputError`` where the text is not TOML.
+    The key is ("", "") where no single key is at fault. A check across several keys runs only if
+    each key is valid. Invalid keys are therefore removed and the rest is checked again; an error
+    that names a removed key is ignored. Raises ``InputError`` where the text is not TOML.
     """
     data = parse_toml(text, "the rig file")
     found: dict[tuple[str, str], str] = {}

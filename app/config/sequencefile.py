@@ -192,10 +192,10 @@ def parse_sequence(text: str, name: str, folder: Path) -> LoadedSequence:
 def read_sequence(
     text: str, name: str, folder: Path
 ) -> tuple[LoadedSequence | None, list[SequenceFault]]:
-    """Return the sequence in the TOML ``text``, or None with every fault that can be told.
+    """Return the sequence in the TOML ``text``, or None with all its errors.
 
-    Which segments do not join is told once each of them is right. Raises ``InputError`` where
-    ``text`` is not TOML.
+    Whether neighbouring segments join is checked only if each segment is valid. Raises
+    ``InputError`` where ``text`` is not TOML.
     """
     data = parse_toml(text, name)
     try:

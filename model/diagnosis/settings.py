@@ -86,7 +86,7 @@ class DiagnosisSettings:
         Cosines of the drift of one record; slower than the drive's lobes are the first half.
     tempering
         Divisor of the criterion in probabilities: residuals of laws that are not quite true are
-        no samples of their noise. Calibrated on made rigs (``tests/blind``).
+        no samples of their noise. An assumption: it is not calibrated yet.
     """
 
     effort: float = 2.8e8
