@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import product
 from threading import Lock
 
 import numpy as np
@@ -27,6 +27,7 @@ from dearig.model.fitting.coarse_drive import coarse_drive_of
 from dearig.model.fitting.drift import DriftFit
 from dearig.model.fitting.identify import fit_globally, is_determined, is_worth_freeing
 from dearig.model.fitting.intervals import correlation_time, covariance, is_flat, unevenness
+from dearig.model.fitting.left_out import left_out
 from dearig.model.fitting.levenberg import LocalFit, descend
 from dearig.model.fitting.parallel import Job, Result, parallel_map
 from dearig.model.fitting.parameters import Estimate, Layout
@@ -83,10 +84,8 @@ _BESIDE = (0.6, 1.6)  # of the relaxation time of the branch that it helps
 _SLOWER = 3.0  # times the relaxation time of the stiffest branch: such do something else than it
 _ELSEWHERE = (1.0, 4.0, 16.0)  # s, where a branch that is spare may be of use
 _WORTH = 1e-4  # of chi-square: a descent that promises less has ended
-_RIDGE = 1e-3  # of a number's own curvature, so that no segment alone sets it free
 _MOST_OF_IT = 0.5  # of the motion: what does so much of it is not taken off the records
 _SLOW_RATE = 50.0  # Hz: enough to see which branches there may be
-_SEGMENTS = 10  # of time, each predicted by a fit to the others
 
 
 def information(cost: float, free: int, samples: float) -> float:
@@ -983,26 +982,9 @@ def _by_record(problem: Problem, residuals: np.ndarray) -> list[np.ndarray]:
 
 
 def _left_out(trial: Trial, jac: np.ndarray) -> np.ndarray:
-    """Residuals over noise (N,) of each segment of time, predicted by a fit to all others.
-
-    The fit without a segment is the linear one about the optimum: exact where the model is linear
-    over the change that a segment makes, and the change is small where a segment is one of many.
-    """
-    n = trial.residuals.size
-    edges = np.linspace(0, n, _SEGMENTS + 1).astype(int)
-    out = trial.residuals.copy()
+    """Return the residuals over noise (N,) that ``left_out`` gives, drift included."""
     reach = trial.problem.layout.reach(trial.x)[~trial.fixed]
-    # a walk in a segment is foretold by that in the rest of its record
+    # the drift in a segment is predicted by that in the rest of its record
     own = trial.problem.drift_jacobian()
     jac, reach = np.hstack([jac, own]), np.append(reach, np.full(own.shape[1], np.inf))
-    normal = jac.T @ jac
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    for low, high in pairwise(edges):
-        part, r = jac[low:high], trial.residuals[low:high]
-        rest = (normal - part.T @ part) / np.outer(scale, scale)
-        w, q = np.linalg.eigh(rest)
-        inverse = (q / (np.maximum(w, 0.0) + _RIDGE)) @ q.T
-        # at the optimum the gradient of the others is minus that of the segment
-        step = np.clip(inverse @ ((part.T @ r) / scale) / scale, -reach, reach)
-        out[low:high] = r + part @ step
-    return out
+    return left_out(trial.residuals, jac, reach)

@@ -12,10 +12,6 @@ from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import DRIFT, Fit, Fitter
 from dearig.model.diagnosis.residual import signatures
 from dearig.model.diagnosis.results import (
-    EXPLAINED,
-    NOTHING_MISSING,
-    PARTLY_EXPLAINED,
-    UNEXPLAINED,
     Candidate,
     Diagnosis,
     Round,
@@ -27,11 +23,17 @@ from dearig.model.diagnosis.stress import missing_stress
 from dearig.model.diagnosis.symbolic_regression import describe_unnamed
 from dearig.model.effects import EFFECTS
 from dearig.model.film import Strip
+from dearig.model.verdict import (
+    EXPLAINED,
+    NOTHING_MISSING,
+    PARTLY_EXPLAINED,
+    TOLERANCE,
+    UNEXPLAINED,
+)
 
 __all__ = ["conclude"]
 
 _ITERATIONS = 8  # of the last fits, on every sample
-_EXPLAINED_RMS = 1.15  # residual over noise up to which a record is explained (contracts of --json)
 _NAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
 _TRUSTED_SHARE = 0.8  # of the same: what explains less may be a disguise, and predicts nothing else
 _ALIKE = 10.0  # of the criterion: odds of e^5, below which two explanations are not told apart
@@ -55,7 +57,7 @@ class _Conclusion:
     @property
     def is_small(self) -> bool:
         """Whether the residual is within 15 % of the noise."""
-        return self.last.cost < _EXPLAINED_RMS**2
+        return self.last.cost < TOLERANCE**2
 
     def verdict(self) -> str:
         """Return the verdict on the training records."""

@@ -14,13 +14,9 @@ from dearig.model.film import Strip
 from dearig.model.fitting import Estimate
 
 __all__ = [
-    "EXPLAINED",
     "MUCH_LEFT",
     "NOISE_RMS",
-    "NOTHING_MISSING",
     "NOT_BY_CHANCE",
-    "PARTLY_EXPLAINED",
-    "UNEXPLAINED",
     "Candidate",
     "Dependence",
     "Diagnosis",
@@ -39,11 +35,6 @@ NOISE_RMS = 1.08
 MUCH_LEFT = 25.0
 #: Significance level of the test for a white spectrum.
 NOT_BY_CHANCE = 1e-3
-
-NOTHING_MISSING = "nothing_missing"
-EXPLAINED = "explained"
-PARTLY_EXPLAINED = "partly_explained"
-UNEXPLAINED = "unexplained"
 
 
 @dataclass(frozen=True)

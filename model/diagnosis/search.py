@@ -13,11 +13,7 @@ from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.bench import Bench, Trial, Work, akaike, information, merged, relieved
 from dearig.model.diagnosis.residual import signatures
 from dearig.model.diagnosis.results import (
-    EXPLAINED,
     MUCH_LEFT,
-    NOTHING_MISSING,
-    PARTLY_EXPLAINED,
-    UNEXPLAINED,
     Candidate,
     Diagnosis,
     Round,
@@ -31,6 +27,13 @@ from dearig.model.film import Strip
 from dearig.model.fitting import Estimate
 from dearig.model.fitting.parameters import Layout
 from dearig.model.records import ActuatorRecord, Record
+from dearig.model.verdict import (
+    EXPLAINED,
+    NOTHING_MISSING,
+    PARTLY_EXPLAINED,
+    TOLERANCE,
+    UNEXPLAINED,
+)
 
 __all__ = ["diagnose"]
 
@@ -98,7 +101,6 @@ _ANEW_FROM = (1.0, 1.33, 1.78)  # times that: the branches' measure of it is on 
 _HINT = 0.05  # of the most promising one's: who promises less is not refitted beside it
 _KEPT = 0.8  # of a promise, or of what the leader explains
 _FOLLOWED = 12  # candidates refitted beside an effect, the most promising ones; half beside two
-_EXPLAINED_RMS = 1.15
 _UNNAMED_SHARE = 0.5  # of what was above the noise: explaining less names nothing
 _TRUSTED = 0.8  # of the same: what explains less may be a disguise, and predicts nothing else
 _WORSE = 1.5  # of the cost of one record: a law that is not quite the true one may ask as much
@@ -1049,7 +1051,7 @@ class _Search:
         explained = lead.parent.cost - lead.trial.cost
         if _is_walk(lead.name):
             part, white = _NEARLY_ALL, True
-        elif EFFECTS[lead.name].family == "unknown" and lead.trial.cost > _EXPLAINED_RMS**2:
+        elif EFFECTS[lead.name].family == "unknown" and lead.trial.cost > TOLERANCE**2:
             part, white = _MOSTLY, False
         else:
             return order, correlation
@@ -1195,7 +1197,7 @@ class _Search:
             for left, place, size in looks[:_ANEW]
             if left <= most
         }
-        if leader.cost < _EXPLAINED_RMS**2:
+        if leader.cost < TOLERANCE**2:
             mark = _KEPT * tried[0].promised
             owing = [
                 i
@@ -1388,7 +1390,7 @@ class _Search:
         Then no law of the rig plays it: springs that know of it foretell other recordings as if it
         had not been, and those of a fit without it are bent by it.
         """
-        small = _EXPLAINED_RMS**2
+        small = TOLERANCE**2
         lawful = (t for key, t in self.found.items() if not any(map(_is_walk, key)))
         if self.interrupted or trial.cost > small or any(t.cost < small for t in lawful):
             return False
@@ -1515,7 +1517,7 @@ class _Search:
         correlation = max(1.0, last.correlation)
         stage0 = self.bench.stage(first, correlation, estimates=True)
         explained = _explained(first, last)
-        small = last.cost < _EXPLAINED_RMS**2
+        small = last.cost < TOLERANCE**2
         doubtful = not small and (explained < _TRUSTED or _is_worse_in_one(first, last))
         done = {frozenset(): first, frozenset(best.effects): last}
 
@@ -1754,7 +1756,7 @@ def _explained(base: Trial, trial: Trial) -> float:
 def _is_worse_in_one(base: Trial, trial: Trial) -> bool:
     """Whether a record is much the worse for what explains others: no law of the rig does that."""
     costs = zip(base.record_costs, trial.record_costs, strict=True)
-    return any(after > max(_WORSE * before, _EXPLAINED_RMS**2) for before, after in costs)
+    return any(after > max(_WORSE * before, TOLERANCE**2) for before, after in costs)
 
 
 def _promised_as_much(tried: _Tried, lead: float) -> bool:

@@ -18,6 +18,7 @@ from dearig.model.film import Strip
 from dearig.model.fitting import Estimate
 from dearig.model.fitting.identify import is_determined
 from dearig.model.fitting.intervals import covariance
+from dearig.model.fitting.left_out import left_out
 from dearig.model.records import ActuatorRecord, Record
 
 __all__ = ["DRIFT_LAW", "drift_values", "stage_of", "with_drift"]
@@ -25,8 +26,6 @@ __all__ = ["DRIFT_LAW", "drift_values", "stage_of", "with_drift"]
 #: The effect by which the drift of a record is written into models: polynomials of the time.
 DRIFT_LAW = "fitful drift"
 
-_SEGMENTS = 10  # of time, each predicted by a fit to the others
-_RIDGE = 1e-3  # of a parameter's own curvature, so that no segment alone determines it
 _NORMAL_95 = 1.96
 _AT_BOUND = 1e-9  # of a coordinate
 _FLAT = 1e-4  # relative singular value: polynomials that nearly cancel are left out
@@ -51,7 +50,8 @@ def stage_of(
     scale = problem.sigma[good]
     # thinning took noise away: put back, so that errors compare with those of every sample
     lost = _noise_lost(problem.records, full)
-    predicted = _cross_validated(fit, jacobian)[good] * scale
+    reach = problem.layout.reach(fit.x)[~fit.fixed]
+    predicted = left_out(fit.residuals, jacobian, reach)[good] * scale
     return Stage(
         model=fit.model,
         cost=fit.cost,
@@ -70,28 +70,6 @@ def _noise_lost(thin: Sequence[Record], full: Sequence[Record]) -> float:
     sizes = np.array([r.measured.size for r in thin], dtype=float)
     lost = np.array([f.noise**2 - t.noise**2 for f, t in zip(full, thin, strict=True)])
     return max(float(np.sum(sizes * lost) / np.sum(sizes)), 0.0)
-
-
-def _cross_validated(fit: Fit, jacobian: np.ndarray) -> np.ndarray:
-    """Return residuals over noise (N,) of each segment of time, predicted by a fit to all others.
-
-    The fit without a segment is the linear one about the optimum: exact where the model is linear
-    over the change that a segment makes, and that is small where a segment is one of many.
-    """
-    edges = np.linspace(0, fit.residuals.size, _SEGMENTS + 1).astype(int)
-    out = fit.residuals.copy()
-    reach = fit.problem.layout.reach(fit.x)[~fit.fixed]
-    normal = jacobian.T @ jacobian
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    for low, high in pairwise(edges):
-        part, r = jacobian[low:high], fit.residuals[low:high]
-        rest = (normal - part.T @ part) / np.outer(scale, scale)
-        w, q = np.linalg.eigh(rest)
-        inverse = (q / (np.maximum(w, 0.0) + _RIDGE)) @ q.T
-        # at the optimum the gradient of the others is minus that of the segment
-        step = np.clip(inverse @ ((part.T @ r) / scale) / scale, -reach, reach)
-        out[low:high] = r + part @ step
-    return out
 
 
 def _estimates(fit: Fit, jacobian: np.ndarray) -> tuple[Estimate, ...]:

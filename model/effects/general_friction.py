@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from dearig.model.effects.description import Curve, Effect, Parameter
 from dearig.model.jit import jit
+from dearig.model.yield_elements import carry, first_loading, pull, slope
 
 __all__ = ["EFFECT", "commit", "stiffness", "stress"]
 
@@ -21,12 +20,7 @@ _RATIO = 2.2  # of neighbouring thresholds
 
 
 def _loading(values: Mapping[str, float]) -> Curve:
-    """Return the first loading, from which every loop follows by Masing's rules."""
-    thresholds = values["reach"] * _RATIO ** -np.arange(_ELEMENTS - 1.0, -1.0, -1.0)
-    stretch = np.concatenate(([0.0], np.geomspace(0.3 * thresholds[0], thresholds[-1], 60)))
-    yields = np.array([values[f"yield_{i + 1}"] for i in range(_ELEMENTS)])
-    stress_Pa = np.minimum(stretch[:, None] / thresholds, 1.0) @ yields
-    return Curve(stretch, stress_Pa, "change of stretch", "stress of first loading (Pa)")
+    return first_loading(values, _ELEMENTS, _RATIO)
 
 
 EFFECT = Effect(
@@ -61,28 +55,15 @@ EFFECT = Effect(
 
 @jit
 def stress(c, k, m, j, lam, rate, lam0, since, t):
-    total, threshold, travel = 0.0, c[k + _ELEMENTS], lam - lam0
-    for i in range(_ELEMENTS - 1, -1, -1):
-        if c[k + i] > 0.0:
-            strain = min(max(m[j + i] + travel, -threshold), threshold)
-            total += c[k + i] * strain / threshold
-        threshold /= _RATIO
-    return total
+    return pull(c, k, m, j, lam - lam0, _ELEMENTS, _RATIO)
 
 
 @jit
 def stiffness(c, k, m, j, lam, rate):
-    total, threshold = 0.0, c[k + _ELEMENTS]
-    for i in range(_ELEMENTS - 1, -1, -1):
-        total += c[k + i] / threshold
-        threshold /= _RATIO
-    return total, 0.0
+    return slope(c, k, _ELEMENTS, _RATIO), 0.0
 
 
 @jit
 def commit(c, k, m, j, lam, rate, lam0, h, t):
-    threshold, travel = c[k + _ELEMENTS], lam - lam0
-    for i in range(_ELEMENTS - 1, -1, -1):
-        m[j + i] = min(max(m[j + i] + travel, -threshold), threshold)
-        threshold /= _RATIO
+    carry(c, k, m, j, lam - lam0, _ELEMENTS, _RATIO)
     return 0

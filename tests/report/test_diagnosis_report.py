@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dearig.cli.terminal import diagnosis_tables
-from dearig.model.diagnosis import results as findings
+from dearig.model import verdict as verdicts
 from dearig.report.as_json import diagnosis_json
 from dearig.report.diagnosis import (
     HEADLINES,
@@ -122,8 +122,8 @@ class TestPage:
 class TestWords:
     def test_every_verdict_has_its_sentence(self):
         for verdict in (
-            findings.NOTHING_MISSING, findings.EXPLAINED, findings.PARTLY_EXPLAINED,
-            findings.UNEXPLAINED,
+            verdicts.NOTHING_MISSING, verdicts.EXPLAINED, verdicts.PARTLY_EXPLAINED,
+            verdicts.UNEXPLAINED,
         ):  # fmt: skip
             assert verdict in HEADLINES
             steps = () if verdict == "nothing_missing" else (STEP,)

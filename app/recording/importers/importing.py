@@ -99,9 +99,7 @@ def import_file(
     """
     options = options or ImportOptions()
     path, metadata = Path(source), metadata or RunMetadata()
-    out = check_output(out, overwrite)
-    if out.exists() and path.exists() and out.samefile(path):
-        raise InputError(f"{out} is the input file; choose another output")
+    out = check_output(out, overwrite, path)
     table = source_at(path, names_line=options.names_line, skip_bad_rows=options.skip_bad_rows)
     chosen = choose(table, options.columns, options.raw, timed=options.rate_Hz is not None)
     if chosen.unsure:
@@ -207,7 +205,7 @@ def _say_assumed(values: Values, no_film: bool, no_load: bool) -> None:
 
     assumed = []
     if no_film:
-        assumed.append(f"the film ({film_words(THESIS_FILM)})")
+        assumed.append(f"the film ({_film_words(THESIS_FILM)})")
     if no_load:
         assumed.append(f"the load ({THESIS_LOAD.mass * 1e3:g} g)")
     if assumed:
@@ -217,7 +215,7 @@ def _say_assumed(values: Values, no_film: bool, no_load: bool) -> None:
         )
 
 
-def film_words(film: Film) -> str:
+def _film_words(film: Film) -> str:
     """Return the size of ``film`` in words."""
     return (
         f"{film.length * 1e3:g} mm long, {film.width * 1e3:g} mm wide, "

@@ -24,6 +24,7 @@ from dearig.recording.files import in_words
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import no_such_column
 from dearig.recording.importers.text_layout import (
+    GROUPED,
     HEAD_CHARACTERS,
     Column,
     Layout,
@@ -226,16 +227,13 @@ def _pieces(stream: TextIO, first: int) -> Iterator[tuple[int, str]]:
         line += text.count("\n")
 
 
-_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:[.,' ]\d{3})+(?:[.,]\d+)?")
-
-
 def _number(cell: str, column: Column) -> float | None:
     """Return the number in ``cell``; of a date and time, seconds. None if it is neither."""
     if column.since is not None:
         return _seconds(cell, column.since)
     text = cell
     if column.thousands and column.thousands in text:
-        if not _THOUSANDS.fullmatch(text):
+        if not GROUPED.fullmatch(text):
             return None
         text = text.replace(column.thousands, "")
     if column.decimal == ",":

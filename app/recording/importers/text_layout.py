@@ -19,6 +19,7 @@ from dearig.errors import InputError
 from dearig.recording.importers.units import unit_of
 
 __all__ = [
+    "GROUPED",
     "HEAD_CHARACTERS",
     "Column",
     "Layout",
@@ -44,7 +45,8 @@ _MARKS = {
 _DELIMITERS = ("\t", ";", ",", "|", None)  # None: any white space
 _POINT = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf|infinity)", re.I)
 _COMMA = re.compile(r"[+-]?(?:\d+,?\d*|,\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf|infinity)", re.I)
-_GROUPED = re.compile(r"[+-]?\d{1,3}(?:([.,' ])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")
+#: A number whose digits stand in groups of three.
+GROUPED = re.compile(r"[+-]?\d{1,3}(?:([.,' ])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")
 _SAMPLE = 400  # lines of data that are looked at
 _LEAST = 2  # lines of data in a row that begin a table
 
@@ -290,7 +292,7 @@ class _Table:
             return Column(name, place, "s", since=moments[0])
         decimal, thousands = ".", ""
         if self.delimiter != ",":
-            both = [c for c in cells if "," in c and "." in c and _GROUPED.fullmatch(c)]
+            both = [c for c in cells if "," in c and "." in c and GROUPED.fullmatch(c)]
             if both:
                 decimal = max(",.", key=both[0].rfind)
                 thousands = "." if decimal == "," else ","
@@ -344,7 +346,7 @@ def _unique(columns: tuple[Column, ...]) -> tuple[Column, ...]:
 def _is_number(cell: str, delimiter: str | None) -> bool:
     return bool(
         _POINT.fullmatch(cell)
-        or (delimiter != "," and (_COMMA.fullmatch(cell) or _GROUPED.fullmatch(cell)))
+        or (delimiter != "," and (_COMMA.fullmatch(cell) or GROUPED.fullmatch(cell)))
     )
 
 

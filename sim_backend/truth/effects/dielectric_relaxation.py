@@ -13,8 +13,8 @@ import math
 import numpy as np
 
 from dearig.model.material import Load
-from dearig.sim_backend.truth import kernels as loops
 from dearig.sim_backend.truth.effect import TruthEffect
+from dearig.sim_backend.truth.plumbing import relaxing
 from dearig.sim_backend.truth.sampling import log_uniform
 
 __all__ = ["cole_cole", "three_terms"]
@@ -22,29 +22,12 @@ __all__ = ["cole_cole", "three_terms"]
 _LEAST, _MOST = 0.028, 0.4  # of the permittivity
 
 
-def _relaxing(shares: np.ndarray, times: np.ndarray, words: str) -> TruthEffect:
-    def on_voltage(
-        time: np.ndarray, voltage: np.ndarray, carry: object
-    ) -> tuple[np.ndarray, object]:
-        slow = np.zeros(times.size) if carry is None else np.array(carry)
-        effective = np.empty_like(voltage)
-        loops.polarise(time, voltage, shares, times, slow, effective)
-        return effective, slow
-
-    return TruthEffect(
-        family="dielectric_relaxation",
-        acts_on="dielectric",
-        description=f"{shares.sum():.2%} of the permittivity relaxes, {words}",
-        on_voltage=on_voltage,
-    )
-
-
 def three_terms(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
     """Draw three Debye terms about a decade apart."""
     times = np.array([0.02, 0.2, 2.0]) * np.exp(generator.uniform(-0.8, 0.8, 3))
     shares = log_uniform(generator, _LEAST, _MOST) * generator.dirichlet((3.0, 3.0, 3.0))
     late = ", ".join(f"{time:.2g}" for time in times)
-    return _relaxing(shares, times, f"with time constants of {late} s")
+    return relaxing(shares, times, f"with time constants of {late} s")
 
 
 def cole_cole(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
@@ -54,7 +37,7 @@ def cole_cole(generator: np.random.Generator, load: Load) -> TruthEffect:  # noq
     alpha = generator.uniform(0.25, 0.55)
     x = np.linspace(-4.0, 4.0, 8)  # ln(T/T_0)
     density = math.sin(alpha * math.pi) / (np.cosh((1.0 - alpha) * x) - math.cos(alpha * math.pi))
-    return _relaxing(
+    return relaxing(
         share * density / density.sum(),
         centre * np.exp(x),
         f"spread about {centre:.2g} s (Cole-Cole, alpha {alpha:.2f})",

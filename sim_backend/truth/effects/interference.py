@@ -11,6 +11,7 @@ import numpy as np
 
 from dearig.model.material import Load
 from dearig.sim_backend.truth.effect import TruthEffect
+from dearig.sim_backend.truth.plumbing import tones
 from dearig.sim_backend.truth.sampling import log_uniform
 
 __all__ = ["mains"]
@@ -25,18 +26,12 @@ def mains(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: A
     third = generator.uniform(0.05, 0.5)
     phases = generator.uniform(0.0, 2.0 * math.pi, 2)
 
-    def on_motion(t: np.ndarray, rows: np.ndarray, carry: object) -> tuple[np.ndarray, object]:
-        for amplitude, times, phase in ((size, 1.0, phases[0]), (third * size, 3.0, phases[1])):
-            omega = 2.0 * math.pi * hertz * times
-            rows[0] += amplitude * np.sin(omega * t + phase)
-            rows[1] += amplitude * omega * np.cos(omega * t + phase)
-        return rows, carry
-
+    parts = ((size, 1.0, phases[0]), (third * size, 3.0, phases[1]))
     return TruthEffect(
         family="interference",
         acts_on="sensor",
         description=(
             f"mains of {size * 1e6:.3g} um at {hertz:.2f} Hz, {third:.2f} of that at three times"
         ),
-        on_motion=on_motion,
+        on_motion=tones(parts, hertz),
     )

@@ -13,6 +13,7 @@ import numpy as np
 from dearig.model.material import Load
 from dearig.sim_backend.truth import kernels as loops
 from dearig.sim_backend.truth.effect import TruthEffect
+from dearig.sim_backend.truth.plumbing import looking_back
 from dearig.sim_backend.truth.sampling import log_uniform
 
 __all__ = ["low_pass", "moving_average"]
@@ -24,23 +25,11 @@ def moving_average(generator: np.random.Generator, load: Load) -> TruthEffect:  
     """Draw a window of equal weights."""
     window = 2.0 * log_uniform(generator, _LEAST, _MOST)
 
-    def on_motion(time: np.ndarray, rows: np.ndarray, carry: object) -> tuple[np.ndarray, object]:
-        if carry is None:
-            past, seen = time[:1], rows[:, :1]
-        else:
-            past, seen = cast(tuple[np.ndarray, np.ndarray], carry)
-        times = np.concatenate((past, time[1:]))
-        motion = np.concatenate((seen, rows[:, 1:]), axis=1)
-        loops.moving_average(times, motion, past.size - 1, window, rows)
-        # the next call needs the window before this call's last node
-        keep = max(0, int(np.searchsorted(times, time[-1] - window, side="right")) - 1)
-        return rows, (times[keep:].copy(), motion[:, keep:].copy())
-
     return TruthEffect(
         family="sensor_lag",
         acts_on="sensor",
         description=f"the reading is the mean over the last {window * 1e3:.3g} ms",
-        on_motion=on_motion,
+        on_motion=looking_back(window, loops.moving_average),
     )
 
 

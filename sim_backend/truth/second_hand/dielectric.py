@@ -17,9 +17,9 @@ import math
 import numpy as np
 
 from dearig.model.material import Load
-from dearig.sim_backend.truth import kernels as loops
 from dearig.sim_backend.truth.effect import TruthEffect
 from dearig.sim_backend.truth.film import FilmNumbers
+from dearig.sim_backend.truth.plumbing import relaxing
 from dearig.sim_backend.truth.sampling import either_sign, log_uniform
 from dearig.sim_backend.truth.second_hand.spectrum import asymmetric, stretched_exponential
 
@@ -30,30 +30,13 @@ _CHANGE = (0.008, 0.2)  # of the permittivity at 8 kV, or over 1.5 mm
 _FIELD = (8000.0 * 1.2) ** 2  # V^2, of 8 kV over the film at a stretch of 1.2
 
 
-def _relaxing(shares: np.ndarray, times: np.ndarray, words: str) -> TruthEffect:
-    def on_voltage(
-        time: np.ndarray, voltage: np.ndarray, carry: object
-    ) -> tuple[np.ndarray, object]:
-        slow = np.zeros(times.size) if carry is None else np.array(carry)
-        effective = np.empty_like(voltage)
-        loops.polarise(time, voltage, shares, times, slow, effective)
-        return effective, slow
-
-    return TruthEffect(
-        family="dielectric_relaxation",
-        acts_on="dielectric",
-        description=f"{shares.sum():.2%} of the permittivity relaxes, {words}",
-        on_voltage=on_voltage,
-    )
-
-
 def kohlrausch(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG001
     """Draw a stretched exponential."""
     share = log_uniform(generator, *_RELAXING)
     time = log_uniform(generator, 0.05, 1.5)
     exponent = generator.uniform(0.35, 0.75)
     weights, times = stretched_exponential(exponent)
-    return _relaxing(
+    return relaxing(
         share * weights,
         time * times,
         f"as a stretched exponential of {time:.2g} s to the power of {exponent:.2f}",
@@ -66,7 +49,7 @@ def havriliak_negami(generator: np.random.Generator, load: Load) -> TruthEffect:
     time = log_uniform(generator, 0.05, 1.5)
     a, b = generator.uniform(0.5, 0.85), generator.uniform(0.3, 0.7)
     weights, times = asymmetric(a, b)
-    return _relaxing(
+    return relaxing(
         share * weights,
         time * times,
         f"spread about {time:.2g} s (Havriliak-Negami, {a:.2f} and {b:.2f})",

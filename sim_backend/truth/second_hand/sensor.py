@@ -17,13 +17,13 @@ Interference. ``fan``: a machine's vibration at its own frequency and at twice t
 from __future__ import annotations
 
 import math
-from typing import cast
 
 import numpy as np
 
 from dearig.model.material import Load
 from dearig.sim_backend.truth import kernels as loops
 from dearig.sim_backend.truth.effect import TruthEffect
+from dearig.sim_backend.truth.plumbing import looking_back, tones
 from dearig.sim_backend.truth.sampling import either_sign, log_uniform
 
 __all__ = [
@@ -49,23 +49,11 @@ def delay(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: A
     """Draw a pure delay."""
     age = log_uniform(generator, *_AGE)
 
-    def on_motion(time: np.ndarray, rows: np.ndarray, carry: object) -> tuple[np.ndarray, object]:
-        if carry is None:
-            past, seen = time[:1], rows[:, :1]
-        else:
-            past, seen = cast(tuple[np.ndarray, np.ndarray], carry)
-        times = np.concatenate((past, time[1:]))
-        motion = np.concatenate((seen, rows[:, 1:]), axis=1)
-        loops.delayed(times, motion, past.size - 1, age, rows)
-        # the next call needs the positions from ``age`` before this call's last node on
-        keep = max(0, int(np.searchsorted(times, time[-1] - age, side="right")) - 1)
-        return rows, (times[keep:].copy(), motion[:, keep:].copy())
-
     return TruthEffect(
         family="sensor_lag",
         acts_on="sensor",
         description=f"the reading is the position {age * 1e3:.3g} ms ago",
-        on_motion=on_motion,
+        on_motion=looking_back(age, loops.delayed),
     )
 
 
@@ -184,18 +172,12 @@ def fan(generator: np.random.Generator, load: Load) -> TruthEffect:  # noqa: ARG
     second = generator.uniform(0.0, 0.3)
     phases = generator.uniform(0.0, 2.0 * math.pi, 2)
 
-    def on_motion(t: np.ndarray, rows: np.ndarray, carry: object) -> tuple[np.ndarray, object]:
-        for amplitude, times, phase in ((size, 1.0, phases[0]), (second * size, 2.0, phases[1])):
-            omega = 2.0 * math.pi * hertz * times
-            rows[0] += amplitude * np.sin(omega * t + phase)
-            rows[1] += amplitude * omega * np.cos(omega * t + phase)
-        return rows, carry
-
+    parts = ((size, 1.0, phases[0]), (second * size, 2.0, phases[1]))
     return TruthEffect(
         family="interference",
         acts_on="sensor",
         description=(
             f"vibration of {size * 1e6:.3g} um at {hertz:.2f} Hz, {second:.2f} of that at twice"
         ),
-        on_motion=on_motion,
+        on_motion=tones(parts, hertz),
     )

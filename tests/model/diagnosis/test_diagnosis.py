@@ -15,12 +15,6 @@ import pytest
 from dearig.model.actuator import Actuator, Drive
 from dearig.model.diagnosis import Diagnosis, diagnose, search
 from dearig.model.diagnosis.bench import Trial
-from dearig.model.diagnosis.results import (
-    EXPLAINED,
-    NOTHING_MISSING,
-    PARTLY_EXPLAINED,
-    UNEXPLAINED,
-)
 from dearig.model.diagnosis.screening import Promise
 from dearig.model.diagnosis.search import _NOT_TRIED, _Search
 from dearig.model.effects import EFFECTS
@@ -28,6 +22,12 @@ from dearig.model.errors import ModelError
 from dearig.model.excitation import Sequence
 from dearig.model.material import TABLE_3, Network
 from dearig.model.records import ActuatorRecord
+from dearig.model.verdict import (
+    EXPLAINED,
+    NOTHING_MISSING,
+    PARTLY_EXPLAINED,
+    UNEXPLAINED,
+)
 from tests.tools.diagnoses import HIDDEN, of_hidden, plant
 from tests.tools.engine import (
     NOISE,

@@ -10,14 +10,14 @@ import pytest
 
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.bench import Trial
-from dearig.model.diagnosis.results import (
-    PARTLY_EXPLAINED,
-)
 from dearig.model.diagnosis.screening import Promise
 from dearig.model.diagnosis.search import _numbers, _Search, _Tried
 from dearig.model.effects import EFFECTS
 from dearig.model.fitting.problem import Problem
 from dearig.model.material import Network
+from dearig.model.verdict import (
+    PARTLY_EXPLAINED,
+)
 from tests.tools.diagnoses import HIDDEN, of_hidden
 from tests.tools.engine import (
     NOISE,
