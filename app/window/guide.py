@@ -47,7 +47,8 @@ class _Documents(QTextBrowser):
         self.anchorClicked.connect(self._follow)
         self.document().setDocumentMargin(16)
         self.document().setDefaultStyleSheet(_STYLE)
-        self.setSource(QUrl(_FIRST))
+        # by its type: Qt takes the ending .md for a file of the working folder
+        self.setSource(QUrl(_FIRST), QTextDocument.ResourceType.HtmlResource)
 
     def loadResource(self, kind: int, name: QUrl | str) -> Any:  # noqa: N802
         path = QUrl(name).path()

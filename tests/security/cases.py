@@ -243,7 +243,7 @@ IMPORTS = {
         _import("a.csv", lambda: b"time_s," * 100_000 + b"\n" + b"1," * 100_000), ("a.csv",)
     ),
     "CSV of line ends": Case(_import("a.csv", lambda: b"\n" * 20 * MILLION), ("empty",)),
-    "CSV of commas": Case(_import("a.csv", lambda: COLUMNS + b"," * 10 * MILLION), ("line 2",)),
+    "CSV of commas": Case(_import("a.csv", lambda: COLUMNS + b"," * 10 * MILLION), ("no data",)),
     "CSV of quotation marks": Case(_import("a.csv", lambda: COLUMNS + b'"' * 10 * MILLION)),
     "CSV with a number of 10 MB": Case(
         _import("a.csv", lambda: COLUMNS + b"0,0," + b"1" * 10 * MILLION + b"\n1,1,1\n"), code=None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 
 import pytest
@@ -42,6 +42,18 @@ kind = "half_sine"
 amplitude_kV = 6.0
 frequency_Hz = 2.0
 """
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_teardown() -> Generator[None]:
+    """Close what a failed test left in any state: nobody is there to answer a question.
+
+    pytest-qt closes the windows before any fixture ends.
+    """
+    for widget in QApplication.topLevelWidgets() if QApplication.instance() else ():
+        if isinstance(widget, MainWindow):
+            widget.leave()
+    yield
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import pytest
 from PySide6.QtCore import QUrl
 from PySide6.QtGui import QTextDocument
 from pytestqt.qtbot import QtBot
@@ -10,7 +13,10 @@ from dearig.docs import page_at, pages
 from dearig.window.guide import Guide
 
 
-def test_the_guide_opens_on_the_operators_page_with_its_pictures(qtbot: QtBot) -> None:
+def test_the_guide_opens_on_the_operators_page_with_its_pictures(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # the documents are those of the package, not of the working folder
     guide = Guide()
     qtbot.addWidget(guide)
     first = page_at("app/docs/window.md")

@@ -110,7 +110,7 @@ def test_a_wrong_sequence_is_refused_marked_and_mended(qtbot: QtBot, window: Mai
     assert page.preview.plots.marks == 2  # both periods
     assert not window.run_page.arm_button.isEnabled()
     retype("6, 6.5, seven, 9, 8")
-    assert "takes a number" in page.editor.form.fault("amplitudes_kV")
+    assert "is not a number" in page.editor.form.fault("amplitudes_kV")
     assert page.editor.table.item(0, 0).text() == "✗ 1"
     retype("6, 6.5, 7, 7.5, 8")
     assert "Within all limits" in page.preview.state.text()

@@ -164,10 +164,20 @@ def layout_of(head: str, encoding: str, path: Path, names_line: int | None = Non
     return table.layout(encoding, path, None if names_line is None else names_line - 1)
 
 
+def _too_wide(path: Path, columns: int) -> InputError:
+    return InputError(
+        f"{path} has {columns:,} columns or more; {COLUMNS_MAX:,} are read at most: see that it is "
+        f"the right file"
+    )
+
+
 def _no_table(lines: Sequence[str], start: int, path: Path) -> InputError:
     data = [line for line in lines[start:] if holds_data(line)]
     if not data:
         return InputError(f"{path} is empty")
+    widest = max(line.count(mark) + 1 for line in data for mark in _DELIMITERS if mark)
+    if widest > COLUMNS_MAX:
+        return _too_wide(path, widest)
     if len(data) == 1:
         return InputError(f"{path} has a line of names and no data")
     return InputError(
@@ -224,10 +234,7 @@ class _Table:
     def layout(self, encoding: str, path: Path, names_line: int | None) -> Layout:
         """Return the layout of the file, with the names that stand above the table."""
         if self.cells > COLUMNS_MAX:
-            raise InputError(
-                f"{path} has {self.cells:,} columns; {COLUMNS_MAX:,} are read at most: see that it "
-                f"is the right file"
-            )
+            raise _too_wide(path, self.cells)
         line, names, units = self._names(path, names_line)
         columns = tuple(
             column
