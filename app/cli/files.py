@@ -74,6 +74,10 @@ def import_(
     names_line: Annotated[
         int | None, typer.Option(help="Line of the names in a text file, from 1.")
     ] = None,
+    table: Annotated[
+        str | None,
+        typer.Option(help="Table of a file with several: a sheet, a specimen or a group."),
+    ] = None,
     skip_bad_rows: Annotated[
         bool,
         typer.Option(
@@ -128,7 +132,7 @@ def import_(
     options = ImportOptions(
         _columns(column or []), gauge_length_mm, area_mm2,
         None if kinematics is None else kinematics.value, rate, names_line, skip_bad_rows,
-        {} if settings is None else raw_scales(settings),
+        {} if settings is None else raw_scales(settings), table,
     )  # fmt: skip
     metadata = imported_metadata(
         rig_file, settings, film, notes,

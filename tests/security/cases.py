@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import os
 import socket
 import struct
 import tomllib
+import zipfile
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,6 +17,7 @@ from typing import Any
 import h5py
 import numpy as np
 import tomli_w
+from openpyxl import Workbook
 
 from tests.tools.command import LOBE, thesis_model
 from tests.tools.recordings import write_run
@@ -232,6 +235,27 @@ def _tdms_claim() -> bytes:
     return struct.pack("<4sIIQQ", b"TDSm", 0b1110, 4713, len(meta) + 8, len(meta)) + meta + bytes(8)
 
 
+SHEETS = b"http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+
+
+def _workbook(rows: bytes, before: bytes = b"", texts: bytes = b"") -> bytes:
+    """Return a workbook of one sheet with ``rows``, and ``before`` in front of it."""
+    file = io.BytesIO()
+    book = Workbook()
+    book.active.append(["time_s"])
+    book.save(file)
+    with zipfile.ZipFile(file) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    sheet = b'<worksheet xmlns="%b"><sheetData>%b</sheetData></worksheet>' % (SHEETS, rows)
+    parts["xl/worksheets/sheet1.xml"] = before + sheet
+    parts["xl/sharedStrings.xml"] = b'<sst xmlns="%b">%b</sst>' % (SHEETS, texts)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in parts.items():
+            archive.writestr(name, content)
+    return packed.getvalue()
+
+
 COLUMNS = b"time_s,voltage_V,displacement_m\n"
 IMPORTS = {
     "CSV of one line of 30 MB": Case(_import("a.csv", lambda: b"1," * 15 * MILLION), ("a.csv",)),
@@ -261,6 +285,16 @@ IMPORTS = {
     "CSV of zero bytes": Case(_import("a.csv", lambda: bytes(10 * MILLION)), ("a.csv",)),
     "MAT that unpacks to 2 GB": Case(_import("a.mat", _mat_bomb), ("unpacks",)),
     "MAT that claims 4e18 numbers": Case(_import("a.mat", _mat_claim), ("a.mat",)),
+    "workbook that unpacks to 128 MB": Case(
+        _import("a.xlsx", lambda: _workbook(b" " * 2**27)), ("unpacks",)
+    ),
+    "workbook with entities in entities": Case(
+        _import("a.xlsx", lambda: _workbook(b"", b'<!DOCTYPE a [<!ENTITY b "bbbb">]>')),
+        ("does not begin",),
+    ),
+    "workbook with 1,000,000 texts": Case(
+        _import("a.xlsx", lambda: _workbook(b"", texts=b"<si/>" * MILLION)), ("unpacks",)
+    ),
     "TDMS that claims 1e12 samples": Case(_import("a.tdms", _tdms_claim), ("a.tdms",)),
 }
 

@@ -100,6 +100,7 @@ def _serve() -> None:
 
 def _import_commands() -> None:
     """Import what commands import when they run, so that a fork costs only its own work."""
+    import openpyxl  # noqa: F401
     import rich.table  # noqa: F401
 
     import dearig.acquisition.check

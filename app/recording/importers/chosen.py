@@ -18,18 +18,23 @@ from dearig.recording.importers.labels import (
     Label,
     Target,
     label_of,
+    suggestion,
     target_name,
     target_of,
 )
-from dearig.recording.importers.source import Source, listing, no_such_column
+from dearig.recording.importers.source import Source, listing, no_such_column, part_of
 from dearig.recording.importers.units import UNITS, Scale
 
-__all__ = ["Chosen", "Pick", "choose", "own_name"]
+__all__ = ["Chosen", "Pick", "choose", "label_in", "own_name"]
 
 #: Largest output in V of a monitor of an amplifier or of a laser: the range of the card's inputs.
 MONITOR_MAX = 10.0
 #: Largest voltage in kV of a film, and largest displacement in mm, in a proposal.
 FILM_MAX = 30.0
+#: Tables of a file in which columns are looked for; measurements have fewer specimens.
+TABLES_TRIED = 64
+#: Smallest and largest stretch of a film, and what its first value differs from 1, in a proposal.
+STRETCH_MIN, STRETCH_MAX, AT_REST = 0.2, 15.0, 1e-3
 #: Unit of a column whose name has none, in a proposal.
 _LIKELY = MappingProxyType(
     {"time": "s", "voltage": "kV", "length": "mm", "force": "N", "stress": "MPa", "current": "mA",
@@ -68,6 +73,7 @@ class Chosen:
 
     source: Source
     picked: dict[str, Pick] = field(default_factory=dict)
+    table: str | None = None
     unsure: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
@@ -79,6 +85,8 @@ class Chosen:
         )
         for pair in given:
             words += ["--column", pair]
+        if self.table is not None:
+            words += ["--table", self.table]
         return shlex.join([*words, *more])
 
 
@@ -89,18 +97,84 @@ def own_name(source: Source, column: str) -> str:
     return re.sub(r" #\d+$", "", name)  # of a name that is there twice
 
 
+def label_in(source: Source, column: str) -> Label:
+    """Return what the name of ``column``, or else what its file says of it, tells."""
+    units: Mapping[str, str] = getattr(source, "units", {})
+    labels: Mapping[str, str] = getattr(source, "labels", {})
+    unit = units.get(column, "")
+    found = label_of(own_name(source, column), unit)
+    if found.quantities or found.raw or not labels.get(column):
+        return found
+    told = label_of(labels[column], unit)
+    return told if told.quantities or told.raw or not found.unit else found
+
+
 def choose(
-    source: Source, mapping: Mapping[str, str], raw: Mapping[str, Scale], *, timed: bool
+    source: Source,
+    mapping: Mapping[str, str],
+    raw: Mapping[str, Scale],
+    *,
+    timed: bool,
+    table: str | None = None,
 ) -> Chosen:
     """Return the columns of ``source`` that a recording needs.
 
     ``mapping`` has the column, with its scale if need be, by the name of the target; ``raw`` the
     scales of the rig file from volts at the card, by quantity, empty without one. A time column is
-    not looked for if ``timed``. Raises ``InputError`` for a wrong ``mapping``.
+    not looked for if ``timed``. Only the columns of ``table`` count if it is given; where the file
+    has several and one alone has all that is needed, that one is taken. Raises ``InputError`` for
+    a wrong ``mapping`` or ``table``.
     """
+    tables: Mapping[str, Sequence[str]] = getattr(source, "tables", {})
+    if table is not None:
+        if table not in tables:
+            raise InputError(
+                f"{source.path}: there is no table {table!r}; there are: {listing(list(tables))}"
+                f"{suggestion([table], tables)}"
+            )
+        chosen = _choose(part_of(source, tables[table]), mapping, raw, timed)
+        chosen.table = table
+        return chosen
+    whole = _whole(source, mapping, raw, timed)
+    if isinstance(whole, Chosen) and _suffices(whole, timed):
+        return whole
+    parts: dict[str, Chosen] = {}
+    for name in list(tables)[:TABLES_TRIED]:
+        try:
+            one = _choose(part_of(source, tables[name]), mapping, raw, timed)
+        except InputError:
+            continue
+        if _suffices(one, timed):
+            one.table, parts[name] = name, one
+    if not parts:
+        if isinstance(whole, InputError):
+            raise whole
+        return whole
+    default = getattr(source, "default_table", None)
+    name = default if default in parts else next(iter(parts))
+    found = parts[name]
+    if len(parts) > 1 and name != default:
+        found.unsure.append(f"there are several tables, and --table takes one: {listing([*parts])}")
+    elif len(tables) > 1:
+        found.notes.append(f"of {len(tables)} tables, {name!r} was taken")
+    return found
+
+
+def _whole(
+    source: Source, mapping: Mapping[str, str], raw: Mapping[str, Scale], timed: bool
+) -> Chosen | InputError:
+    """Return the choice among all columns, or why there is none."""
+    try:
+        return _choose(source, mapping, raw, timed)
+    except InputError as error:
+        return error
+
+
+def _choose(
+    source: Source, mapping: Mapping[str, str], raw: Mapping[str, Scale], timed: bool
+) -> Chosen:
     chosen = Chosen(source)
-    units: Mapping[str, str] = getattr(source, "units", {})
-    labels = {name: label_of(own_name(source, name), units.get(name, "")) for name in source.names}
+    labels = {name: label_in(source, name) for name in source.names}
     for name, text in mapping.items():
         pick = _asked(source, labels, raw, target_of(name), text)
         before = chosen.picked.get(pick.target.quantity)
@@ -109,8 +183,48 @@ def choose(
                 f"{pick.target.quantity} is given twice, as {before.target.name} and as {name}"
             )
         chosen.picked[pick.target.quantity] = pick
+    asked = set(chosen.picked)
     _Guess(chosen, labels, raw, timed).fill()
+    _leave_other_sizes(chosen, asked)
     return chosen
+
+
+def _suffices(chosen: Chosen, timed: bool) -> bool:
+    """Return True if ``chosen`` is sure, and all that a recording needs."""
+    there, step = chosen.picked, getattr(chosen.source, "step_s", None)
+    columns = [pick.column for pick in there.values()]
+    if chosen.unsure or not (
+        timed or "time" in there or (step is not None and step(columns) is not None)
+    ):
+        return False
+    if len(set(_sizes(chosen).values()) - {None}) > 1:
+        return getattr(chosen.source, "cut_short", False)
+    film = there.keys() & {"stretch", "strain", "displacement"} and there.keys() & {
+        "nominal_stress", "force"
+    }  # fmt: skip
+    return {"voltage", "displacement"} <= there.keys() or bool(film)
+
+
+def _sizes(chosen: Chosen) -> dict[str, int | None]:
+    """Return the number of values by quantity; None where the source does not tell."""
+    size = getattr(chosen.source, "size", None)
+    return {q: None if size is None else size(p.column) for q, p in chosen.picked.items()}
+
+
+def _leave_other_sizes(chosen: Chosen, asked: set[str]) -> None:
+    """Leave out guessed columns that a recording can do without and that have another length."""
+    sizes = _sizes(chosen)
+    wanted = next((sizes[q] for q in ("displacement", "stretch", "strain") if q in sizes), None)
+    if wanted is None or getattr(chosen.source, "cut_short", False):
+        return
+    for quantity in ("voltage_monitor", "current", "temperature"):
+        if quantity not in asked and sizes.get(quantity, wanted) != wanted:
+            column = chosen.picked.pop(quantity).column
+            chosen.notes.append(
+                f"the {quantity.replace('_', ' ')} was not imported: {column!r} has "
+                f"{sizes[quantity]} values and the displacement has {wanted}; columns at several "
+                f"rates are not resampled"
+            )
 
 
 def _asked(
@@ -259,7 +373,11 @@ class _Guess:
             if rising:
                 self._offer("time_s", rising[0])
                 names.remove(rising[0])
-        wanted = [q for q in ("voltage", "displacement") if q not in there]
+        if "displacement" not in there and len(names) > 1 and _is_stretch(values[names[0]]):
+            self._offer("stretch", names[0])
+            self._offer("nominal_stress_kPa", names[1])
+            names = []
+        wanted = [q for q in ("voltage", "displacement") if q not in there and names]
         if len(names) < len(wanted):
             return
         for quantity, column in zip(wanted, names, strict=False):
@@ -390,6 +508,12 @@ class _Guess:
         self._chosen.source.check(column)
         self._chosen.picked[target.quantity] = Pick(target, column, scale)
         self._free.remove(column)
+
+
+def _is_stretch(values: np.ndarray) -> bool:
+    """Return True if ``values`` seem to be a stretch: 1 at the start, and some times 1 later."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    return abs(float(values[0]) - 1.0) < AT_REST and low > STRETCH_MIN and 1.0 < high < STRETCH_MAX
 
 
 def _counts(values: np.ndarray) -> bool:

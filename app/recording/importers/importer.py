@@ -29,8 +29,9 @@ class Importer:
     sniff : callable
         Returns True if the first ``HEAD_BYTES`` of a file are of this format.
     text : bool
-        True for text tables, which are tried last; ``open`` then takes ``names_line`` and
-        ``skip_bad_rows`` by keyword too.
+        True for text tables, which are tried last.
+    takes : tuple of str
+        Options that ``open`` takes by keyword too: ``names_line``, ``skip_bad_rows``.
     """
 
     title: str
@@ -38,3 +39,4 @@ class Importer:
     open: Callable[..., Source]
     sniff: Callable[[bytes], bool]
     text: bool = False
+    takes: tuple[str, ...] = ()

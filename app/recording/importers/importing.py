@@ -46,6 +46,9 @@ class ImportOptions:
         Line of the names in a text file, from 1.
     skip_bad_rows : bool
         Leave out rows that cannot be used; their places become events of the recording.
+    table : str, optional
+        Table of a file with several: a sheet, a specimen, a group. By default the only one with
+        all the columns that are needed.
     raw : mapping of str to Scale
         Scales of a rig file from volts at the card, by quantity.
     """
@@ -58,6 +61,7 @@ class ImportOptions:
     names_line: int | None = None
     skip_bad_rows: bool = False
     raw: Mapping[str, Scale] = field(default_factory=dict)
+    table: str | None = None
 
     def __post_init__(self) -> None:
         if self.kinematics is not None and self.kinematics not in KINEMATICS:
@@ -101,7 +105,9 @@ def import_file(
     path, metadata = Path(source), metadata or RunMetadata()
     out = check_output(out, overwrite, path)
     table = source_at(path, names_line=options.names_line, skip_bad_rows=options.skip_bad_rows)
-    chosen = choose(table, options.columns, options.raw, timed=options.rate_Hz is not None)
+    chosen = choose(
+        table, options.columns, options.raw, timed=options.rate_Hz is not None, table=options.table
+    )
     if chosen.unsure:
         raise InputError(
             f"{path}: it is not sure what its columns are ({'; '.join(chosen.unsure)}). If this is "

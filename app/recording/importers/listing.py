@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from dearig.errors import InputError
-from dearig.recording.importers.chosen import own_name
-from dearig.recording.importers.labels import label_of
+from dearig.recording.importers.chosen import label_in
 from dearig.recording.importers.registry import source_at
 from dearig.recording.importers.source import printable
 
@@ -42,7 +41,7 @@ def preview(path: Path, names_line: int | None = None) -> list[ColumnPreview]:
             values = source.read([name])[name]
         except InputError:
             values = np.empty(0)
-        label = label_of(own_name(source, name), units.get(name, ""))
+        label = label_in(source, name)
         raw = (label.raw,) if label.raw and not label.quantities else ()
         found.append(
             ColumnPreview(

@@ -20,6 +20,7 @@ _OWN = MappingProxyType(
         "csv": "dearig.recording.importers.text_file:IMPORTER",
         "mat": "dearig.recording.importers.mat_file:IMPORTER",
         "parquet": "dearig.recording.importers.parquet_file:IMPORTER",
+        "xlsx": "dearig.recording.importers.excel_file:IMPORTER",
         "tdms": "dearig.recording.importers.tdms_file:IMPORTER",
     }
 )
@@ -46,8 +47,7 @@ def source_at(path: Path, **options: object) -> Source:
     """Return the columns of the file at ``path``. Raises ``InputError``.
 
     The importer is the one that recognises the first bytes; those that take the suffix come
-    first. ``options`` are those of text files: ``names_line`` and ``skip_bad_rows``; other formats
-    have no use for them.
+    first. It gets those ``options`` that it takes: ``names_line`` and ``skip_bad_rows``.
     """
     try:
         with open_input(path) as stream:
@@ -69,4 +69,4 @@ def source_at(path: Path, **options: object) -> Source:
         raise InputError(
             f"{path}: files named {', '.join(most)} and {last} can be imported, not {suffix!r}"
         )
-    return chosen.open(path, **options) if chosen.text else chosen.open(path)
+    return chosen.open(path, **{name: options[name] for name in chosen.takes if name in options})

@@ -6,14 +6,14 @@ import struct
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
 
 from dearig.errors import InputError
 from dearig.recording.importers.labels import suggestion
 
-__all__ = ["PARSER_FAILURES", "Source", "listing", "no_such_column", "printable"]
+__all__ = ["PARSER_FAILURES", "Source", "listing", "no_such_column", "part_of", "printable"]
 
 #: Exceptions of the libraries that parse binary formats, on damaged files.
 PARSER_FAILURES = (
@@ -40,11 +40,14 @@ LISTED = 12
 class Source(Protocol):
     """Columns of numbers in a file.
 
-    A source may have more, which is used where it is there: ``units``, those that the file gives,
-    by column; ``own_name(column)``, its name without a group or path; ``places``, columns by their
-    numbers from 1; ``step_s(columns)``, the time in s from row to row, or None; ``block``, the
-    cells of the lines above a table; ``skipped``, the rows before each one that was left out, and
-    its place in words; ``cut_short``, True if columns may end early.
+    A source may have more, which is used where it is there: ``units`` and ``labels``, what the file
+    says of columns beside their names; ``own_name(column)``, its name without a group or path;
+    ``places``, columns by their numbers from 1; ``tables``, the columns of each specimen, sheet or
+    group; ``size(column)``, its number of values; ``step_s(columns)``, the time in s from row to
+    row, or None, and ``step_from``, the name that it is from; ``cell(index, column)``, the text in
+    the file for a value that is no number; ``block``, the cells of the lines above a table;
+    ``skipped``, the rows before each one that was left out, and its place in words;
+    ``cut_short``, True if columns may end early; ``notes``, sentences on what was found.
     """
 
     @property
@@ -80,6 +83,25 @@ class Source(Protocol):
     def row(self, index: int) -> str:
         """Return the place of sample ``index`` (from 0) in the file, for a message."""
         ...
+
+
+class _Part:
+    """The columns ``names`` of ``source``, and all else as it has it."""
+
+    def __init__(self, source: Source, names: Sequence[str]) -> None:
+        self._source = source
+        self.names = list(names)
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._source, name)
+
+    def named(self, name: str) -> list[str]:
+        return [n for n in self._source.named(name) if n in self.names]
+
+
+def part_of(source: Source, names: Sequence[str]) -> Source:
+    """Return ``source`` with the columns ``names`` only."""
+    return cast(Source, _Part(source, names))
 
 
 def printable(name: str) -> str:

@@ -10,9 +10,7 @@ import codecs
 import csv
 import io
 import math
-import re
 from collections.abc import Iterator, Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import TextIO
 
@@ -21,10 +19,10 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.files import in_words
+from dearig.recording.importers.cells import complaint_about, number_in
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import no_such_column
 from dearig.recording.importers.text_layout import (
-    GROUPED,
     HEAD_CHARACTERS,
     Column,
     Layout,
@@ -32,7 +30,6 @@ from dearig.recording.importers.text_layout import (
     encoding_of,
     holds_data,
     layout_of,
-    moment_of,
 )
 
 __all__ = ["IMPORTER", "TextFile"]
@@ -41,8 +38,6 @@ __all__ = ["IMPORTER", "TextFile"]
 #: long that what is done once for each block does not count.
 BLOCK = 2**21
 _HEAD = 4 * HEAD_CHARACTERS  # bytes: a character has four at most
-#: A cell is quoted in messages up to this length.
-SHOWN = 30
 
 
 class TextFile:
@@ -73,6 +68,8 @@ class TextFile:
         self.layout: Layout = layout_of(head, encoding, path, names_line)
         self._columns = {column.name: column for column in self.layout.columns}
         self._skip = skip_bad_rows
+        self._side_by_side = bool(self.tables)
+        self._wanted: list[Column] = []  # columns that were read last
         #: rows before each row that was left out, and its line, in words
         self.skipped: list[tuple[int, str]] = []
         self._spans: list[tuple[int, int, int]] = []  # rows before, first line, rows of a block
@@ -93,6 +90,19 @@ class TextFile:
         return {column.place + 1: name for name, column in self._columns.items()}
 
     @property
+    def tables(self) -> dict[str, list[str]]:
+        """Columns of each specimen or table, where several stand side by side."""
+        found: dict[str, list[str]] = {}
+        for name, column in self._columns.items():
+            if column.group:
+                found.setdefault(column.group, []).append(name)
+        return found
+
+    def own_name(self, name: str) -> str:
+        """Return ``name`` without its specimen or table."""
+        return self._columns[name].own
+
+    @property
     def block(self) -> Sequence[Sequence[str]]:
         """Cells of the lines above the names."""
         return self.layout.block
@@ -103,8 +113,7 @@ class TextFile:
 
     def named(self, name: str) -> list[str]:
         """Return the columns called ``name``."""
-        again = re.compile(rf"{re.escape(name)} #\d+")
-        return [n for n in self._columns if n == name or again.fullmatch(n)]
+        return [n for n, column in self._columns.items() if name in (n, column.own)]
 
     def check(self, name: str) -> None:
         """See ``Source``."""
@@ -114,7 +123,7 @@ class TextFile:
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return columns by name; see ``Source``."""
         wanted = [self._columns[name] for name in dict.fromkeys(names)]
-        self.skipped, self._spans = [], []
+        self.skipped, self._spans, self._wanted = [], [], wanted
         pieces: list[np.ndarray] = []
         rows = 0
         for line, text in self._blocks():
@@ -134,7 +143,7 @@ class TextFile:
             if line != first:
                 continue
             for number, content in enumerate(text.splitlines(), line):
-                if holds_data(content) and f"line {number}" not in skipped:
+                if self._holds_data(content) and f"line {number}" not in skipped:
                     if left == 0:
                         return f"line {number}"
                     left -= 1
@@ -186,7 +195,7 @@ class TextFile:
         """
         rows: list[list[float]] = []
         for number, content in enumerate(text.splitlines(), line):
-            if not holds_data(content):
+            if not self._holds_data(content):
                 continue
             fault, values = self._row(content, wanted)
             if not fault:
@@ -199,6 +208,16 @@ class TextFile:
                 )
         return np.array(rows, dtype=np.float64).reshape(len(rows), len(wanted)).T
 
+    def _holds_data(self, content: str) -> bool:
+        """Return True if a line has a row of the columns that are read.
+
+        Of specimens side by side, one may be shorter than another.
+        """
+        if not holds_data(content) or not self._side_by_side:
+            return holds_data(content)
+        cells = cells_of(content, self.layout.delimiter)
+        return any(c.place < len(cells) and cells[c.place] for c in self._wanted)
+
     def _row(self, content: str, wanted: Sequence[Column]) -> tuple[str, list[float]]:
         """Return what is wrong with a line, empty if nothing is, and its values."""
         try:
@@ -209,9 +228,10 @@ class TextFile:
             return f": {len(cells)} values, and the table has {self.layout.cells} columns", []
         values = []
         for column in wanted:
-            value = _number(cells[column.place], column)
+            value = number_in(cells[column.place], column)
             if value is None or not math.isfinite(value):
-                return f", column {column.name!r}: {_complaint(cells[column.place], column)}", []
+                wrong = complaint_about(cells[column.place], value)
+                return f", column {column.name!r}: {wrong}", []
             values.append(value)
         return "", values
 
@@ -227,47 +247,6 @@ def _pieces(stream: TextIO, first: int) -> Iterator[tuple[int, str]]:
         line += text.count("\n")
 
 
-def _number(cell: str, column: Column) -> float | None:
-    """Return the number in ``cell``; of a date and time, seconds. None if it is neither."""
-    if column.since is not None:
-        return _seconds(cell, column.since)
-    text = cell
-    if column.thousands and column.thousands in text:
-        if not GROUPED.fullmatch(text):
-            return None
-        text = text.replace(column.thousands, "")
-    if column.decimal == ",":
-        if "." in text:
-            return None
-        text = text.replace(",", ".")
-    # float() also takes 1_000 and the digits of other scripts
-    if "_" in text or not text.isascii():
-        return None
-    try:
-        return float(text)
-    except ValueError:
-        return None
-
-
-def _seconds(cell: str, since: datetime) -> float | None:
-    moment = moment_of(cell)
-    try:
-        return None if moment is None else (moment - since).total_seconds()
-    except TypeError:  # one has a time zone and the other has none
-        return None
-
-
-def _complaint(cell: str, column: Column) -> str:
-    if not cell:
-        return "there is no value"
-    shown = cell if len(cell) <= SHOWN else f"{cell[:SHOWN]}..."
-    if _number(cell, column) is not None:
-        return f"{shown!r} is not a finite number"
-    if "," in cell and "." in cell:
-        return f"{shown!r} has both a comma and a point; write numbers without thousands separators"
-    return f"{shown!r} is not a number"
-
-
 def _sniff(head: bytes) -> bool:
     """Return True for the beginning of a text with a table of numbers."""
     path = Path("file")
@@ -281,4 +260,6 @@ def _sniff(head: bytes) -> bool:
 
 _SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".tra", ".lvm")
 
-IMPORTER = Importer("text table", _SUFFIXES, TextFile, _sniff, text=True)
+IMPORTER = Importer(
+    "text table", _SUFFIXES, TextFile, _sniff, True, ("names_line", "skip_bad_rows")
+)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import itertools
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -55,8 +56,10 @@ _LEAST = 2  # lines of data in a row that begin a table
 class Column:
     """A column of a text table: its name, the unit below the name, and its place from 0.
 
-    ``decimal`` is the sign before decimals, ``thousands`` that between groups of digits, or empty.
-    ``since`` is the first moment of a column of dates and times of day, which is read in s from it.
+    ``own`` is its name without ``group``, the specimen or table that it belongs to where there are
+    several side by side, and without the place behind a repeated name. ``decimal`` is the sign
+    before decimals, ``thousands`` that between groups of digits, or empty. ``since`` is the first
+    moment of a column of dates and times of day, which is read in s from it.
     """
 
     name: str
@@ -65,6 +68,8 @@ class Column:
     decimal: str = "."
     thousands: str = ""
     since: datetime | None = None
+    group: str = ""
+    own: str = ""
 
 
 @dataclass(frozen=True)
@@ -144,11 +149,17 @@ _MOMENTS = (
 )  # fmt: skip
 
 
-def layout_of(head: str, encoding: str, path: Path, names_line: int | None = None) -> Layout:
+def layout_of(
+    head: str,
+    encoding: str,
+    path: Path,
+    names_line: int | None = None,
+    delimiters: Sequence[str | None] = _DELIMITERS,
+) -> Layout:
     """Return the layout of the text that begins with ``head``.
 
-    ``names_line`` is the number of the line of names, from 1, where the user says it. Raises
-    ``InputError`` if there is no table of numbers.
+    ``names_line`` is the number of the line of names, from 1, where the user says it; one of
+    ``delimiters`` separates the cells. Raises ``InputError`` if there is no table of numbers.
     """
     lines = head.splitlines()
     if not any(map(str.strip, lines)):
@@ -156,7 +167,7 @@ def layout_of(head: str, encoding: str, path: Path, names_line: int | None = Non
     forced = re.fullmatch(r'"?sep=(.)"?\s*', lines[0])
     start = 1 if forced else 0
     labview = lines[0].startswith("LabVIEW Measurement")
-    options = (forced[1],) if forced else _DELIMITERS
+    options = (forced[1],) if forced else delimiters
     found = [t for d in options if (t := _Table.find(lines, start, d, labview))]
     if not found:
         raise _no_table(lines, start, path)
@@ -236,8 +247,9 @@ class _Table:
         if self.cells > COLUMNS_MAX:
             raise _too_wide(path, self.cells)
         line, names, units = self._names(path, names_line)
+        groups = self._groups(line, names)
         columns = tuple(
-            column
+            replace(column, group=groups[place])
             for place in range(self.cells)
             if (column := self._column(place, names, units)) is not None
         )
@@ -289,6 +301,37 @@ class _Table:
         numbers = sum(_is_number(cell, ",") for cell in named)
         return len(cells) >= used and len(named) > 0 and numbers == 0
 
+    def _groups(self, line: int, names: list[str]) -> list[str]:
+        """Return the specimen or table of each column; empty where there is only one.
+
+        A line above the names may say it, each at its first column, as merged cells of a
+        spreadsheet do; without one, names that repeat as a whole are numbered.
+        """
+        none = [""] * self.cells
+        named = [name for name in names[: self.cells] if name]
+        above = next((i for i in range(line - 1, self.start - 1, -1) if self.lines[i].strip()), -1)
+        if line >= 0 and above >= 0:
+            titles = (self._split(above) + none)[: self.cells]
+            starts = [i for i, title in enumerate(titles) if title]
+            blocks = [
+                set(filter(None, names[a:b])) for a, b in itertools.pairwise([*starts, self.cells])
+            ]
+            words = not any(_is_number(titles[i], ",") for i in starts)
+            if len(starts) > 1 and words and all(blocks) and blocks[0] & blocks[1]:
+                found = list(none)
+                for a, b in itertools.pairwise([*starts, self.cells]):
+                    found[a:b] = [titles[a]] * (b - a)
+                return found
+        once = len(set(named))
+        if once < 2 or once == len(named) or named != named[:once] * (len(named) // once):
+            return none
+        found, seen = list(none), 0
+        for place, name in enumerate(names[: self.cells]):
+            if name:
+                found[place] = str(seen // once + 1)
+                seen += 1
+        return found
+
     def _column(self, place: int, names: list[str], units: list[str]) -> Column | None:
         cells = [row[place] for row in self.sample if row[place]]
         if not cells:
@@ -339,14 +382,15 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 
 def _unique(columns: tuple[Column, ...]) -> tuple[Column, ...]:
-    """Return ``columns`` with the place behind names that repeat an earlier one."""
+    """Return ``columns`` with the group before their names, and the place behind repeated ones."""
     seen: Counter[str] = Counter()
     found = []
     for column in columns:
-        seen[column.name] += 1
-        again = seen[column.name] > 1
-        name = f"{column.name} #{column.place + 1}" if again else column.name
-        found.append(replace(column, name=name))
+        name = f"{column.group}/{column.name}" if column.group else column.name
+        seen[name] += 1
+        if seen[name] > 1:
+            name = f"{name} #{column.place + 1}"
+        found.append(replace(column, name=name, own=column.name))
     return tuple(found)
 
 

@@ -60,6 +60,7 @@ def values_of(
     can be.
     """
     values = Values(_kind(chosen), {}, notes=list(chosen.notes))
+    values.notes += getattr(chosen.source, "notes", ())
     if values.kind == "actuator":
         if "force" in chosen.picked:
             values.warnings.append("the force was not used: actuator data have none")
@@ -197,7 +198,11 @@ def _read(
     table = {q: raw[pick.column][:size] for q, pick in picked.items()}
     if step is not None:
         table["time"] = step * np.arange(size)
-        values.notes.append(f"time is counted from the first row, {step:.9g} s from row to row")
+        said = getattr(source, "step_from", "") if rate_Hz is None else ""
+        values.notes.append(
+            f"time is counted from the first row, {step:.9g} s from row to row"
+            f"{said and f', as {said} says'}"
+        )
     names = (
         {q: pick.column for q, pick in picked.items()}
         | {"time": "time"}
@@ -248,16 +253,20 @@ def _good_rows(
     Raises ``InputError`` for the first other one unless ``skip``.
     """
     source = chosen.source
+    finite = {quantity: np.isfinite(column) for quantity, column in table.items()}
     good = np.ones(table["time"].size, dtype=bool)
-    for quantity, column in table.items():
-        finite = np.isfinite(column)
-        if not finite.all() and not skip:
-            at = int(np.argmin(finite))
-            raise InputError(
-                f"{source.path}, {source.row(at)}, column {names[quantity]!r}: {column[at]} is not "
-                f"a finite number; --skip-bad-rows leaves such rows out"
-            )
-        good &= finite
+    for column in finite.values():
+        good &= column
+    if not skip and not good.all():
+        at = int(np.argmin(good))
+        quantity = next(q for q in table if not finite[q][at])
+        cell = getattr(source, "cell", None)
+        wrong = "" if cell is None else cell(at, names[quantity])
+        raise InputError(
+            f"{source.path}, {source.row(at)}, column {names[quantity]!r}: "
+            f"{wrong or f'{table[quantity][at]} is not a finite number'}; --skip-bad-rows leaves "
+            f"such rows out"
+        )
     seconds = table["time"]
     if not skip:
         if (back := not_forward(seconds)) is not None:

@@ -1,0 +1,55 @@
+"""Values of the cells of a table: numbers in the ways in which people write them, and moments."""
+
+from __future__ import annotations
+
+import math
+from datetime import datetime
+
+from dearig.recording.importers.text_layout import GROUPED, Column, moment_of
+
+__all__ = ["complaint_about", "number_in"]
+
+#: A cell is quoted in messages up to this length.
+SHOWN = 30
+
+
+def number_in(cell: str, column: Column) -> float | None:
+    """Return the number in ``cell``; of a date and time, seconds. None if it is neither."""
+    if column.since is not None:
+        return _seconds(cell, column.since)
+    text = cell
+    if column.thousands and column.thousands in text:
+        if not GROUPED.fullmatch(text):
+            return None
+        text = text.replace(column.thousands, "")
+    if column.decimal == ",":
+        if "." in text:
+            return None
+        text = text.replace(",", ".")
+    # float() also takes 1_000 and the digits of other scripts
+    if "_" in text or not text.isascii():
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _seconds(cell: str, since: datetime) -> float | None:
+    moment = moment_of(cell)
+    try:
+        return None if moment is None else (moment - since).total_seconds()
+    except TypeError:  # one has a time zone and the other has none
+        return None
+
+
+def complaint_about(cell: str, number: float | None) -> str:
+    """Return what is wrong with ``cell``, whose ``number`` is not finite or None."""
+    if not cell:
+        return "there is no value"
+    shown = cell if len(cell) <= SHOWN else f"{cell[:SHOWN]}..."
+    if number is not None and not math.isfinite(number):
+        return f"{shown!r} is not a finite number"
+    if "," in cell and "." in cell:
+        return f"{shown!r} has both a comma and a point; write numbers without thousands separators"
+    return f"{shown!r} is not a number"
