@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -44,6 +45,8 @@ def sample_of(name: str, run: Path, folder: Path) -> Path:
     if name == "tdms":
         with TdmsWriter(path) as writer:
             writer.write_segment([ChannelObject("rig", n, v) for n, v in columns.items()])
+    if name == "json":
+        path.write_text(json.dumps({n: v.tolist() for n, v in columns.items()}), "utf-8")
     if name == "xlsx":
         book = Workbook()
         for row in [list(columns), *np.column_stack(list(columns.values())).tolist()]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import zipfile
 from collections.abc import Iterable, Sequence
@@ -212,6 +213,99 @@ def test_what_looks_like_a_workbook_and_is_none(tmp_path: Path) -> None:
             archive.writestr(part, "x")
         with pytest.raises(InputError, match=match):
             imported(tmp_path / "in.zip")
+
+
+def as_rows(**more: object) -> list[dict[str, object]]:
+    return [{**dict(zip(NAMES, row, strict=True)), **more} for row in TABLE.tolist()]
+
+
+def as_columns() -> dict[str, list[float]]:
+    return dict(zip(NAMES, TABLE.T.tolist(), strict=True))
+
+
+START = datetime(2024, 3, 1, 23, 59, 59, 900_000)
+CHANNELS = [
+    {"name": name, "unit": unit, "data": values}
+    for name, unit, values in zip(
+        ("Time", "Voltage", "Travel"), ("s", "V", "mm"), TABLE.T.tolist(), strict=True
+    )
+]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        pytest.param(as_columns(), id="columns"),
+        pytest.param({"run": {"id": 7, "raw": as_columns()}, "by": ["me", "you"]}, id="nested"),
+        pytest.param(as_rows(remark="ok"), id="rows"),
+        pytest.param({"samples": [{"t": r} for r in as_rows()]}, id="rows in rows"),
+        pytest.param({"columns": NAMES, "index": [0], "data": TABLE.tolist()}, id="pandas split"),
+        pytest.param(
+            {k: dict(zip(map(str, range(ROWS)), v, strict=True)) for k, v in as_columns().items()},
+            id="pandas columns",
+        ),
+        pytest.param({"channels": CHANNELS}, id="channels"),
+        pytest.param({c["name"]: {**c, "name": "x"} for c in CHANNELS}, id="named"),
+        pytest.param(
+            {"units": {"time": "s", "u": "V", "x": "mm", "Travel": "mm"},
+             "time": CHANNELS[0]["data"], "u": CHANNELS[1]["data"], "Travel": CHANNELS[2]["data"]},
+            id="units beside",
+        ),
+        pytest.param([list(NAMES), *TABLE.tolist()], id="names first"),
+        pytest.param(
+            {"fs_Hz": 100.0, "data": {k: v for k, v in as_columns().items() if k != "time_s"}},
+            id="a rate",
+        ),
+        pytest.param(
+            {**as_columns(), "time_s": [(START + timedelta(seconds=t)).isoformat() for t in TIME]},
+            id="time stamps",
+        ),
+    ],
+)  # fmt: skip
+def test_json_in_the_ways_in_which_programs_write_it(tmp_path: Path, content: object) -> None:
+    path = tmp_path / "in.txt"
+    path.write_text(json.dumps(content, indent=1), "utf-8")
+    same(taken(path))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_json_lines(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "in.jsonl"
+    path.write_text("\n".join(map(json.dumps, as_rows())) + "\n", encoding)
+    same(taken(path))
+    path.write_text("\n".join(map(json.dumps, [NAMES, *TABLE.tolist()])), encoding)
+    same(taken(path))
+
+
+def test_what_is_wrong_in_json(tmp_path: Path) -> None:
+    path = tmp_path / "in.json"
+    lines = as_rows()
+    lines[4]["voltage_V"], lines[7]["displacement_mm"] = None, "OVER"
+    path.write_text("\n".join(map(json.dumps, lines)), "utf-8")
+    with pytest.raises(InputError, match="line 5, column 'voltage_V': there is no value; --skip-"):
+        imported(path)
+    imported(path, skip_bad_rows=True)
+    run = open_recording(tmp_path / "out.h5")
+    np.testing.assert_allclose(run.time, np.delete(TIME, [4, 7]))
+    path.write_text(json.dumps({"first": as_columns(), "second": as_columns()}), "utf-8")
+    same(taken(path))  # they are the same
+    other = {name: [2 * value for value in column] for name, column in as_columns().items()}
+    path.write_text(json.dumps({"first": other, "second": as_columns()}), "utf-8")
+    with pytest.raises(InputError, match="--table takes one: first, second"):
+        imported(path)
+    same(taken(path, table="second"))
+    for text, match in (
+        ("[" * 100_000, "nested too deeply"),
+        ('{"time_s": [1, 2', "cannot be read as a JSON file"),
+        ('{"a": "b"}', "holds no columns of numbers"),
+        (
+            '{"time_s": [1' + "0" * 5000 + ", 2]}",
+            "cannot be read as a JSON file: Exceeds the limit",
+        ),
+    ):
+        path.write_text(text, "utf-8")
+        with pytest.raises(InputError, match=match):
+            imported(path)
 
 
 def test_stretch_is_proposed_for_numbers_that_look_like_it(tmp_path: Path) -> None:

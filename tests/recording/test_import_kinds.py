@@ -125,6 +125,7 @@ def test_groups_of_thousands_are_read_where_they_are_sure(tmp_path: Path) -> Non
         (table("time_s,voltage_V,Laser (V)"), {"columns": {"displacement_mm": "Laser (V)"}},
          "is in V by its name, and displacement_mm asks for mm; if it is the output"),
         (table("time_s,voltage_V,Laser (V)"), {}, "the output of an instrument in V"),
+        (table("a #1,b #1,c #1"), {}, "no column for voltage"),
         (table("a,b,c"), {}, "--column time_s=a --column voltage_V=b --column displacement_mm=c"),
         (table("time_s,voltage_V,displacement_mm").replace("time_s,", "").replace("\n0", "\n0"),
          {}, "no column for|are not sure|not sure"),

@@ -285,6 +285,17 @@ IMPORTS = {
     "CSV of zero bytes": Case(_import("a.csv", lambda: bytes(10 * MILLION)), ("a.csv",)),
     "MAT that unpacks to 2 GB": Case(_import("a.mat", _mat_bomb), ("unpacks",)),
     "MAT that claims 4e18 numbers": Case(_import("a.mat", _mat_claim), ("a.mat",)),
+    "JSON of arrays in arrays": Case(_import("a.json", lambda: b"[" * MILLION), ("nested",)),
+    "JSON of 1,000,000 arrays": Case(
+        _import("a.json", lambda: b"[" + b"[]," * MILLION + b"[]]"), ("no columns",)
+    ),
+    "JSON of 1,000,000 objects": Case(
+        _import("a.json", lambda: b"[" + b'{"a":1},' * MILLION + b"{}]"), ("a.json",)
+    ),
+    "JSON of 1,000,000 names": Case(
+        _import("a.json", lambda: b"{%b}" % b",".join(b'"%d":[1,2]' % i for i in range(MILLION))),
+        ("a.json",),
+    ),
     "workbook that unpacks to 128 MB": Case(
         _import("a.xlsx", lambda: _workbook(b" " * 2**27)), ("unpacks",)
     ),

@@ -359,6 +359,8 @@ class _Guess:
         """Propose columns by their order, for an actuator: time, voltage, displacement."""
         source, there = self._chosen.source, self._chosen.picked
         names = [n for n in self._free if not re.search(r" #\d+$", n)]
+        if not names:
+            return
         try:
             values = source.read(names)
         except InputError:

@@ -18,6 +18,7 @@ __all__ = ["IMPORTERS", "source_at"]
 _OWN = MappingProxyType(
     {
         "csv": "dearig.recording.importers.text_file:IMPORTER",
+        "json": "dearig.recording.importers.json_file:IMPORTER",
         "mat": "dearig.recording.importers.mat_file:IMPORTER",
         "parquet": "dearig.recording.importers.parquet_file:IMPORTER",
         "xlsx": "dearig.recording.importers.excel_file:IMPORTER",
@@ -60,7 +61,7 @@ def source_at(path: Path, **options: object) -> Source:
     named = [importer for importer in IMPORTERS.values() if suffix in importer.suffixes]
     others = [importer for importer in IMPORTERS.values() if importer not in named]
     # text comes last: it is what is no other format
-    candidates = sorted(named, key=_is_text) + sorted(others, key=_is_text)
+    candidates = sorted([*named, *others], key=_is_text)
     chosen = next((importer for importer in candidates if importer.sniff(head)), None)
     if chosen is None and named:
         chosen = named[0]  # its error says what is wrong with the file
