@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import h5py
 
-__all__ = ["Refused", "dataset", "group", "item"]
+__all__ = ["Refused", "checked", "dataset", "group", "item"]
 
 #: Largest size that a dataset may claim, in multiples of its size in the file.
 PACKED_MAX = 100
@@ -30,7 +30,11 @@ def item(parent: h5py.Group, name: str, stored: bool = True) -> h5py.Group | h5p
     where = f"{parent.name.rstrip('/')}/{name}"
     if not isinstance(link, h5py.HardLink):
         raise Refused(f"{where} is a link, and links are not followed")
-    found = parent[name]
+    return checked(parent[name], stored)
+
+
+def checked(found: h5py.Group | h5py.Dataset, stored: bool = True) -> h5py.Group | h5py.Dataset:
+    """Return ``found``, an object of the file. Raises ``Refused`` as ``item`` does."""
     if isinstance(found, h5py.Dataset):
         _check_own(found)
         if stored:
@@ -57,5 +61,6 @@ def _check_own(values: h5py.Dataset) -> None:
 
 def _check_stored(values: h5py.Dataset) -> None:
     claimed, stored = int(values.nbytes), int(values.id.get_storage_size())
-    if claimed > stored * (PACKED_MAX if values.compression else 1):
+    filtered = values.id.get_create_plist().get_nfilters() > 0
+    if claimed > stored * (PACKED_MAX if filtered else 1):
         raise Refused(f"{values.name} claims {claimed} bytes and {stored} are stored")

@@ -7,6 +7,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from nptdms import ChannelObject, TdmsWriter
@@ -45,6 +46,10 @@ def sample_of(name: str, run: Path, folder: Path) -> Path:
     if name == "tdms":
         with TdmsWriter(path) as writer:
             writer.write_segment([ChannelObject("rig", n, v) for n, v in columns.items()])
+    if name == "h5":
+        with h5py.File(path, "w") as file:
+            for n, v in columns.items():
+                file[f"scan/{n}"] = v
     if name == "json":
         path.write_text(json.dumps({n: v.tolist() for n, v in columns.items()}), "utf-8")
     if name == "xlsx":

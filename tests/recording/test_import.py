@@ -376,7 +376,7 @@ def test_what_is_wrong_in_a_mat_file(
 
 def test_mat_files_that_cannot_be_read(tmp_path: Path) -> None:
     header = b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\x00\x02IM"
-    with pytest.raises(InputError, match=r"version 7\.3; save it in MATLAB with save"):
+    with pytest.raises(InputError, match=r"version 7\.3 and no HDF5 file behind it"):
         taken(csv(tmp_path, header + bytes(400), "in.mat"))
     with pytest.raises(InputError, match="cannot be read as a MAT file"):
         taken(csv(tmp_path, b"junk" * 100, "in.mat"))

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 import re
+import struct
 import zipfile
-from collections.abc import Iterable, Sequence
+import zlib
+from collections.abc import Callable, Iterable, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from openpyxl import Workbook
+from scipy.io import savemat
 
 from dearig.errors import InputError
 from dearig.recording import Recording, import_file, open_recording
@@ -306,6 +310,214 @@ def test_what_is_wrong_in_json(tmp_path: Path) -> None:
         path.write_text(text, "utf-8")
         with pytest.raises(InputError, match=match):
             imported(path)
+
+
+def hdf5(path: Path, content: Callable[[h5py.File], object], userblock: bytes = b"") -> Path:
+    with h5py.File(path, "w", userblock_size=512 if userblock else 0) as file:
+        content(file)
+    if userblock:
+        with path.open("r+b") as file:
+            file.write(userblock)
+    return path
+
+
+def scan(file: h5py.File, place: str = "scan", times: float = 1.0) -> None:
+    for name, values in zip(NAMES, times * TABLE.T, strict=True):
+        file[f"{place}/{name}"] = values
+
+
+def with_units(file: h5py.File) -> None:
+    for name, unit, values in zip(("time", "hv", "x"), ("s", "V", "mm"), TABLE.T, strict=True):
+        file[f"raw/{name}/data"] = values
+        file[f"raw/{name}/data"].attrs["units"] = np.bytes_(unit)
+    file["raw/x/data"].attrs["long_name"] = "Laser displacement"
+    file["raw/sample_rate_Hz"] = 7.0  # a column of time counts more
+
+
+def nexus(file: h5py.File) -> None:
+    file.attrs["default"] = "entry"
+    file.create_group("entry").attrs["default"] = "data"
+    scan(file, "entry/instrument", 2.0)
+    data = file["entry"].create_group("data")
+    data.attrs.update({"NX_class": "NXdata", "signal": "displacement_mm", "axes": ["clock"]})
+    data["clock"] = TABLE[:, 0] * 1e3
+    data["clock"].attrs["units"] = "ms since 2024-03-01 12:00:00"
+    data["voltage_V"] = TABLE[:, 1]
+    file["entry/laser"] = TABLE[:, 2]
+    data["displacement_mm"] = h5py.SoftLink("/entry/laser")
+
+
+def matrix(file: h5py.File) -> None:
+    file["log"] = TABLE
+    file["log"].attrs["columns"] = list(NAMES)
+
+
+def compound(file: h5py.File) -> None:
+    kind = np.dtype([(name, "f8") for name in NAMES] + [("remark", "S3")])
+    file["table"] = np.array([(*row, b"ok") for row in TABLE], dtype=kind)
+
+
+def a_rate(file: h5py.File) -> None:
+    scan(file)
+    del file["scan/time_s"]
+    file["fs"] = 100.0
+
+
+@pytest.mark.parametrize("content", [scan, with_units, nexus, matrix, compound, a_rate])
+def test_hdf5_of_other_programs(tmp_path: Path, content: Callable[[h5py.File], object]) -> None:
+    same(taken(hdf5(tmp_path / "in.dat", content)))
+
+
+def test_groups_of_an_hdf5_file_are_chosen_from(tmp_path: Path) -> None:
+    def content(file: h5py.File) -> None:
+        scan(file, "run1", 2.0)
+        scan(file, "run2")
+        file["run3/time_s"] = TIME
+
+    path = hdf5(tmp_path / "in.h5", content)
+    with pytest.raises(InputError, match="--table takes one: run1, run2"):
+        imported(path)
+    same(taken(path, table="run2"))
+    columns = {name: f"run2/{name}" for name in NAMES}
+    same(taken(path, columns=columns))
+    assert "run1/time_s" in [column.name for column in preview(path)]
+
+
+def refs(file: h5py.File) -> None:
+    """Two runs as MATLAB keeps an array of structs: fields of references to hidden datasets."""
+    hidden = file.create_group("#refs#")
+    for name, values in zip(NAMES, TABLE.T, strict=True):
+        kept = []
+        for times in (2.0, 1.0):
+            hidden[f"{name}{times:g}"] = times * values[None, :]
+            kept.append(hidden[f"{name}{times:g}"].ref)
+        file.create_dataset(f"run/{name}", data=[kept], dtype=h5py.ref_dtype)
+    file["run"].attrs["MATLAB_class"] = np.bytes_("struct")
+
+
+def turned(file: h5py.File) -> None:
+    """A matrix of three columns, whose rows and columns MATLAB exchanges."""
+    file["log"] = TABLE.T
+    file["log"].attrs["MATLAB_class"] = np.bytes_("double")
+    file["fs"] = [[50.0]]
+
+
+def test_mat_of_version_7_3(tmp_path: Path) -> None:
+    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
+    path = hdf5(tmp_path / "in.mat", refs, head)
+    with pytest.raises(InputError, match=r"--table takes one: run\(1\), run\(2\)"):
+        imported(path)
+    same(taken(path, table="run(2)"))
+    path = hdf5(path, turned, head)
+    columns = {name: f"log[{i}]" for i, name in enumerate(NAMES)}
+    same(taken(path, columns=columns))
+    path = hdf5(
+        path, lambda file: file.create_dataset("t", data=[1]).attrs.update(MATLAB_object_decode=3),
+        head,
+    )  # fmt: skip
+    with pytest.raises(InputError, match=r"objects of MATLAB .* save their columns with"):
+        imported(path)
+
+
+def test_hostile_hdf5_is_a_sentence(tmp_path: Path) -> None:
+    def claims(file: h5py.File) -> None:
+        file.create_dataset("time_s", shape=(10**12,), chunks=(1000,), dtype="f8")
+
+    def outside(file: h5py.File) -> None:
+        scan(file)
+        del file["scan/voltage_V"]
+        file["scan/voltage_V"] = h5py.ExternalLink("/etc/passwd", "/x")
+        file["loop"] = file["/"]
+
+    with pytest.raises(InputError, match="holds no columns of numbers"):
+        imported(hdf5(tmp_path / "in.h5", claims))
+    with pytest.raises(InputError, match="no column for voltage"):
+        imported(hdf5(tmp_path / "in.h5", outside))
+    scan_run = tmp_path / "out.h5"
+    same(taken(hdf5(tmp_path / "in.h5", scan)))
+    with pytest.raises(InputError, match="is a recording already: give it to the commands"):
+        import_file(scan_run, tmp_path / "again.h5", now=Clock())
+
+
+def array_of(name: bytes, body: bytes, kind: int = 6) -> bytes:
+    """Return the element of a MAT variable (n,) of doubles."""
+
+    def element(code: int, content: bytes) -> bytes:
+        return struct.pack("<2I", code, len(content)) + content + bytes(-len(content) % 8)
+
+    shape = struct.pack("<2i", len(body) // 8, 1)
+    return element(14, element(6, struct.pack("<2I", kind, 0)) + element(5, shape)
+                   + element(1, name) + element(9, body))  # fmt: skip
+
+
+MAT_HEAD = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+
+
+def test_a_mat_variable_whose_stream_has_no_end_is_read(tmp_path: Path) -> None:
+    """MATLAB leaves the end out where a variable takes whole blocks of 65536 bytes."""
+    parts = []
+    for name, values in zip(NAMES, TABLE.T, strict=True):
+        packing = zlib.compressobj()
+        body = packing.compress(array_of(name.encode(), values.tobytes()))
+        body += packing.flush(zlib.Z_SYNC_FLUSH)
+        parts.append(struct.pack("<2I", 15, len(body)) + body)
+    path = tmp_path / "in.mat"
+    path.write_bytes(MAT_HEAD + b"".join(parts))
+    same(taken(path))
+    cut = parts[2][8:-40]
+    path.write_bytes(MAT_HEAD + parts[0] + parts[1] + struct.pack("<2I", 15, len(cut)) + cut)
+    with pytest.raises(InputError, match="is truncated: the variable at byte"):
+        imported(path)
+
+
+RAW = dict(zip(NAMES[1:], TABLE.T[1:], strict=True))
+
+
+def cells(*values: np.ndarray) -> np.ndarray:
+    found = np.empty((1, len(values)), dtype=object)
+    for place, value in enumerate(values):
+        found[0, place] = value
+    return found
+
+
+def signals(values: np.ndarray) -> np.ndarray:
+    """Return what Simulink calls a structure with time."""
+    kind = [("values", "O"), ("label", "O"), ("unit", "O")]
+    rows = zip(("Voltage", "Travel"), ("V", "mm"), values.T[1:], strict=True)
+    return np.array([[(column[:, None], label, unit) for label, unit, column in rows]], dtype=kind)
+
+
+@pytest.mark.parametrize(
+    ("content", "options"),
+    [
+        ({"runs": cells(2 * TIME, TIME)}, None),
+        ({"fs": 100.0, **RAW}, {}),
+        ({"dt_ms": 10.0, **RAW}, {}),
+        ({"log": np.array([list(NAMES), *TABLE.tolist()], dtype=object)}, {}),
+        ({"out": {"time_s": TIME, "signals": signals(TABLE)}}, {}),
+        (
+            {"run": np.array([[tuple(2 * TABLE.T), tuple(TABLE.T)]], [(n, "O") for n in NAMES])},
+            {"table": "run(2)"},
+        ),
+    ],
+    ids=["cells", "a rate", "a step", "cells of a table", "signals", "structs"],
+)
+def test_what_mat_files_hold(
+    tmp_path: Path, content: dict[str, object], options: dict[str, object] | None
+) -> None:
+    path = tmp_path / "in.mat"
+    savemat(path, content)
+    if options is None:
+        assert [column.name for column in preview(path)] == ["runs{1}", "runs{2}"]
+    else:
+        same(taken(path, **options))
+
+
+def test_objects_of_matlab_are_named_as_such(tmp_path: Path) -> None:
+    path = tmp_path / "in.mat"
+    path.write_bytes(MAT_HEAD + array_of(b"t", b"", kind=17))
+    with pytest.raises(InputError, match=r"objects of MATLAB \(tables, timetables, time series\)"):
+        imported(path)
 
 
 def test_stretch_is_proposed_for_numbers_that_look_like_it(tmp_path: Path) -> None:

@@ -256,6 +256,13 @@ def _workbook(rows: bytes, before: bytes = b"", texts: bytes = b"") -> bytes:
     return packed.getvalue()
 
 
+def _hdf5_claim() -> bytes:
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
+        file.create_dataset("time_s", shape=(10**12,), chunks=(1000,), dtype="f8")
+    return content.getvalue()
+
+
 COLUMNS = b"time_s,voltage_V,displacement_m\n"
 IMPORTS = {
     "CSV of one line of 30 MB": Case(_import("a.csv", lambda: b"1," * 15 * MILLION), ("a.csv",)),
@@ -296,6 +303,7 @@ IMPORTS = {
         _import("a.json", lambda: b"{%b}" % b",".join(b'"%d":[1,2]' % i for i in range(MILLION))),
         ("a.json",),
     ),
+    "HDF5 that claims 1e12 numbers": Case(_import("a.h5", _hdf5_claim), ("no columns",)),
     "workbook that unpacks to 128 MB": Case(
         _import("a.xlsx", lambda: _workbook(b" " * 2**27)), ("unpacks",)
     ),

@@ -11,15 +11,30 @@ from __future__ import annotations
 import itertools
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from types import MappingProxyType
+from typing import TypeAlias
 
 import numpy as np
 
-__all__ = ["Damaged", "Value", "columns", "variables"]
+__all__ = ["Cells", "Damaged", "Opaque", "Value", "variables"]
 
-#: An array of numbers, text, the fields of a struct, or None for anything else.
-Value = np.ndarray | str | dict[str, "Value"] | None
+
+class Cells(list["Value"]):
+    """Cells of an array, column by column, of ``rows`` each."""
+
+    def __init__(self, values: Iterable[Value], rows: int) -> None:
+        super().__init__(values)
+        self.rows = rows
+
+
+class Opaque:
+    """An object of a class of MATLAB, such as a table, which only MATLAB reads."""
+
+
+#: An array of numbers, text, the fields of a struct, the structs of an array, or None for
+#: anything else.
+Value: TypeAlias = "np.ndarray | str | dict[str, Value] | list[Value] | Cells | Opaque | None"
 
 HEADER = 128
 VERSION_5, VERSION_7_3 = 0x0100, 0x0200
@@ -27,7 +42,7 @@ MATRIX, COMPRESSED, UTF8, UTF16, UTF32 = 14, 15, 16, 17, 18
 NUMBERS = MappingProxyType(
     {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 )
-CELL, STRUCT, OBJECT, CHAR = 1, 2, 3, 4
+CELL, STRUCT, OBJECT, CHAR, OPAQUE = 1, 2, 3, 4, 17
 #: Classes of arrays of numbers.
 NUMERIC = range(6, 16)
 COMPLEX = 0x08
@@ -37,8 +52,8 @@ DEEPEST = 8
 UNPACKED_MAX, PACKED_MAX = 2**28, 100
 #: Bytes that are unpacked at once to count them.
 COUNTED_AT_ONCE = 2**20
-#: Largest number of fields, cells or columns, and of items in all; measurements have fewer.
-FIELDS_MAX, ITEMS_MAX = 4096, 200_000
+#: Largest number of fields or columns, of cells, and of items in all; measurements have fewer.
+FIELDS_MAX, CELLS_MAX, ITEMS_MAX = 4096, 30_000, 200_000
 
 
 class Damaged(Exception):  # noqa: N818  (what happened to the file, said by the importer)
@@ -104,7 +119,7 @@ def variables(raw: bytes) -> dict[str, Value]:
     version = struct.unpack_from(f"{order}H", raw, 124)[0]
     if version == VERSION_7_3:
         raise Damaged(
-            "is a MAT file of version 7.3; save it in MATLAB with save(..., '-v7') and import that"
+            "is damaged: it has the header of a MAT file of version 7.3 and no HDF5 file behind it"
         )
     if version != VERSION_5:
         raise Damaged(f"is a MAT file of unknown version {version:#06x}")
@@ -115,18 +130,18 @@ def variables(raw: bytes) -> dict[str, Value]:
         top.where = f"at byte {HEADER + top.at}"
         kind, body = top.element()
         if kind == COMPRESSED:
-            unpacked = _unpacked(body, room, top.where)
+            unpacked = _unpacked(body, order, room, top.where)
             room -= len(unpacked)
             kind, body = top.inside(memoryview(unpacked)).element()
         if kind != MATRIX:
             raise Damaged(f"is damaged: there is no variable at byte {HEADER + top.at}")
         name, value = _matrix(top.inside(body), 0)
-        if not name.startswith("__"):
+        if name and not name.startswith("__"):
             found[name] = value
     return found
 
 
-def _unpacked(body: memoryview, room: int, where: str) -> bytes:
+def _unpacked(body: memoryview, order: str, room: int, where: str) -> bytes:
     # unpacked twice: the first time only to count, so that a bomb takes no memory
     try:
         counting, size, left = zlib.decompressobj(), 0, bytes(body)
@@ -137,12 +152,22 @@ def _unpacked(body: memoryview, room: int, where: str) -> bytes:
             size, left = size + len(piece), counting.unconsumed_tail
         if size > room:
             raise Damaged(f"is not read: the variable {where} unpacks to more than {room} bytes")
-        # only the end of the stream checks its checksum
-        if not counting.eof:
-            raise Damaged(f"is truncated: the variable {where} is incomplete")
-        return zlib.decompressobj().decompress(body, max(size, 1))
+        found = zlib.decompressobj().decompress(body, max(size, 1))
     except zlib.error as error:
         raise Damaged(f"is damaged: the variable {where}: {error}") from error
+    # only the end of the stream checks its checksum; MATLAB leaves it out after some variables,
+    # of 65536 bytes for instance, whose element is whole then
+    if not counting.eof and not _is_whole(found, order):
+        raise Damaged(f"is truncated: the variable {where} is incomplete")
+    return found
+
+
+def _is_whole(element: bytes, order: str) -> bool:
+    """Return True if ``element`` has as many bytes as its tag says."""
+    if len(element) < 8:
+        return False
+    kind, size = struct.unpack_from(f"{order}2I", element)
+    return bool(kind == MATRIX and len(element) >= 8 + size)
 
 
 def _matrix(items: _Bytes, depth: int) -> tuple[str, Value]:
@@ -152,6 +177,8 @@ def _matrix(items: _Bytes, depth: int) -> tuple[str, Value]:
     if flags.dtype.kind != "u" or flags.dtype.itemsize != 4 or flags.size < 1:
         raise Damaged(f"is damaged in the variable {items.where}: no array flags")
     array_class, complex_ = int(flags[0]) & 0xFF, bool(int(flags[0]) >> 8 & COMPLEX)
+    if array_class == OPAQUE:
+        return bytes(items.element()[1]).decode("latin-1"), Opaque()
     shape = [int(n) for n in items.numbers(*items.element())]
     name = bytes(items.element()[1]).decode("latin-1")
     if not shape or min(shape) < 0 or len(shape) > 32:
@@ -166,20 +193,21 @@ def _matrix(items: _Bytes, depth: int) -> tuple[str, Value]:
     if array_class == CHAR:
         return name, _text(items, shape, size)
     if array_class == CELL:
-        cells = [_next(items, depth) for _ in _few(size, items)]
-        return name, cells[0] if size == 1 else None
+        return name, Cells([_next(items, depth) for _ in _few(size, items)], shape[0])
     if array_class in (STRUCT, OBJECT):
         if array_class == OBJECT:
             items.element()
         fields = _fields(items)
         _few(size * len(fields), items)
-        values = [(field, _next(items, depth)) for _ in range(size) for field in fields]
-        return name, dict(values) if size == 1 else None
+        structs: list[Value] = [
+            {field: _next(items, depth) for field in fields} for _ in range(size)
+        ]
+        return name, structs[0] if size == 1 else structs
     return name, None
 
 
 def _few(size: int, items: _Bytes) -> range:
-    if size > FIELDS_MAX:
+    if size > CELLS_MAX:
         raise Damaged(f"is not read: the variable {items.where} has {size} cells")
     return range(size)
 
@@ -222,16 +250,3 @@ def _text(items: _Bytes, shape: list[int], size: int) -> str | None:
     if encoding in ("utf-16", "utf-32"):
         encoding += "-le" if items.order == "<" else "-be"
     return bytes(body).decode(encoding, "replace")
-
-
-def columns(name: str, value: Value) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield path and numbers (n,) float64 of every column in ``value``, called ``name``."""
-    if isinstance(value, dict):
-        for field, inner in value.items():
-            yield from columns(f"{name}.{field}", inner)
-    elif isinstance(value, np.ndarray) and value.size and value.ndim <= 2:
-        if 1 in value.shape or value.ndim < 2:
-            yield name, value.reshape(-1).astype(np.float64)
-        elif value.shape[1] <= FIELDS_MAX:
-            for i in range(value.shape[1]):
-                yield f"{name}[{i}]", value[:, i].astype(np.float64)

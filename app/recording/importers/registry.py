@@ -22,6 +22,7 @@ _OWN = MappingProxyType(
         "mat": "dearig.recording.importers.mat_file:IMPORTER",
         "parquet": "dearig.recording.importers.parquet_file:IMPORTER",
         "xlsx": "dearig.recording.importers.excel_file:IMPORTER",
+        "h5": "dearig.recording.importers.hdf5_file:IMPORTER",
         "tdms": "dearig.recording.importers.tdms_file:IMPORTER",
     }
 )

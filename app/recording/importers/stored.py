@@ -28,7 +28,7 @@ class Stored:
     size : int, optional
         Number of values, where it is known before they are read.
     own : str
-        Its name without its path.
+        Its name without its path; of a column of a matrix, with its number: ``x[2]``.
     unit, label : str
         What the file says of it beside its name.
     table : str
@@ -113,8 +113,8 @@ class StoredColumns:
         return {table: [*shared, *names] for table, names in found.items()}
 
     def own_name(self, name: str) -> str:
-        """Return ``name`` without its path."""
-        return self._columns[name].own
+        """Return ``name`` without its path, and without its number in a matrix."""
+        return re.sub(r"\[\d+\]$", "", self._columns[name].own)
 
     def named(self, name: str) -> list[str]:
         """Return the columns whose path is ``name`` or ends with it."""
