@@ -14,6 +14,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from nptdms import ChannelObject, TdmsWriter
 from openpyxl import Workbook
 from scipy.io import savemat
 
@@ -518,6 +519,129 @@ def test_objects_of_matlab_are_named_as_such(tmp_path: Path) -> None:
     path.write_bytes(MAT_HEAD + array_of(b"t", b"", kind=17))
     with pytest.raises(InputError, match=r"objects of MATLAB \(tables, timetables, time series\)"):
         imported(path)
+
+
+STEP = {"wf_increment": 0.01, "wf_start_offset": 0.0}
+
+
+def tdms(path: Path, *channels: ChannelObject) -> Path:
+    with TdmsWriter(str(path)) as writer:
+        writer.write_segment(list(channels))
+    return path
+
+
+def channels(**more: object) -> list[ChannelObject]:
+    return [ChannelObject("Log", n, v, {**STEP, **more}) for n, v in RAW.items()]
+
+
+def test_tdms_of_several_rates(tmp_path: Path) -> None:
+    slow = ChannelObject("Slow", "temperature_C", np.full(6, 23.0), {"wf_increment": 0.1})
+    path = tdms(tmp_path / "in.tdms", *channels(), slow)
+    done = imported(path)
+    same(open_recording(tmp_path / "out.h5"))
+    assert any("temperature was not imported: 'Slow/temperature_C' has 6" in n for n in done.notes)
+    with pytest.raises(InputError, match=r"have different times: .* every 0.1 s .* not resampled"):
+        imported(path, columns={"temperature_C": "Slow/temperature_C"})
+    fast = ChannelObject("Fast", "Laser (mm)", np.zeros(600), {"wf_increment": 0.001})
+    with pytest.raises(InputError, match=r"every 0.001 s from 0 s; they are not resampled here"):
+        imported(tdms(path, channels()[0], fast))
+    start = np.datetime64("2024-03-01T12:00:00.000000")
+    later = {**STEP, "wf_start_time": start + np.timedelta64(2, "s")}
+    late = ChannelObject("Late", "Laser (mm)", np.zeros(ROWS), later)
+    with pytest.raises(InputError, match=r"every 0\.01 s from 2 s; they are not resampled"):
+        imported(tdms(path, channels(wf_start_time=start)[0], late))
+
+
+def test_tdms_units_scales_and_time_stamps(tmp_path: Path) -> None:
+    monitor = {**STEP, "unit_string": "kV"}
+    path = tdms(
+        tmp_path / "in.tdms",
+        ChannelObject("Log", "HV monitor", VOLTAGE / 1e3, monitor),
+        ChannelObject("Log", "Laser", MOVED * 1e6, {**STEP, "unit_string": "µm"}),
+    )
+    same(taken(path))
+    scale = {
+        "NI_Scaling_Status": "unscaled", "NI_Number_Of_Scales": 1,
+        "NI_Scale[0]_Scale_Type": "Linear", "NI_Scale[0]_Linear_Slope": 0.25,
+        "NI_Scale[0]_Linear_Y_Intercept": 0.0, "NI_Scale[0]_Linear_Input_Source": 0xFFFFFFFF,
+    }  # fmt: skip
+    counts = np.round(VOLTAGE * 4).astype(np.int16)
+    start = np.datetime64("2024-03-01T23:59:59.900000")
+    stamps = start + np.round(TIME * 1e6).astype("timedelta64[us]")
+    path = tdms(
+        path,
+        ChannelObject("Log", "voltage_V", counts, scale),
+        ChannelObject("Log", "displacement_mm", MOVED * 1e3),
+        ChannelObject("Log", "time_s", stamps),
+    )
+    run = taken(path)
+    np.testing.assert_array_equal(run.voltage_command, counts * 0.25)
+    np.testing.assert_allclose(run.time, TIME, atol=1e-9)
+
+
+def big_endian() -> bytes:
+    """Return a file as a big-endian computer writes it; only the flags stay little-endian."""
+
+    def text(value: str) -> bytes:
+        return struct.pack(">I", len(value)) + value.encode()
+
+    objects = b""
+    for name in RAW:
+        objects += text(f"/'Log'/'{name}'") + struct.pack(">IIIQ", 20, 10, 1, ROWS)
+        objects += struct.pack(">I", 1) + text("wf_increment") + struct.pack(">Id", 10, 0.01)
+    meta = struct.pack(">I", len(RAW)) + objects
+    raw = b"".join(values.astype(">f8").tobytes() for values in RAW.values())
+    flags = (1 << 1) | (1 << 2) | (1 << 3) | (1 << 6)
+    sizes = struct.pack(">IQQ", 4713, len(meta) + len(raw), len(meta))
+    return b"TDSm" + struct.pack("<I", flags) + sizes + meta + raw
+
+
+def test_tdms_of_a_big_endian_computer(tmp_path: Path) -> None:
+    path = tmp_path / "in.tdms"
+    path.write_bytes(big_endian())
+    assert not any("ends early" in doubt for doubt in imported(path).doubts)
+    same(open_recording(tmp_path / "out.h5"))
+
+
+def test_tdms_that_was_not_closed(tmp_path: Path) -> None:
+    """The last segment says that its writing was not completed, and lacks some values."""
+    path = tdms(tmp_path / "in.tdms", *channels())
+    whole = path.read_bytes()
+    last = whole[:12] + struct.pack("<Q", 2**64 - 1) + whole[20:]
+    path.write_bytes(whole + last[: -8 * 20])
+    done = imported(path)
+    assert any("ends early" in doubt for doubt in done.doubts)
+    assert open_recording(tmp_path / "out.h5").samples == 2 * ROWS - 20
+
+
+def parquet(path: Path, **columns: object) -> Path:
+    pytest.importorskip("pyarrow")
+    import pyarrow
+    from pyarrow.parquet import write_table
+
+    write_table(pyarrow.table(columns), path)
+    return path
+
+
+def test_parquet_of_time_stamps_and_structs(tmp_path: Path) -> None:
+    stamps = np.datetime64("2024-03-01T23:59:59.9", "ns") + np.round(TIME * 1e9).astype("m8[ns]")
+    same(taken(parquet(tmp_path / "in.parquet", **{**RAW, "time_s": stamps})))
+    run = [dict(zip(NAMES, row, strict=True)) for row in TABLE.tolist()]
+    same(taken(parquet(tmp_path / "in.parquet", run=run)))
+    clock = [(START + timedelta(seconds=t)).time() for t in TIME]
+    found = taken(parquet(tmp_path / "in.parquet", **{**RAW, "time": clock}), skip_bad_rows=True)
+    np.testing.assert_allclose(found.time, 86399.9 + TIME[:10])
+
+
+def test_rows_of_a_parquet_file_without_values_are_left_out(tmp_path: Path) -> None:
+    moved = [None if i == 7 else d for i, d in enumerate(TABLE[:, 2].tolist())]
+    volts = np.where(TIME[9] == TIME, np.nan, VOLTAGE)
+    path = parquet(tmp_path / "in.parquet", time_s=TIME, voltage_V=volts, displacement_mm=moved)
+    with pytest.raises(InputError, match="row 8, column 'displacement_mm': there is no value; --"):
+        imported(path)
+    done = imported(path, skip_bad_rows=True)
+    assert any("2 rows were left out" in doubt for doubt in done.doubts)
+    np.testing.assert_allclose(open_recording(tmp_path / "out.h5").time, np.delete(TIME, [7, 9]))
 
 
 def test_stretch_is_proposed_for_numbers_that_look_like_it(tmp_path: Path) -> None:

@@ -215,14 +215,17 @@ def _leave_other_sizes(chosen: Chosen, asked: set[str]) -> None:
     """Leave out guessed columns that a recording can do without and that have another length."""
     sizes = _sizes(chosen)
     wanted = next((sizes[q] for q in ("displacement", "stretch", "strain") if q in sizes), None)
-    if wanted is None or getattr(chosen.source, "cut_short", False):
+    if wanted is None:
         return
+    # columns of a file that was not closed differ by the values of one write
+    least = wanted // 2 if getattr(chosen.source, "cut_short", False) else wanted
     for quantity in ("voltage_monitor", "current", "temperature"):
-        if quantity not in asked and sizes.get(quantity, wanted) != wanted:
+        size = sizes.get(quantity)
+        if quantity not in asked and size is not None and (size > wanted or size < least):
             column = chosen.picked.pop(quantity).column
             chosen.notes.append(
                 f"the {quantity.replace('_', ' ')} was not imported: {column!r} has "
-                f"{sizes[quantity]} values and the displacement has {wanted}; columns at several "
+                f"{size} values and the displacement has {wanted}; columns at several "
                 f"rates are not resampled"
             )
 

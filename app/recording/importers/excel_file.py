@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import itertools
 import math
 import re
@@ -9,7 +10,7 @@ import warnings
 import zipfile
 from array import array
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from datetime import date, datetime, timedelta
 from datetime import time as time_of_day
 from pathlib import Path
@@ -263,7 +264,8 @@ def _opened(path: Path, values: bool) -> Iterator[Workbook]:
 
     # opened here, because the library takes no path with another ending
     with _reading(path), open_input(path) as file:
-        book = load_workbook(file, read_only=True, data_only=values, keep_links=False)
+        with redirect_stdout(io.StringIO()):  # it prints what is wrong with styles
+            book = load_workbook(file, read_only=True, data_only=values, keep_links=False)
         try:
             yield book
         finally:

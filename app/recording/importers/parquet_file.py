@@ -1,8 +1,9 @@
-"""Columns of numbers in a Parquet file, without gaps."""
+"""Columns of numbers, dates and durations in a Parquet file."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -12,81 +13,110 @@ from dearig.errors import InputError
 from dearig.extras import import_extra
 from dearig.recording.files import one_line
 from dearig.recording.importers.importer import Importer
-from dearig.recording.importers.source import PARSER_FAILURES, no_such_column
+from dearig.recording.importers.source import PARSER_FAILURES, printable
+from dearig.recording.importers.stored import Stored, StoredColumns
 
 __all__ = ["IMPORTER", "ParquetFile"]
 
 #: Bytes that are unpacked at most: the first plus the second times the size of the file.
 UNPACKED_MAX, PACKED_MAX = 2**28, 100
+#: Columns, and depth of structs, at most.
+COLUMNS_MAX, DEEPEST = 2000, 8
+_UNITS = (b"unit", b"units")
 
 
-class ParquetFile:
-    """The Parquet file at ``path``. Raises ``InputError`` if it is not one or has no numbers."""
+class ParquetFile(StoredColumns):
+    """The Parquet file at ``path``. Raises ``InputError`` if it is not one or has no numbers.
+
+    A field of a struct is called ``run.voltage_V``. What is null is not a number.
+    """
 
     def __init__(self, path: Path) -> None:
         pyarrow, parquet = _library()
-
         self.path = path
+        self._nulls: dict[str, np.ndarray] = {}
         try:
             with parquet.ParquetFile(path) as file:
                 schema, rows = file.schema_arrow, file.metadata.num_rows
+            found = list(islice(_fields(pyarrow.types, schema, (), 0), COLUMNS_MAX))
         except (*PARSER_FAILURES, pyarrow.ArrowException) as error:
             raise self._unreadable(error) from error
-        self.names = [
-            field.name
-            for field in schema
-            if pyarrow.types.is_floating(field.type) or pyarrow.types.is_integer(field.type)
-        ]
-        if not self.names:
-            raise InputError(f"{path} holds no columns of numbers")
-        claimed, size = 8 * rows * len(self.names), path.stat().st_size
+        claimed, size = 8 * rows * len(found), path.stat().st_size
         if not 0 <= claimed <= UNPACKED_MAX + PACKED_MAX * size:
             raise InputError(f"{path} is not read: its {size} bytes claim {rows} rows")
-        self.about = {
-            name.decode("utf-8", "replace"): text.decode("utf-8", "replace")
-            for name, text in (schema.metadata or {}).items()
-        }
+        columns = {}
+        for place, unit in found:
+            name = ".".join(place)
+            if printable(name) in columns:
+                raise InputError(f"{path}: two columns are called {name!r}; rename one")
+            columns[printable(name)] = Stored(
+                self._loader(place), rows, place[-1], unit, table=".".join(place[:-1]),
+                cell=self._cell(name),
+            )  # fmt: skip
+        super().__init__(
+            path, "a Parquet file", columns, separator=".",
+            about={
+                name.decode("utf-8", "replace"): text.decode("utf-8", "replace")
+                for name, text in (schema.metadata or {}).items()
+            },
+        )  # fmt: skip
 
     def _unreadable(self, error: Exception) -> InputError:
         return InputError(f"{self.path} cannot be read as a Parquet file: {one_line(error)}")
 
-    def named(self, name: str) -> list[str]:
-        """Return the columns called ``name``."""
-        return [n for n in self.names if n == name]
+    def _cell(self, name: str) -> Callable[[int], str]:
+        def cell(index: int) -> str:
+            nulls = self._nulls.get(name)
+            return "there is no value" if nulls is not None and nulls[index] else ""
 
-    def row(self, index: int) -> str:
-        """Return the row of sample ``index``, counted from 1."""
-        return f"row {index + 1}"
+        return cell
 
-    def check(self, name: str) -> None:
-        """See ``Source``."""
-        count = self.names.count(name)
-        if count == 0:
-            raise no_such_column(self, name)
-        if count > 1:
-            raise InputError(f"{self.path}: {count} columns are called {name!r}; rename one")
-
-    def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
-        """Return columns by name; see ``Source``."""
-        pyarrow, parquet = _library()
-
-        wanted = list(dict.fromkeys(names))
-        found = {}
-        try:
-            with parquet.ParquetFile(self.path, page_checksum_verification=True) as file:
-                table = file.read(columns=wanted, use_threads=False)
-            for name in wanted:
-                column = table.column(name)
-                if column.null_count:
-                    empty = column.is_null().to_numpy()
-                    raise InputError(
-                        f"{self.path}, {self.row(int(np.argmax(empty)))}, column {name!r}: there "
-                        f"is no value; fill it in or leave the row out"
+    def _loader(self, place: tuple[str, ...]) -> Callable[[], np.ndarray]:
+        def load() -> np.ndarray:
+            pyarrow, parquet = _library()
+            try:
+                with parquet.ParquetFile(self.path, page_checksum_verification=True) as file:
+                    table = file.read(columns=[".".join(place)], use_threads=False)
+                values = table.column(place[0])
+                for name in place[1:]:
+                    values = pyarrow.chunked_array(
+                        [chunk.field(name) for chunk in values.chunks], values.type.field(name).type
                     )
-                found[name] = column.to_numpy().astype(np.float64)
-        except (*PARSER_FAILURES, pyarrow.ArrowException) as error:
-            raise self._unreadable(error) from error
-        return found
+                if values.null_count:
+                    self._nulls[".".join(place)] = values.is_null().to_numpy()
+                return _as_array(pyarrow, values)
+            except pyarrow.ArrowException as error:
+                raise self._unreadable(error) from error
+
+        return load
+
+
+def _as_array(pyarrow: Any, values: Any) -> np.ndarray:
+    """Return a column (n,) of a table; what is null becomes not a number, or not a time."""
+    kind = values.type
+    if pyarrow.types.is_decimal(kind):
+        values = values.cast(pyarrow.float64())
+    elif pyarrow.types.is_time(kind):  # of day
+        whole = pyarrow.int32() if pyarrow.types.is_time32(kind) else pyarrow.int64()
+        values = values.cast(whole).cast(pyarrow.duration(kind.unit))
+    return np.asarray(values.to_numpy())
+
+
+def _fields(
+    types: Any, fields: Any, path: tuple[str, ...], depth: int
+) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Yield the path of every column of numbers, and its unit."""
+    for field in fields:
+        kind, inside = field.type, (*path, field.name)
+        if types.is_struct(kind) and depth < DEEPEST:
+            yield from _fields(types, [kind.field(i) for i in range(kind.num_fields)], inside,
+                               depth + 1)  # fmt: skip
+        elif types.is_temporal(kind) and not types.is_interval(kind):
+            yield inside, "s"
+        elif types.is_floating(kind) or types.is_integer(kind) or types.is_decimal(kind):
+            told = field.metadata or {}
+            unit = next((told[name] for name in _UNITS if name in told), b"")
+            yield inside, unit.decode("utf-8", "replace")
 
 
 def _library() -> tuple[Any, Any]:

@@ -132,18 +132,19 @@ class StoredColumns:
 
         Raises ``InputError`` for columns of several rates or starts.
         """
-        timed = {n: self._columns[n] for n in names if self._columns[n].step_s is not None}
-        timings = {(column.step_s, column.start_s) for column in timed.values()}
-        if len(timings) > 1:
-            different = ", ".join(
-                f"{n} every {c.step_s:.6g} s from {c.start_s:.6g} s" for n, c in timed.items()
-            )
-            raise InputError(
-                f"{self.path}: the columns have different times: {different}; they are not "
-                f"resampled here: give columns of one rate with --column"
-            )
-        if timings:
-            return timings.pop()[0]
+        timed = {n: c for n in names if (c := self._columns[n]).step_s is not None}
+        for column in timed.values():
+            first = next(iter(timed.values()))
+            if not _same_timing(first, column):
+                different = ", ".join(
+                    f"{n} every {c.step_s:.6g} s from {c.start_s:.6g} s" for n, c in timed.items()
+                )
+                raise InputError(
+                    f"{self.path}: the columns have different times: {different}; they are not "
+                    f"resampled here: give columns of one rate with --column"
+                )
+        if timed:
+            return next(iter(timed.values())).step_s
         for name, setting in self._settings.items():
             value = self.read_setting(name)
             step = None if value is None else rate_step(setting.own, value)
@@ -194,14 +195,29 @@ class StoredColumns:
         return found
 
 
+#: Part of a step by which the starts of columns that were sampled together may differ.
+START_APART = 0.01
+
+
+def _same_timing(one: Stored, other: Stored) -> bool:
+    step, second = one.step_s or 0.0, other.step_s or 0.0
+    return bool(
+        np.isclose(step, second, rtol=1e-9, atol=0.0)
+        and abs(one.start_s - other.start_s) <= START_APART * step
+    )
+
+
 def as_numbers(values: np.ndarray) -> np.ndarray:
-    """Return ``values`` (n,) as float64; of dates and durations, in s, dates from the first."""
+    """Return ``values`` (n,) as float64; of dates and durations, in s, dates from the first.
+
+    What is not a time becomes not a number.
+    """
     if values.dtype.kind == "M":
         there = values[~np.isnat(values)]
         values = values - there[0] if there.size else values - values
     if values.dtype.kind == "m":
         seconds = values / np.timedelta64(1, "s")
-        return np.asarray(seconds, dtype=np.float64)  # not a time becomes not a number
+        return np.asarray(seconds, dtype=np.float64)
     return np.asarray(values, dtype=np.float64)
 
 

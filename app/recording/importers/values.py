@@ -187,14 +187,14 @@ def _read(
     raw = source.read(columns)
     sizes = {column: raw[column].size for column in columns}
     size = min(sizes.values())
-    if len(set(sizes.values())) > 1:
-        if not getattr(source, "cut_short", False):
-            different = ", ".join(f"{column} {n}" for column, n in sizes.items())
-            raise InputError(f"{path}: the columns have different lengths: {different}")
+    if getattr(source, "cut_short", False):
         values.warnings.append(
-            f"the file was not closed: its columns have {min(sizes.values())} to "
-            f"{max(sizes.values())} values, and the first {size} of each are imported"
+            f"the file ends early: it was not closed, or not copied as a whole; its columns have "
+            f"{size} to {max(sizes.values())} values, and the first {size} of each are imported"
         )
+    elif len(set(sizes.values())) > 1:
+        different = ", ".join(f"{column} {n}" for column, n in sizes.items())
+        raise InputError(f"{path}: the columns have different lengths: {different}")
     table = {q: raw[pick.column][:size] for q, pick in picked.items()}
     if step is not None:
         table["time"] = step * np.arange(size)
