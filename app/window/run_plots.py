@@ -32,7 +32,7 @@ PLOTS = {
     "displacement": "Displacement",
     "residual": "Residual",
 }
-_SHARES = {"voltage": 4, "current": 4, "displacement": 5, "residual": 4}  # of the height
+_SHARES = {"voltage": 4, "current": 4, "displacement": 6, "residual": 4}  # of the height
 _NAMES = {
     "command": "commanded",
     "monitor": "monitor",

@@ -88,6 +88,19 @@ def test_from_the_first_start_to_the_first_recording(qtbot: QtBot, window: MainW
     assert now.errors[0].rms == pytest.approx(1e-6, rel=0.2)  # the simulated noise
 
 
+def test_the_page_fits_a_small_screen_before_in_and_after_a_run(
+    qtbot: QtBot, window: MainWindow
+) -> None:
+    page, sizes = window.run_page, []
+    shown = page.visibleRegion().boundingRect  # without what a scroll bar hides
+    window.show_page(page)
+    page.runner.state_changed.connect(lambda: sizes.append((page.height(), shown().height())))
+    play(qtbot, page)
+    sizes.append((page.height(), shown().height()))
+    assert len(sizes) > 2
+    assert all(height == visible for height, visible in sizes), sizes
+
+
 def test_a_wrong_sequence_is_refused_marked_and_mended(qtbot: QtBot, window: MainWindow) -> None:
     page, session = window.sequence_page, window.session
     window.show_page(page)
