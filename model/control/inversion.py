@@ -25,7 +25,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_closing, binary_dilation
 
 from dearig.model.actuator import STATUS_WORDS, Actuator, Drive, at_rest, reading_of
 from dearig.model.coefficients import ELECTRIC, FORCE, HELD, MODULUS, WIDTH
@@ -56,6 +56,7 @@ _SENSOR_PASSES = 4  # of a sensor effect along the target, for the start
 _ELECTRIC_PASSES = 3  # of what is between command and film along the target, for the start
 _AT_LIMIT = 1e-3  # of the highest voltage: so near it stands at a limit
 _BELOW_PULL_IN = 0.95  # of the displacement at which the film pulls in; the gate refuses more
+_PAUSE = 0.1  # s between two parts of a target that are unreachable as one
 _GIVEN_BACK = 0.9  # of the voltage, while the film runs away
 _NOTHING = np.zeros(0)
 
@@ -178,8 +179,7 @@ def invert(
         raise ModelError("a target has samples between its lead-in and its tail")
     job = _Job(model, target, rate, limits, lead_in, tail, lag, bandwidth)
     first = job.from_balance() if start is None else np.square(start)
-    found = job.follow(first)
-    return job.result(found, tolerance)
+    return job.result(job.within_field(job.follow(first)), tolerance)
 
 
 @dataclass
@@ -288,9 +288,9 @@ class _Job:
     def follow(self, u: np.ndarray) -> _Pass:
         """Return the pass of the smallest error, from the voltage squared ``u`` (N,) V^2 on."""
         best = now = self._started(u)
-        level = float(np.mean(now.u[now.u > 0.01 * now.u.max()])) if now.u.any() else 0.0
-        if level == 0.0:
-            return best
+        if now.u.max() <= (_AT_LIMIT * self.limits.voltage) ** 2:
+            return best  # nothing is asked for
+        level = float(np.mean(now.u[now.u > 0.01 * now.u.max()]))
         linear = linearise(self.model, self.target.size, self.rate, level, self.lag)
         inverse = linear.inverse(self.bandwidth)
         mixing = _Anderson()
@@ -301,9 +301,7 @@ class _Job:
             following = self._pass(mixing.next(now.u, correction))
             if following is None or following.size > 2.0 * best.size:
                 mixing = _Anderson()
-                halved = linear.through(
-                    0.5 * inverse, np.where(best.free, best.error, 0.0)
-                )
+                halved = linear.through(0.5 * inverse, np.where(best.free, best.error, 0.0))
                 following = self._pass(best.u + halved)
                 if following is None or following.size > best.size:
                     break  # nothing better in this direction
@@ -339,11 +337,31 @@ class _Job:
         stuck = binary_dilation(low | high, np.ones(width, dtype=bool))
         return _Pass(u, reading, error, self.inside & ~stuck)
 
+    def within_field(self, found: _Pass) -> _Pass:
+        """Return ``found``, with less voltage where its film is thinner than the target's.
+
+        The ceiling is that of a film on the target, and a film that misses it may be thinner.
+        """
+        if not math.isfinite(self.limits.field):
+            return found
+        while True:
+            drive = Drive(self.time, np.sqrt(found.u), hold=True)
+            reached = float(self.model.simulate(drive, self.lag).field.max())
+            if reached <= self.limits.highest_field:
+                return found
+            lowered = _GIVEN_BACK * self.limits.highest_field / reached
+            self.ceiling = np.minimum(self.ceiling, lowered * math.sqrt(float(found.u.max())))
+            found = self._started(np.minimum(found.u, np.square(self.ceiling)))
+
     def result(self, found: _Pass, tolerance: float) -> Inversion:
         """Return ``found`` with its unreachable parts, farther than ``tolerance`` in m."""
         distance = np.where(self.inside, np.abs(found.error), 0.0)
         beyond = distance > tolerance
         beyond |= self.inside & self.pulls_in & (self.target - found.reading > tolerance)
+        # a film that was let go rings: what it misses with pauses is one part
+        width = 2 * math.ceil(0.5 * _PAUSE * self.rate) + 1
+        joined = binary_closing(np.pad(beyond, width), np.ones(width, dtype=bool))[width:-width]
+        beyond |= joined & self.inside
         parts = tuple(self._part(found, first, last) for first, last in _runs(beyond))
         reference = np.where(beyond | ~self.inside, found.reading, self.smooth)
         return Inversion(

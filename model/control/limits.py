@@ -11,6 +11,7 @@ from dearig.model.errors import ModelError
 __all__ = ["VoltageLimits"]
 
 _INSIDE = 1e-6  # of a limit: rounding of the waveform on its way to the output stays within it
+_INSIDE_FIELD = 0.01  # of the field: two models of one film differ by less in its thickness
 
 
 @dataclass(frozen=True)
@@ -30,9 +31,14 @@ class VoltageLimits:
             if not getattr(self, name) > 0.0:
                 raise ModelError(f"limits: {name} = {getattr(self, name)!r} must be above 0")
 
+    @property
+    def highest_field(self) -> float:
+        """The highest true field in V/m that a voltage is computed for."""
+        return self.field * (1.0 - _INSIDE_FIELD)
+
     def ceiling(self, thickness: np.ndarray) -> np.ndarray:
         """Return the highest voltage (N,) in V for a film of ``thickness`` (N,) m."""
-        return np.minimum(self.voltage, self.field * thickness) * (1.0 - _INSIDE)
+        return np.minimum(self.voltage * (1.0 - _INSIDE), self.highest_field * thickness)
 
     def nearest(self, voltage: np.ndarray, ceiling: np.ndarray, rate: float) -> np.ndarray:
         """Return a waveform (N,) V within the limits from ``voltage`` (N,), whatever that is.

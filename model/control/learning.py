@@ -1,0 +1,375 @@
+"""Iterative learning control: the voltage of the next run from the error of the last.
+
+The method is that of A. Schoellig, F. Mueller and R. D'Andrea, Autonomous Robots 33, 103 (2012):
+each run gives an estimate of what the model lacks along the path,
+
+    d_j = measured - reading of the model under the same voltage,
+
+and the next voltage is the one with which the model follows ``reference - Q d_j``, computed under
+all limits of the voltage (``inversion``). It was chosen because the limits act inside the
+computation: a film that stands at 0 V winds nothing up. For a linear film it is u + Q L e
+with the learning filter L = G^-1 of the linearised model, and the known condition holds (D. A.
+Bristow, M. Tharayil and A. G. Alleyne, IEEE Control Systems 26(3), 96 (2006)): the error shrinks
+from run to run, at every frequency, where
+
+    |Q (1 - L G_true)| = |Q| W < 1,    W = |G_true/G - 1|.
+
+W is taken from the model's uncertainty (``alternatives``) and from the runs. After the first run it
+is the ratio of the spectra of d_0 and of the prediction, where the path has power. After a run that
+has learned, it is the part of the error that is left in the band that was learned. Beyond what was
+seen W grows with the square of the frequency, as the error of a mass does. The zero-phase filter Q
+passes what keeps |Q| W below ``CONTRACTION``. Where nothing does, nothing is learned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import binary_dilation, maximum_filter1d, median_filter, uniform_filter1d
+
+from dearig.model.actuator import Actuator
+from dearig.model.control.bands import low_pass, pass_band
+from dearig.model.control.inversion import BANDWIDTH, Inversion, invert
+from dearig.model.control.limits import VoltageLimits
+from dearig.model.control.linear import linearise
+from dearig.model.errors import ModelError
+
+__all__ = ["CONTRACTION", "Learner", "Lesson"]
+
+#: Largest |Q| W that is learned with: the error of a run is at most this part of the last one's.
+CONTRACTION = 0.8
+
+_USABLE = 0.5  # of the path's samples: with fewer a run teaches nothing
+_WORSE = 1.1  # times the smallest error: a run so much worse is stepped back from
+_NEAR_NOISE = 1.5  # times the noise: from here on, half of an error is learned, to average noise
+_SPIKE = 8.0  # noises: a single reading so far from its neighbours is a spike
+_SPIKE_WINDOW = 11  # samples
+_STUCK = 0.05  # s of one and the same reading while the film is predicted to move
+_MOVED = 6.0  # noises that the prediction moves meanwhile
+_JUMP_WINDOW = 0.02  # s on either side of a jump
+_JUMP = 8.0  # standard deviations of such differences elsewhere in the run
+_SUDDEN = 0.6  # of the change over four times as long: what moves steadily has a quarter
+_WIDENED = 2.0  # times the band of the last run, at most
+_POWER = 0.05  # of the largest line of the prediction's spectrum: a path has power there
+_NARROWED = 0.5  # of Q's band, where a run was stepped back from
+
+
+@dataclass(frozen=True, eq=False)
+class Lesson:
+    """What a run taught: its error, and the voltage of the next run.
+
+    ``rms`` and ``largest`` in m are of reference minus measured, over the ``samples`` that the film
+    can reach and that could be used; NaN where there are none. ``voltage`` (N,) in V is the next
+    one. ``learned`` is False where it is that of a former run. ``edge`` in Hz is where Q begins to
+    fall, ``contraction`` the largest |Q| W, NaN where the error is noise. ``notes`` are sentences
+    on what was left out.
+    """
+
+    rms: float
+    largest: float
+    samples: int
+    voltage: np.ndarray
+    learned: bool
+    edge: float
+    contraction: float
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """A run as far as it is remembered."""
+
+    voltage: np.ndarray  # (N,) V
+    known: np.ndarray  # (N,) m: Q d before it
+    lacking: np.ndarray  # (N,) m: d of it
+    rms: float
+    left: np.ndarray  # (M,) m: amplitudes of its error
+
+
+class Learner:
+    """Learns the voltage of a target from run to run.
+
+    Parameters
+    ----------
+    model, target, rate, limits, lead_in, tail, lag, bandwidth
+        As of ``invert``; ``first`` is its result.
+    noise : float
+        Standard deviation in m of a single reading.
+    alternatives : sequence of Actuator
+        Models that the data allow as well, such as those at the ends of the parameters' intervals.
+    """
+
+    def __init__(
+        self,
+        model: Actuator,
+        target: np.ndarray,
+        rate: float,
+        limits: VoltageLimits,
+        *,
+        noise: float,
+        lead_in: int = 0,
+        tail: int = 0,
+        lag: float = 0.0,
+        bandwidth: float = BANDWIDTH,
+        alternatives: Sequence[Actuator] = (),
+    ) -> None:
+        if not noise > 0.0:
+            raise ModelError(f"noise = {noise!r} must be above 0")
+        self._model, self._rate, self._limits, self._noise = model, rate, limits, noise
+        self._lead_in, self._tail, self._lag, self._bandwidth = lead_in, tail, lag, bandwidth
+        self.first: Inversion = self._invert(np.asarray(target, dtype=np.float64), None)
+        self._inside = np.zeros(self.first.time.size, dtype=bool)
+        self._inside[lead_in : self.first.time.size - tail] = True
+        self._edge = min(bandwidth, 0.2 * rate)
+        self._frequency = np.fft.rfftfreq(self.first.time.size, 1.0 / rate)
+        self._uncertain = self._spread(alternatives)
+        self._now = self.first
+        self._known = np.zeros(self.first.time.size)
+        self._best: _Run | None = None
+        self._lacking: list[np.ndarray] = []  # raw, of the last runs
+        self._learned: tuple[np.ndarray, float] | None = None  # amplitudes (M,) of an error, edge
+
+    @property
+    def voltage(self) -> np.ndarray:
+        """The voltage (N,) in V of the next run."""
+        return self._now.voltage
+
+    @property
+    def best_rms(self) -> float:
+        """The smallest error in m of any run, inf before the first."""
+        return np.inf if self._best is None else self._best.rms
+
+    def learn(self, reading: np.ndarray, valid: np.ndarray | None = None) -> Lesson:
+        """Learn from the ``reading`` (N,) m of a run of ``voltage``; return what follows.
+
+        ``valid`` (N,) is False for readings that must not be used. Readings that are not finite,
+        stuck, or spikes are not used either. Whatever the reading is, the next voltage is within
+        the limits.
+        """
+        usable, reading, notes = self._usable(reading, valid)
+        counted = usable & self.first.reachable
+        error = np.where(counted, self.first.reference - reading, 0.0)
+        rms, largest, samples = np.nan, np.nan, int(np.count_nonzero(counted))
+        if samples:
+            rms = float(np.sqrt(np.mean(error[counted] ** 2)))
+            largest = float(np.abs(error).max())
+        if np.count_nonzero(usable & self._inside) < _USABLE * np.count_nonzero(self._inside):
+            notes.append("too few readings can be used: nothing is learned from this run")
+            return self._lesson(rms, largest, samples, learned=False, notes=notes)
+        lacking = self._bridged(reading - self._now.reading, usable)
+        best = self._best
+        if best is not None and rms > _WORSE * best.rms + 0.1 * self._noise:
+            return self._step_back(best, rms, largest, samples, notes)
+        lacking = self._repeated(lacking, notes)
+        left = np.abs(np.fft.rfft(np.where(counted, error, 0.0)))
+        self._best = _Run(self._now.voltage, self._known, lacking, rms, left)
+        return self._follow(self._best, rms, largest, samples, notes)
+
+    # ------------------------------------------------------------ next voltage
+
+    def _invert(self, target: np.ndarray, start: np.ndarray | None) -> Inversion:
+        return invert(
+            self._model, target, self._rate, self._limits, lead_in=self._lead_in, tail=self._tail,
+            lag=self._lag, bandwidth=self._bandwidth, start=start,
+        )  # fmt: skip
+
+    def _follow(
+        self, run: _Run, rms: float, largest: float, samples: int, notes: list[str]
+    ) -> Lesson:
+        """Take the next voltage from what ``run`` has shown."""
+        edge, contraction = self._pass(run)
+        if edge <= 0.0:
+            notes.append(
+                "the measured displacement has too little to do with the prediction: nothing is "
+                "learned; check the sign of the laser, the film and the model"
+            )
+            return self._lesson(rms, largest, samples, learned=False, notes=notes)
+        part = 1.0 if rms > _NEAR_NOISE * self._noise else 0.5
+        change = low_pass(np.where(self._inside, run.lacking - run.known, 0.0), self._rate, edge)
+        self._known = run.known + part * change
+        self._learned = (run.left, edge)
+        self._now = self._invert(self.first.reference - self._known, run.voltage)
+        return self._lesson(rms, largest, samples, learned=True, notes=notes, edge=edge,
+                            contraction=contraction)  # fmt: skip
+
+    def _step_back(
+        self, best: _Run, rms: float, largest: float, samples: int, notes: list[str]
+    ) -> Lesson:
+        """Go back to the run of the smallest error, and learn less of it."""
+        self._edge = _NARROWED * (self._edge if self._learned is None else self._learned[1])
+        self._learned = None
+        notes.append(
+            f"the error has grown from {best.rms * 1e6:.3g} um: the run is stepped back from, and "
+            f"less is learned"
+        )
+        return self._follow(best, rms, largest, samples, notes)
+
+    def _lesson(
+        self,
+        rms: float,
+        largest: float,
+        samples: int,
+        *,
+        learned: bool,
+        notes: Sequence[str],
+        edge: float = 0.0,
+        contraction: float = np.nan,
+    ) -> Lesson:
+        return Lesson(rms, largest, samples, self.voltage, learned, edge, contraction, tuple(notes))
+
+    # ------------------------------------------------------------ uncertainty
+
+    def _spread(self, alternatives: Sequence[Actuator]) -> np.ndarray:
+        """Return |G_other/G - 1| (M,), the largest of all ``alternatives``."""
+        spread = np.zeros(self._frequency.size)
+        square = np.square(self.first.voltage)
+        if not alternatives or not square.any():
+            return spread
+        n, level = square.size, float(np.mean(square[square > 0.01 * square.max()]))
+        own = linearise(self._model, n, self._rate, level, self._lag)
+        for other in alternatives:
+            gain = linearise(other, n, self._rate, level, self._lag).gain
+            off = np.abs(gain / own.gain - 1.0)
+            off = np.where(np.isfinite(off), off, np.inf)
+            spread = np.maximum(spread, np.interp(self._frequency, own.frequency, off))
+        return spread
+
+    def _pass(self, run: _Run) -> tuple[float, float]:
+        """Return the edge in Hz of Q, and the largest |Q| W with it; 0 where nothing passes."""
+        highest, least = self._edge, self._rate / self.first.time.size
+        off = self._uncertain
+        if self._learned is None or self._learned[0] is run.left:
+            off = np.maximum(off, self._off_at_first(run.lacking))
+        else:
+            before, learned = self._learned
+            ratio = self._ratio(before, run.left, learned)
+            if np.isnan(ratio):  # the error is noise: nothing more can be told
+                return learned, ratio
+            if ratio > CONTRACTION:
+                return (learned if ratio < 1.0 else _NARROWED * learned), ratio
+            highest = min(highest, _WIDENED * learned)
+            off = np.maximum(off, ratio * np.maximum(self._frequency / learned, 1.0) ** 2)
+        edge = highest
+        while edge > least:
+            contraction = float(np.max(pass_band(self._frequency, edge) * off))
+            if contraction <= CONTRACTION:
+                return edge, contraction
+            edge *= 0.9
+        return 0.0, np.nan
+
+    def _ratio(self, before: np.ndarray, after: np.ndarray, edge: float) -> float:
+        """Return the part that is left of an error in the band that was learned, up to ``edge``.
+
+        NaN where what is left is noise.
+        """
+        band = self._frequency <= edge
+        noise = self._noise**2 * np.count_nonzero(self.first.reachable) * np.count_nonzero(band)
+        left, had = (float(np.sum(amplitudes[band] ** 2)) for amplitudes in (after, before))
+        if left < 2.0 * noise and had < 2.0 * noise:
+            return float("nan")
+        return float(np.sqrt(max(left - noise, 0.0) / max(had, noise)))
+
+    def _off_at_first(self, lacking: np.ndarray) -> np.ndarray:
+        """Return W (M,) from what the model ``lacking`` (N,) m shows of the first run."""
+        window = np.where(self._inside, 1.0, 0.0)
+        shown = np.abs(np.fft.rfft(lacking * window))
+        noise = self._noise * np.sqrt(np.count_nonzero(self._inside))
+        shown = np.sqrt(np.maximum(shown**2 - noise**2, 0.0))
+        predicted = np.abs(np.fft.rfft(self._now.reading * window))
+        # neighbouring lines together: a path of finite length has its power spread over a few
+        shown, predicted = (uniform_filter1d(s, 5, mode="nearest") for s in (shown, predicted))
+        powerful = np.flatnonzero(predicted > _POWER * predicted.max())
+        if powerful.size == 0:
+            return np.full(shown.size, np.inf)
+        ratio = shown[powerful] / predicted[powerful]
+        last = max(int(powerful[-1]), 1)
+        off = np.interp(np.arange(shown.size), powerful, ratio)
+        beyond = np.arange(shown.size) > last
+        off[beyond] = ratio[-1] * (np.arange(shown.size)[beyond] / last) ** 2
+        return off
+
+    # ------------------------------------------------------------ readings
+
+    def _usable(
+        self, reading: np.ndarray, valid: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray, list[str]]:
+        """Return which readings may be used, the readings from rest, and notes."""
+        notes: list[str] = []
+        given = np.asarray(reading, dtype=np.float64)
+        n, size = self.first.time.size, given.size
+        if given.ndim != 1 or size != n:
+            # a run that was ended early has fewer
+            notes.append(f"{size} readings were recorded of {n}")
+            row = np.full(n, np.nan)
+            row[: min(size, n)] = given.ravel()[:n]
+            given = row
+            valid = None if valid is None else np.resize(valid, n)
+        with np.errstate(invalid="ignore", over="ignore"):
+            usable = np.isfinite(given) & (np.abs(given) < 1.0)  # 1 m: no film moves so far
+        if valid is not None:
+            usable &= np.asarray(valid, dtype=bool)
+        given = np.where(usable, given, 0.0)
+        lead = usable & (np.arange(n) < self._lead_in)
+        if lead.any():
+            given = given - float(np.median(given[lead]))
+        off = given - self._now.reading
+        spikes = usable & (np.abs(off - median_filter(off, _SPIKE_WINDOW)) > _SPIKE * self._noise)
+        stuck = self._stuck(given) & usable
+        for mask, words in ((spikes, "spikes"), (stuck, "stuck readings")):
+            if mask.any():
+                notes.append(f"{np.count_nonzero(mask)} {words} are left out")
+        return usable & ~spikes & ~stuck, given, notes
+
+    def _stuck(self, reading: np.ndarray) -> np.ndarray:
+        """Return where the reading stands still while the film is predicted to move."""
+        width = max(round(_STUCK * self._rate), 2)
+        same = np.concatenate([[False], np.diff(reading) == 0.0]).astype(float)
+        stands = uniform_filter1d(same, width, mode="nearest") > 1.0 - 0.5 / width
+        predicted = self._now.reading
+        moves = maximum_filter1d(predicted, width) + maximum_filter1d(-predicted, width)
+        return np.asarray(
+            binary_dilation(stands & (moves > _MOVED * self._noise), np.ones(width, dtype=bool))
+        )
+
+    def _bridged(self, lacking: np.ndarray, usable: np.ndarray) -> np.ndarray:
+        """Return ``lacking`` (N,) m with what is known already where it was not measured."""
+        if usable.all():
+            return lacking
+        at = np.arange(lacking.size)
+        # the difference from what is known is joined across a gap, so that no step is learned
+        more = np.interp(at, at[usable], (lacking - self._known)[usable])
+        return np.where(usable, lacking, self._known + more)
+
+    def _repeated(self, lacking: np.ndarray, notes: list[str]) -> np.ndarray:
+        """Return ``lacking`` (N,) m without what this run or the last one had alone.
+
+        A jump of the difference of two runs is an event of one of them, a slip or a touch. Then the
+        median of the last three runs counts, of two their mean.
+        """
+        self._lacking = [*self._lacking, lacking][-3:]
+        if len(self._lacking) < 2:
+            return lacking
+        change = self._lacking[-1] - self._lacking[-2]
+        if not self._jumps(change):
+            return lacking
+        notes.append("something happened in one run only: it is not learned")
+        return np.median(np.array(self._lacking), axis=0)
+
+    def _jumps(self, change: np.ndarray) -> bool:
+        """Return whether ``change`` (N,) m has a jump: as large at once as over a longer time."""
+        width = max(round(_JUMP_WINDOW * self._rate), 3)
+        near, far = (_differences(change, width, k * width) for k in (1, 4))
+        usual = float(np.median(np.abs(near[self._inside]))) / 0.67
+        least = _JUMP * max(self._noise * np.sqrt(2.0 / width), usual)
+        sudden = (np.abs(near) > least) & (np.abs(near) > _SUDDEN * np.abs(far))
+        return bool(np.any(sudden[self._inside]))
+
+
+def _differences(values: np.ndarray, width: int, apart: int) -> np.ndarray:
+    """Return the differences (N,) of means over ``width`` samples that are ``apart`` samples."""
+    mean = uniform_filter1d(values, width, mode="nearest")
+    half = apart // 2
+    padded = np.pad(mean, (half, apart - half), mode="edge")
+    return np.asarray(padded[apart:] - padded[: values.size])

@@ -1,0 +1,182 @@
+"""Learning from run to run: what it reaches, what it refuses, and that it stays within limits."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dearig.acquisition.prediction import PredictedFilm
+from dearig.drivers.gate import Limits, admit
+from dearig.drivers.samples import Listed
+from dearig.model.actuator import Drive
+from dearig.model.control import Learner, VoltageLimits
+from dearig.model.control.learning import CONTRACTION
+from dearig.model.errors import ModelError
+from tests.tools.effect_cases import THESIS, numbers, with_effect
+from tests.tools.targets import LEAD_IN, LIMITS, RATE, TAIL, path
+
+NOISE = 1e-6
+
+
+def learner(model=THESIS, target=None, **options):
+    options = {"noise": NOISE, "lead_in": LEAD_IN, "tail": TAIL, **options}
+    return Learner(model, path() if target is None else target, RATE, LIMITS, **options)
+
+
+class Rig:
+    """A film that hides something from the learner's model, read with noise."""
+
+    def __init__(self, truth):
+        self.truth = truth
+        self.rng = np.random.default_rng(0)
+
+    def play(self, teacher):
+        drive = Drive(teacher.first.time, teacher.voltage, hold=True)
+        answer = self.truth.simulate(drive)
+        assert answer.ok
+        return answer.displacement + NOISE * self.rng.standard_normal(drive.time.size)
+
+
+def hiding(name, size=3.0):
+    return Rig(with_effect(THESIS, name, numbers(name, size)))
+
+
+def taught(rig, runs=5, **options):
+    teacher = learner(**options)
+    return teacher, [teacher.learn(rig.play(teacher)) for _ in range(runs)]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "strain-dependent permittivity",
+        "electrode resistance",
+        "sensor lag",
+        "slow branch",
+        "leakage",
+    ],
+)
+def test_the_error_falls_to_the_noise(name):
+    _, lessons = taught(hiding(name))
+    assert lessons[0].rms > 2.0 * NOISE
+    assert lessons[-1].rms < 1.25 * NOISE
+    assert all(lesson.contraction <= CONTRACTION for lesson in lessons[:2])
+
+
+@pytest.mark.parametrize("name", ["dry friction", "elastoplastic hysteresis", "Mullins softening"])
+def test_what_a_linear_filter_does_not_describe_is_learned_in_part(name):
+    teacher, lessons = taught(hiding(name))
+    assert teacher.best_rms < 0.4 * lessons[0].rms
+
+
+def test_a_model_that_knows_the_effect_needs_no_learning():
+    rig = hiding("slow branch")
+    _, lessons = taught(rig, runs=1, model=rig.truth)
+    assert lessons[0].rms < 1.1 * NOISE
+
+
+def test_a_wrong_sign_of_the_laser_teaches_nothing():
+    teacher = learner()
+    before = teacher.voltage.copy()
+    lesson = teacher.learn(-Rig(THESIS).play(teacher))
+    assert not lesson.learned
+    assert "sign of the laser" in lesson.notes[-1]
+    np.testing.assert_array_equal(teacher.voltage, before)
+
+
+def test_readings_without_a_value_are_left_out():
+    rig, teacher = hiding("leakage"), learner()
+    for _ in range(4):
+        reading = rig.play(teacher)
+        reading[300:360] = np.nan
+        reading[500] += 1e-3
+        lesson = teacher.learn(reading)
+    assert "1 spikes are left out" in lesson.notes
+    assert lesson.rms < 1.5 * NOISE
+    masked = np.arange(reading.size) < reading.size // 2
+    assert lesson.samples > teacher.learn(rig.play(teacher), masked).samples
+
+
+def test_a_laser_that_stands_still_teaches_nothing():
+    teacher = learner()
+    lesson = teacher.learn(np.full(teacher.first.time.size, 1e-6))
+    assert not lesson.learned
+    assert "too few readings" in lesson.notes[-1]
+
+
+def test_a_slip_of_one_run_is_not_learned():
+    rig, teacher = hiding("leakage"), learner()
+    for _ in range(3):
+        quiet = teacher.learn(rig.play(teacher))
+    reading = rig.play(teacher)
+    reading[reading.size // 2 :] += 6e-6
+    shifted = teacher.learn(reading)
+    assert shifted.rms > 2.0 * quiet.rms
+    assert teacher.learn(rig.play(teacher)).rms < 1.3 * quiet.rms
+
+
+def test_a_run_that_got_worse_is_stepped_back_from():
+    rig, teacher = hiding("slow branch"), learner()
+    first = teacher.learn(rig.play(teacher))
+    second = teacher.learn(rig.play(teacher))
+    best = teacher.best_rms
+    worse = teacher.learn(rig.play(teacher) * 1.2)
+    assert worse.rms > second.rms
+    assert "stepped back" in " ".join(worse.notes)
+    assert worse.edge < second.edge
+    assert teacher.best_rms == best < first.rms
+    assert teacher.learn(rig.play(teacher)).rms < 1.3 * best
+
+
+def test_an_uncertain_model_learns_less():
+    rig = hiding("linear drag")
+    heavier = with_effect(THESIS, "load inertia", numbers("load inertia", 4.0))
+    _, (sure,) = taught(rig, runs=1)
+    _, (unsure,) = taught(rig, runs=1, alternatives=(heavier,))
+    assert unsure.edge < sure.edge
+
+
+def test_noise_is_above_zero():
+    with pytest.raises(ModelError, match="noise"):
+        learner(noise=0.0)
+
+
+# ---------------------------------------------------------------- no reading passes a limit
+
+_GATE = Limits(0.0, 5e3, 2e5, 6e6, 1e3, 1e3, 600.0)
+_SHORT = path(seconds=3.0, amplitude=80e-6, offset=350e-6)
+
+
+def _spoil(reading, kind, rng):
+    if kind == "nan":
+        reading[rng.random(reading.size) < 0.5] = np.nan
+    elif kind == "spikes":
+        reading[rng.integers(0, reading.size, 40)] = rng.choice([1e300, -1e300, 1e-3, np.inf], 40)
+    elif kind == "stuck":
+        reading[reading.size // 3 :] = reading[reading.size // 3]
+    elif kind == "flipped":
+        reading *= -1.0
+    elif kind == "large":
+        reading *= 1e3 * rng.standard_normal()
+    elif kind == "noise":
+        reading += 1e-4 * rng.standard_normal(reading.size)
+    elif kind == "ended":
+        reading = reading[: rng.integers(0, reading.size)]
+    return reading
+
+
+_KINDS = ("nan", "spikes", "stuck", "flipped", "large", "noise", "ended", "sound")
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.lists(st.sampled_from(_KINDS), min_size=1, max_size=3), st.integers(0, 2**31))
+def test_no_reading_makes_a_voltage_beyond_a_limit(kinds, seed):
+    rng = np.random.default_rng(seed)
+    limits = VoltageLimits(_GATE.voltage_max, _GATE.slew, _GATE.field)
+    teacher = Learner(THESIS, _SHORT, RATE, limits, noise=NOISE, lead_in=LEAD_IN, tail=TAIL)
+    rig = hiding("slow branch")
+    for kind in kinds:
+        lesson = teacher.learn(_spoil(rig.play(teacher), kind, rng))
+        voltage = lesson.voltage
+        predicted = PredictedFilm(THESIS, voltage.size, RATE, _GATE, "", None)
+        admit(Listed(voltage), RATE, _GATE, predicted)  # raises where a limit is passed
