@@ -8,9 +8,10 @@
     fit = dearig.identify(run)
     fit.save("model.toml")
 
-``open``, ``record``, ``identify``, ``validate``, ``simulate`` and ``diagnose`` take objects or
-paths and return values that a notebook displays and that have ``plot``, ``to_html`` and ``save``.
-Nothing is printed; errors are ``DearigError``, each a sentence that says what to do.
+``open``, ``record``, ``identify``, ``validate``, ``simulate``, ``diagnose``, ``invert`` and
+``track`` take objects or paths and return values that a notebook displays and that have ``plot``,
+``to_html`` and ``save``. Nothing is printed; errors are ``DearigError``, each a sentence that says
+what to do.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from dearig.api.recordings import Recording, open, record  # noqa: A004
     from dearig.api.results import DiagnoseResult, IdentifyResult, ValidateResult
     from dearig.api.sequences import Sequence
+    from dearig.api.tracking import Inversion, TrackResult, invert, track
     from dearig.errors import (
         DearigError,
         DiskFault,
@@ -44,19 +46,23 @@ __all__ = [
     "InputError",
     "InstrumentFault",
     "Interrupted",
+    "Inversion",
     "Model",
     "NotSafe",
     "Prediction",
     "Recording",
     "SafetyStop",
     "Sequence",
+    "TrackResult",
     "ValidateResult",
     "__version__",
     "diagnose",
     "identify",
+    "invert",
     "open",
     "record",
     "simulate",
+    "track",
     "validate",
 ]
 
@@ -68,6 +74,7 @@ _MODULES = {
     "dearig.api.recordings": ("Recording", "open", "record"),
     "dearig.api.results": ("DiagnoseResult", "IdentifyResult", "ValidateResult"),
     "dearig.api.sequences": ("Sequence",),
+    "dearig.api.tracking": ("Inversion", "TrackResult", "invert", "track"),
     "dearig.errors": (
         "DearigError",
         "DiskFault",

@@ -42,11 +42,13 @@ if TYPE_CHECKING:
         Published,
         ValidateOutcome,
     )
+    from dearig.analysis.track import TrackOutcome
 
 __all__ = [
     "branch_table",
     "diagnosis_tables",
     "identify_table",
+    "track_table",
     "validate_tables",
 ]
 
@@ -88,6 +90,13 @@ def branch_table(outcome: IdentifyOutcome) -> RenderableType:
     if not outcome.trials:
         return Group()
     return _Fitted([branch_trials(outcome.trials, outcome.kind)], ())
+
+
+def track_table(outcome: TrackOutcome) -> RenderableType:
+    """Return a target that was followed as sentences, and the error of every run."""
+    from dearig.report.track_page import runs_table, track_summary, track_warnings
+
+    return _Fitted([*track_summary(outcome), runs_table(outcome)], track_warnings(outcome))
 
 
 _RANKED = 6  # candidates of a round that a terminal shows

@@ -1,4 +1,4 @@
-"""Commands that help to set up: rig-file, sequence-file, presets, doctor, docs."""
+"""Commands that help to set up: rig-file, sequence-file, target-file, presets, doctor, docs."""
 
 from __future__ import annotations
 
@@ -43,6 +43,24 @@ def sequence_file(
     with replaced_when_done(out, overwrite=force) as partial:
         partial.write_text(example(), encoding="utf-8", newline="\n")
     print_line(console_for(), f"{out}: edit it, then run it with dearig record {out} --out FILE.h5")
+
+
+@commands.command("target-file", rich_help_panel=_PANEL)
+def target_file(
+    out: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.")],
+    force: Force = False,
+) -> None:
+    """Write a target file: a displacement that the film shall follow."""
+    from dearig.config.targetfile import EXAMPLE
+    from dearig.recording.files import replaced_when_done
+
+    check_files(force, (), out, json=None)
+    with replaced_when_done(out, overwrite=force) as partial:
+        partial.write_text(EXAMPLE, encoding="utf-8", newline="\n")
+    print_line(
+        console_for(),
+        f"{out}: edit it, then run dearig track {out} --model MODEL.toml --out DIR",
+    )
 
 
 @commands.command(rich_help_panel=_PANEL)

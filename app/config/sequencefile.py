@@ -145,10 +145,10 @@ HEAD_FIELDS: Mapping[str, FieldInfo] = MappingProxyType(_Head.model_fields)
 
 
 @cache
-def _model() -> type[Table]:
-    """Return the model of a sequence file, with every kind of segment that is installed."""
-    kinds: Any = Union[tuple(SEGMENT_KINDS.values())]  # noqa: UP007  (made at run time)
-    segments: Any = list[Annotated[kinds, Discriminator("kind")]]
+def _model(kinds: tuple[type[SegmentTable], ...]) -> type[Table]:
+    """Return the model of a sequence file with these kinds of segment."""
+    one: Any = Union[kinds]  # noqa: UP007  (made at run time)
+    segments: Any = list[Annotated[one, Discriminator("kind")]]
     return create_model(
         "SequenceFile",
         __base__=_Head,
@@ -190,22 +190,25 @@ def parse_sequence(text: str, name: str, folder: Path) -> LoadedSequence:
 
 
 def read_sequence(
-    text: str, name: str, folder: Path
+    text: str,
+    name: str,
+    folder: Path,
+    kinds: Mapping[str, type[SegmentTable]] = SEGMENT_KINDS,
 ) -> tuple[LoadedSequence | None, list[SequenceFault]]:
     """Return the sequence in the TOML ``text``, or None with all its errors.
 
-    Whether neighbouring segments join is checked only if each segment is valid. Raises
-    ``InputError`` where ``text`` is not TOML.
+    ``kinds`` are the kinds of segment by name. Whether neighbouring segments join is checked only
+    if each segment is valid. Raises ``InputError`` where ``text`` is not TOML.
     """
     data = parse_toml(text, name)
     try:
-        file: Any = _model().model_validate(data)
+        file: Any = _model(tuple(kinds.values())).model_validate(data)
     except ValidationError as error:
-        faults = _faults(error, data)
+        faults = _faults(error, data, kinds)
         wrong = {fault.row for fault in faults}
         tables = data.get("segment")
         right = {
-            i: SEGMENT_KINDS[table["kind"]].model_validate(table)
+            i: kinds[table["kind"]].model_validate(table)
             for i, table in enumerate(tables if isinstance(tables, list) else ())
             if i not in wrong
         }
@@ -279,7 +282,9 @@ _NO_SEGMENTS = (
 )
 
 
-def _faults(error: ValidationError, data: dict[str, Any]) -> list[SequenceFault]:
+def _faults(
+    error: ValidationError, data: dict[str, Any], kinds: Mapping[str, type[SegmentTable]]
+) -> list[SequenceFault]:
     """Return all faults; unknown keys come before the faults that they may cause."""
     found = sorted(
         error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden"
@@ -287,13 +292,17 @@ def _faults(error: ValidationError, data: dict[str, Any]) -> list[SequenceFault]
     # a missing key beside an unknown one is probably the key that was meant
     unknown = {f["loc"][:-1] for f in found if f["type"] == "extra_forbidden"}
     return [
-        _fault(f, data) for f in found if f["type"] != "missing" or f["loc"][:-1] not in unknown
+        _fault(f, data, kinds)
+        for f in found
+        if f["type"] != "missing" or f["loc"][:-1] not in unknown
     ]
 
 
-def _fault(fault: ErrorDetails, data: dict[str, Any]) -> SequenceFault:
+def _fault(
+    fault: ErrorDetails, data: dict[str, Any], kinds: Mapping[str, type[SegmentTable]]
+) -> SequenceFault:
     place = list(fault["loc"])
-    fields, where, row = _model().model_fields, "", None
+    fields, where, row = _model(tuple(kinds.values())).model_fields, "", None
     if len(place) >= 2 and place[0] == "segment":
         row = int(place[1])
         where = f"segment {row + 1}"
@@ -302,12 +311,12 @@ def _fault(fault: ErrorDetails, data: dict[str, Any]) -> SequenceFault:
             return SequenceFault(f"{where} {words}", words, row)
         if fault["type"] in ("union_tag_not_found", "union_tag_invalid"):
             kind = data["segment"][row].get("kind")
-            known = f"the kinds are {', '.join(SEGMENT_KINDS)}"
+            known = f"the kinds are {', '.join(kinds)}"
             said = "is missing" if kind is None else f"= {shown(kind)} is not known"
             return SequenceFault(f"{where}: kind {said}; {known}", f"kind {said}; {known}", row)
         if len(place) > 2:
             kind = str(place[2])
-            fields, where = SEGMENT_KINDS[kind].model_fields, f"{where} ({kind})"
+            fields, where = kinds[kind].model_fields, f"{where} ({kind})"
             place = place[3:]
         where += ": "
     if not place:

@@ -8,17 +8,18 @@ each run gives an estimate of what the model lacks along the path,
 and the next voltage is the one with which the model follows ``reference - Q d_j``, computed under
 all limits of the voltage (``inversion``). It was chosen because the limits act inside the
 computation: a film that stands at 0 V winds nothing up. For a linear film it is u + Q L e
-with the learning filter L = G^-1 of the linearised model, and the known condition holds (D. A.
+with the learning filter L = 1/(g G), G of the linearised model. The known condition holds (D. A.
 Bristow, M. Tharayil and A. G. Alleyne, IEEE Control Systems 26(3), 96 (2006)): the error shrinks
 from run to run, at every frequency, where
 
-    |Q (1 - L G_true)| = |Q| W < 1,    W = |G_true/G - 1|.
+    |Q (1 - L G_true)| = |Q| W < 1,    W = |G_true/(g G) - 1|.
 
-W is taken from the model's uncertainty (``alternatives``) and from the runs. After the first run it
-is the ratio of the spectra of d_0 and of the prediction, where the path has power. After a run that
-has learned, it is the part of the error that is left in the band that was learned. Beyond what was
-seen W grows with the square of the frequency, as the error of a mass does. The zero-phase filter Q
-passes what keeps |Q| W below ``CONTRACTION``. Where nothing does, nothing is learned.
+The gain g of the film over the model's is that of the first run, within 0.5 and 2. W is taken from
+the model's uncertainty (``alternatives``) and from the runs. After the first run it is the ratio of
+the spectra of d_0 and of the prediction, where the path has power, without what g explains. After a
+run that has learned, it is the part of the error that is left in the band that was learned. Beyond
+what was seen W grows with the square of the frequency, as the error of a mass does. The filter Q of
+no phase passes what keeps |Q| W below ``CONTRACTION``. Where nothing does, nothing is learned.
 """
 
 from __future__ import annotations
@@ -53,6 +54,7 @@ _JUMP = 8.0  # standard deviations of such differences elsewhere in the run
 _SUDDEN = 0.6  # of the change over four times as long: what moves steadily has a quarter
 _WIDENED = 2.0  # times the band of the last run, at most
 _POWER = 0.05  # of the largest line of the prediction's spectrum: a path has power there
+_GAIN = (0.5, 2.0)  # of the film over the model's, that learning corrects for
 _NARROWED = 0.5  # of Q's band, where a run was stepped back from
 
 
@@ -95,8 +97,6 @@ class Learner:
     ----------
     model, target, rate, limits, lead_in, tail, lag, bandwidth
         As of ``invert``; ``first`` is its result.
-    noise : float
-        Standard deviation in m of a single reading.
     alternatives : sequence of Actuator
         Models that the data allow as well, such as those at the ends of the parameters' intervals.
     """
@@ -108,16 +108,13 @@ class Learner:
         rate: float,
         limits: VoltageLimits,
         *,
-        noise: float,
         lead_in: int = 0,
         tail: int = 0,
         lag: float = 0.0,
         bandwidth: float = BANDWIDTH,
         alternatives: Sequence[Actuator] = (),
     ) -> None:
-        if not noise > 0.0:
-            raise ModelError(f"noise = {noise!r} must be above 0")
-        self._model, self._rate, self._limits, self._noise = model, rate, limits, noise
+        self._model, self._rate, self._limits, self._noise = model, rate, limits, 0.0
         self._lead_in, self._tail, self._lag, self._bandwidth = lead_in, tail, lag, bandwidth
         self.first: Inversion = self._invert(np.asarray(target, dtype=np.float64), None)
         self._inside = np.zeros(self.first.time.size, dtype=bool)
@@ -127,6 +124,7 @@ class Learner:
         self._uncertain = self._spread(alternatives)
         self._now = self.first
         self._known = np.zeros(self.first.time.size)
+        self._gain = 1.0  # of the film over the model's, from the first run
         self._best: _Run | None = None
         self._lacking: list[np.ndarray] = []  # raw, of the last runs
         self._learned: tuple[np.ndarray, float] | None = None  # amplitudes (M,) of an error, edge
@@ -141,13 +139,17 @@ class Learner:
         """The smallest error in m of any run, inf before the first."""
         return np.inf if self._best is None else self._best.rms
 
-    def learn(self, reading: np.ndarray, valid: np.ndarray | None = None) -> Lesson:
+    def learn(self, reading: np.ndarray, noise: float, valid: np.ndarray | None = None) -> Lesson:
         """Learn from the ``reading`` (N,) m of a run of ``voltage``; return what follows.
 
-        ``valid`` (N,) is False for readings that must not be used. Readings that are not finite,
-        stuck, or spikes are not used either. Whatever the reading is, the next voltage is within
-        the limits.
+        ``noise`` is the standard deviation in m of a single reading. ``valid`` (N,) is False for
+        readings that must not be used. Readings that are not finite, stuck, or spikes are not used
+        either. Whatever the reading is, the next voltage is within
+        the limits. Raises ``ModelError`` for a noise that is not above 0.
         """
+        if not 0.0 < noise < np.inf:
+            raise ModelError(f"noise = {noise!r} m must be above 0")
+        self._noise = noise
         usable, reading, notes = self._usable(reading, valid)
         counted = usable & self.first.reachable
         error = np.where(counted, self.first.reference - reading, 0.0)
@@ -162,6 +164,11 @@ class Learner:
         best = self._best
         if best is not None and rms > _WORSE * best.rms + 0.1 * self._noise:
             return self._step_back(best, rms, largest, samples, notes)
+        if best is None:
+            moved = np.where(self._inside, self._now.reading, 0.0)
+            power = float(moved @ moved)
+            gain = 1.0 + float(lacking @ moved) / power if power > 0.0 else 1.0
+            self._gain = float(np.clip(gain, *_GAIN))
         lacking = self._repeated(lacking, notes)
         left = np.abs(np.fft.rfft(np.where(counted, error, 0.0)))
         self._best = _Run(self._now.voltage, self._known, lacking, rms, left)
@@ -186,7 +193,7 @@ class Learner:
                 "learned; check the sign of the laser, the film and the model"
             )
             return self._lesson(rms, largest, samples, learned=False, notes=notes)
-        part = 1.0 if rms > _NEAR_NOISE * self._noise else 0.5
+        part = (1.0 if rms > _NEAR_NOISE * self._noise else 0.5) / self._gain
         change = low_pass(np.where(self._inside, run.lacking - run.known, 0.0), self._rate, edge)
         self._known = run.known + part * change
         self._learned = (run.left, edge)
@@ -274,7 +281,9 @@ class Learner:
     def _off_at_first(self, lacking: np.ndarray) -> np.ndarray:
         """Return W (M,) from what the model ``lacking`` (N,) m shows of the first run."""
         window = np.where(self._inside, 1.0, 0.0)
-        shown = np.abs(np.fft.rfft(lacking * window))
+        # what a gain alone does not explain
+        rest = (lacking - (self._gain - 1.0) * self._now.reading) / self._gain
+        shown = np.abs(np.fft.rfft(rest * window))
         noise = self._noise * np.sqrt(np.count_nonzero(self._inside))
         shown = np.sqrt(np.maximum(shown**2 - noise**2, 0.0))
         predicted = np.abs(np.fft.rfft(self._now.reading * window))

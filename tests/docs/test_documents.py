@@ -22,6 +22,7 @@ from dearig.config.modelfile import load_model
 from dearig.config.rigfile import load_rig_file
 from dearig.config.segments import SEGMENT_KINDS
 from dearig.config.sequencefile import parse_sequence
+from dearig.config.targetfile import parse_target
 from dearig.docs import pages
 from dearig.docs.site import anchors
 from tests.docs import reference
@@ -105,7 +106,10 @@ def test_every_toml_example_is_accepted(block: Block, tmp_path: Path) -> None:
 def accept_toml(text: str, folder: Path) -> None:
     """Fail unless the reader that such a file is for takes it."""
     content = tomllib.loads(text)
-    if "segment" in content and "name" not in content:  # a part of a sequence
+    keys = {key for table in content.get("segment", ()) for key in table}
+    if any(key.endswith("_mm") for key in keys):
+        parse_target(text, "example", folder)
+    elif "segment" in content and "name" not in content:  # a part of a sequence
         for table in content["segment"]:
             SEGMENT_KINDS[table["kind"]].model_validate(table)
     elif "segment" in content:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path, PurePath
 from typing import Any, ClassVar, Literal
 
@@ -24,6 +25,8 @@ class Csv(SegmentTable):
     """A waveform from a CSV file beside the sequence; straight lines between its points."""
 
     example: ClassVar[dict[str, Any]] = {"file": "waveform.csv"}
+    #: Columns that may hold the values, and V in a unit of each.
+    columns: ClassVar[Mapping[str, float]] = {"voltage_kV": KV, "voltage_V": 1.0}
 
     kind: Literal["csv"]
     file: str = Field(
@@ -55,11 +58,11 @@ class Csv(SegmentTable):
                 f"put the waveform itself beside the sequence"
             )
         source = TextFile(folder / place)
-        scale = next((k for k in ("voltage_kV", "voltage_V") if k in source.names), None)
+        scale = next((k for k in self.columns if k in source.names), None)
         if scale is None or "time_s" not in source.names:
             raise InputError(
                 f"{source.path} has the columns {listing(source.names)}; a waveform takes time_s "
-                f"and voltage_kV or voltage_V"
+                f"and {' or '.join(self.columns)}"
             )
         for column in ("time_s", scale):
             source.check(column)
@@ -73,5 +76,4 @@ class Csv(SegmentTable):
                 f"{source.path}, {source.row(at)}: time {how}, from {time[at - 1]:.9g} s to "
                 f"{time[at]:.9g} s; a step takes two lines with a little time between them"
             )
-        voltages = columns[scale] * (KV if scale == "voltage_kV" else 1.0)
-        return excitation.Sampled(time, voltages)
+        return excitation.Sampled(time, columns[scale] * self.columns[scale])

@@ -19,7 +19,7 @@ NOISE = 1e-6
 
 
 def learner(model=THESIS, target=None, **options):
-    options = {"noise": NOISE, "lead_in": LEAD_IN, "tail": TAIL, **options}
+    options = {"lead_in": LEAD_IN, "tail": TAIL, **options}
     return Learner(model, path() if target is None else target, RATE, LIMITS, **options)
 
 
@@ -43,7 +43,7 @@ def hiding(name, size=3.0):
 
 def taught(rig, runs=5, **options):
     teacher = learner(**options)
-    return teacher, [teacher.learn(rig.play(teacher)) for _ in range(runs)]
+    return teacher, [teacher.learn(rig.play(teacher), NOISE) for _ in range(runs)]
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_a_model_that_knows_the_effect_needs_no_learning():
 def test_a_wrong_sign_of_the_laser_teaches_nothing():
     teacher = learner()
     before = teacher.voltage.copy()
-    lesson = teacher.learn(-Rig(THESIS).play(teacher))
+    lesson = teacher.learn(-Rig(THESIS).play(teacher), NOISE)
     assert not lesson.learned
     assert "sign of the laser" in lesson.notes[-1]
     np.testing.assert_array_equal(teacher.voltage, before)
@@ -90,16 +90,16 @@ def test_readings_without_a_value_are_left_out():
         reading = rig.play(teacher)
         reading[300:360] = np.nan
         reading[500] += 1e-3
-        lesson = teacher.learn(reading)
+        lesson = teacher.learn(reading, NOISE)
     assert "1 spikes are left out" in lesson.notes
     assert lesson.rms < 1.5 * NOISE
     masked = np.arange(reading.size) < reading.size // 2
-    assert lesson.samples > teacher.learn(rig.play(teacher), masked).samples
+    assert lesson.samples > teacher.learn(rig.play(teacher), NOISE, masked).samples
 
 
 def test_a_laser_that_stands_still_teaches_nothing():
     teacher = learner()
-    lesson = teacher.learn(np.full(teacher.first.time.size, 1e-6))
+    lesson = teacher.learn(np.full(teacher.first.time.size, 1e-6), NOISE)
     assert not lesson.learned
     assert "too few readings" in lesson.notes[-1]
 
@@ -107,25 +107,25 @@ def test_a_laser_that_stands_still_teaches_nothing():
 def test_a_slip_of_one_run_is_not_learned():
     rig, teacher = hiding("leakage"), learner()
     for _ in range(3):
-        quiet = teacher.learn(rig.play(teacher))
+        quiet = teacher.learn(rig.play(teacher), NOISE)
     reading = rig.play(teacher)
     reading[reading.size // 2 :] += 6e-6
-    shifted = teacher.learn(reading)
+    shifted = teacher.learn(reading, NOISE)
     assert shifted.rms > 2.0 * quiet.rms
-    assert teacher.learn(rig.play(teacher)).rms < 1.3 * quiet.rms
+    assert teacher.learn(rig.play(teacher), NOISE).rms < 1.3 * quiet.rms
 
 
 def test_a_run_that_got_worse_is_stepped_back_from():
     rig, teacher = hiding("slow branch"), learner()
-    first = teacher.learn(rig.play(teacher))
-    second = teacher.learn(rig.play(teacher))
+    first = teacher.learn(rig.play(teacher), NOISE)
+    second = teacher.learn(rig.play(teacher), NOISE)
     best = teacher.best_rms
-    worse = teacher.learn(rig.play(teacher) * 1.2)
+    worse = teacher.learn(rig.play(teacher) * 1.2, NOISE)
     assert worse.rms > second.rms
     assert "stepped back" in " ".join(worse.notes)
     assert worse.edge < second.edge
     assert teacher.best_rms == best < first.rms
-    assert teacher.learn(rig.play(teacher)).rms < 1.3 * best
+    assert teacher.learn(rig.play(teacher), NOISE).rms < 1.3 * best
 
 
 def test_an_uncertain_model_learns_less():
@@ -138,7 +138,7 @@ def test_an_uncertain_model_learns_less():
 
 def test_noise_is_above_zero():
     with pytest.raises(ModelError, match="noise"):
-        learner(noise=0.0)
+        learner().learn(path(), 0.0)
 
 
 # ---------------------------------------------------------------- no reading passes a limit
@@ -173,10 +173,10 @@ _KINDS = ("nan", "spikes", "stuck", "flipped", "large", "noise", "ended", "sound
 def test_no_reading_makes_a_voltage_beyond_a_limit(kinds, seed):
     rng = np.random.default_rng(seed)
     limits = VoltageLimits(_GATE.voltage_max, _GATE.slew, _GATE.field)
-    teacher = Learner(THESIS, _SHORT, RATE, limits, noise=NOISE, lead_in=LEAD_IN, tail=TAIL)
+    teacher = Learner(THESIS, _SHORT, RATE, limits, lead_in=LEAD_IN, tail=TAIL)
     rig = hiding("slow branch")
     for kind in kinds:
-        lesson = teacher.learn(_spoil(rig.play(teacher), kind, rng))
+        lesson = teacher.learn(_spoil(rig.play(teacher), kind, rng), NOISE)
         voltage = lesson.voltage
         predicted = PredictedFilm(THESIS, voltage.size, RATE, _GATE, "", None)
         admit(Listed(voltage), RATE, _GATE, predicted)  # raises where a limit is passed

@@ -1,0 +1,286 @@
+"""A displacement that the film shall follow: the voltage for it, and runs that learn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dearig.acquisition.run import RunOptions
+from dearig.analysis import track as tracking
+from dearig.api.display import card, drawing, facts, table_html, write_page
+from dearig.api.models import ModelSource, as_model_file
+from dearig.api.recordings import Recording, RigSource, load_rig
+from dearig.config.modelfile import ModelFile, load_model
+from dearig.config.targetfile import LoadedTarget, load_target, target_of
+from dearig.errors import InputError
+from dearig.model.actuator import Actuator
+from dearig.model.control import Unreachable
+from dearig.model.control import inversion as control
+from dearig.progress import Progress, quiet
+from dearig.recording.files import check_output, replaced_when_done
+from dearig.recording.json_file import write_json
+from dearig.recording.reader import open_recording
+from dearig.report.numbers import seconds, significant
+from dearig.report.signal_figures import signal_figure
+from dearig.report.track_page import (
+    errors_figure,
+    runs_figure,
+    runs_table,
+    track_json,
+    track_summary,
+    write_track_report,
+)
+from dearig.sim_backend.faults import FaultPlan
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Inversion", "TargetSource", "TrackResult", "invert", "track"]
+
+#: The path of a target file, or time (N,) in s and displacement (N,) in m.
+TargetSource = str | Path | tuple[np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Inversion:
+    """The voltage with which a model follows a target; arrays are (N,) in SI units."""
+
+    name: str
+    inversion: control.Inversion
+
+    @property
+    def time(self) -> np.ndarray:
+        """Time in s, with lead-in and tail."""
+        return self.inversion.time
+
+    @property
+    def voltage(self) -> np.ndarray:
+        """Voltage in V, held from sample to sample."""
+        return self.inversion.voltage
+
+    @property
+    def target(self) -> np.ndarray:
+        """The asked displacement in m."""
+        return self.inversion.target
+
+    @property
+    def reference(self) -> np.ndarray:
+        """The nearest feasible target in m."""
+        return self.inversion.reference
+
+    @property
+    def response(self) -> np.ndarray:
+        """The displacement in m that the model reads under the voltage."""
+        return self.inversion.reading
+
+    @property
+    def unreachable(self) -> tuple[Unreachable, ...]:
+        """The parts of the target that the film cannot follow: when, why and by how much."""
+        return self.inversion.unreachable
+
+    @property
+    def feasible(self) -> bool:
+        """True if the film can follow the whole target."""
+        return self.inversion.feasible
+
+    def plot(self) -> Figure:
+        """Return a figure of the voltage, and of target and response over time."""
+        return signal_figure("actuator", self.time, self.voltage, self.target, self.response)
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the voltage as a table (``.csv``), which a sequence can play; return the path.
+
+        Raises ``InputError``.
+        """
+        out = check_output(path, overwrite)
+        if out.suffix != ".csv":
+            raise InputError(f"{path}: the voltage is a table; end the name in .csv")
+        table = np.column_stack([self.time, self.voltage])
+        with replaced_when_done(out, overwrite) as partial:
+            np.savetxt(partial, table, fmt="%.12g", delimiter=",", header="time_s,voltage_V",
+                       comments="")  # fmt: skip
+        return out
+
+    def to_html(self, path: str | Path) -> Path:
+        """Write a page with the main facts and a figure to ``path``, replacing it."""
+        return write_page(path, self.name, self._repr_html_())
+
+    def __repr__(self) -> str:
+        """Return name, peak voltage and what is unreachable."""
+        said = "feasible" if self.feasible else f"{len(self.unreachable)} parts unreachable"
+        peak = float(self.voltage.max()) * 1e-3
+        return f"<Inversion {self.name!r}: up to {significant(peak)} kV, {said}>"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("samples", f"{self.time.size:,}, {seconds(float(self.time[-1]))}"),
+            ("voltage", f"up to {significant(float(self.voltage.max()) * 1e-3)} kV"),
+            *(("not reachable", part.sentence) for part in self.unreachable),
+        ]
+        return card(self.name, facts(rows), drawing(self.plot(), f"{self.name} over time"))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TrackResult:
+    """A target that was followed; ``outcome`` has everything that is known of it."""
+
+    outcome: tracking.TrackOutcome
+
+    @property
+    def inversion(self) -> Inversion:
+        """What the model says can be reached, before any run."""
+        return Inversion(self.outcome.target.name, self.outcome.inversion)
+
+    @property
+    def runs(self) -> tuple[tracking.TrackedRun, ...]:
+        """All runs with their errors in m, those that were compared first."""
+        return self.outcome.runs
+
+    @property
+    def best(self) -> Recording:
+        """The recording of the run with the smallest error. Raises ``InputError`` without one."""
+        best = self.outcome.best
+        if best is None:
+            raise InputError("no run was finished")
+        return Recording.of(open_recording(best.recording), best.margins)
+
+    def plot(self, what: str = "runs") -> Figure:
+        """Return a figure of the ``runs`` over time, or of the ``errors`` of all iterations."""
+        if what not in ("runs", "errors"):
+            raise InputError(f"{what!r} cannot be plotted; what can is runs, errors")
+        return (runs_figure if what == "runs" else errors_figure)(self.outcome)
+
+    def to_html(self, path: str | Path) -> Path:
+        """Write the report to ``path``, replacing it. Raises ``InputError``."""
+        return write_track_report(self.outcome, path)
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write all numbers (``.json``) to ``path`` and return the path. Raises ``InputError``."""
+        out = check_output(path, overwrite)
+        if out.suffix != ".json":
+            raise InputError(f"{path}: all numbers are written as JSON; end the name in .json")
+        write_json(track_json(self.outcome), out)
+        return out
+
+    def __repr__(self) -> str:
+        """Return the summary in sentences."""
+        return "\n".join(track_summary(self.outcome))
+
+    def _repr_html_(self) -> str:
+        name = self.outcome.target.name
+        return card(
+            f"Tracking: {name}",
+            table_html(runs_table(self.outcome)),
+            drawing(self.plot(), f"Runs of {name} over time"),
+            sentences=track_summary(self.outcome),
+        )
+
+
+def invert(
+    model: ModelSource, target: TargetSource, *, rig_file: RigSource | None = None
+) -> Inversion:
+    """Compute the voltage with which a model follows a displacement.
+
+    Parameters
+    ----------
+    model : model, result or path
+        An actuator, such as a diagnosis has found.
+    target : path, or two arrays
+        A target file (TOML or CSV), or time in s and displacement in m from the loaded rest state,
+        which starts and ends at 0.
+    rig_file : path or mapping, optional
+        Limits and sample rate.
+
+    Raises
+    ------
+    InputError
+        For a target or a model that cannot be used. What the film cannot reach raises nothing: see
+        ``Inversion.unreachable``.
+    """
+    loaded, settings = _target(target), load_rig(rig_file)[0]
+    file = _model(model)
+    if not isinstance(file.model, Actuator):
+        raise InputError(
+            f"the model {file.name!r} is of a bare film, which a voltage does not move"
+        )
+    return Inversion(loaded.name, tracking.plan_target(loaded, file.model, settings)[0])
+
+
+def track(
+    target: TargetSource,
+    model: ModelSource,
+    *,
+    out: str | Path,
+    rig: str = "sim",
+    rig_file: RigSource | None = None,
+    iterations: int = 5,
+    compare: ModelSource | None = None,
+    nearest: bool = False,
+    within_um: float = 5.0,
+    operator: str = "",
+    film: str = "",
+    notes: str = "",
+    seed: int = 0,
+    paced: bool = False,
+    faults: Iterable[str] = (),
+    overwrite: bool = False,
+    progress: Progress = quiet,
+) -> TrackResult:
+    """Make the film follow a displacement, and learn from run to run.
+
+    Parameters
+    ----------
+    target, model, rig_file
+        As for ``invert``.
+    out : path
+        Folder for the recordings and the sequences that were played.
+    rig : str
+        ``sim``, ``sim:SEED`` for a simulated rig with a hidden effect, ``daqmx:Dev1`` for a card.
+    iterations : int
+        Number of runs that learn from the one before.
+    compare : model, result or path, optional
+        Before, play the voltage of this model, such as the thesis's, and that of a linear map.
+    nearest : bool
+        Follow the nearest feasible target where the film cannot follow the asked one.
+    within_um : float
+        Distance from the target in um that is accepted without ``nearest``.
+    operator, film, notes, seed, paced, faults, overwrite, progress
+        As for ``record``.
+
+    Raises
+    ------
+    InputError
+        For a target that cannot be reached, and for a voltage that the gate refuses.
+    SafetyStop, InstrumentFault, DiskFault, Interrupted
+        For a run that ended early. The rig is safe, and the recordings so far are kept.
+    """
+    settings, text = load_rig(rig_file)
+    try:
+        plan = FaultPlan.parse(list(faults))
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    outcome = tracking.track(
+        _target(target), _model(model), rig, settings, Path(out),
+        RunOptions(
+            text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced, faults=plan
+        ),
+        iterations=iterations, compare=None if compare is None else _model(compare),
+        nearest=nearest, within=within_um * 1e-6, progress=progress,
+    )  # fmt: skip
+    return TrackResult(outcome)
+
+
+def _model(source: ModelSource) -> ModelFile:
+    given = as_model_file(source)
+    return given if isinstance(given, ModelFile) else load_model(given)
+
+
+def _target(source: TargetSource) -> LoadedTarget:
+    if isinstance(source, str | Path):
+        return load_target(source)
+    time, displacement = source
+    return target_of(time, displacement)

@@ -1,0 +1,213 @@
+"""A displacement that is followed run after run, on simulated rigs."""
+
+from __future__ import annotations
+
+import signal
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dearig.acquisition.run import RunObserver, RunOptions
+from dearig.analysis.track import alternatives_of, plan_target, track
+from dearig.config.modelfile import ModelFile
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import load_sequence
+from dearig.config.targetfile import parse_target
+from dearig.drivers.settings import CardSettings, LimitsSettings
+from dearig.errors import InputError, Interrupted, SafetyStop
+from dearig.model.actuator import Actuator
+from dearig.model.control import CAUSES
+from dearig.model.film import Strip
+from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
+from dearig.recording.reader import open_recording
+from dearig.sim_backend.faults import FaultPlan
+
+PATH = """\
+name = "path"
+lead_in_s = 0.5
+tail_s = 0.2
+[[segment]]
+kind = "ramp"
+to_mm = 0.3
+duration_s = 1.0
+[[segment]]
+kind = "sine"
+amplitude_mm = 0.05
+frequency_Hz = 1.0
+offset_mm = 0.3
+[[segment]]
+kind = "ramp"
+to_mm = 0.0
+duration_s = 1.5
+"""
+RIG = RigFile(card=CardSettings(sample_rate_Hz=200.0))
+MODEL = ModelFile("Table 3", Actuator(THESIS_FILM, THESIS_LOAD, TABLE_3))
+STIFFER = replace(
+    TABLE_3,
+    equilibrium=replace(TABLE_3.equilibrium, modulus=1.15 * TABLE_3.equilibrium.modulus),
+)
+WRONG = ModelFile("stiffer", Actuator(THESIS_FILM, THESIS_LOAD, STIFFER))
+
+
+def target(text=PATH):
+    return parse_target(text, "path.toml", Path())
+
+
+def followed(folder, model=MODEL, **options):
+    given = {"iterations": 0, "nearest": True, **options}
+    settings = given.pop("rig_file", RIG)
+    run = given.pop("options", RunOptions())
+    return track(target(), model, "sim", settings, folder, run, **given)
+
+
+@pytest.fixture(scope="module")
+def learned(tmp_path_factory):
+    """A wrong model that learns, beside the right one and a linear map."""
+    folder = tmp_path_factory.mktemp("learned") / "out"
+    return followed(
+        folder, WRONG, iterations=3, compare=MODEL, options=RunOptions(notes="before lunch")
+    )
+
+
+def test_the_right_model_follows_within_the_noise(learned):
+    right = learned.runs[1]
+    assert right.kind == "thesis"
+    assert right.rms < 1.2 * learned.noise
+
+
+def test_a_wrong_model_learns(learned):
+    ours = [run for run in learned.runs if run.kind in ("model", "learned")]
+    assert [run.iteration for run in ours] == [0, 1, 2, 3]
+    assert ours[0].rms > 10.0 * learned.noise
+    assert ours[-1].rms < 1.5 * learned.noise
+    assert learned.best.rms == min(run.rms for run in ours)
+    assert learned.runs[0].kind == "linear"
+    assert learned.runs[0].rms > 5.0 * learned.runs[1].rms
+    assert learned.status == "complete"
+
+
+def test_every_run_is_a_recording_with_its_origin(learned):
+    for run in learned.runs:
+        recording = open_recording(run.recording)
+        assert recording.outcome == "finished"
+        assert recording.notes == f"before lunch; target 'path', {run.recording.stem}"
+        assert f"{run.recording.stem}.csv had sha256" in recording.sequence_toml
+        assert run.margins
+        assert (recording.displacement_model is None) == (run.kind == "linear")
+    assert "stiffer" in open_recording(learned.runs[-1].recording).model_toml
+
+
+def test_a_learned_voltage_can_be_played_again(learned):
+    run = learned.best
+    _, voltage = load_sequence(run.recording.with_suffix(".toml")).sample(200.0)
+    np.testing.assert_allclose(voltage, run.voltage, atol=1.0)  # V: a step of the converter
+
+
+def test_the_noise_of_two_runs_differs(learned):
+    first, second = (open_recording(r.recording).displacement[:80] for r in learned.runs[-2:])
+    assert not np.array_equal(first, second)
+
+
+def test_what_cannot_be_reached_is_refused_before_anything_is_written(tmp_path):
+    folder = tmp_path / "out"
+    with pytest.raises(InputError) as refused:
+        followed(folder, nearest=False)
+    assert CAUSES["zero"] in str(refused.value)
+    assert "--nearest" in str(refused.value)
+    assert not folder.exists()
+
+
+def test_the_nearest_feasible_target_respects_the_rig_files_limits(tmp_path):
+    low = RIG.model_copy(update={"limits": LimitsSettings(voltage_max_kV=3.0)})
+    found = followed(tmp_path / "out", rig_file=low)
+    assert "voltage" in {part.cause for part in found.inversion.unreachable}
+    (run,) = found.runs
+    assert run.voltage.max() <= 3001.0  # V: a step of the converter
+    assert run.rms < 1.5 * found.noise  # where it can be reached
+
+
+def test_a_folder_with_results_is_kept(tmp_path):
+    (tmp_path / "old.h5").write_bytes(b"")
+    with pytest.raises(InputError, match="is not empty"):
+        followed(tmp_path)
+
+
+def test_a_model_of_a_bare_film_is_refused(tmp_path):
+    with pytest.raises(InputError, match="a voltage does not move"):
+        followed(tmp_path / "out", ModelFile("film", Strip(TABLE_3)))
+
+
+def test_a_target_too_long_to_be_inverted_is_refused():
+    long = target(PATH.replace("duration_s = 1.5", "duration_s = 6000.0"))
+    with pytest.raises(InputError, match=r"more than 1,000,000 samples at 200 Hz"):
+        plan_target(long, MODEL.model, RIG)
+
+
+def test_a_voltage_that_the_gate_refuses_leaves_nothing(tmp_path):
+    brief = RIG.model_copy(update={"limits": LimitsSettings(time_at_voltage_max_s=0.5)})
+    folder, kept = tmp_path / "out", []
+    with pytest.raises(InputError, match="time at 1 kV or more reaches"):
+        followed(folder, rig_file=brief, ended=kept.append)
+    assert not folder.exists()
+    assert kept == []
+
+
+def test_a_fault_keeps_what_was_done(tmp_path):
+    kept = []
+    with pytest.raises(SafetyStop):
+        followed(
+            tmp_path / "out", ended=kept.append,
+            options=RunOptions(faults=FaultPlan.parse(["arc@1.2"])),
+        )  # fmt: skip
+    (outcome,) = kept
+    assert outcome.status == "stopped"
+    assert outcome.runs == ()
+    assert "0 V" in outcome.reason
+
+
+class _SecondRunInterrupted(RunObserver):
+    """Presses ctrl-C in the second run."""
+
+    def __init__(self):
+        self.runs = 0
+
+    def started(self, *_):
+        self.runs += 1
+
+    def block(self, *_):
+        if self.runs == 2:
+            self.runs += 1
+            signal.raise_signal(signal.SIGINT)
+
+
+def test_an_interrupt_ends_at_zero_and_keeps_what_was_done(tmp_path):
+    kept, folder = [], tmp_path / "out"
+    with pytest.raises(Interrupted, match="ramped down to 0 V"):
+        followed(folder, iterations=3, ended=kept.append, observer=_SecondRunInterrupted())
+    (outcome,) = kept
+    assert outcome.status == "interrupted"
+    assert [run.kind for run in outcome.runs] == ["model"]
+    last = open_recording(folder / "learned-1.h5")
+    assert last.outcome.startswith("interrupted")
+    assert abs(last.voltage_command[-1]) < 1.0
+
+
+def test_intervals_make_alternatives():
+    estimates = [
+        {"name": "mu_0", "value": 1.0, "low95": 40e3, "high95": 50e3, "determined": True},
+        {"name": "T_1", "value": 1.0, "low95": 0.3, "high95": 0.5, "determined": True},
+        {"name": "J_1", "value": 1.0, "low95": 1.0, "high95": 2.0, "determined": True},
+        {"name": "mu_2", "value": 1.0, "low95": 1.0, "high95": 2.0, "determined": False},
+        {"name": "mu_9", "value": 1.0, "low95": 1.0, "determined": True},
+        {"name": "sensor lag: time_constant", "low95": 0.01, "determined": True},
+        "nonsense",
+    ]
+    lagged = replace(MODEL.model, effects=(("sensor lag", (("time_constant", 0.02),)),))
+    found = alternatives_of(ModelFile("fitted", lagged, {"estimate": estimates}))
+    assert len(found) == 5
+    assert found[0].network.equilibrium.modulus == 40e3
+    assert found[3].network.branches[0].relaxation_time == 0.5
+    assert found[4].effects == (("sensor lag", (("time_constant", 0.01),)),)
+    assert alternatives_of(MODEL) == ()
