@@ -257,7 +257,7 @@ def test_scales_are_those_of_the_units(value: float, name: str) -> None:
 def test_blocks_of_a_large_file_join_without_a_seam(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dearig.recording.importers.text_file.BLOCK", 97)
+    monkeypatch.setattr("dearig.recording.importers.text_blocks.BLOCK", 97)
     path = tmp_path / "in.csv"
     path.write_text(table(), "utf-8")
     source = TextFile(path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -114,7 +115,10 @@ def import_file(
             f"right, or after correcting it, run: {chosen.command(Path(out), _typed(options))}"
         )
     specimen = Specimen(options.gauge_length_mm, options.area_mm2)
-    values = values_of(chosen, specimen, options.rate_Hz, options.skip_bad_rows)
+    with ThreadPoolExecutor(1) as beside:  # hashing a file takes as long as reading its numbers
+        digest = beside.submit(file_sha256, path)
+        values = values_of(chosen, specimen, options.rate_Hz, options.skip_bad_rows)
+    noted = _provenance(path, digest.result(), chosen, options)
     was = exported(table.about)
     film, kinematics = metadata.film or was.film, options.kinematics or was.kinematics
     rest = 0.0
@@ -134,7 +138,7 @@ def import_file(
             film=film,
             load=metadata.load or was.load,
             sequence_toml=metadata.sequence_toml or was.sequence,
-            provenance={**_provenance(path, chosen, options), **metadata.provenance},
+            provenance={**noted, **metadata.provenance},
         ),
         hold=was.hold and values.kind == "actuator",
         kinematics=kinematics or (None if values.kind == "actuator" else "uniaxial"),
@@ -162,11 +166,13 @@ def _typed(options: ImportOptions) -> list[str]:
     return [*words, "--skip-bad-rows"] if options.skip_bad_rows else words
 
 
-def _provenance(path: Path, chosen: Chosen, options: ImportOptions) -> dict[str, object]:
+def _provenance(
+    path: Path, digest: str, chosen: Chosen, options: ImportOptions
+) -> dict[str, object]:
     """Return the file, the columns and the settings that the values come from."""
     found: dict[str, object] = {
         "source": path.name,
-        "source_sha256": file_sha256(path),
+        "source_sha256": digest,
         "columns": ", ".join(f"{p.target.name}={p.column}" for p in chosen.picked.values()),
     }
     for name in ("gauge_length_mm", "area_mm2", "rate_Hz"):

@@ -231,6 +231,8 @@ _STEPS = re.compile(
     r"(dt|ts|d_t|delta_?(t|x|time)|x?_?increment|wf_increment|time_?step"
     r"|(sample|sampling)_?(time|interval|period)|abtastzeit)(_?(?P<unit>s|ms|us))?"
 )
+#: Shortest and longest time in s from row to row that a setting may give.
+STEP_MIN, STEP_MAX = 1e-12, 1e6
 _PER_UNIT = MappingProxyType({"khz": 1e3, "ms": 1e-3, "us": 1e-6})
 
 
@@ -240,7 +242,9 @@ def rate_step(name: str, value: float) -> float | None:
     if not 0.0 < value < float("inf"):
         return None
     if match := _RATES.fullmatch(plain):
-        return 1.0 / (value * _PER_UNIT.get(match["unit"] or "", 1.0))
-    if match := _STEPS.fullmatch(plain):
-        return value * _PER_UNIT.get(match["unit"] or "", 1.0)
-    return None
+        step = 1.0 / (value * _PER_UNIT.get(match["unit"] or "", 1.0))
+    elif match := _STEPS.fullmatch(plain):
+        step = value * _PER_UNIT.get(match["unit"] or "", 1.0)
+    else:
+        return None
+    return step if STEP_MIN <= step <= STEP_MAX else None

@@ -1,18 +1,19 @@
 """Columns of a table of numbers in a text file: CSV and its many relatives.
 
-pandas parses the numbers, a block of lines at a time. A block that it refuses is read again line by
-line, to say which cell of which line is wrong, or to leave that row out.
+pandas parses the numbers, a block of lines at a time. A block that it refuses is halved until few
+lines are left, which are read one by one, to say which cell is wrong, or to leave that row out.
 """
 
 from __future__ import annotations
 
 import codecs
 import csv
-import io
 import math
+from collections import deque
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from dearig.recording.files import in_words
 from dearig.recording.importers.cells import complaint_about, number_in
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import no_such_column
+from dearig.recording.importers.text_blocks import BytesReader, blocks_of, halves_of
 from dearig.recording.importers.text_layout import (
     HEAD_CHARACTERS,
     Column,
@@ -34,9 +36,12 @@ from dearig.recording.importers.text_layout import (
 
 __all__ = ["IMPORTER", "TextFile"]
 
-#: Characters of a block: so short that a block with a wrong cell is read again in no time, and so
-#: long that what is done once for each block does not count.
-BLOCK = 2**21
+#: Bytes of a block that is read line by line where it is not whole.
+SHORT = 2**15
+#: Threads that parse blocks.
+THREADS = 2
+#: Room for rows, in multiples of those that the first block lets expect.
+ROOM = 1.05
 _HEAD = 4 * HEAD_CHARACTERS  # bytes: a character has four at most
 
 
@@ -68,11 +73,13 @@ class TextFile:
         self.layout: Layout = layout_of(head, encoding, path, names_line)
         self._columns = {column.name: column for column in self.layout.columns}
         self._skip = skip_bad_rows
+        # it costs a third of the parsing
+        self._is_spaced = f"{self.layout.delimiter} " in head
         self._side_by_side = bool(self.tables)
         self._wanted: list[Column] = []  # columns that were read last
         #: rows before each row that was left out, and its line, in words
         self.skipped: list[tuple[int, str]] = []
-        self._spans: list[tuple[int, int, int]] = []  # rows before, first line, rows of a block
+        self._spans: list[_Span] = []
 
     @property
     def names(self) -> list[str]:
@@ -124,80 +131,119 @@ class TextFile:
         """Return columns by name; see ``Source``."""
         wanted = [self._columns[name] for name in dict.fromkeys(names)]
         self.skipped, self._spans, self._wanted = [], [], wanted
-        pieces: list[np.ndarray] = []
-        rows = 0
-        for line, text in self._blocks():
-            fast = self._read_fast(text, wanted)
-            piece = self._read_slowly(rows, line, text, wanted) if fast is None else fast
-            pieces.append(piece)
-            self._spans.append((rows, line, piece.shape[1]))
-            rows += piece.shape[1]
-        table = np.concatenate(pieces, axis=1) if pieces else np.empty((len(wanted), 0))
-        return {column.name: table[i] for i, column in enumerate(wanted)}
+        table = _Table(len(wanted))
+        left = self.path.stat().st_size
+        for line, block, values in self._parsed():
+            self._keep(line, block, values, table, left)
+            left -= len(block)
+        return {column.name: values for column, values in zip(wanted, table.values, strict=True)}
 
     def row(self, index: int) -> str:
         """Return the line of sample ``index`` of what was read last."""
-        before, first, _ = next(span for span in self._spans if index < span[0] + span[2])
-        left, skipped = index - before, {where for _, where in self.skipped}
-        for line, text in self._blocks():
-            if line != first:
-                continue
-            for number, content in enumerate(text.splitlines(), line):
-                if self._holds_data(content) and f"line {number}" not in skipped:
-                    if left == 0:
-                        return f"line {number}"
-                    left -= 1
-        raise IndexError(index)
+        return self.rows([index])[0]
 
-    def _blocks(self) -> Iterator[tuple[int, str]]:
-        """Yield the number, from 1, of a block's first line, and the block."""
-        try:
-            with (
-                open_input(self.path) as raw,
-                io.TextIOWrapper(raw, self.layout.encoding, newline=None) as stream,
-            ):
-                yield from _pieces(stream, self.layout.first)
-        except (OSError, UnicodeDecodeError) as error:
-            said = in_words(error) if isinstance(error, OSError) else str(error)
-            raise InputError(f"{self.path} cannot be read: {said}") from error
+    def rows(self, indices: Sequence[int]) -> list[str]:
+        """Return the lines of the samples ``indices``, which go up, of what was read last."""
+        skipped = {where for _, where in self.skipped}
+        spans = iter(self._spans)
+        span = next(spans)
+        found: list[str] = []
+        for first, block in blocks_of(self.path, self.layout.encoding, self.layout.first):
+            lines = block.removesuffix(b"\n").split(b"\n")
+            while span.line < first + len(lines):
+                left = [i - span.before for i in indices[len(found) :] if i < span.end]
+                count = -1
+                for number in range(span.line, first + len(lines)) if left else ():
+                    if f"line {number}" in skipped or not self._is_row(lines[number - first]):
+                        continue
+                    count += 1
+                    if count == left[0]:
+                        found.append(f"line {number}")
+                        if not left[1:]:
+                            break
+                        del left[0]
+                if len(found) == len(indices):
+                    return found
+                span = next(spans)
+        raise IndexError(indices[len(found)])
 
-    def _read_fast(self, text: str, wanted: Sequence[Column]) -> np.ndarray | None:
-        """Return the columns as pandas parses them, (columns, rows); None if they are not whole."""
+    def _is_row(self, line: bytes) -> bool:
+        return self._holds_data(line.decode("utf-8", "replace"))
+
+    def _parsed(self) -> Iterator[tuple[int, bytes, list[np.ndarray] | None]]:
+        """Yield the blocks of the file, each with what ``_read_fast`` makes of it, in order.
+
+        pandas parses outside of Python's lock, so two threads take half the time.
+        """
+        import pandas as pd  # noqa: F401  (once, before threads do)
+
+        waiting: deque[tuple[int, bytes, Future[list[np.ndarray] | None]]] = deque()
+        with ThreadPoolExecutor(THREADS) as threads:
+            for line, block in blocks_of(self.path, self.layout.encoding, self.layout.first):
+                waiting.append((line, block, threads.submit(self._read_fast, block)))
+                if len(waiting) > THREADS:
+                    first, whole, found = waiting.popleft()
+                    yield first, whole, found.result()
+            for first, whole, found in waiting:
+                yield first, whole, found.result()
+
+    def _keep(
+        self, line: int, block: bytes, values: list[np.ndarray] | None, table: _Table, left: int
+    ) -> None:
+        """Append the rows of ``block`` to ``table``; of ``left`` bytes of the file, it is a part.
+
+        A block that is not whole is halved until the lines that are wrong stand alone.
+        """
+        if values is None:
+            halves = halves_of(line, block) if self._is_plain and len(block) > SHORT else []
+            if len(halves) > 1:
+                for first, half in halves:
+                    self._keep(first, half, self._read_fast(half), table, left)
+                return
+            values = self._read_slowly(table.rows, line, block)
+        before = table.rows
+        table.append(values, left / len(block))
+        self._spans.append(_Span(before, line, table.rows))
+
+    @property
+    def _is_plain(self) -> bool:
+        """True if pandas can parse the columns that are read."""
+        plain = self._wanted[0].decimal if self._wanted else ""
+        return all(c.since is None and not c.thousands and c.decimal == plain for c in self._wanted)
+
+    def _read_fast(self, block: bytes) -> list[np.ndarray] | None:
+        """Return the columns (rows,) as pandas parses them; None if they are not whole."""
         import pandas as pd  # takes a second to import, and most commands read no table
 
-        layout = self.layout
-        plain = wanted[0].decimal
-        if any(c.since or c.thousands or c.decimal != plain for c in wanted):
+        layout, wanted = self.layout, self._wanted
+        if not self._is_plain or not wanted:
             return None
         try:
             table = pd.read_csv(
-                io.StringIO(text), header=None, names=range(layout.cells), index_col=False,
+                BytesReader(block), header=None, names=range(layout.cells), index_col=False,
                 sep=r"\s+" if layout.delimiter is None else layout.delimiter, comment="#",
-                decimal=plain, dtype=dict.fromkeys((c.place for c in wanted), np.float64),
-                skipinitialspace=True, na_filter=False, engine="c", low_memory=False,
+                decimal=wanted[0].decimal,
+                dtype=dict.fromkeys((c.place for c in wanted), np.float64),
+                skipinitialspace=self._is_spaced, na_filter=False, engine="c", low_memory=False,
             )  # fmt: skip
         except (ValueError, OverflowError):  # a parser's error is a ValueError
             return None
-        values = np.empty((len(wanted), len(table)))
-        for i, column in enumerate(wanted):
-            values[i] = table[column.place].to_numpy()
+        values = [table[column.place].to_numpy() for column in wanted]
         # a row that is too short has no last cell
         last = table[layout.cells - 1]
         whole = last.dtype.kind == "f" or bool((last.astype(str) != "").all())
-        return values if np.isfinite(values).all() and whole else None
+        return values if whole and all(np.isfinite(v).all() for v in values) else None
 
-    def _read_slowly(
-        self, before: int, line: int, text: str, wanted: Sequence[Column]
-    ) -> np.ndarray:
-        """Return the columns, read line by line; ``before`` are the rows above.
+    def _read_slowly(self, before: int, line: int, block: bytes) -> list[np.ndarray]:
+        """Return the columns (rows,), read line by line; ``before`` are the rows above.
 
         Raises ``InputError`` for a wrong cell, or leaves its row out.
         """
         rows: list[list[float]] = []
-        for number, content in enumerate(text.splitlines(), line):
+        for number, content in enumerate(block.decode("utf-8", "replace").split("\n"), line):
             if not self._holds_data(content):
                 continue
-            fault, values = self._row(content, wanted)
+            fault, values = self._row(content, self._wanted)
             if not fault:
                 rows.append(values)
             elif self._skip:
@@ -206,7 +252,7 @@ class TextFile:
                 raise InputError(
                     f"{self.path}, line {number}{fault}; --skip-bad-rows leaves such rows out"
                 )
-        return np.array(rows, dtype=np.float64).reshape(len(rows), len(wanted)).T
+        return list(np.array(rows, dtype=np.float64).reshape(len(rows), len(self._wanted)).T)
 
     def _holds_data(self, content: str) -> bool:
         """Return True if a line has a row of the columns that are read.
@@ -236,15 +282,39 @@ class TextFile:
         return "", values
 
 
-def _pieces(stream: TextIO, first: int) -> Iterator[tuple[int, str]]:
-    for _ in range(first):
-        stream.readline()
-    line = first + 1
-    while text := stream.read(BLOCK):
-        if not text.endswith("\n"):
-            text += stream.readline()
-        yield line, text
-        line += text.count("\n")
+@dataclass(frozen=True)
+class _Span:
+    """Rows of the table from ``before`` to ``end``, which begin in ``line`` of the file."""
+
+    before: int
+    line: int
+    end: int
+
+
+class _Table:
+    """Columns that grow by blocks of rows; ``rows`` of them are there."""
+
+    def __init__(self, width: int) -> None:
+        self._room = np.empty((width, 0))
+        self.rows = 0
+
+    @property
+    def values(self) -> np.ndarray:
+        """The rows that are there, (columns, rows)."""
+        return self._room[:, : self.rows]
+
+    def append(self, columns: Sequence[np.ndarray], more: float) -> None:
+        """Append rows; ``more`` times as many are expected, with these."""
+        count = columns[0].size if columns else 0
+        end = self.rows + count
+        if end > self._room.shape[1]:
+            # room that is never written takes no memory
+            grown = np.empty((len(columns), self.rows + int(count * max(more, 1.0) * ROOM) + 1))
+            grown[:, : self.rows] = self.values
+            self._room = grown
+        for room, values in zip(self._room, columns, strict=True):
+            room[self.rows : end] = values
+        self.rows = end
 
 
 def _sniff(head: bytes) -> bool:

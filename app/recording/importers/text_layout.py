@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import functools
 import itertools
 import re
 from collections import Counter
@@ -161,13 +162,14 @@ def layout_of(
     ``names_line`` is the number of the line of names, from 1, where the user says it; one of
     ``delimiters`` separates the cells. Raises ``InputError`` if there is no table of numbers.
     """
-    lines = head.splitlines()
+    lines = head.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     if not any(map(str.strip, lines)):
         raise InputError(f"{path} is empty")
     forced = re.fullmatch(r'"?sep=(.)"?\s*', lines[0])
     start = 1 if forced else 0
     labview = lines[0].startswith("LabVIEW Measurement")
-    options = (forced[1],) if forced else delimiters
+    there = [d for d in delimiters if d is None or d in head]
+    options = (forced[1],) if forced else there or delimiters
     found = [t for d in options if (t := _Table.find(lines, start, d, labview))]
     if not found:
         raise _no_table(lines, start, path)
@@ -225,21 +227,16 @@ class _Table:
         rows = [cells_of(lines[i], delimiter) for i in places]
         # numbers only, then mostly numbers, then one row of numbers below a line of names
         for strict, least in ((True, _LEAST), (False, _LEAST), (True, 1)):
-            good = [_is_data(row, delimiter, strict) for row in rows]
+            good = functools.partial(_is_data, delimiter=delimiter, strict=strict)
             for at in range(len(rows) - least + 1):
                 run = rows[at : at + least]
                 same = len({len(row) for row in (run if least > 1 else rows[at - 1 : at + 1])}) == 1
-                if not (all(good[at : at + least]) and same):
+                if not (same and all(map(good, run))):
                     continue
-                like = [
-                    tuple(row)
-                    for row, fine in zip(rows[at:], good[at:], strict=True)
-                    if fine and len(row) == len(run[0])
-                ][:_SAMPLE]
-                return cls(
-                    lines, start, delimiter, labview, places[at], len(run[0]), len(like),
-                    tuple(like),
-                )  # fmt: skip
+                width = len(run[0])
+                below = (row for row in rows[at:] if len(row) == width and good(row))
+                like = tuple(tuple(row) for row in itertools.islice(below, _SAMPLE))
+                return cls(lines, start, delimiter, labview, places[at], width, len(like), like)
         return None
 
     def layout(self, encoding: str, path: Path, names_line: int | None) -> Layout:

@@ -197,6 +197,8 @@ def _read(
         raise InputError(f"{path}: the columns have different lengths: {different}")
     table = {q: raw[pick.column][:size] for q, pick in picked.items()}
     if step is not None:
+        if not step * size < float("inf"):
+            raise InputError(f"{path}: {step!r} s from row to row is too long")
         table["time"] = step * np.arange(size)
         said = getattr(source, "step_from", "") if rate_Hz is None else ""
         values.notes.append(
@@ -284,11 +286,14 @@ def _good_rows(
 def _note_left_out(chosen: Chosen, values: Values, good: np.ndarray) -> None:
     """Note which rows were left out, at the sample before which they stood."""
     skipped: Sequence[tuple[int, str]] = getattr(chosen.source, "skipped", ())
+    if not skipped and good.all():
+        return
     kept = np.cumsum(good)
     places = [(int(kept[min(at, good.size) - 1]) if at else 0, where) for at, where in skipped]
-    places += [
-        (int(kept[at]), chosen.source.row(int(at))) for at in np.flatnonzero(~good)[:_LISTED]
-    ]
+    bad = np.flatnonzero(~good)[:_LISTED].tolist()
+    rows = getattr(chosen.source, "rows", None)
+    found = rows(bad) if rows is not None and bad else [chosen.source.row(at) for at in bad]
+    places += [(int(kept[at]), where) for at, where in zip(bad, found, strict=True)]
     for sample, where in places:
         values.left.setdefault(sample, []).append(where)
     count = len(skipped) + int((~good).sum())
@@ -296,4 +301,4 @@ def _note_left_out(chosen: Chosen, values: Values, good: np.ndarray) -> None:
         values.warnings.append(f"{count} rows were left out because they could not be used")
 
 
-_LISTED = 100  # rows whose places are looked up; each takes a pass through the file
+_LISTED = 100  # rows whose places are looked up
