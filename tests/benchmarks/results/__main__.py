@@ -30,6 +30,8 @@ DISTRIBUTIONS = (
     "scipy",
     "numba",
     "h5py",
+    "pandas",
+    "pyarrow",
     "pyside6-essentials",
     "pyqtgraph",
 )
@@ -79,6 +81,9 @@ MEASUREMENTS = {
             "tests.crash kills",
             "tests.fuzz --inputs 1050000",
         ),
+    ),
+    "import": Measurement(
+        "Time and memory of importing a large CSV file", ("tests.benchmarks.bench_import",)
     ),
     "window": Measurement("Drawing speed of the window", ("tests.benchmarks.bench_window",)),
     "ni-component-tests": Measurement(
