@@ -13,10 +13,12 @@ from dearig.model.actuator import Actuator
 from dearig.model.errors import ModelError
 from dearig.model.film import Strip
 from dearig.model.material import Branch, Film, Load, Network, Spring
+from dearig.recording.assumed import assumed_of
 from dearig.recording.recording import Recording
 
 __all__ = [
     "BRANCHES_MAX",
+    "assumed_by",
     "base_model",
     "check_apart",
     "check_branches",
@@ -81,6 +83,21 @@ def base_model(
         except ModelError as error:
             raise InputError(f"a rest length of {rest_length_mm:g} mm: {error}") from error
     return Actuator(film, load, network)
+
+
+def assumed_by(recordings: Sequence[Recording], rig_file: RigFile | None) -> str:
+    """Return a sentence on values of the film and the load that no recording says; "" if none."""
+    if recordings[0].kind == "film" or rig_file is not None:
+        return ""
+    declared = next((r for r in recordings if r.film is not None), recordings[0])
+    load = next((r.load for r in recordings if r.load is not None), None)
+    assumed = assumed_of(declared.film, load, declared.provenance)
+    if not assumed:
+        return ""
+    return (
+        f"Assumed, because the recordings do not say it: {' and '.join(assumed)} of the thesis; "
+        f"give yours with --rig-file, or when the data are imported"
+    )
 
 
 def check_apart(train: Sequence[Recording], validation: Sequence[Recording]) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.compatibility import (
+    assumed_by,
     base_model,
     check_apart,
     check_branches,
@@ -366,6 +367,7 @@ def _outcome(
         performed=tuple(performed),
         rig=rig,
         few_data=few_data(recordings, drive),
+        assumed=assumed_by(recordings, settings.rig_file),
         not_compared=tuple(r.name for r in others if r.name not in compared),
     )
     history = _history(outcome, recordings)

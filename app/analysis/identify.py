@@ -9,7 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from dearig.analysis.compatibility import base_model, check_apart, check_branches
+from dearig.analysis.compatibility import (
+    assumed_by,
+    base_model,
+    check_apart,
+    check_branches,
+)
 from dearig.analysis.cores import for_simulations
 from dearig.analysis.early_ends import choose
 from dearig.analysis.outcomes import BranchTrial, Comparison, IdentifyOutcome
@@ -109,6 +114,7 @@ def identify_recordings(
         seconds=seconds,
         quality=(*left_out, *also_left_out),
         few_data=few_data(recordings, drive),
+        assumed=assumed_by(recordings, rig_file),
         published_fit=PUBLISHED_FIT if is_thesis_run else None,
     )
 

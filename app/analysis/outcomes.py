@@ -126,7 +126,8 @@ class IdentifyOutcome:
 
     ``model`` is the fitted model with its history; ``model_path`` is where it was saved, "" if it
     was not. ``quality`` are sentences on recordings, ``few_data`` says how few data were fitted,
-    "" if there are enough. ``seconds`` is the computing time.
+    "" if there are enough. ``assumed`` says which values of the film and the load no recording
+    has, "" if none. ``seconds`` is the computing time.
     """
 
     title: str
@@ -141,6 +142,7 @@ class IdentifyOutcome:
     model_path: str = ""
     quality: tuple[str, ...] = ()
     few_data: str = ""
+    assumed: str = ""
     published_fit: Published | None = None
 
 
@@ -201,6 +203,7 @@ class DiagnoseOutcome:
     each. ``quality`` are sentences on recordings. ``ended`` is the error that ended the recording
     on the rig early, None if none did. ``not_compared`` names validation recordings that the final
     model cannot follow. ``few_data`` says how few data were fitted, "" if there are enough.
+    ``assumed`` says which values of the film and the load no recording has, "" if none.
     ``seconds`` is the computing time.
     """
 
@@ -221,6 +224,7 @@ class DiagnoseOutcome:
     ended: DearigError | None = None
     not_compared: tuple[str, ...] = ()
     few_data: str = ""
+    assumed: str = ""
 
     @property
     def status(self) -> str:

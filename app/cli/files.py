@@ -137,7 +137,7 @@ def import_(
     metadata = imported_metadata(
         rig_file, settings, film, notes,
         length_mm=film_length_mm, width_mm=film_width_mm, thickness_um=film_thickness_um,
-        permittivity=permittivity, load_g=load_g,
+        permittivity=permittivity, load_g=load_g, kinematics=options.kinematics,
     )  # fmt: skip
     with working(json, computes=False) as (console, _):
         done = import_file(source, out, options, metadata=metadata, overwrite=force)

@@ -11,6 +11,7 @@ from dearig.errors import InputError
 from dearig.model.errors import ModelError
 from dearig.model.material import THESIS_FILM, THESIS_LOAD
 from dearig.model.specimen import Film, Load
+from dearig.recording.assumed import ASSUMED, FILM_VALUES
 from dearig.recording.importers.units import Scale
 from dearig.recording.metadata import RunMetadata
 
@@ -40,11 +41,13 @@ def imported_metadata(
     thickness_um: float | None = None,
     permittivity: float | None = None,
     load_g: float | None = None,
+    kinematics: str | None = None,
 ) -> RunMetadata:
     """Return the film, load and remarks of imported data.
 
-    Sizes that are given replace those of the rig file; without one, those of the thesis. Nothing
-    given leaves the film and the load open. Raises ``InputError`` for a size that none can have.
+    Values that are given replace those of the rig file; without one, those of the thesis, and the
+    provenance names the others. Nothing given leaves the film and the load open. Raises
+    ``InputError`` for a size that none can have.
     """
     given = {
         "length": _scaled(length_mm, 1e3),
@@ -52,21 +55,27 @@ def imported_metadata(
         "thickness": _scaled(thickness_um, 1e6),
         "permittivity": permittivity,
     }
-    changed = {name: value for name, value in given.items() if value is not None}
+    changed: dict[str, object] = {n: value for n, value in given.items() if value is not None}
     film: Film | None = None if settings is None else settings.as_film()
     load: Load | None = None if settings is None else settings.as_load()
     try:
+        if changed and kinematics is not None:
+            changed["kinematics"] = kinematics
         if changed:
             film = replace(film or THESIS_FILM, **changed)  # type: ignore[arg-type]
         if load_g is not None:
             load = replace(load or THESIS_LOAD, mass=load_g / 1e3)
     except ModelError as error:
         raise InputError(str(error)) from error
+    not_given = [name for name in FILM_VALUES if name not in changed]
+    if settings is not None or not changed:
+        not_given = []
     return RunMetadata(
         film=film,
         load=load,
         film_id=film_name,
         notes=notes,
+        provenance={ASSUMED: ", ".join(not_given)} if not_given else {},
         configuration="" if rig_file is None else read_text(rig_file, "rig file"),
     )
 

@@ -61,6 +61,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "published_fit": _published_json(outcome.published_fit),
         "simulations": int(fit.simulations),
         "few_data": outcome.few_data,
+        "assumed": outcome.assumed,
         "seconds": _number(outcome.seconds),
         "warnings": list(warnings_of(outcome)),
     }
@@ -226,6 +227,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             c.name: _end_json(c) for c in (*after.train, *after.validation) if c.ended is not None
         },
         "few_data": outcome.few_data,
+        "assumed": outcome.assumed,
         "performed": list(outcome.performed),
         "parameters": [_effect_number_json(e) for e in finding.final.estimates],
         "quality": list(outcome.quality),

@@ -298,7 +298,8 @@ def _sentence(text: str) -> str:
 
 def warnings(outcome: DiagnoseOutcome) -> tuple[str, ...]:
     """Return the warnings about recordings and search, without duplicates."""
-    said = [*outcome.quality, *(w[:1].upper() + w[1:] for w in outcome.finding.notes)]
+    said = [outcome.assumed] if outcome.assumed else []
+    said += [*outcome.quality, *(w[:1].upper() + w[1:] for w in outcome.finding.notes)]
     for comparison in (*outcome.after.train, *outcome.after.validation):
         said += [f"{comparison.name}: {w}" for w in comparison.warnings]
     return tuple(dict.fromkeys(readable(_sentence(w)) for w in said))

@@ -155,6 +155,8 @@ def warnings_of(outcome: IdentifyOutcome | ValidateOutcome) -> tuple[str, ...]:
         comparisons = (*getattr(outcome, "train", ()), *getattr(outcome, "validation", ()))
     else:
         comparisons = getattr(outcome, "comparisons", ())
+    assumed = getattr(outcome, "assumed", "")
+    said += [assumed] if assumed else []
     said += getattr(outcome, "quality", ())
     said += [f"{c.name}: {w}" for c in comparisons for w in c.warnings]
     return tuple(dict.fromkeys(_sentence(w) for w in said))

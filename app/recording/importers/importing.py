@@ -10,7 +10,8 @@ from pathlib import Path
 
 from dearig.drivers.rig import Event
 from dearig.errors import InputError
-from dearig.model.specimen import KINEMATICS, Film
+from dearig.model.specimen import KINEMATICS, Film, Load
+from dearig.recording.assumed import ASSUMED, FILM_VALUES, assumed_of
 from dearig.recording.files import check_output, file_sha256
 from dearig.recording.importers.chosen import Chosen, choose
 from dearig.recording.importers.exported import exported
@@ -118,15 +119,13 @@ def import_file(
     with ThreadPoolExecutor(1) as beside:  # hashing a file takes as long as reading its numbers
         digest = beside.submit(file_sha256, path)
         values = values_of(chosen, specimen, options.rate_Hz, options.skip_bad_rows)
-    noted = _provenance(path, digest.result(), chosen, options)
+    noted = {**_provenance(path, digest.result(), chosen, options), **metadata.provenance}
     was = exported(table.about)
     film, kinematics = metadata.film or was.film, options.kinematics or was.kinematics
     rest = 0.0
     if values.kind == "actuator":
         rest = _from_rest(values)
-        _say_assumed(values, film is None, (metadata.load or was.load) is None)
-        if film is not None and kinematics is not None:
-            film = replace(film, kinematics=kinematics)
+        film = _of_actuator(values, film, metadata.load or was.load, kinematics, noted)
     values.warnings += doubts(values.columns, film)
     save_recording(
         out,
@@ -138,7 +137,7 @@ def import_file(
             film=film,
             load=metadata.load or was.load,
             sequence_toml=metadata.sequence_toml or was.sequence,
-            provenance={**noted, **metadata.provenance},
+            provenance=noted,
         ),
         hold=was.hold and values.kind == "actuator",
         kinematics=kinematics or (None if values.kind == "actuator" else "uniaxial"),
@@ -210,30 +209,34 @@ def _from_rest(values: Values) -> float:
     return rest
 
 
-def _say_assumed(values: Values, no_film: bool, no_load: bool) -> None:
-    """Say which film and which load every fit of these data will take."""
-    # imports the effects and their compiler, which other commands on recordings do without
-    from dearig.model.material import THESIS_FILM, THESIS_LOAD
+def _of_actuator(
+    values: Values,
+    film: Film | None,
+    load: Load | None,
+    kinematics: str | None,
+    noted: dict[str, object],
+) -> Film | None:
+    """Return the film of an actuator, held as ``kinematics`` says, and say what is assumed.
 
-    assumed = []
-    if no_film:
-        assumed.append(f"the film ({_film_words(THESIS_FILM)})")
-    if no_load:
-        assumed.append(f"the load ({THESIS_LOAD.mass * 1e3:g} g)")
-    if assumed:
+    Changes ``noted``, the provenance: values of the film that nobody gave are named there.
+    """
+    if kinematics is not None:
+        if film is None:
+            # imports the effects and their compiler, which other commands do without
+            from dearig.model.material import THESIS_FILM
+
+            film = THESIS_FILM
+            noted[ASSUMED] = ", ".join(FILM_VALUES)
+        film = replace(film, kinematics=kinematics)
+        left = str(noted.pop(ASSUMED, "")).split(", ")
+        if names := [name for name in left if name and name != "kinematics"]:
+            noted[ASSUMED] = ", ".join(names)
+    if assumed := assumed_of(film, load, noted):
         values.notes.append(
             f"fits of these data take {' and '.join(assumed)} of the thesis: give yours with "
             f"--rig-file or the options of the film"
         )
-
-
-def _film_words(film: Film) -> str:
-    """Return the size of ``film`` in words."""
-    return (
-        f"{film.length * 1e3:g} mm long, {film.width * 1e3:g} mm wide, "
-        f"{film.thickness * 1e6:g} um thick, relative permittivity {film.permittivity:g}, "
-        f"{film.kinematics}"
-    )
+    return film
 
 
 def _events(values: Values) -> list[Event]:
