@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,16 @@ def table(
     return f"{above}{names}\n{text}\n"
 
 
+LABVIEW = """LabVIEW Measurement
+Separator\tTab
+***End_of_Header***
+
+Y_Unit_Label\tVolts\tMillimeters
+Delta_X\t0.01\t0.01
+***End_of_Header***
+"""
+
+
 def imported(folder: Path, text: str | bytes, name: str = "in.csv", **options: object) -> Imported:
     path = folder / name
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
@@ -70,6 +81,8 @@ def same(run: Recording) -> None:
         pytest.param(table("t h,u V,x".replace("x", "Weg cm"), (1 / 3600, 1, 1e2)), id="h and cm"),
         pytest.param(table("Zeit;Spannung;Weg\ns;kV;mm", (1, 1e-3, 1e3), ","), id="line of units"),
         pytest.param(table("Time,Voltage,Travel\n(s),(mV),(nm)", (1, 1e3, 1e9)), id="units, nm"),
+        pytest.param(table("Time,Voltage,Travel\nSec,VOLTS,Millimeters"), id="units, written out"),
+        pytest.param(LABVIEW + table("X_Value\tVoltage\tTravel"), id="LabVIEW's units"),
         pytest.param(table(above="Lab,7\nOperator,me\nThickness,1.5,mm\n"), id="block above"),
         pytest.param(table("time_s;voltage_V;displacement_mm", above="sep=;\n"), id="Excel's sep"),
         pytest.param("# a rig\n# " + table("time_s voltage_V displacement_mm"), id="names after #"),
@@ -89,6 +102,19 @@ def same(run: Recording) -> None:
 )
 def test_what_the_names_say_is_read(tmp_path: Path, text: str | bytes) -> None:
     same(taken(tmp_path, text, "in.dat"))
+
+
+@pytest.mark.parametrize(
+    ("form", "name"),
+    [("%m/%d/%Y %I:%M:%S.%f %p", "Logged"), ("%d.%m.%Y %H:%M:%S.%f", "Datum"),
+     ("%Y-%m-%dT%H:%M:%S.%fZ", "Zeitstempel")],
+)  # fmt: skip
+def test_dates_in_the_ways_of_several_countries(tmp_path: Path, form: str, name: str) -> None:
+    start = datetime(2024, 3, 12, 23, 59, 59, 900_000)
+    first, *lines = table(f"{name};voltage_V;displacement_mm").splitlines()
+    stamps = [(start + timedelta(seconds=t)).strftime(form) for t in TIME]
+    rows = [f"{s};{line.partition(';')[2]}" for s, line in zip(stamps, lines, strict=True)]
+    same(taken(tmp_path, "\n".join([first, *rows])))
 
 
 def test_time_stamps_count_from_the_first(tmp_path: Path) -> None:
@@ -125,6 +151,8 @@ def test_groups_of_thousands_are_read_where_they_are_sure(tmp_path: Path) -> Non
         (table("time_s,voltage_V,Laser (V)"), {"columns": {"displacement_mm": "Laser (V)"}},
          "is in V by its name, and displacement_mm asks for mm; if it is the output"),
         (table("time_s,voltage_V,Laser (V)"), {}, "the output of an instrument in V"),
+        (table("t [s],U [V],s [mm]"), {}, r"'s \[mm\]' may be the displacement, by its unit alone"),
+        (table("x-axis,1,2\nsecond,Volt,mm"), {}, "time_s=x-axis .* --column displacement_mm=2"),
         (table("a #1,b #1,c #1"), {}, "no column for voltage"),
         (table("a,b,c"), {}, "--column time_s=a --column voltage_V=b --column displacement_mm=c"),
         (table("time_s,voltage_V,displacement_mm").replace("time_s,", "").replace("\n0", "\n0"),

@@ -322,7 +322,7 @@ class _Guess:
         """Choose a column for every quantity that the kind of the data needs."""
         there = self._chosen.picked
         if not self._timed:
-            self._take("time")
+            self._take("time", by_unit=True)
         self._take("voltage")
         if "voltage" in there:
             self._take_if_sure("voltage_monitor")
@@ -330,7 +330,7 @@ class _Guess:
             self._take("voltage_monitor")
         actuator = "voltage" in there or "voltage_monitor" in there
         if actuator:
-            self._take("displacement")
+            self._take("displacement", by_unit=True)
             for quantity in ("current", "temperature"):
                 self._take_if_sure(quantity)
             if not {"stretch", "strain", "nominal_stress"} & there.keys():
@@ -356,6 +356,7 @@ class _Guess:
             return
         self._take_one(("stretch", "strain", "displacement"))
         self._take_one(("nominal_stress", "force"))
+        self._take_one(("nominal_stress", "force"), by_unit=True)
         self._take_if_sure("temperature")
 
     def _propose(self) -> None:
@@ -411,11 +412,11 @@ class _Guess:
         )
         self._free.remove(column)
 
-    def _take_one(self, quantities: Sequence[str]) -> None:
+    def _take_one(self, quantities: Sequence[str], by_unit: bool = False) -> None:
         if any(q in self._chosen.picked for q in quantities):
             return
         for quantity in quantities:
-            self._take(quantity)
+            self._take(quantity, by_unit=by_unit)
             if quantity in self._chosen.picked:
                 return
 
@@ -429,13 +430,18 @@ class _Guess:
             self._free.append(chosen.picked.pop(quantity).column)
             chosen.notes.append(f"the {quantity.replace('_', ' ')} was not imported: {why}")
 
-    def _take(self, quantity: str, only_own: bool = False) -> None:
-        """Pick the one column that is ``quantity``, or note why none is sure."""
+    def _take(self, quantity: str, only_own: bool = False, by_unit: bool = False) -> None:
+        """Pick the one column that is ``quantity``, or note why none is sure.
+
+        With ``by_unit`` a column is proposed whose unit alone says what it may be.
+        """
         if quantity in self._chosen.picked:
             return
         own = [n for n in self._free if _is_own(self._own(n), quantity)]
         found = own or ([] if only_own else self._like(quantity))
         found = found if len(found) < 2 else self._different(found)
+        if not found and by_unit:
+            found = self._of_unit(quantity)
         if not found:
             return
         if len(found) > 1:
@@ -459,6 +465,16 @@ class _Guess:
                     f"{column!r} names no unit: it is taken as a part of the length, not as %"
                 )
             self._pick(target, column, target.scale)
+
+    def _of_unit(self, quantity: str) -> list[str]:
+        """Return the one free column with a unit of ``quantity``, and say that it is a guess."""
+        labels = {n: self._labels[n] for n in self._free if not self._labels[n].quantities}
+        found = [n for n, label in labels.items() if DIMENSIONS[quantity] in label.dimensions]
+        if len(found) != 1:
+            return []
+        what = quantity.replace("_", " ")
+        self._chosen.unsure.append(f"{found[0]!r} may be the {what}, by its unit alone")
+        return found
 
     def _own(self, name: str) -> str:
         return own_name(self._chosen.source, name)

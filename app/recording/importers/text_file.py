@@ -92,6 +92,11 @@ class TextFile:
         return {name: column.unit for name, column in self._columns.items() if column.unit}
 
     @property
+    def labels(self) -> dict[str, str]:
+        """What columns are that do not say it by their names: dates and times of day are times."""
+        return {name: "time" for name, column in self._columns.items() if column.since is not None}
+
+    @property
     def places(self) -> dict[int, str]:
         """Names by the number of the column in the file, from 1."""
         return {column.place + 1: name for name, column in self._columns.items()}

@@ -145,6 +145,7 @@ def moment_of(cell: str) -> datetime | None:
 
 
 _MOMENTS = (
+    "%m/%d/%Y %I:%M:%S.%f %p", "%m/%d/%Y %I:%M:%S %p",
     "%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%H:%M:%S.%f", "%H:%M:%S",
     "%Y-%m-%d %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S",
 )  # fmt: skip
@@ -244,6 +245,8 @@ class _Table:
         if self.cells > COLUMNS_MAX:
             raise _too_wide(path, self.cells)
         line, names, units = self._names(path, names_line)
+        if self.labview:
+            units = units or self._labview_units()
         groups = self._groups(line, names)
         columns = tuple(
             replace(column, group=groups[place])
@@ -278,9 +281,14 @@ class _Table:
         cells = self._split(above[0])
         if len(above) > 1 and _are_units(cells):
             names = self._split(above[1])
-            if self._are_names(names):
+            if self._are_names(names) or (len(names) == len(cells) and _are_all_units(cells)):
                 return above[1], names, cells
         return (above[0], cells, []) if self._are_names(cells) else (-1, [], [])
+
+    def _labview_units(self) -> list[str]:
+        """Return the units that the head of a LabVIEW file gives, by the place of the column."""
+        rows = (self._split(line) for line in range(self.start, self.first))
+        return next((row for row in rows if row[:1] == ["Y_Unit_Label"]), [])
 
     def _split(self, line: int) -> list[str]:
         text = _bare(self.lines[line])
@@ -376,6 +384,11 @@ def _are_units(cells: Sequence[str]) -> bool:
     named = [c for c in cells if c and not _is_number(c, ",")]
     known = [c for c in named if unit_of(c) is not None]
     return len(known) > 0 and len(known) >= len(named) - 1
+
+
+def _are_all_units(cells: Sequence[str]) -> bool:
+    """Return True if ``cells`` are units and nothing else; numbers above them name channels."""
+    return all(not c or (not _is_number(c, ",") and unit_of(c) is not None) for c in cells)
 
 
 def _unique(columns: tuple[Column, ...]) -> tuple[Column, ...]:

@@ -111,9 +111,15 @@ ALIASES = MappingProxyType(
 )
 
 
+#: Words for units, whose case does not count: SEC, Volts, Millimeters.
+_WRITTEN_OUT = MappingProxyType(
+    {a.lower(): s for a, s in ALIASES.items() if a.isalpha() and a[1:].islower() and len(a) > 2}
+)
+
+
 def unit_of(text: str) -> tuple[str, tuple[str, ...]] | None:
     """Return the symbol of a unit that is written as ``text``, and its dimensions; else None."""
     text = text.strip().strip("()[]").strip()
-    symbol = ALIASES.get(text, text)
+    symbol = ALIASES.get(text) or _WRITTEN_OUT.get(text.lower(), text)
     dimensions = tuple(d for d, units in UNITS.items() if symbol in units)
     return (symbol, dimensions) if dimensions else None
