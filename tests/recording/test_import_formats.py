@@ -112,6 +112,31 @@ def test_specimens_side_by_side_are_chosen_from(tmp_path: Path, suffix: str) -> 
     np.testing.assert_allclose(two.stretch, 1 + 2 * FILM[:40, 1] / 30.0)
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp1252"])
+def test_specimens_one_below_another_are_chosen_from(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "in.txt"
+    names = ["Zeit (s)\tWeg (mm)\tKraft (N)"]
+    first, second = (["\t".join(map(str, row)) for row in times * FILM] for times in (1.0, 2.0))
+    second[5] = "over\t1\t2"
+    parts = [["Prüfling\tA"], names, first, ["", "Prüfling\tB", "Prüfer\tme"], names, second]
+    path.write_text("\n".join(line for part in parts for line in part), encoding)
+    size = {"gauge_length_mm": 30.0, "area_mm2": 18.0}
+    with pytest.raises(InputError, match="--table takes one: Prüfling A, Prüfling B"):
+        imported(path, **size)
+    titles = [column.name.partition("/")[0] for column in preview(path)]
+    assert titles == [*["Prüfling A"] * 3, *["Prüfling B"] * 3]
+    one = taken(path, **size, table="Prüfling A")
+    np.testing.assert_allclose(one.nominal_stress, FILM[:, 2] / 18e-6)
+    line = 2 + ROWS + 4 + 6
+    with pytest.raises(
+        InputError, match=f"line {line}, column 'Prüfling B/Zeit .s.': 'over' is not"
+    ):
+        imported(path, **size, table="Prüfling B")
+    two = taken(path, **size, table="Prüfling B", skip_bad_rows=True)
+    np.testing.assert_allclose(two.nominal_stress, np.delete(2 * FILM[:, 2], 5) / 18e-6)
+    assert any(f"line {line}" in event.message for event in two.events)
+
+
 def test_names_that_repeat_as_a_whole_are_tables(tmp_path: Path) -> None:
     path = tmp_path / "in.csv"
     names = ",".join(NAMES)

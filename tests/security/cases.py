@@ -292,6 +292,9 @@ IMPORTS = {
     "CSV of zero bytes": Case(_import("a.csv", lambda: bytes(10 * MILLION)), ("a.csv",)),
     "MAT that unpacks to 2 GB": Case(_import("a.mat", _mat_bomb), ("unpacks",)),
     "MAT that claims 4e18 numbers": Case(_import("a.mat", _mat_claim), ("a.mat",)),
+    "CSV of 10,000,000 lines of names": Case(
+        _import("a.csv", lambda: b"a;b\n1;2\n3;4\n" + b"a;b\n" * 10 * MILLION), ("a.csv",)
+    ),
     "JSON of arrays in arrays": Case(_import("a.json", lambda: b"[" * MILLION), ("nested",)),
     "JSON of 1,000,000 arrays": Case(
         _import("a.json", lambda: b"[" + b"[]," * MILLION + b"[]]"), ("no columns",)

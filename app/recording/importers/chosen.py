@@ -35,6 +35,8 @@ FILM_MAX = 30.0
 TABLES_TRIED = 64
 #: Smallest and largest stretch of a film, and what its first value differs from 1, in a proposal.
 STRETCH_MIN, STRETCH_MAX, AT_REST = 0.2, 15.0, 1e-3
+#: Columns of one quantity whose values are compared, at most.
+COMPARED_MAX = 8
 #: Unit of a column whose name has none, in a proposal.
 _LIKELY = MappingProxyType(
     {"time": "s", "voltage": "kV", "length": "mm", "force": "N", "stress": "MPa", "current": "mA",
@@ -490,7 +492,9 @@ class _Guess:
         return with_unit or found
 
     def _different(self, names: list[str]) -> list[str]:
-        """Return ``names`` without columns that repeat another one's values."""
+        """Return ``names`` without columns that repeat another one's values, if they are few."""
+        if len(names) > COMPARED_MAX:
+            return names
         try:
             values = self._chosen.source.read(names)
         except InputError:

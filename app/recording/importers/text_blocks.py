@@ -35,10 +35,13 @@ class BytesReader:
         return iter(self._file)
 
 
-def blocks_of(path: Path, encoding: str, skip: int) -> Iterator[tuple[int, bytes]]:
+def blocks_of(
+    path: Path, encoding: str, skip: int, stop: int | None = None
+) -> Iterator[tuple[int, bytes]]:
     """Yield the number, from 1, of a block's first line, and the block.
 
-    The first ``skip`` lines are left out. Raises ``InputError`` if the file cannot be read.
+    The first ``skip`` lines are left out, and those from the number ``stop``, from 0, on. Raises
+    ``InputError`` if the file cannot be read.
     """
     line = 1
     try:
@@ -56,6 +59,12 @@ def blocks_of(path: Path, encoding: str, skip: int) -> Iterator[tuple[int, bytes
                     at = piece.index(b"\n", at) + 1
                     line += 1
                     count -= 1
+                if stop is not None and line + count > stop:
+                    end = at
+                    for _ in range(stop + 1 - line):
+                        end = piece.find(b"\n", end) + 1 or len(piece)
+                    yield line, piece[at:end]
+                    return
                 yield line, piece[at:]
                 line += count
     except (OSError, UnicodeError) as error:

@@ -12,7 +12,7 @@ import math
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +33,7 @@ from dearig.recording.importers.text_layout import (
     holds_data,
     layout_of,
 )
+from dearig.recording.importers.text_sections import Section, sections_of
 
 __all__ = ["IMPORTER", "TextFile"]
 
@@ -72,11 +73,23 @@ class TextFile:
             head = head.rpartition("\n")[0] or head
         self.layout: Layout = layout_of(head, encoding, path, names_line)
         self._columns = {column.name: column for column in self.layout.columns}
+        self._section_of: dict[str, Section] = {}
+        lines = head.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        sections = sections_of(path, self.layout, lines[self.layout.names_line])
+        if sections:
+            self._columns = {}
+            for section in sections:
+                for column in self.layout.columns:
+                    name = f"{section.title}/{column.name}"
+                    group = f"{section.title}/{column.group}" if column.group else section.title
+                    self._columns[name] = replace(column, name=name, group=group)
+                    self._section_of[name] = section
         self._skip = skip_bad_rows
         # it costs a third of the parsing
         self._is_spaced = f"{self.layout.delimiter} " in head
-        self._side_by_side = bool(self.tables)
+        self._side_by_side = any(column.group for column in self.layout.columns)
         self._wanted: list[Column] = []  # columns that were read last
+        self._section = Section("", self.layout.first, None)  # and the table that they are of
         #: rows before each row that was left out, and its line, in words
         self.skipped: list[tuple[int, str]] = []
         self._spans: list[_Span] = []
@@ -98,7 +111,9 @@ class TextFile:
 
     @property
     def places(self) -> dict[int, str]:
-        """Names by the number of the column in the file, from 1."""
+        """Names by the number of the column in the file, from 1, or by their order in tables."""
+        if self._section_of:
+            return dict(enumerate(self._columns, 1))
         return {column.place + 1: name for name, column in self._columns.items()}
 
     @property
@@ -134,6 +149,13 @@ class TextFile:
 
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return columns by name; see ``Source``."""
+        found: dict[str, np.ndarray] = {}
+        for section in dict.fromkeys(self._section_of.get(name) for name in names):
+            self._section = section or self._section
+            found |= self._read_section([n for n in names if self._section_of.get(n) == section])
+        return found
+
+    def _read_section(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         wanted = [self._columns[name] for name in dict.fromkeys(names)]
         self.skipped, self._spans, self._wanted = [], [], wanted
         table = _Table(len(wanted))
@@ -153,7 +175,7 @@ class TextFile:
         spans = iter(self._spans)
         span = next(spans)
         found: list[str] = []
-        for first, block in blocks_of(self.path, self.layout.encoding, self.layout.first):
+        for first, block in self._blocks():
             lines = block.removesuffix(b"\n").split(b"\n")
             while span.line < first + len(lines):
                 left = [i - span.before for i in indices[len(found) :] if i < span.end]
@@ -175,6 +197,10 @@ class TextFile:
     def _is_row(self, line: bytes) -> bool:
         return self._holds_data(line.decode("utf-8", "replace"))
 
+    def _blocks(self) -> Iterator[tuple[int, bytes]]:
+        section = self._section
+        return blocks_of(self.path, self.layout.encoding, section.first, section.end)
+
     def _parsed(self) -> Iterator[tuple[int, bytes, list[np.ndarray] | None]]:
         """Yield the blocks of the file, each with what ``_read_fast`` makes of it, in order.
 
@@ -184,7 +210,7 @@ class TextFile:
 
         waiting: deque[tuple[int, bytes, Future[list[np.ndarray] | None]]] = deque()
         with ThreadPoolExecutor(THREADS) as threads:
-            for line, block in blocks_of(self.path, self.layout.encoding, self.layout.first):
+            for line, block in self._blocks():
                 waiting.append((line, block, threads.submit(self._read_fast, block)))
                 if len(waiting) > THREADS:
                     first, whole, found = waiting.popleft()

@@ -28,6 +28,7 @@ __all__ = [
     "cells_of",
     "encoding_of",
     "holds_data",
+    "is_row",
     "layout_of",
     "moment_of",
 ]
@@ -409,6 +410,17 @@ def _is_number(cell: str, delimiter: str | None) -> bool:
         _POINT.fullmatch(cell)
         or (delimiter != "," and (_COMMA.fullmatch(cell) or GROUPED.fullmatch(cell)))
     )
+
+
+def is_row(line: str, layout: Layout) -> bool:
+    """Return True if ``line`` is one of the table's rows, most of whose cells are numbers."""
+    if not holds_data(line):
+        return False
+    try:
+        cells = cells_of(line, layout.delimiter)
+    except csv.Error:
+        return False
+    return len(cells) == layout.cells and _is_data(cells, layout.delimiter, strict=False)
 
 
 def _is_data(cells: Sequence[str], delimiter: str | None, strict: bool) -> bool:
