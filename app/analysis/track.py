@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypedDict
 
 import numpy as np
 import tomli_w
@@ -135,6 +136,12 @@ class TrackOutcome:
         return min(ours, key=lambda r: r.rms, default=None)
 
 
+class _Ends(TypedDict):
+    lead_in: int
+    tail: int
+    lag: float
+
+
 @dataclass(frozen=True)
 class _Job:
     """What does not change from run to run."""
@@ -146,9 +153,20 @@ class _Job:
     options: RunOptions
     observer: RunObserver | None
     progress: Progress
+    inversion: Inversion
     lead_in: int
-    rate: float
+    tail: int
     runs: list[TrackedRun] = field(default_factory=list)
+
+    @property
+    def limits(self) -> VoltageLimits:
+        """Limits of the voltage."""
+        return limits_of(self.rig_file)
+
+    @property
+    def ends(self) -> _Ends:
+        """Samples at rest and age of a reading, for an inversion."""
+        return {"lead_in": self.lead_in, "tail": self.tail, "lag": _lag(self.rig_file)}
 
 
 # ---------------------------------------------------------------- before a run
@@ -300,10 +318,11 @@ def track(
     inversion, lead_in, tail = plan_target(target, ours, rig_file)
     if not nearest:
         check_feasible(target, inversion.unreachable, within)
-    limits, rate = limits_of(rig_file), float(rig_file.card.sample_rate_Hz)
     kind_of(address)  # refuses what is no rig
     result_folder(folder, options.overwrite)
-    job = _Job(target, address, rig_file, folder, options, observer, progress, lead_in, rate)
+    job = _Job(
+        target, address, rig_file, folder, options, observer, progress, inversion, lead_in, tail
+    )
     outcome = TrackOutcome(
         target, model, address, inversion, within, warnings=tuple(_warnings(ours, rig_file))
     )
@@ -314,24 +333,8 @@ def track(
 
     try:
         if compare is not None:
-            theirs = _actuator(compare, "--compare")
-            linear = _linear_map(theirs, inversion, limits, lead_in, tail)
-            job.runs.append(_play(job, inversion, "linear", 0, linear, None))
-            other = invert(
-                theirs, inversion.reference, rate, limits, lead_in=lead_in, tail=tail,
-                lag=_lag(rig_file),
-            )  # fmt: skip
-            job.runs.append(_play(job, inversion, "thesis", 0, other.voltage, compare))
-        progress("learning", 0.0)
-        learner = Learner(
-            ours, inversion.target, rate, limits, lead_in=lead_in, tail=tail, lag=_lag(rig_file),
-            alternatives=alternatives_of(model),
-        )  # fmt: skip
-        for i in range(iterations + 1):
-            run = _play(job, inversion, "learned" if i else "model", i, learner.voltage, model)
-            progress("learning", i / (iterations + 1))
-            lesson = learner.learn(run.measured, run.noise)
-            job.runs.append(_taught(run, lesson, last=i == iterations))
+            _play_others(job, compare)
+        _play_and_learn(job, model, ours, iterations)
     except (DearigError, KeyboardInterrupt) as error:
         stopped = error
         if isinstance(error, KeyboardInterrupt):
@@ -348,6 +351,28 @@ def track(
             raise
         raise stopped from error
     return now()
+
+
+def _play_others(job: _Job, compare: ModelFile) -> None:
+    """Play the voltages of a linear map and of another model, for the same reference."""
+    theirs = _actuator(compare, "--compare")
+    job.runs.append(_play(job, "linear", 0, _linear_map(job, theirs), None))
+    found = invert(theirs, job.inversion.reference, job.inversion.rate, job.limits, **job.ends)
+    job.runs.append(_play(job, "thesis", 0, found.voltage, compare))
+
+
+def _play_and_learn(job: _Job, model: ModelFile, ours: Actuator, iterations: int) -> None:
+    """Play the voltage of the model, and then what was learned."""
+    job.progress("learning", 0.0)
+    learner = Learner(
+        ours, job.inversion.target, job.inversion.rate, job.limits, **job.ends,
+        alternatives=alternatives_of(model),
+    )  # fmt: skip
+    for i in range(iterations + 1):
+        run = _play(job, "learned" if i else "model", i, learner.voltage, model)
+        job.progress("learning", i / (iterations + 1))
+        lesson = learner.learn(run.measured, run.noise)
+        job.runs.append(_taught(run, lesson, last=i == iterations))
 
 
 def _actuator(model: ModelFile, option: str) -> Actuator:
@@ -369,14 +394,13 @@ def _warnings(model: Actuator, rig_file: RigFile) -> Iterator[str]:
         )
 
 
-def _linear_map(
-    model: Actuator, inversion: Inversion, limits: VoltageLimits, lead_in: int, tail: int
-) -> np.ndarray:
+def _linear_map(job: _Job, model: Actuator) -> np.ndarray:
     """Return the voltage (N,) in V of a film whose displacement is a straight line over V^2.
 
     The line is that of ``model`` at rest, through 0 and the largest displacement of the reference:
     what a person has who measured one displacement at one voltage.
     """
+    inversion, limits = job.inversion, job.limits
     largest = float(inversion.reference.max())
     volts = np.zeros(inversion.time.size)
     if largest > 0.0:
@@ -390,18 +414,13 @@ def _linear_map(
             low, high = (middle, high) if moved < largest else (low, middle)
         volts = high * np.sqrt(np.maximum(inversion.reference, 0.0) / largest)
     ceiling = np.full(volts.size, limits.voltage)
-    ceiling[:lead_in] = 0.0
-    ceiling[volts.size - tail :] = 0.0
+    ceiling[: job.lead_in] = 0.0
+    ceiling[volts.size - job.tail :] = 0.0
     return limits.nearest(volts, ceiling, inversion.rate)
 
 
 def _play(
-    job: _Job,
-    inversion: Inversion,
-    kind: str,
-    iteration: int,
-    voltage: np.ndarray,
-    model: ModelFile | None,
+    job: _Job, kind: str, iteration: int, voltage: np.ndarray, model: ModelFile | None
 ) -> TrackedRun:
     """Play ``voltage`` (N,) V, record it, and return the run."""
     stem = f"{kind}-{iteration}" if kind == "learned" else kind
@@ -427,12 +446,12 @@ def _play(
             (job.folder / f"{stem}.{ending}").unlink()
         raise
     recording = open_recording(result.path)
-    return _measured(job, kind, iteration, inversion, recording, result.margins)
+    return _measured(job, kind, iteration, recording, result.margins)
 
 
 def _as_sequence(job: _Job, stem: str, voltage: np.ndarray) -> LoadedSequence:
     """Write ``voltage`` (N,) V as a sequence in the folder, and return it as it is read."""
-    time = np.arange(voltage.size) / job.rate
+    time = np.arange(voltage.size) / job.inversion.rate
     table = np.column_stack([time, voltage])
     np.savetxt(
         job.folder / f"{stem}.csv", table, fmt="%.12g", delimiter=",", header="time_s,voltage_V",
@@ -470,11 +489,11 @@ def _measured(
     job: _Job,
     kind: str,
     iteration: int,
-    inversion: Inversion,
     recording: Recording,
     margins: tuple[Margin, ...],
 ) -> TrackedRun:
     """Return a run with its errors from the reference."""
+    inversion = job.inversion
     reading, valid = _reading(recording)
     n = min(reading.size, inversion.time.size)
     usable = np.isfinite(reading[:n]) if valid is None else valid[:n] & np.isfinite(reading[:n])

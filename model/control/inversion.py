@@ -291,7 +291,10 @@ class _Job:
         if now.u.max() <= (_AT_LIMIT * self.limits.voltage) ** 2:
             return best  # nothing is asked for
         level = float(np.mean(now.u[now.u > 0.01 * now.u.max()]))
-        linear = linearise(self.model, self.target.size, self.rate, level, self.lag)
+        try:
+            linear = linearise(self.model, self.target.size, self.rate, level, self.lag)
+        except ModelError:  # the film stands so much for a moment, and not for as long as this
+            return best
         inverse = linear.inverse(self.bandwidth)
         mixing = _Anderson()
         for _ in range(_PASSES):

@@ -15,11 +15,11 @@ from run to run, at every frequency, where
     |Q (1 - L G_true)| = |Q| W < 1,    W = |G_true/(g G) - 1|.
 
 The gain g of the film over the model's is that of the first run, within 0.5 and 2. W is taken from
-the model's uncertainty (``alternatives``) and from the runs. After the first run it is the ratio of
-the spectra of d_0 and of the prediction, where the path has power, without what g explains. After a
-run that has learned, it is the part of the error that is left in the band that was learned. Beyond
-what was seen W grows with the square of the frequency, as the error of a mass does. The filter Q of
-no phase passes what keeps |Q| W below ``CONTRACTION``. Where nothing does, nothing is learned.
+the model's uncertainty (``alternatives``) and from the runs: the ratio of the spectra of d_j and of
+the prediction, in half octaves, without what g explains. After a run that has learned, it is the
+part of the error that is left in the band that was learned. Beyond what was seen W grows with the
+square of the frequency, as the error of a mass does. The filter Q of no phase passes what keeps
+|Q| W below ``CONTRACTION``. Where nothing does, nothing is learned.
 """
 
 from __future__ import annotations
@@ -53,7 +53,9 @@ _JUMP_WINDOW = 0.02  # s on either side of a jump
 _JUMP = 8.0  # standard deviations of such differences elsewhere in the run
 _SUDDEN = 0.6  # of the change over four times as long: what moves steadily has a quarter
 _WIDENED = 2.0  # times the band of the last run, at most
-_POWER = 0.05  # of the largest line of the prediction's spectrum: a path has power there
+_LOWEST = 3  # lines of a spectrum in which an error of the zero shows
+_COUNTS = 0.02  # of the power of an error: half an octave with less decides nothing
+_TOLD = 4.0  # times the power of the noise: what is less tells nothing
 _GAIN = (0.5, 2.0)  # of the film over the model's, that learning corrects for
 _NARROWED = 0.5  # of Q's band, where a run was stepped back from
 
@@ -88,6 +90,7 @@ class _Run:
     lacking: np.ndarray  # (N,) m: d of it
     rms: float
     left: np.ndarray  # (M,) m: amplitudes of its error
+    edge: float  # Hz: of what its voltage was learned with, 0 for the first
 
 
 class Learner:
@@ -171,7 +174,8 @@ class Learner:
             self._gain = float(np.clip(gain, *_GAIN))
         lacking = self._repeated(lacking, notes)
         left = np.abs(np.fft.rfft(np.where(counted, error, 0.0)))
-        self._best = _Run(self._now.voltage, self._known, lacking, rms, left)
+        edge = 0.0 if self._learned is None else self._learned[1]
+        self._best = _Run(self._now.voltage, self._known, lacking, rms, left, edge)
         return self._follow(self._best, rms, largest, samples, notes)
 
     # ------------------------------------------------------------ next voltage
@@ -205,7 +209,9 @@ class Learner:
         self, best: _Run, rms: float, largest: float, samples: int, notes: list[str]
     ) -> Lesson:
         """Go back to the run of the smallest error, and learn less of it."""
-        self._edge = _NARROWED * (self._edge if self._learned is None else self._learned[1])
+        failed = self._edge if self._learned is None else self._learned[1]
+        # the band that made the best run is known to be safe
+        self._edge = best.edge if 0.0 < best.edge < failed else _NARROWED * failed
         self._learned = None
         notes.append(
             f"the error has grown from {best.rms * 1e6:.3g} um: the run is stepped back from, and "
@@ -237,7 +243,10 @@ class Learner:
         n, level = square.size, float(np.mean(square[square > 0.01 * square.max()]))
         own = linearise(self._model, n, self._rate, level, self._lag)
         for other in alternatives:
-            gain = linearise(other, n, self._rate, level, self._lag).gain
+            try:
+                gain = linearise(other, n, self._rate, level, self._lag).gain
+            except ModelError:  # it does not stand this voltage: the data rule it out
+                continue
             off = np.abs(gain / own.gain - 1.0)
             off = np.where(np.isfinite(off), off, np.inf)
             spread = np.maximum(spread, np.interp(self._frequency, own.frequency, off))
@@ -246,18 +255,23 @@ class Learner:
     def _pass(self, run: _Run) -> tuple[float, float]:
         """Return the edge in Hz of Q, and the largest |Q| W with it; 0 where nothing passes."""
         highest, least = self._edge, self._rate / self.first.time.size
-        off = self._uncertain
-        if self._learned is None or self._learned[0] is run.left:
-            off = np.maximum(off, self._off_at_first(run.lacking))
-        else:
+        off = self._off_by_prediction(run.lacking)
+        if self._learned is not None and self._learned[0] is not run.left:
             before, learned = self._learned
-            ratio = self._ratio(before, run.left, learned)
-            if np.isnan(ratio):  # the error is noise: nothing more can be told
-                return learned, ratio
-            if ratio > CONTRACTION:
-                return (learned if ratio < 1.0 else _NARROWED * learned), ratio
+            left = self._left(before, run.left)
+            band = self._frequency <= learned
+            if np.isnan(left[band]).all():
+                return learned, float("nan")  # the error is noise: nothing more can be told
+            left = np.nan_to_num(left)
+            beyond = left[band][-1] * np.maximum(self._frequency / learned, 1.0) ** 2
+            off = np.where(band, left, np.minimum(off, beyond))
             highest = min(highest, _WIDENED * learned)
-            off = np.maximum(off, ratio * np.maximum(self._frequency / learned, 1.0) ** 2)
+            worst = float(np.max(left[band]))
+            if worst > CONTRACTION:
+                # no wider: it still shrinks as a whole, or it does not
+                shrinks = np.sum(run.left[band] ** 2) < np.sum(before[band] ** 2)
+                return min(highest, learned if shrinks else _NARROWED * learned), worst
+        off = np.maximum(off, self._uncertain)
         edge = highest
         while edge > least:
             contraction = float(np.max(pass_band(self._frequency, edge) * off))
@@ -266,38 +280,53 @@ class Learner:
             edge *= 0.9
         return 0.0, np.nan
 
-    def _ratio(self, before: np.ndarray, after: np.ndarray, edge: float) -> float:
-        """Return the part that is left of an error in the band that was learned, up to ``edge``.
+    def _left(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """Return the part (M,) of an error that is left, from amplitudes; NaN where it is noise."""
+        noise = self._noise_around(int(np.count_nonzero(self.first.reachable)))
+        had, left = self._around(before), self._around(after)
+        told = np.maximum(had, left) > np.maximum(_TOLD * noise, _COUNTS * np.sum(after**2))
+        part = np.sqrt(np.maximum(left - noise, 0.0) / np.maximum(had, noise))
+        return np.where(told, part, np.nan)
 
-        NaN where what is left is noise.
-        """
-        band = self._frequency <= edge
-        noise = self._noise**2 * np.count_nonzero(self.first.reachable) * np.count_nonzero(band)
-        left, had = (float(np.sum(amplitudes[band] ** 2)) for amplitudes in (after, before))
-        if left < 2.0 * noise and had < 2.0 * noise:
-            return float("nan")
-        return float(np.sqrt(max(left - noise, 0.0) / max(had, noise)))
-
-    def _off_at_first(self, lacking: np.ndarray) -> np.ndarray:
-        """Return W (M,) from what the model ``lacking`` (N,) m shows of the first run."""
-        window = np.where(self._inside, 1.0, 0.0)
+    def _off_by_prediction(self, lacking: np.ndarray) -> np.ndarray:
+        """Return W (M,) from what the model ``lacking`` (N,) m shows in a run."""
+        noise = self._noise_around(int(np.count_nonzero(self._inside)))
         # what a gain alone does not explain
         rest = (lacking - (self._gain - 1.0) * self._now.reading) / self._gain
-        shown = np.abs(np.fft.rfft(rest * window))
-        noise = self._noise * np.sqrt(np.count_nonzero(self._inside))
-        shown = np.sqrt(np.maximum(shown**2 - noise**2, 0.0))
-        predicted = np.abs(np.fft.rfft(self._now.reading * window))
-        # neighbouring lines together: a path of finite length has its power spread over a few
-        shown, predicted = (uniform_filter1d(s, 5, mode="nearest") for s in (shown, predicted))
-        powerful = np.flatnonzero(predicted > _POWER * predicted.max())
-        if powerful.size == 0:
+        shown, predicted = (
+            self._around(np.abs(np.fft.rfft(np.where(self._inside, row, 0.0))))
+            for row in (rest, self._now.reading)
+        )
+        told = np.flatnonzero(predicted > _TOLD * noise)
+        if told.size == 0:
             return np.full(shown.size, np.inf)
-        ratio = shown[powerful] / predicted[powerful]
-        last = max(int(powerful[-1]), 1)
-        off = np.interp(np.arange(shown.size), powerful, ratio)
-        beyond = np.arange(shown.size) > last
-        off[beyond] = ratio[-1] * (np.arange(shown.size)[beyond] / last) ** 2
-        return off
+        ratio = np.sqrt(np.maximum(shown - noise, 0.0)[told] / predicted[told])
+        lines = np.arange(shown.size)
+        off = np.interp(lines, told, ratio)
+        last = max(int(told[-1]), 1)
+        return off * np.maximum(lines / last, 1.0) ** 2
+
+    def _around(self, amplitudes: np.ndarray) -> np.ndarray:
+        """Return the power (M,) of ``amplitudes`` (M,) in the half octave about each frequency."""
+        low, high = self._half_octave()
+        power = np.concatenate([[0.0], np.cumsum(amplitudes**2)])
+        return power[high] - power[low]
+
+    def _noise_around(self, samples: int) -> np.ndarray:
+        """Return the power (M,) of the noise of so many ``samples``, as of ``_around``."""
+        low, high = self._half_octave()
+        power = self._noise**2 * samples * (high - low)
+        # the zero is the median of the lead-in, and its error is that of all samples
+        at_rest = max(self._lead_in, 1)
+        power[:_LOWEST] += 0.5 * np.pi / at_rest * (self._noise * samples) ** 2
+        return power
+
+    def _half_octave(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the first line, and the one after the last, of the half octave about each."""
+        lines = np.arange(self._frequency.size)
+        low = np.floor(lines / 2**0.25).astype(np.int64)
+        high = np.minimum(np.ceil(lines * 2**0.25).astype(np.int64), lines[-1]) + 1
+        return low, high
 
     # ------------------------------------------------------------ readings
 

@@ -105,6 +105,10 @@ MEASUREMENTS = {
         "The diagnosis beside general methods",
         ("tests.benchmarks.bench_diagnosis --train thesis --seeds 2003,79,225",),
     ),
+    "track": Measurement(
+        "Following a path beside a PI loop and learning without a model",
+        ("tests.benchmarks.bench_track --rigs 12",),
+    ),
     "ni-examples": Measurement(
         "Example programs of nidaqmx-python on the simulated card",
         ("tests.benchmarks.bench_ni_examples --source FOLDER",),
