@@ -97,6 +97,7 @@ CAUSES = {
     "field": "the path needs more than the highest true field",
     "pull-in": "the film would pull in",
     "slew": "the voltage may not change so fast",
+    "bandwidth": "the target changes faster than is followed",
     "dynamics": "no voltage was found that follows so closely",
 }
 
@@ -107,8 +108,8 @@ class Inversion:
 
     ``time`` is in s, ``voltage`` in V at the film, held between samples at ``rate`` Hz. ``target``
     in m is the asked one, ``reference`` the nearest feasible target: ``target`` without what is
-    faster than the bandwidth, and the model's reading where it is unreachable. ``reading`` in m is
-    that of the model. ``reachable`` is True where the film can follow. ``unreachable`` are the
+    faster than the bandwidth, and the model's reading where that is unreachable. ``reading`` in m
+    is that of the model. ``reachable`` is True where the film can follow. ``unreachable`` are the
     parts where it cannot. ``passes`` counts simulations.
     """
 
@@ -358,9 +359,7 @@ class _Job:
 
     def result(self, found: _Pass, tolerance: float) -> Inversion:
         """Return ``found`` with its unreachable parts, farther than ``tolerance`` in m."""
-        distance = np.where(self.inside, np.abs(found.error), 0.0)
-        beyond = distance > tolerance
-        beyond |= self.inside & self.pulls_in & (self.target - found.reading > tolerance)
+        beyond = self.inside & (np.abs(self.target - found.reading) > tolerance)
         # a film that was let go rings: what it misses with pauses is one part
         width = 2 * math.ceil(0.5 * _PAUSE * self.rate) + 1
         joined = binary_closing(np.pad(beyond, width), np.ones(width, dtype=bool))[width:-width]
@@ -381,17 +380,19 @@ class _Job:
 
     def _part(self, found: _Pass, first: int, last: int) -> Unreachable:
         """Return the unreachable part of the samples ``first`` to before ``last``."""
-        off = np.abs(self.target - found.reading)[first:last]
+        part = slice(first, last)
+        off = np.abs(self.target - found.reading)[part]
         worst = first + int(np.argmax(off))
-        around = slice(first, last)
-        voltage, near = np.sqrt(found.u[around]), _AT_LIMIT * self.limits.voltage
-        high = voltage >= self.ceiling[around] - near
-        wanted = np.sqrt(np.maximum(self.needed[around], 0.0))
-        needed, cause = float(wanted.max()), "dynamics"
-        if self.pulls_in[first:last].any():
+        voltage, near = np.sqrt(found.u[part]), _AT_LIMIT * self.limits.voltage
+        ceiling, wanted = self.ceiling[part], np.sqrt(np.maximum(self.needed[part], 0.0))
+        most = int(np.argmax(wanted - ceiling))
+        needed, cause = float(wanted[most]), "dynamics"
+        if self.pulls_in[part].any():
             cause, needed = "pull-in", math.nan
-        elif high.any():
-            capped = self.ceiling[around][high].min() < (1.0 - 1e-3) * self.limits.voltage
+        elif np.abs(self.target - self.smooth)[worst] > 0.5 * off.max():
+            cause = "bandwidth"
+        elif (voltage >= ceiling - near).any():
+            capped = ceiling[most] < (1.0 - 1e-3) * self.limits.voltage
             cause = "field" if capped else "voltage"
         elif (voltage <= near).any():
             cause, needed = "zero", math.nan
@@ -404,7 +405,7 @@ class _Job:
             worst=float(off.max()),
             at=float(self.time[worst]),
             needed=needed,
-            allowed=float(self.ceiling[around].max()),
+            allowed=float(ceiling[most]),
         )
 
 

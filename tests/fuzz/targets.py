@@ -16,6 +16,7 @@ from dearig.config.modelfile import load_model
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import load_rig_file, write_default
 from dearig.config.sequencefile import load_sequence
+from dearig.config.targetfile import EXAMPLE, load_target
 from dearig.drivers.rig import Block
 from dearig.recording import RunMetadata, export_recording, open_recording, save_recording
 from dearig.recording.importers.chosen import choose
@@ -113,6 +114,10 @@ def sequences(folder: Path) -> list[bytes]:
     return [LOBE.encode(), *(text.encode() for text in PRESETS.values())]
 
 
+def paths(folder: Path) -> list[bytes]:
+    return [EXAMPLE.encode(), LOBE.replace("kV", "mm").encode()]
+
+
 def rig_files(folder: Path) -> list[bytes]:
     write_default(folder / "rig.toml")
     return [(folder / "rig.toml").read_bytes(), b"[card]\nsample_rate_Hz = 200.0\n"]
@@ -127,6 +132,7 @@ def models(folder: Path) -> list[bytes]:
 
 TARGETS: dict[str, Target] = {
     "sequences": Target(".toml", sequences, mutated_text, load_sequence, 0.2),
+    "paths": Target(".toml", paths, mutated_text, load_target, 0.01),
     "rig files": Target(".toml", rig_files, mutated_text, load_rig_file, 0.12),
     "model files": Target(".toml", models, mutated_text, load_model, 0.2),
     "CSV": Target(".csv", exported("csv"), mutated_text, read_table, 0.2),

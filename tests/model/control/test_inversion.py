@@ -133,6 +133,16 @@ def test_a_target_beyond_a_limit_says_when_and_by_how_much(limits, cause, says):
     assert cause not in {u.cause for u in feasible.unreachable}
 
 
+def test_what_is_too_fast_is_said():
+    target = path()
+    time = np.arange(target.size) / RATE
+    shaking = (time > 1.5) & (time < 2.0)
+    target[shaking] += 5e-6 * np.sin(2.0 * np.pi * 60.0 * time[shaking])
+    found = inverted(THESIS, target)
+    assert found.unreachable[0].cause == "bandwidth"
+    assert 1.4 < found.unreachable[0].start < found.unreachable[0].stop < 2.1
+
+
 def test_a_target_beyond_pull_in_is_cut_off_below_it():
     free = replace(THESIS, film=replace(THESIS.film, kinematics="equibiaxial"))
     pull_in = pull_in_voltage(free)
