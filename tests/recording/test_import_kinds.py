@@ -153,6 +153,7 @@ def test_groups_of_thousands_are_read_where_they_are_sure(tmp_path: Path) -> Non
         (table("time_s,voltage_V,Laser (V)"), {}, "the output of an instrument in V"),
         (table("t [s],U [V],s [mm]"), {}, r"'s \[mm\]' may be the displacement, by its unit alone"),
         (table("x-axis,1,2\nsecond,Volt,mm"), {}, "time_s=x-axis .* --column displacement_mm=2"),
+        (table("t,V,x"), {}, "'x' may be the displacement, because no .* displacement_mm=x"),
         (table("a #1,b #1,c #1"), {}, "no column for voltage"),
         (table("a,b,c"), {}, "--column time_s=a --column voltage_V=b --column displacement_mm=c"),
         (table("time_s,voltage_V,displacement_mm").replace("time_s,", "").replace("\n0", "\n0"),

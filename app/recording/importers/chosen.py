@@ -469,13 +469,20 @@ class _Guess:
             self._pick(target, column, target.scale)
 
     def _of_unit(self, quantity: str) -> list[str]:
-        """Return the one free column with a unit of ``quantity``, and say that it is a guess."""
+        """Return the one free column with a unit of ``quantity``, or the only one that is left.
+
+        Says that it is a guess.
+        """
         labels = {n: self._labels[n] for n in self._free if not self._labels[n].quantities}
         found = [n for n, label in labels.items() if DIMENSIONS[quantity] in label.dimensions]
+        why = "by its unit alone"
+        if not found and quantity != "time":
+            found = [n for n, label in labels.items() if not label.unit]
+            why = "because no other column is left"
         if len(found) != 1:
             return []
         what = quantity.replace("_", " ")
-        self._chosen.unsure.append(f"{found[0]!r} may be the {what}, by its unit alone")
+        self._chosen.unsure.append(f"{found[0]!r} may be the {what}, {why}")
         return found
 
     def _own(self, name: str) -> str:
