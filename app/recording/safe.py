@@ -6,9 +6,13 @@ claims more values than are stored is refused before memory is allocated for it.
 
 from __future__ import annotations
 
+import mmap
+import struct
+from pathlib import Path
+
 import h5py
 
-__all__ = ["Refused", "checked", "dataset", "group", "item"]
+__all__ = ["Refused", "check_heaps", "checked", "dataset", "group", "item"]
 
 #: Largest size that a dataset may claim, in multiples of its size in the file.
 PACKED_MAX = 100
@@ -52,6 +56,41 @@ def dataset(parent: h5py.Group, name: str) -> h5py.Dataset | None:
     """Return the dataset ``name`` in ``parent``, None if there is none."""
     found = item(parent, name)
     return found if isinstance(found, h5py.Dataset) else None
+
+
+def check_heaps(path: Path) -> None:
+    """Raise ``Refused`` if a global heap, which texts are in, would be read without an end.
+
+    The library takes the size of a free space as the way to the next object, and a size of 0 leads
+    nowhere. The layout is that of "HDF5 File Format Specification", III.E, with sizes of 8 bytes.
+    """
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as raw:
+        # heaps that overlap would have more objects than the file has room for
+        left = len(raw) // _OBJECT.size
+        at = raw.find(_HEAP)
+        while at >= 0:
+            if at + _OBJECT.size <= len(raw):
+                end = min(at + int.from_bytes(raw[at + 8 : at + 16], "little"), len(raw))
+                left = _check_heap(raw, at + 16, end, left)
+            at = raw.find(_HEAP, at + 1)
+
+
+def _check_heap(raw: mmap.mmap, at: int, end: int, left: int) -> int:
+    """Return how many of the ``left`` objects of all heaps this one leaves."""
+    first = at
+    while at + _OBJECT.size <= end:
+        index, size = _OBJECT.unpack_from(raw, at)
+        # of an object without the header, of free space with it; the library adds modulo 2**64
+        need = (_OBJECT.size + -(-size // 8) * 8) % 2**64 if index else size
+        left -= 1
+        if need == 0 or left < 0:
+            raise Refused(f"the heap at byte {first - 16} is damaged")
+        at += need
+    return left
+
+
+#: Beginning of a global heap of version 1; index and size of an object in it.
+_HEAP, _OBJECT = b"GCOL\x01\0\0\0", struct.Struct("<H6xQ")
 
 
 def _check_own(values: h5py.Dataset) -> None:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import io
+import json
 import random
 import tempfile
+import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import h5py
 import numpy as np
 from nptdms import ChannelObject, TdmsWriter
+from openpyxl import Workbook
 from scipy.io import savemat
 
 from dearig.config.modelfile import load_model
@@ -110,6 +115,52 @@ def tdms_files(folder: Path) -> list[bytes]:
     return [first.read_bytes(), second.read_bytes()]
 
 
+def workbooks(folder: Path) -> list[bytes]:
+    book = Workbook()
+    for row in (("Zeit", "Spannung", "Weg"), ("s", "kV", "mm"), *([i, i, i] for i in range(20))):
+        book.active.append(row)
+    book.save(folder / "a.xlsx")
+    return [(folder / "a.xlsx").read_bytes()]
+
+
+def mutated_workbook(rng: random.Random, seeds: Sequence[bytes]) -> bytes:
+    """Return a workbook with another text in one of its parts."""
+    with zipfile.ZipFile(io.BytesIO(rng.choice(seeds))) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    name = rng.choice([n for n in parts if n.startswith("xl/") and "theme" not in n])
+    parts[name] = mutated_text(rng, [parts[name]])
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as archive:
+        for part, content in parts.items():
+            archive.writestr(part, content)
+    return made.getvalue()
+
+
+def json_files(folder: Path) -> list[bytes]:
+    names, n = ("time_s", "voltage_V", "displacement_mm"), list(range(20))
+    rows = [dict.fromkeys(names, i) for i in n]
+    contents = (
+        {"run": dict.fromkeys(names, n), "fs": 100}, rows,
+        {"columns": names, "data": [[1, 2, 3]] * 9},
+        [{"name": name, "unit": "s", "data": n} for name in names],
+    )  # fmt: skip
+    return [
+        *(json.dumps(c).encode() for c in contents),
+        b"\n".join(json.dumps(r).encode() for r in rows),
+    ]
+
+
+def other_hdf5(folder: Path) -> list[bytes]:
+    with h5py.File(folder / "a.h5", "w") as file:
+        file.attrs["default"] = "scan"
+        for name in ("time_s", "voltage_V", "displacement_mm"):
+            file[f"scan/{name}"] = np.arange(20.0)
+            file[f"scan/{name}"].attrs["units"] = name.rpartition("_")[2]
+        file["log"] = np.ones((20, 3))
+        file["table"] = np.ones(20, dtype=[("time_s", "f8"), ("x", "f4", (2,))])
+    return [(folder / "a.h5").read_bytes()]
+
+
 def sequences(folder: Path) -> list[bytes]:
     return [LOBE.encode(), *(text.encode() for text in PRESETS.values())]
 
@@ -139,6 +190,9 @@ TARGETS: dict[str, Target] = {
     "MAT": Target(".mat", exported("mat"), mutated_bytes, read_table, 0.2),
     "Parquet": Target(".parquet", exported("parquet"), mutated_bytes, read_table, 0.03),
     "TDMS": Target(".tdms", tdms_files, mutated_bytes, read_table, 0.03),
+    "workbooks": Target(".xlsx", workbooks, mutated_workbook, read_table, 0.02),
+    "JSON": Target(".json", json_files, mutated_text, read_table, 0.1),
+    "HDF5 of others": Target(".hdf5", other_hdf5, mutated_hdf5, read_table, 0.02),
     "recordings": Target(".h5", recordings, mutated_hdf5, read_recording, 0.01),
 }
 

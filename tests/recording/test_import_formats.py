@@ -457,6 +457,13 @@ def test_hostile_hdf5_is_a_sentence(tmp_path: Path) -> None:
 
     with pytest.raises(InputError, match="holds no columns of numbers"):
         imported(hdf5(tmp_path / "in.h5", claims))
+    path = hdf5(tmp_path / "in.h5", matrix)
+    raw = bytearray(path.read_bytes())
+    heap = raw.index(b"GCOL")
+    raw[heap + 16 : heap + 32] = bytes(16)  # free space of size 0 in front of the texts
+    path.write_bytes(raw)
+    with pytest.raises(InputError, match=f"the heap at byte {heap} is damaged"):
+        imported(path)
     with pytest.raises(InputError, match="no column for voltage"):
         imported(hdf5(tmp_path / "in.h5", outside))
     scan_run = tmp_path / "out.h5"

@@ -18,7 +18,7 @@ from dearig.recording.importers.source import PARSER_FAILURES, printable
 from dearig.recording.importers.stored import Stored, StoredColumns
 from dearig.recording.importers.units import unit_of
 from dearig.recording.layout import FORMAT
-from dearig.recording.safe import Refused, checked, item
+from dearig.recording.safe import Refused, check_heaps, checked, item
 
 __all__ = ["IMPORTER", "Hdf5File"]
 
@@ -50,10 +50,11 @@ class Hdf5File(StoredColumns):
             raise InputError(f"{path} cannot be read: {in_words(error)}") from error
         what = "a MAT file of version 7.3" if matlab else "an HDF5 file"
         try:
+            check_heaps(path)
             with h5py.File(path, "r", locking=False) as file:
                 walk = _Walk(path, file, matlab)
                 columns, default = dict(walk.columns()), _default(file)
-        except PARSER_FAILURES as error:
+        except (*PARSER_FAILURES, Refused) as error:
             raise InputError(f"{path} cannot be read as {what}: {one_line(error)}") from error
         if not columns and walk.objects:
             raise InputError(f"{path} {OBJECTS}")
