@@ -15,7 +15,7 @@ from dearig.errors import InputError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from dearig.analysis.track import TrackOutcome
+    from dearig.analysis import track as tracking
 
 __all__ = ["commands"]
 
@@ -98,7 +98,7 @@ def track(
     done.
     """
     from dearig.acquisition.run import RunOptions
-    from dearig.analysis.track import check_feasible, plan_target
+    from dearig.analysis.track import TrackOutcome, check_feasible, plan_target
     from dearig.analysis.track import track as follow
     from dearig.config.modelfile import load_actuator, load_model
     from dearig.config.rigfile import load_rig_file
@@ -110,19 +110,19 @@ def track(
     check_files(force, (target, model, compare, rig_file), json=json)
     loaded, settings = load_target(target), load_rig_file(rig_file)
     text = "" if rig_file is None else read_text(rig_file, "rig file")
+    ours = load_model(model)
+    actuator = load_actuator(model)  # refuses that of a bare film
     if check:
         with working(json) as (console, _):
-            found, _, _ = plan_target(loaded, load_actuator(model), settings)
+            found, _, _ = plan_target(loaded, actuator, settings)
+        outcome = TrackOutcome(loaded, ours, rig, found, within_um * 1e-6)
+        write_result(track_json(outcome), json)
         check_feasible(loaded, found.unreachable, within_um * 1e-6)
-        print_line(
-            console,
-            f"{loaded.name}: the film can follow it, with up to "
-            f"{found.voltage.max() * 1e-3:.4g} kV",
-        )
+        peak = found.voltage.max() * 1e-3
+        print_line(console, f"{loaded.name}: the film can follow it, with up to {peak:.4g} kV")
         return
     if out is None:
         raise InputError("--out DIR is missing: recordings and the report are written there")
-    load_actuator(model)  # refuses that of a bare film
     try:
         faults = FaultPlan.parse(fault or ())
     except ValueError as error:
@@ -133,21 +133,21 @@ def track(
     report = out / "report.html"
     with working(json) as (console, progress):
 
-        def finish(outcome: TrackOutcome) -> None:
+        def finish(outcome: tracking.TrackOutcome) -> None:
             """Write and show what was done."""
             written = replace(outcome, report=write_track_report(outcome, report))
             _show(console, written)
             write_result(track_json(written), json)
 
         outcome = follow(
-            loaded, load_model(model), rig, settings, out, options, iterations=iterations,
+            loaded, ours, rig, settings, out, options, iterations=iterations,
             compare=None if compare is None else load_model(compare), nearest=nearest,
             within=within_um * 1e-6, ended=finish, progress=progress,
         )  # fmt: skip
         finish(outcome)
 
 
-def _show(console: Console, outcome: TrackOutcome) -> None:
+def _show(console: Console, outcome: tracking.TrackOutcome) -> None:
     """Print the errors of all runs, the summary, and where the files are."""
     from dearig.cli.terminal import track_table
 

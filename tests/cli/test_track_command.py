@@ -69,7 +69,10 @@ def test_it_follows_learns_and_reports(files, tmp_path: Path) -> None:
 
 def test_it_says_what_can_be_reached_and_touches_nothing(files, tmp_path: Path) -> None:
     before = names(tmp_path)
-    assert "the film can follow it, with up to" in done("track", *files, "--check").out
+    answer = done("track", *files, "--check", "--json", "-")
+    assert "the film can follow it, with up to" in answer.err
+    assert answer.json["feasible"] is True
+    assert answer.json["runs"] == []
     target = write(tmp_path / "fast.toml", PATH.replace("duration_s = 5.0", "duration_s = 0.2"))
     refused(dearig("track", target, *files[1:], "--check"), "no voltage pushes it", "--nearest")
     refused(dearig("track", *files, "--within-um", "0.5", "--check"), "cannot be reached")
