@@ -16,7 +16,7 @@ from run to run, at every frequency, where
 
 The gain g of the film over the model's is that of the first run, within 0.5 and 2. W is taken from
 the model's uncertainty (``alternatives``) and from the runs: the ratio of the spectra of d_j and of
-the prediction, in half octaves, without what g explains. After a run that has learned, it is the
+the prediction, over two octaves, without what g explains. After a run that has learned, it is the
 part of the error that is left in the band that was learned. Beyond what was seen W grows with the
 square of the frequency, as the error of a mass does. The filter Q of no phase passes what keeps
 |Q| W below ``CONTRACTION``. Where nothing does, nothing is learned.
@@ -54,7 +54,7 @@ _JUMP = 8.0  # standard deviations of such differences elsewhere in the run
 _SUDDEN = 0.6  # of the change over four times as long: what moves steadily has a quarter
 _WIDENED = 2.0  # times the band of the last run, at most
 _LOWEST = 3  # lines of a spectrum in which an error of the zero shows
-_COUNTS = 0.02  # of the power of an error: half an octave with less decides nothing
+_COUNTS = 0.02  # of the power of an error: a band with less decides nothing
 _TOLD = 4.0  # times the power of the noise: what is less tells nothing
 _GAIN = (0.5, 2.0)  # of the film over the model's, that learning corrects for
 _NARROWED = 0.5  # of Q's band, where a run was stepped back from
@@ -235,20 +235,26 @@ class Learner:
     # ------------------------------------------------------------ uncertainty
 
     def _spread(self, alternatives: Sequence[Actuator]) -> np.ndarray:
-        """Return |G_other/G - 1| (M,), the largest of all ``alternatives``."""
+        """Return |G_other/(k G) - 1| (M,), the largest of all ``alternatives``.
+
+        ``k`` is a gain over the lines of the path, which learning finds by itself.
+        """
         spread = np.zeros(self._frequency.size)
         square = np.square(self.first.voltage)
         if not alternatives or not square.any():
             return spread
         n, level = square.size, float(np.mean(square[square > 0.01 * square.max()]))
         own = linearise(self._model, n, self._rate, level, self._lag)
+        power = np.abs(np.fft.rfft(self.first.reading, own.length)) ** 2
         for other in alternatives:
             try:
                 gain = linearise(other, n, self._rate, level, self._lag).gain
             except ModelError:  # it does not stand this voltage: the data rule it out
                 continue
-            off = np.abs(gain / own.gain - 1.0)
-            off = np.where(np.isfinite(off), off, np.inf)
+            ratio = gain / own.gain
+            ratio = np.where(np.isfinite(ratio), ratio, 0.0)
+            k = float(np.sum(power * ratio.real) / np.sum(power))
+            off = np.abs(ratio / k - 1.0) if k > 0.0 else np.full(ratio.size, np.inf)
             spread = np.maximum(spread, np.interp(self._frequency, own.frequency, off))
         return spread
 
@@ -307,25 +313,28 @@ class Learner:
         return off * np.maximum(lines / last, 1.0) ** 2
 
     def _around(self, amplitudes: np.ndarray) -> np.ndarray:
-        """Return the power (M,) of ``amplitudes`` (M,) in the half octave about each frequency."""
-        low, high = self._half_octave()
+        """Return the power (M,) of ``amplitudes`` (M,) in two octaves about each frequency."""
+        low, high = self._near()
         power = np.concatenate([[0.0], np.cumsum(amplitudes**2)])
         return power[high] - power[low]
 
     def _noise_around(self, samples: int) -> np.ndarray:
         """Return the power (M,) of the noise of so many ``samples``, as of ``_around``."""
-        low, high = self._half_octave()
+        low, high = self._near()
         power = self._noise**2 * samples * (high - low)
         # the zero is the median of the lead-in, and its error is that of all samples
         at_rest = max(self._lead_in, 1)
         power[:_LOWEST] += 0.5 * np.pi / at_rest * (self._noise * samples) ** 2
         return power
 
-    def _half_octave(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first line, and the one after the last, of the half octave about each."""
+    def _near(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the first line, and the one after the last, of the two octaves about each.
+
+        A path has lines of little power between its own, so narrower bands tell of chance.
+        """
         lines = np.arange(self._frequency.size)
-        low = np.floor(lines / 2**0.25).astype(np.int64)
-        high = np.minimum(np.ceil(lines * 2**0.25).astype(np.int64), lines[-1]) + 1
+        low = np.maximum(np.minimum(lines // 2, lines - _LOWEST), 0)
+        high = np.minimum(np.maximum(2 * lines, lines + _LOWEST), lines[-1]) + 1
         return low, high
 
     # ------------------------------------------------------------ readings

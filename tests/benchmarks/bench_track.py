@@ -144,7 +144,7 @@ def _row(seed: int, training: tuple[str, ...], folder: Path) -> Row:
         path = folder / f"{name}.h5"
         record(load_sequence(name), address, rig, path, RunOptions(seed=i))
         train.append(path)
-    thesis = identify_recordings(train).model
+    thesis = identify_recordings(train, intervals=False).model
     diagnosed = diagnose_recordings(train)
     model = diagnosed.model
     target = _target(rig, address)
