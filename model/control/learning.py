@@ -49,6 +49,8 @@ _SPIKE = 8.0  # noises: a single reading so far from its neighbours is a spike
 _SPIKE_WINDOW = 11  # samples
 _STUCK = 0.05  # s of one and the same reading while the film is predicted to move
 _MOVED = 6.0  # noises that the prediction moves meanwhile
+_RELEASED = 0.1  # s without a voltage, after which a film that is above its target is let go
+_WEAK = 0.05  # of the highest voltage: its square pulls 1/400 as much
 _JUMP_WINDOW = 0.02  # s on either side of a jump
 _JUMP = 8.0  # standard deviations of such differences elsewhere in the run
 _SUDDEN = 0.6  # of the change over four times as long: what moves steadily has a quarter
@@ -154,7 +156,7 @@ class Learner:
             raise ModelError(f"noise = {noise!r} m must be above 0")
         self._noise = noise
         usable, reading, notes = self._usable(reading, valid)
-        counted = usable & self.first.reachable
+        counted = usable & self.first.reachable & ~self._let_go(reading, notes)
         error = np.where(counted, self.first.reference - reading, 0.0)
         rms, largest, samples = np.nan, np.nan, int(np.count_nonzero(counted))
         if samples:
@@ -368,6 +370,23 @@ class Learner:
             if mask.any():
                 notes.append(f"{np.count_nonzero(mask)} {words} are left out")
         return usable & ~spikes & ~stuck, given, notes
+
+    def _let_go(self, reading: np.ndarray, notes: list[str]) -> np.ndarray:
+        """Return where the film is above the reference though nothing pulls: it returns slower."""
+        width = max(round(_RELEASED * self._rate), 1)
+        highest = maximum_filter1d(self._now.voltage, width, origin=(width - 1) // 2)
+        away = uniform_filter1d(reading - self.first.reference, width, mode="nearest")
+        least = max(2.0 * self._noise, _WEAK**2 * float(self.first.reference.max()))
+        found = self._inside & (highest <= _WEAK * self._limits.voltage) & (away > least)
+        if np.count_nonzero(found) < width:
+            return np.zeros(found.size, dtype=bool)
+        time = self.first.time[found]
+        notes.append(
+            f"without a voltage the film returns more slowly than the model: from {time[0]:.4g} s "
+            f"to {time[-1]:.4g} s it is up to {away[found].max() * 1e6:.3g} um above the target, "
+            f"which no voltage changes"
+        )
+        return found
 
     def _stuck(self, reading: np.ndarray) -> np.ndarray:
         """Return where the reading stands still while the film is predicted to move."""

@@ -84,6 +84,13 @@ def test_a_wrong_sign_of_the_laser_teaches_nothing():
     np.testing.assert_array_equal(teacher.voltage, before)
 
 
+def test_a_film_that_returns_more_slowly_than_the_model_is_said_to():
+    rig = hiding("slow branch", 20.0)
+    _, lessons = taught(rig, target=path(offset=300e-6, seconds=5.0), runs=4)
+    assert any("no voltage changes" in note for note in lessons[-1].notes)
+    assert lessons[-1].rms < 2.0 * NOISE  # no error is counted there
+
+
 def test_readings_without_a_value_are_left_out():
     rig, teacher = hiding("leakage"), learner()
     for _ in range(4):
