@@ -76,7 +76,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     "recover of none": ("recover {s}/text.h5", ["is not an HDF5 file"]),
     # import
     "nothing to import": ("import no.csv --out o.h5", ["no.csv is not there"]),
-    "an unknown format": ("import {s}/rig.toml --out o.h5", [".csv, .mat, .parquet and .tdms"]),
+    "an unknown format": ("import {s}/rig.toml --out o.h5", [".csv, .xlsx, ", " and .tdms can"]),
     "import onto itself": ("import {s}/film.csv --out {s}/film.csv --force", ["the input file"]),
     "column nonsense": (
         "import {s}/film.csv --out o.h5 --column nonsense",
