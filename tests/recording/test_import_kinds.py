@@ -17,12 +17,8 @@ from dearig.recording.importers.labels import label_of, target_of
 from dearig.recording.importers.listing import preview
 from dearig.recording.importers.text_file import TextFile
 from dearig.recording.importers.units import Scale
+from tests.tools.imports import MOVED, ROWS, TIME, VOLTAGE, same
 from tests.tools.recordings import Clock
-
-ROWS = 60
-TIME = np.arange(ROWS) / 100.0
-VOLTAGE = np.where(TIME < 0.3, 0.0, 4000.0 * (TIME - 0.3))  # V
-MOVED = 1e-4 * (VOLTAGE / 1000.0) ** 2  # m
 
 
 def table(
@@ -60,12 +56,6 @@ def imported(folder: Path, text: str | bytes, name: str = "in.csv", **options: o
 def taken(folder: Path, text: str | bytes, name: str = "in.csv", **options: object) -> Recording:
     imported(folder, text, name, **options)
     return open_recording(folder / "out.h5")
-
-
-def same(run: Recording) -> None:
-    np.testing.assert_allclose(run.time, TIME, rtol=0, atol=1e-8)
-    np.testing.assert_allclose(run.voltage_command, VOLTAGE, rtol=1e-8)
-    np.testing.assert_allclose(run.displacement, MOVED, rtol=1e-8, atol=1e-15)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,36 @@
+"""A run as files of other programs hold it, and its import."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from dearig.recording import Recording, import_file, open_recording
+from dearig.recording.importers import Imported, ImportOptions
+from tests.tools.recordings import Clock
+
+ROWS = 60
+TIME = np.arange(ROWS) / 100.0
+VOLTAGE = np.where(TIME < 0.3, 0.0, 4000.0 * (TIME - 0.3))  # V
+MOVED = 1e-4 * (VOLTAGE / 1000.0) ** 2  # m
+NAMES = ("time_s", "voltage_V", "displacement_mm")
+TABLE = np.column_stack([TIME, VOLTAGE, MOVED * 1e3])
+
+
+def imported(path: Path, **options: object) -> Imported:
+    """Import a file as ``out.h5`` beside it."""
+    out = path.parent / "out.h5"
+    return import_file(path, out, ImportOptions(**options), overwrite=True, now=Clock())
+
+
+def taken(path: Path, **options: object) -> Recording:
+    """Import a file, and return the recording."""
+    imported(path, **options)
+    return open_recording(path.parent / "out.h5")
+
+
+def same(run: Recording) -> None:
+    np.testing.assert_allclose(run.time, TIME, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(run.voltage_command, VOLTAGE, rtol=1e-8)
+    np.testing.assert_allclose(run.displacement, MOVED, rtol=1e-8, atol=1e-15)
