@@ -27,8 +27,8 @@ import numpy as np
 
 from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.diagnose import diagnose_recordings
-from dearig.analysis.identify import identify_recordings
 from dearig.analysis.track import TrackOutcome, limits_of, track
+from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence
 from dearig.config.targetfile import LoadedTarget, target_of
@@ -144,9 +144,10 @@ def _row(seed: int, training: tuple[str, ...], folder: Path) -> Row:
         path = folder / f"{name}.h5"
         record(load_sequence(name), address, rig, path, RunOptions(seed=i))
         train.append(path)
-    thesis = identify_recordings(train, intervals=False).model
     diagnosed = diagnose_recordings(train)
     model = diagnosed.model
+    # the diagnosis begins with the thesis's model, fitted to the same recordings
+    thesis = ModelFile("thesis's model", diagnosed.finding.baseline.model)
     target = _target(rig, address)
     ours = track(
         target, model, address, rig, folder / "ours", RunOptions(seed=10), iterations=ITERATIONS,
