@@ -8,18 +8,20 @@ each run gives an estimate of what the model lacks along the path,
 and the next voltage is the one with which the model follows ``reference - Q d_j``, computed under
 all limits of the voltage (``inversion``). It was chosen because the limits act inside the
 computation: a film that stands at 0 V winds nothing up. For a linear film it is u + Q L e
-with the learning filter L = 1/(g G), G of the linearised model. The known condition holds (D. A.
+with the learning filter L = 1/(r G), G of the linearised model. The known condition holds (D. A.
 Bristow, M. Tharayil and A. G. Alleyne, IEEE Control Systems 26(3), 96 (2006)): the error shrinks
 from run to run, at every frequency, where
 
-    |Q (1 - L G_true)| = |Q| W < 1,    W = |G_true/(g G) - 1|.
+    |Q (1 - L G_true)| = |Q| W < 1,    W = |G_true/(r G) - 1|.
 
-The gain g of the film over the model's is that of the first run, within 0.5 and 2. W is taken from
-the model's uncertainty (``alternatives``) and from the runs: the ratio of the spectra of d_j and of
-the prediction, over two octaves, without what g explains. After a run that has learned, it is the
-part of the error that is left in the band that was learned. Beyond what was seen W grows with the
-square of the frequency, as the error of a mass does. The filter Q of no phase passes what keeps
-|Q| W below ``CONTRACTION``. Where nothing does, nothing is learned.
+The ratio r of the film's response to the model's is that of the first run, where the path has
+power: learning by the measured response, as K.-S. Kim and Q. Zou, IEEE/ASME Trans. Mechatronics 18,
+1767 (2013), but nothing is divided by what was not excited. W is taken from the model's uncertainty
+(``alternatives``) and from the runs: the ratio of the spectra of what r leaves and of the
+prediction, over two octaves. After a run that has learned, it is the part of the error that is left
+in the band that was learned. Beyond what was seen W grows with the square of the frequency, as the
+error of a mass does. The filter Q of no phase passes what keeps |Q| W below ``CONTRACTION``. Where
+nothing does, nothing is learned.
 """
 
 from __future__ import annotations
@@ -59,6 +61,8 @@ _LOWEST = 3  # lines of a spectrum in which an error of the zero shows
 _COUNTS = 0.02  # of the power of an error: a band with less decides nothing
 _TOLD = 4.0  # times the power of the noise: what is less tells nothing
 _GAIN = (0.5, 2.0)  # of the film over the model's, that learning corrects for
+_PHASE = 1.0  # rad, of the film against the model, that learning corrects for
+_CLEAR = 30.0  # times the power of the noise: a path tells the response of the film there
 _NARROWED = 0.5  # of Q's band, where a run was stepped back from
 
 
@@ -129,7 +133,8 @@ class Learner:
         self._uncertain = self._spread(alternatives)
         self._now = self.first
         self._known = np.zeros(self.first.time.size)
-        self._gain = 1.0  # of the film over the model's, from the first run
+        self._ratio = np.ones(self._frequency.size, dtype=complex)  # see _film_over_model
+        self._told_up_to = 1  # line
         self._best: _Run | None = None
         self._lacking: list[np.ndarray] = []  # raw, of the last runs
         self._learned: tuple[np.ndarray, float] | None = None  # amplitudes (M,) of an error, edge
@@ -170,10 +175,7 @@ class Learner:
         if best is not None and rms > _WORSE * best.rms + 0.1 * self._noise:
             return self._step_back(best, rms, largest, samples, notes)
         if best is None:
-            moved = np.where(self._inside, self._now.reading, 0.0)
-            power = float(moved @ moved)
-            gain = 1.0 + float(lacking @ moved) / power if power > 0.0 else 1.0
-            self._gain = float(np.clip(gain, *_GAIN))
+            self._ratio, self._told_up_to = self._film_over_model(lacking)
         lacking = self._repeated(lacking, notes)
         left = np.abs(np.fft.rfft(np.where(counted, error, 0.0)))
         edge = 0.0 if self._learned is None else self._learned[1]
@@ -199,9 +201,9 @@ class Learner:
                 "learned; check the sign of the laser, the film and the model"
             )
             return self._lesson(rms, largest, samples, learned=False, notes=notes)
-        part = (1.0 if rms > _NEAR_NOISE * self._noise else 0.5) / self._gain
+        part = 1.0 if rms > _NEAR_NOISE * self._noise else 0.5
         change = low_pass(np.where(self._inside, run.lacking - run.known, 0.0), self._rate, edge)
-        self._known = run.known + part * change
+        self._known = run.known + part * self._over_ratio(change)
         self._learned = (run.left, edge)
         self._now = self._invert(self.first.reference - self._known, run.voltage)
         return self._lesson(rms, largest, samples, learned=True, notes=notes, edge=edge,
@@ -299,25 +301,71 @@ class Learner:
     def _off_by_prediction(self, lacking: np.ndarray) -> np.ndarray:
         """Return W (M,) from what the model ``lacking`` (N,) m shows in a run."""
         noise = self._noise_around(int(np.count_nonzero(self._inside)))
-        # what a gain alone does not explain
-        rest = (lacking - (self._gain - 1.0) * self._now.reading) / self._gain
-        shown, predicted = (
-            self._around(np.abs(np.fft.rfft(np.where(self._inside, row, 0.0))))
-            for row in (rest, self._now.reading)
+        more, moved = (
+            np.fft.rfft(np.where(self._inside, row, 0.0)) for row in (lacking, self._now.reading)
         )
+        expected = self._ratio * moved
+        shown, predicted = self._around(np.abs(more + moved - expected)), self._around(expected)
         told = np.flatnonzero(predicted > _TOLD * noise)
         if told.size == 0:
             return np.full(shown.size, np.inf)
         ratio = np.sqrt(np.maximum(shown - noise, 0.0)[told] / predicted[told])
         lines = np.arange(shown.size)
-        off = np.interp(lines, told, ratio)
-        last = max(int(told[-1]), 1)
-        return off * np.maximum(lines / last, 1.0) ** 2
+        off, last = np.interp(lines, told, ratio), self._told_up_to
+        # what the ratio corrects for at the last line of the path grows beyond it
+        corrected = abs(self._ratio[last] / abs(self._ratio[0]) - 1.0)
+        grown = max(off[last], corrected) * (lines / last) ** 2
+        return np.where(lines > last, np.maximum(off, grown), off)
+
+    def _film_over_model(self, lacking: np.ndarray) -> tuple[np.ndarray, int]:
+        """Return the film's response over the model's (M,), and the last line that tells of it.
+
+        It is the cross-spectrum of measurement and prediction over the power of the prediction, in
+        bands of half an octave, where that power is well above the noise. In between it is
+        interpolated, beyond it stays. Its size is kept within ``_GAIN``, its phase within
+        ``_PHASE``.
+        """
+        moved, more = (
+            np.fft.rfft(np.where(self._inside, row, 0.0)) for row in (self._now.reading, lacking)
+        )
+        lines = np.arange(moved.size)
+        low = np.maximum(np.minimum(np.floor(lines / 2**0.25), lines - _LOWEST), 0).astype(int)
+        high = np.maximum(np.ceil(lines * 2**0.25), lines + _LOWEST).astype(int)
+        high = np.minimum(high, lines[-1]) + 1
+
+        def around(values: np.ndarray) -> np.ndarray:
+            summed = np.concatenate([[0.0], np.cumsum(values)])
+            return summed[high] - summed[low]
+
+        power = around(np.abs(moved) ** 2)
+        noise = self._noise**2 * np.count_nonzero(self._inside) * (high - low)
+        told = np.flatnonzero(power > _CLEAR * noise)
+        if told.size == 0:
+            return np.ones(moved.size, dtype=complex), 1
+        ratio = (around((moved + more) * np.conj(moved)) / np.maximum(power, noise))[told]
+        size = np.clip(np.abs(ratio), *_GAIN)
+        phase = np.clip(np.angle(ratio), -_PHASE, _PHASE)
+        found = size * np.exp(1j * phase)
+        whole = np.interp(lines, told, found.real) + 1j * np.interp(lines, told, found.imag)
+        whole[0] = abs(whole[0])
+        return whole, max(int(told[-1]), 1)
+
+    def _over_ratio(self, change: np.ndarray) -> np.ndarray:
+        """Return ``change`` (N,) m of the film as one of the model."""
+        first = abs(self._ratio[0])
+        n, width = change.size, change.size // 2
+        padded = np.pad(change, width, mode="edge")  # both ends are at rest
+        lines = np.fft.rfftfreq(padded.size, 1.0 / self._rate)
+        ratio = np.interp(lines, self._frequency, self._ratio.real) + 1j * np.interp(
+            lines, self._frequency, self._ratio.imag
+        )
+        extra = np.fft.irfft(np.fft.rfft(padded) * (first / ratio - 1.0), padded.size)
+        return (change + extra[width : width + n]) / first
 
     def _around(self, amplitudes: np.ndarray) -> np.ndarray:
         """Return the power (M,) of ``amplitudes`` (M,) in two octaves about each frequency."""
         low, high = self._near()
-        power = np.concatenate([[0.0], np.cumsum(amplitudes**2)])
+        power = np.concatenate([[0.0], np.cumsum(np.abs(amplitudes) ** 2)])
         return power[high] - power[low]
 
     def _noise_around(self, samples: int) -> np.ndarray:
