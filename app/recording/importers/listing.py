@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +20,10 @@ _SHOWN = 5  # values of each column
 
 @dataclass(frozen=True)
 class ColumnPreview:
-    """A column of a file: its name, what the name says of quantity and unit, and first values."""
+    """A column of a file: its name, what the name says of quantity and unit, and first values.
+
+    ``table`` is the sheet, specimen or group that it belongs to, empty where it belongs to all.
+    """
 
     number: int
     name: str
@@ -28,6 +31,7 @@ class ColumnPreview:
     unit: str
     values: tuple[float, ...]
     count: int
+    table: str = ""
 
 
 def preview(path: Path, names_line: int | None = None) -> list[ColumnPreview]:
@@ -35,6 +39,11 @@ def preview(path: Path, names_line: int | None = None) -> list[ColumnPreview]:
     source = source_at(path, names_line=names_line, skip_bad_rows=True)
     units: Mapping[str, str] = getattr(source, "units", {})
     places: Mapping[int, str] = getattr(source, "places", None) or dict(enumerate(source.names, 1))
+    tables: Mapping[str, Sequence[str]] = getattr(source, "tables", {})
+    owners: dict[str, list[str]] = {}
+    for table, names in tables.items():
+        for name in names:
+            owners.setdefault(name, []).append(table)
     found = []
     for number, name in places.items():
         try:
@@ -51,6 +60,7 @@ def preview(path: Path, names_line: int | None = None) -> list[ColumnPreview]:
                 label.unit or units.get(name, ""),
                 tuple(float(v) for v in values[:_SHOWN]),
                 int(values.size),
+                owners[name][0] if len(owners.get(name, ())) == 1 else "",
             )
         )
     return found
