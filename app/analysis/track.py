@@ -335,14 +335,18 @@ def track(
         if compare is not None:
             _play_others(job, compare)
         _play_and_learn(job, model, ours, iterations)
-    except (DearigError, KeyboardInterrupt) as error:
-        stopped = error
-        if isinstance(error, KeyboardInterrupt):
+    except (DearigError, ModelError, KeyboardInterrupt) as error:
+        stopped: DearigError
+        if isinstance(error, DearigError):
+            stopped = error
+        elif isinstance(error, ModelError):
+            stopped = InputError(f"target {target.name!r}: {error}")
+        else:
             stopped = Interrupted(
                 f"interrupted between two runs, at 0 V; {len(job.runs)} runs are in {folder}"
             )
         status = "interrupted" if isinstance(stopped, Interrupted) else "stopped"
-        if isinstance(error, InputError) and not job.runs:
+        if isinstance(stopped, InputError) and not job.runs:
             with contextlib.suppress(OSError):  # it may hold files of others
                 folder.rmdir()
         elif ended is not None:

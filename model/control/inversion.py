@@ -57,6 +57,7 @@ _ELECTRIC_PASSES = 3  # of what is between command and film along the target, fo
 _AT_LIMIT = 1e-3  # of the highest voltage: so near it stands at a limit
 _BELOW_PULL_IN = 0.95  # of the displacement at which the film pulls in; the gate refuses more
 _PAUSE = 0.1  # s between two parts of a target that are unreachable as one
+_ATTEMPTS = 80  # with less and less voltage: the last has a sixtieth of the first
 _GIVEN_BACK = 0.9  # of the voltage, while the film runs away
 _NOTHING = np.zeros(0)
 
@@ -315,12 +316,13 @@ class _Job:
         return best
 
     def _started(self, u: np.ndarray) -> _Pass:
-        """Return the first pass that the film survives."""
-        while True:
+        """Return the first pass that the film survives, with less voltage where it does not."""
+        for _ in range(_ATTEMPTS):
             first = self._pass(u)
             if first is not None:
                 return first
             u = _GIVEN_BACK * np.maximum(u, 0.0)
+        raise ModelError("the film cannot be simulated, however small the voltage is")
 
     def _pass(self, wanted: np.ndarray) -> _Pass | None:
         """Simulate the voltage squared ``wanted`` (N,) V^2 within limits; None: it ran away."""
