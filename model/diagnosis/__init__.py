@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from dearig.model.diagnosis.results import Diagnosis
-from dearig.model.diagnosis.search import diagnose
+from dearig.model.diagnosis.run import diagnose
 
 __all__ = ["Diagnosis", "diagnose"]

@@ -212,7 +212,7 @@ def conclude(
         simulations=fitter.work.simulations,
         interrupted=found.status == "stopped",
         held=held,
-        notes=tuple(_notes(end, doubtful, others, after)),
+        notes=tuple(_notes(end, doubtful, others, after, held)),
         status=found.status,
         families=_families(end),
     )
@@ -234,7 +234,11 @@ def _families(end: _Conclusion) -> tuple[tuple[str, float], ...]:
 
 
 def _notes(
-    end: _Conclusion, doubtful: bool, others: Actuator | Strip, after: Sequence[object]
+    end: _Conclusion,
+    doubtful: bool,
+    others: Actuator | Strip,
+    after: Sequence[object],
+    held: bool,
 ) -> list[str]:
     """Return sentences for the operator."""
     said = []
@@ -254,6 +258,11 @@ def _notes(
         said.append(
             f"{', '.join(gone)}: specific to these recordings as far as they show; other "
             "recordings are predicted without it"
+        )
+    if held:
+        said.append(
+            "the voltage is held between samples, as by a converter, although the records declare "
+            "it linear: half a sample of delay, not an effect of the rig"
         )
     if end.is_small and not all(getattr(s, "is_noise", True) for s in after):
         said.append(

@@ -17,6 +17,7 @@ from dearig.model.records import ActuatorRecord, Record
 
 __all__ = ["MUCH_LESS", "Found", "Race", "Search"]
 
+_BASELINE_PART = 0.1  # of the progress
 _DRIFT_TURNS = 3  # of fitting the model and the drift's variance in turn
 #: Ratio of costs from which drift is believed before laws.
 MUCH_LESS = 2.0
@@ -77,7 +78,7 @@ class Search:
         self.fits: dict[frozenset[str], Fit] = {}
         self.races: list[Race] = []
         self._left_out: set[tuple[frozenset[str], str]] = set()
-        self._searching = False
+        self._searching, self._done = False, _BASELINE_PART
         drive = "voltage" if fitter.of_actuator else "stretch"
         warm = any(
             isinstance(r, ActuatorRecord) and r.drive.warmth is not None for r in fitter.full
@@ -101,7 +102,9 @@ class Search:
 
     def run(self) -> Found:
         """Return what the records lack, or the best of what the work or the operator allowed."""
-        baseline = self.keep(self.fitter.baseline(self.progress))
+        baseline = self.keep(
+            self.fitter.baseline(lambda stage, done: self.progress(stage, _BASELINE_PART * done))
+        )
         self.judge = Judge(self.settings, baseline)
         self.log(f"baseline {baseline.cost:.4g}, effort {self.fitter.work.effort:.2e}")
         self._searching, status = True, "complete"
@@ -243,6 +246,11 @@ class Search:
 
     def _raced(self, parent: Fit, pairs: bool = False) -> list[Fit]:
         """Return the fits of one more effect each, or of two, the most probable first."""
+        # how many races there will be is not known: each is taken for a third of what is left
+        self._done += (1.0 - self._done) / 3.0
+        self.progress(
+            f"candidates beside {' + '.join(sorted(parent.members)) or 'the baseline'}", self._done
+        )
         regression, extent = self._regression(parent)
         effects = [e for e in self.effects if e.name not in parent.effects]
         starts = regression.starts(effects, extent)

@@ -10,7 +10,8 @@ import numpy as np
 
 from dearig.model import kernel
 from dearig.model.actuator import Actuator, Drive
-from dearig.model.diagnosis.bench import Bench, Trial
+from dearig.model.diagnosis.fits import Fit
+from dearig.model.diagnosis.noise import WhitenedProblem
 from dearig.model.effects import EFFECTS, EffectValues
 from dearig.model.excitation import Sequence
 from dearig.model.film import Strip
@@ -61,15 +62,6 @@ def film_record_of(model: Strip, seed: int = 0, noise: float = FILM_NOISE) -> Fi
     return FilmRecord("strip", time, stretch, noisy, noise)
 
 
-def fitted(bench: Bench, model: Actuator | Strip) -> Trial:
-    """``model``, whose numbers are near already, fitted on the bench; limits are held."""
-    layout = bench.problem(model).layout
-    held = np.zeros(layout.size, dtype=bool)
-    held[layout.column("J")] = True
-    start = layout.coordinates(layout.initial())
-    return bench.settled(bench.fit(model, [(start, None)], held))
-
-
 def typical(name: str) -> tuple[str, tuple[tuple[str, float], ...]]:
     """The effect ``name`` with numbers that would be noticed."""
     numbers = EFFECTS[name].parameters
@@ -87,20 +79,21 @@ def posed(
     return problem, layout.coordinates(layout.initial()), free
 
 
-def made_trial(records: Several[Record], model: Actuator | Strip, residual: np.ndarray) -> Trial:
-    """A trial in which measured less model is ``residual`` (N,), whatever the records say."""
+def made_fit(records: Several[Record], model: Actuator | Strip, residual: np.ndarray) -> Fit:
+    """A fit in which measured less model is ``residual`` (N,), whatever the records say."""
     layout = Layout(model)
-    problem = Problem(records, layout, workers=1)
+    problem = WhitenedProblem(records, layout, workers=1)
     start = layout.coordinates(layout.initial())
     over = np.where(np.isfinite(problem.sigma), -residual / problem.sigma, 0.0)
     held = np.zeros(layout.size, dtype=bool)
-    return Trial(problem, start, held, over, float(np.mean(over**2)), 1.0)
+    empty = np.zeros((over.size, 0))
+    return Fit(problem, start, held, float(np.mean(over**2)), over, empty)
 
 
-def with_residual(record: Record, residual: np.ndarray) -> tuple[Record, Trial]:
-    """``record`` and a trial that leaves ``residual`` (N,) of it."""
+def with_residual(record: Record, residual: np.ndarray) -> tuple[Record, Fit]:
+    """``record`` and a fit that leaves ``residual`` (N,) of it."""
     model: Actuator | Strip = PLAIN if isinstance(record, ActuatorRecord) else STRIP
-    return record, made_trial([record], model, residual)
+    return record, made_fit([record], model, residual)
 
 
 def masked(record: ActuatorRecord, bad: np.ndarray) -> ActuatorRecord:

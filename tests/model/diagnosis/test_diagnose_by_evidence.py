@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from dearig.model.diagnosis import Diagnosis
-from dearig.model.diagnosis.by_evidence import diagnose_by_evidence
+from dearig.model.diagnosis import Diagnosis, diagnose
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from tests.tools.diagnoses import HIDDEN, plant
 from tests.tools.engine import PLAIN, STRIP, effect, film_record_of, record_of
@@ -16,7 +15,7 @@ from tests.tools.engine import PLAIN, STRIP, effect, film_record_of, record_of
 
 @functools.cache
 def of_hidden(name: str) -> Diagnosis:
-    return diagnose_by_evidence([record_of(plant(name))], PLAIN, workers=1)
+    return diagnose([record_of(plant(name))], PLAIN, workers=1)
 
 
 def test_a_hidden_effect_is_named_with_its_parameters() -> None:
@@ -44,7 +43,7 @@ def test_the_race_is_a_round_of_the_report() -> None:
 
 
 def test_nothing_is_missing_where_nothing_is_hidden() -> None:
-    found = diagnose_by_evidence([record_of(PLAIN)], PLAIN, workers=1)
+    found = diagnose([record_of(PLAIN)], PLAIN, workers=1)
     assert found.verdict == "nothing_missing"
     assert found.steps == ()
     assert dict(found.families) == {"none": 1.0}
@@ -52,23 +51,19 @@ def test_nothing_is_missing_where_nothing_is_hidden() -> None:
 
 def test_a_film_driven_by_stretch_is_diagnosed_alike() -> None:
     hidden = effect("Mullins softening", softening=0.1, width=0.4)
-    found = diagnose_by_evidence([film_record_of(replace(STRIP, effects=hidden))], STRIP, workers=1)
+    found = diagnose([film_record_of(replace(STRIP, effects=hidden))], STRIP, workers=1)
     assert [s.family for s in found.steps] == ["softening"]
     assert found.verdict == "explained"
 
 
 def test_a_search_that_is_stopped_says_so_and_never_that_nothing_is_missing() -> None:
-    found = diagnose_by_evidence(
-        [record_of(plant("sensor curvature"))], PLAIN, workers=1, stop=lambda: True
-    )
+    found = diagnose([record_of(plant("sensor curvature"))], PLAIN, workers=1, stop=lambda: True)
     assert (found.status, found.interrupted) == ("stopped", True)
     assert found.verdict == "unexplained"
 
 
 def test_a_search_without_work_left_ends_with_what_it_has() -> None:
     settings = DiagnosisSettings(effort=2e6)
-    found = diagnose_by_evidence(
-        [record_of(plant("sensor curvature"))], PLAIN, workers=1, settings=settings
-    )
+    found = diagnose([record_of(plant("sensor curvature"))], PLAIN, workers=1, settings=settings)
     assert found.status == "budget"
     assert any("computing budget" in note for note in found.notes)

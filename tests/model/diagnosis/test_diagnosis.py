@@ -5,7 +5,6 @@ from __future__ import annotations
 import builtins
 import functools
 import io
-import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -13,10 +12,8 @@ import numpy as np
 import pytest
 
 from dearig.model.actuator import Actuator, Drive
-from dearig.model.diagnosis import Diagnosis, diagnose, search
-from dearig.model.diagnosis.bench import Trial
-from dearig.model.diagnosis.screening import Promise
-from dearig.model.diagnosis.search import _NOT_TRIED, _Search
+from dearig.model.diagnosis import Diagnosis, diagnose
+from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
 from dearig.model.errors import ModelError
 from dearig.model.excitation import Sequence
@@ -35,11 +32,9 @@ from tests.tools.engine import (
     STRIP,
     effect,
     film_record_of,
-    made_trial,
     masked,
     record_of,
     thesis_drive,
-    typical,
 )
 
 
@@ -168,7 +163,7 @@ def test_every_family_is_tried(name):
     wanted = {
         e.family
         for e in EFFECTS.values()
-        if "voltage" in e.drives and not e.is_general and e.name not in _NOT_TRIED
+        if "voltage" in e.drives and not e.is_general and e.drift_basis is None
     } - {"thermal"}
     assert wanted <= tried
     chosen = first.candidates[0]
@@ -308,124 +303,6 @@ def test_indistinguishable_effects_are_reported_as_such():
         assert rival.effects != found.final.model.effects
 
 
-def refitted(
-    parent: float,
-    shares: dict[str, float],
-    left: dict[str, float],
-    alone: bool = False,
-    thorough: bool = False,
-    records: int = 1,
-) -> list[str]:
-    """Which effects of such promised ``shares`` are refitted beside a drag that leaves ``parent``.
-
-    Or ``alone``. ``left`` is what a refit of each leaves, in the noise's mean square.
-    """
-    record = record_of(PLAIN)
-    search = _Search([record] * records, PLAIN, 1, lambda *_: None, lambda: False, thorough)
-
-    def trial(names: tuple[str, ...], cost: float) -> Trial:
-        with_them = replace(PLAIN, effects=tuple(typical(name) for name in names))
-        return made_trial([record] * records, with_them, np.full(1, math.sqrt(cost) * NOISE))
-
-    beside = trial(() if alone else ("linear drag",), parent)
-    promises = {
-        name: [Promise(beside.model, beside.x, np.zeros((1, 1)), share)]
-        for name, share in shares.items()
-    }
-    search._screened = lambda *_: (promises, np.zeros((1, 1)))  # type: ignore[method-assign]
-    done: list[str] = []
-
-    def refit(parent: Trial, name: str, *_: object) -> Trial:
-        done.append(name)
-        return trial((*parent.effects, name), left.get(name, parent.cost))
-
-    search._refit = refit  # type: ignore[method-assign]
-    tried = search._round(beside, 0 if alone else 1, (0.0, 1.0))
-    assert [t.name for t in tried] == done
-    return done
-
-
-def test_an_effect_with_no_predicted_gain_is_not_refitted():
-    shares = {"leakage": 0.9, "mains interference": 0.5, "ageing": 0.01, "warm-up": 0.02}
-    assert refitted(20.0, shares, {"leakage": 1.0}) == ["leakage", "mains interference"]
-    # what is left may be of those too, where it does not explain all
-    assert set(refitted(20.0, shares, {"leakage": 3.0})) == set(shares)
-
-
-def test_far_from_the_noise_one_effect_of_each_family_is_refitted():
-    shares = {
-        "leakage": 0.9,
-        "ageing": 0.5,
-        "logarithmic ageing": 0.45,
-        "warm-up": 0.4,
-        "slowing warm-up": 0.3,
-    }
-    left = {"leakage": 400.0, "ageing": 900.0, "warm-up": 500.0}
-    # of warm-ups the others may lead too
-    assert set(refitted(1e3, shares, left)) == set(shares) - {"logarithmic ageing"}
-    assert set(refitted(20.0, shares, left)) == set(shares)
-    # alone, a family that has come within a few times of the leader may lead; thoroughly, any
-    assert set(refitted(1e3, shares, left, alone=True)) == set(shares)
-    left["leakage"] = 100.0
-    told = set(shares) - {"logarithmic ageing"}
-    assert set(refitted(1e3, shares, left, alone=True)) == told
-    assert set(refitted(1e3, shares, left, alone=True, thorough=True)) == set(shares)
-    # of several records as beside another
-    left["leakage"] = 400.0
-    assert set(refitted(1e3, shares, left, alone=True, records=2)) == told
-
-
-def told_apart(left: dict[str, float], found_last: dict[str, float]) -> tuple[list[list[str]], str]:
-    """Which effects of such costs are fitted to the last, in two turns, and which is told then.
-
-    Of ``left`` the first is the best until then; ``found_last`` are costs that the last fits leave.
-    """
-    record = record_of(PLAIN)
-    search = _Search([record], PLAIN, 1, lambda *_: None, lambda: False)
-    noise = NOISE * np.random.default_rng(1).standard_normal(record.measured.size)
-    noise /= np.sqrt(np.mean((noise / NOISE) ** 2))
-
-    def trial(name: str, cost: float) -> Trial:
-        effects = (typical(name),) if name else ()
-        return made_trial([record], replace(PLAIN, effects=effects), math.sqrt(cost) * noise)
-
-    search.found = {frozenset({n} - {""}): trial(n, c) for n, c in {"": 20.0, **left}.items()}
-    search.left_out = {(frozenset({n}), n) for n in left}
-    looked: list[str] = []
-
-    def to_the_last(given: Trial) -> Trial:
-        (name,) = given.effects
-        looked.append(name)
-        return trial(name, found_last.get(name, given.cost))
-
-    search.bench.to_the_last = to_the_last  # type: ignore[method-assign]
-    best, turns = search.found[frozenset({next(iter(left))})], []
-    for turn in (search._in_own_laws, search._among_rivals, search._in_own_laws):
-        best = turn(best)
-        turns.append(sorted(looked))
-        looked.clear()
-    assert turns.pop() == []  # nobody is fitted to the last twice
-    assert [r.chosen for r in search.rounds] == [n for n in best.effects if n != next(iter(left))]
-    return turns, best.effects[0]
-
-
-def test_effects_that_leave_only_noise_are_compared_at_convergence():
-    # of chi-square 1.4 a thousandth
-    left = {"ageing": 1.02, "logarithmic ageing": 1.05, "Mullins softening": 1.2, "leakage": 1.03}
-    turns = [["ageing", "logarithmic ageing"], ["leakage"]]
-    assert told_apart(left, {}) == (turns, "ageing")
-    assert told_apart(left, {"logarithmic ageing": 1.021}) == (turns, "ageing")
-    assert told_apart(left, {"logarithmic ageing": 1.015}) == (turns, "logarithmic ageing")
-    assert told_apart(left, {"leakage": 0.98}) == (turns, "leakage")
-
-
-def test_fits_that_leave_more_than_noise_are_not_refined_to_convergence():
-    left = {"ageing": 1.5, "logarithmic ageing": 1.51, "leakage": 1.51}
-    assert told_apart(left, {"logarithmic ageing": 1.0}) == ([[], []], "ageing")
-    # nor who has no rival
-    assert told_apart({"ageing": 1.02, "leakage": 1.2}, {}) == ([[], []], "ageing")
-
-
 def test_a_residual_of_no_family_is_described():
     truth = replace(PLAIN, effects=effect("sudden change of force", stress=30.0, moment=6.3))
     found = diagnose([record_of(truth)], PLAIN, workers=1)
@@ -526,19 +403,19 @@ def test_an_interrupted_search_returns_what_it_has_found():
     assert found.before[0].rms == found.after[0].rms > 3.0 * NOISE
 
 
-def test_a_search_stops_at_its_computing_budget(monkeypatch):
+def test_a_search_stops_at_its_computing_budget():
     record = record_of(plant("load inertia"))
     whole = of_hidden("load inertia")
-    monkeypatch.setattr(search, "_EFFORT", 1.6e7)
-    found = diagnose([record], PLAIN, workers=1)
+    small = DiagnosisSettings(effort=1.6e7)
+    found = diagnose([record], PLAIN, workers=1, settings=small)
     require_consistent(found)
     assert not found.interrupted
     assert found.simulations < whole.simulations
     assert "stopped at its computing budget" in found.notes[0]
     # by what is simulated, not by a clock: the same again, on as many threads as there are
-    again = diagnose([record], PLAIN, workers=1)
+    again = diagnose([record], PLAIN, workers=1, settings=small)
     assert (again.simulations, again.final.cost) == (found.simulations, found.final.cost)
-    thorough = diagnose([record], PLAIN, workers=1, thorough=True)
+    thorough = diagnose([record], PLAIN, workers=1, thorough=True, settings=small)
     assert (thorough.simulations, thorough.final.cost) == (whole.simulations, whole.final.cost)
     assert thorough.notes == whole.notes
 

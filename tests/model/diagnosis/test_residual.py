@@ -16,7 +16,7 @@ from tests.tools.engine import (
     PLAIN,
     STRIP,
     film_record_of,
-    made_trial,
+    made_fit,
     masked,
     record_of,
     thesis_drive,
@@ -37,7 +37,7 @@ def noise(seed, size=None):
 def look(residual, of=None):
     of = of or record()
     base = STRIP if hasattr(of, "stretch") else PLAIN
-    (found,) = signatures([of], made_trial([of], base, residual))
+    (found,) = signatures([of], made_fit([of], base, residual))
     return found
 
 
@@ -224,7 +224,7 @@ def test_a_line_is_found(frequency):
 def test_each_record_has_its_own_part():
     a, b = record(), replace(record_of(PLAIN, seed=1, noise=3e-6), name="other")
     residual = np.concatenate([noise(1), 4.0 * noise(2)])
-    found = signatures([a, b], made_trial([a, b], PLAIN, residual))
+    found = signatures([a, b], made_fit([a, b], PLAIN, residual))
     assert [s.record for s in found] == ["made", "other"]
     np.testing.assert_allclose(found[0].residual, noise(1), rtol=1e-12)
     np.testing.assert_allclose(found[1].residual, 4.0 * noise(2), rtol=1e-12)

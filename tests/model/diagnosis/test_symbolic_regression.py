@@ -14,7 +14,7 @@ from dearig.model.diagnosis.results import MissingStress, Stage, Step
 from dearig.model.diagnosis.symbolic_regression import describe_unnamed
 from dearig.model.effects import EFFECTS
 from dearig.model.fitting import Estimate
-from tests.tools.engine import NOISE, PLAIN, made_trial, record_of, thesis_drive
+from tests.tools.engine import NOISE, PLAIN, made_fit, record_of, thesis_drive
 
 
 @functools.cache
@@ -47,7 +47,7 @@ def looks(residual=None):
     record = record_of(PLAIN, thesis_drive(100.0, 2))
     if residual is None:
         residual = NOISE * np.random.default_rng(1).standard_normal(record.time.size)
-    return signatures([record], made_trial([record], PLAIN, residual))
+    return signatures([record], made_fit([record], PLAIN, residual))
 
 
 def terms(expression):

@@ -9,9 +9,6 @@ import pytest
 
 from dearig.model import kernel
 from dearig.model.actuator import Drive, reading_of
-from dearig.model.diagnosis.bench import Bench
-from dearig.model.diagnosis.screening import Screen
-from dearig.model.effects import EFFECTS
 from dearig.model.excitation import Chirp, Lobes, Ramp, Sequence, Steps
 from dearig.model.fitting.broyden import descend_broyden
 from dearig.model.fitting.coarse_drive import coarse_drive_of
@@ -145,30 +142,6 @@ def test_what_is_known_is_not_asked_again():
     assert not problem.find_coarse_columns(x, free, doubted)[0]
 
 
-def test_springs_are_asked_once_for_all_effects_that_leave_a_film_its_turns():
-    two = replace(PLAIN, network=Network.gent((45e3, 60e3, 20e3), (1e4, 1e4, 1e4), (0.4, 3.0)))
-    bench = Bench([record(*SLOW, model=two)], two, workers=1)
-    base = bench.baseline(two, lambda *_: None)
-    asked = []
-
-    def told(effects):
-        model = replace(base.model, effects=effects)
-        layout = bench.problem(model).layout
-        start = layout.coordinates(layout.initial())
-        fixed = np.append(base.fixed, np.zeros(layout.size - base.fixed.size, dtype=bool))
-        before = bench.simulations
-        bench.fit(model, [(start, None)], fixed)
-        asked.append(bench.simulations - before)
-        return bench.problem(model).coarse_columns
-
-    springs = bench.problem(base.model).coarse_columns
-    np.testing.assert_array_equal(springs, ~base.fixed)
-    np.testing.assert_array_equal(told(effect("linear drift", drift=1e-6))[:-1], springs)
-    # friction is computed again; coarse drives do not give its derivative
-    assert not told((typical("easing friction"),)).any()
-    assert asked[0] < asked[1]
-
-
 def test_coarse_derivatives_equal_those_of_the_full_record():
     model = replace(PLAIN, effects=effect("linear drag", drag=300.0))
     problem, x, free = posed(model, with_coarse_drive(record(*SLOW, model=model)))
@@ -208,46 +181,3 @@ def test_a_coarse_descent_ends_at_the_optimum_of_the_full_record(off):
     assert fit.cost == pytest.approx(wanted.cost, abs=0.1 / problem.samples)
     assert fit.cost == pytest.approx(problem.costs(fit.x[None])[0], rel=1e-12)
     np.testing.assert_allclose(fit.residuals, problem.residuals(fit.x))
-
-
-def screens(truth):
-    """Score tests of one record, by its full and by its coarse drive."""
-    one = record(*SLOW, model=truth)
-    for coarse in (None, coarse_drive_of(one, PLAIN)):
-        bench = Bench([one], PLAIN, workers=1)
-        trial = bench.baseline(PLAIN, lambda *_: None)
-        assert trial.problem.records[0].coarse_drive is not None
-        bench.records = tuple(replace(r, coarse_drive=coarse) for r in bench.records)
-        yield Screen(bench, replace(trial, problem=bench.problem(PLAIN)))
-
-
-def test_score_tests_by_coarse_drives_equal_those_of_the_full_record():
-    truth = replace(PLAIN, effects=effect("Mullins softening", softening=0.004, width=0.3))
-    names = ("Mullins softening", "ageing", "linear drift", "dielectric relaxation")
-    whole, told = (
-        [screen.promises(EFFECTS[n])[0].share for n in names] for screen in screens(truth)
-    )
-    assert max(whole) > 0.9
-    assert told == pytest.approx(whole, abs=0.01)
-    assert told != whole
-
-
-def test_a_coarse_drive_without_the_derivative_is_not_used():
-    _, screen = screens(PLAIN)
-    model = replace(
-        screen.trial.model, effects=effect("Mullins softening", softening=0.0, width=0.3)
-    )
-    problem = screen.bench.problem(model, kernel.ROUGH)
-    start = problem.layout.values(problem.layout.coordinates(problem.layout.initial()))
-    population = np.tile(start, (3, 1))
-    # of so much it rings at each turn
-    population[:, problem.layout.names.index("Mullins softening: softening")] = 1e-3, 2e-3, 0.3
-    whole = (problem.predict(population)[0] - problem.measured) / problem.sigma
-    whole -= screen.trial.residuals
-    moved, _ = screen._moved(problem, population, [2])
-    np.testing.assert_array_equal(moved, whole)
-    moved, _ = screen._moved(problem, population, [0])
-    np.testing.assert_array_equal(moved[0], whole[0])
-    off = np.linalg.norm(moved - whole, axis=1)
-    assert 0.0 < off[1] < 0.15 * np.linalg.norm(whole[1])
-    assert off[2] > 0.15 * np.linalg.norm(whole[2])

@@ -9,7 +9,8 @@ import pytest
 
 from dearig.model import kernel
 from dearig.model.actuator import Drive, reading_of
-from dearig.model.diagnosis.bench import Bench
+from dearig.model.diagnosis.fits import Fitter
+from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.excitation import Chirp, Lobes, Ramp, Sequence, Steps
 from dearig.model.fitting.thinning import thinned
 from dearig.model.records import ActuatorRecord
@@ -90,11 +91,12 @@ def test_what_is_fitted_as_the_baseline_is_asked_again():
     # the model that is asked first would stand any thinning: it hardly moves
     record = dense(*STEPS, noise=NOISE)
     stiff = replace(PLAIN, film=replace(PLAIN.film, permittivity=0.01))
-    bench = Bench([record], stiff, workers=1)
-    before = bench.records[0].means_of
+    fitter = Fitter([record], stiff, DiagnosisSettings(), workers=1)
+    before = fitter.records[0].means_of
     wanted = thinned(record, 200.0, PLAIN).means_of
     assert before > wanted
-    trial = bench.baseline(PLAIN, lambda *_: None)
-    assert bench.records[0].means_of == trial.problem.records[0].means_of == wanted
-    assert trial.cost == pytest.approx(1.0, abs=0.1)
-    assert trial.is_white
+    fitter.base = PLAIN
+    fit = fitter.baseline(lambda *_: None)
+    assert fitter.records[0].means_of == fit.problem.records[0].means_of == wanted
+    assert fit.cost == pytest.approx(1.0, abs=0.1)
+    assert fit.is_flat

@@ -1,0 +1,155 @@
+"""What happened once, in one recording: a slip, a jump, a sudden loss of field; and its own drift.
+
+A model that predicts other recordings cannot know of them. They are sought in each recording by
+itself, the validation recordings too, while the model stays as it is, and taken off.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dearig.model import kernel
+from dearig.model.actuator import Actuator
+from dearig.model.diagnosis.evidence import Judge
+from dearig.model.diagnosis.fits import Fit, Fitter, with_effect
+from dearig.model.diagnosis.settings import DiagnosisSettings
+from dearig.model.diagnosis.shapes import typical_values
+from dearig.model.effects import EFFECTS
+from dearig.model.film import Strip
+from dearig.model.fitting.broyden import descend_broyden
+from dearig.model.records import ActuatorRecord
+
+__all__ = ["Event", "Own", "own_of"]
+
+_ITERATIONS = 20  # of the fit of one size and one moment
+
+
+@dataclass(frozen=True)
+class Event:
+    """One event: the effect ``kind`` of that ``size`` in ``unit``, at ``time`` s."""
+
+    kind: str
+    time: float
+    size: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Own:
+    """What is a recording's own: its ``events``, and whether its reading ``drifts``.
+
+    ``rms`` is the model's error in m without them.
+    """
+
+    events: tuple[Event, ...]
+    drifts: bool
+    rms: float
+
+
+def own_of(
+    record: ActuatorRecord, model: Actuator, settings: DiagnosisSettings | None = None
+) -> Own | None:
+    """Return the events and the drift of ``record`` beside ``model``; None without any.
+
+    They are believed where they leave noise: an event explains some part of what any law leaves
+    that the model lacks. An effect can act at one moment of a recording: of two events of one kind
+    the larger is found.
+    """
+    fitter = Fitter([record], replace(model, effects=()), settings or DiagnosisSettings(), 1)
+    plain = _unchanged(fitter, model, 0.0)
+    judge = Judge(fitter.settings, plain)
+    if judge.is_noise(plain):
+        return None
+    drift = fitter.space().most_probable(plain.plain_residuals())
+    ways = [_with_events(fitter, judge, plain)]
+    later = fitter.space().most_probable(ways[0].plain_residuals())
+    ways.append(_redrifted(fitter, ways[0], later))
+    if drift:
+        ways.append(_with_events(fitter, judge, _unchanged(fitter, model, drift)))
+    judge.see(ways)
+    best = judge.ranked([plain, *ways])[0]
+    added = best.effects[len(model.effects) :]
+    if not judge.is_noise(best) or not (added or best.drift):
+        return None
+    numbers = dict(best.model.effects)
+    events = []
+    for name in added:
+        size, moment = EFFECTS[name].parameters
+        found = dict(numbers[name])
+        events.append(Event(name, found[moment.name], found[size.name], size.unit))
+    whole = _unchanged(fitter, best.model, best.drift, full=True)
+    left, own = whole.plain_residuals(), whole.problem.noise_drift
+    left = left - own.mean(left) if own else left
+    good = np.isfinite(whole.problem.sigma)
+    rms = fitter.full[0].noise * float(np.sqrt(np.mean(left[good] ** 2)))
+    return Own(tuple(sorted(events, key=lambda e: e.time)), best.drift > 0.0, rms)
+
+
+def _unchanged(fitter: Fitter, model: Actuator | Strip, drift: float, full: bool = False) -> Fit:
+    """Return ``model`` as a fit in which nothing was free."""
+    fidelity = kernel.CAREFUL if full else kernel.QUICK
+    if full and drift:
+        # the drift's variance is in units of one reading's noise, which thinning has lowered
+        drift *= (fitter.records[0].noise / fitter.full[0].noise) ** 2
+    problem = fitter.problem(model, drift, fidelity, full)
+    x = problem.layout.coordinates(problem.layout.initial())
+    costs, residuals = problem.evaluate(x[None])
+    held = np.ones(x.size, dtype=bool)
+    none = np.zeros((residuals.shape[1], 0))
+    return Fit(problem, x, held, float(costs[0]), residuals[0], none, converged=True)
+
+
+def _redrifted(fitter: Fitter, fit: Fit, drift: float) -> Fit:
+    again = _unchanged(fitter, fit.model, drift)
+    return replace(again, fixed=fit.fixed)
+
+
+def _with_events(fitter: Fitter, judge: Judge, best: Fit) -> Fit:
+    """Return ``best`` with the events that the evidence asks for, one after the other."""
+    kinds = [e.name for e in EFFECTS.values() if "moment" in {p.name for p in e.parameters}]
+    held = best.fixed.size
+    for _ in range(fitter.settings.effects_max):
+        if judge.is_noise(best):
+            break
+        fits = [_with_event(fitter, best, n, held) for n in kinds if n not in best.effects]
+        judge.see(fits)
+        top = min(fits, key=judge.criterion, default=best)
+        if judge.gain(best, top) < fitter.settings.odds:
+            break
+        best = top
+    return best
+
+
+def _with_event(fitter: Fitter, best: Fit, name: str, held: int) -> Fit:
+    """Return ``best`` with an event of the kind ``name`` where it explains most.
+
+    The first ``held`` parameters stay. A size that is small against the film's motion acts in
+    proportion to it, so that one simulation at each moment tells the size there.
+    """
+    problem = fitter.problem(
+        with_effect(best.model, name, typical_values(EFFECTS[name])), best.drift
+    )
+    layout, time = problem.layout, fitter.records[0].time
+    count = fitter.settings.moments
+    step = float(np.ptp(time)) / count
+    typical = layout.values(layout.coordinates(layout.initial()))
+    typical[: best.x.size] = best.problem.layout.values(best.x)
+    at, values = time[0] - step / 2.0, typical
+    # all of the recording, then the place between two of the moments
+    for among in (np.arange(1, count + 1), np.linspace(-1.0, 1.0, count)):
+        rows = np.tile(typical, (count, 1))
+        rows[:, -1] = np.clip(at + step * among, time[0], time[-1])
+        _, residuals = problem.evaluate(np.array([layout.coordinates(row) for row in rows]))
+        shape = np.where(np.isfinite(residuals), residuals - best.residuals, 0.0)
+        size = -shape @ best.residuals / np.maximum(np.sum(shape**2, axis=1), 1e-12)
+        most = int(np.argmax(-size * (shape @ best.residuals)))
+        values, at = rows[most], float(rows[most, -1])
+        values[-2] = typical[-2] * size[most]
+    start = np.clip(layout.coordinates(values), layout.lower, layout.upper)
+    fixed = np.arange(layout.size) < held
+    found = descend_broyden(problem, start, fixed, None, _ITERATIONS, 1.0, True)
+    return Fit(
+        problem, found.x, fixed, found.cost, found.residuals, found.jacobian, found.converged
+    )

@@ -1,0 +1,97 @@
+"""Diagnose records: search for what the model lacks, and say how sure that is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from dearig.model.actuator import Actuator
+from dearig.model.diagnosis.conclusion import conclude
+from dearig.model.diagnosis.engine import Found, Search
+from dearig.model.diagnosis.fits import Fit, Fitter
+from dearig.model.diagnosis.results import Diagnosis
+from dearig.model.diagnosis.settings import DiagnosisSettings
+from dearig.model.film import Strip
+from dearig.model.records import ActuatorRecord, Record
+
+__all__ = ["diagnose"]
+
+_LAST = 0.94  # of the progress: then come the final fits
+
+
+def _quiet(stage: str, fraction: float) -> None:
+    """Progress that nobody watches."""
+
+
+def _never() -> bool:
+    return False
+
+
+def _silent(line: str) -> None:
+    """A log that nobody reads."""
+
+
+def diagnose(
+    records: Sequence[Record],
+    base: Actuator | Strip,
+    *,
+    workers: int = 2,
+    progress: Callable[[str, float], None] = _quiet,
+    stop: Callable[[], bool] = _never,
+    thorough: bool = False,
+    settings: DiagnosisSettings | None = None,
+    log: Callable[[str], None] = _silent,
+) -> Diagnosis:
+    """Fit ``base`` to ``records``, find what it lacks, and put that in.
+
+    ``records`` are all of actuators or all of films. ``progress(stage, fraction)`` is called often;
+    when ``stop()`` is True, what was found until then is returned. The search ends after the work
+    that the ``settings`` allow unless it is to be ``thorough``: that is counted in simulations, so
+    the same records give the same answer on any machine. ``log`` receives a line on each choice.
+    Raises ``ModelError`` for records and models that do not fit together.
+    """
+    settings = settings or DiagnosisSettings()
+    if thorough:
+        settings = replace(settings, effort=math.inf)
+    as_held = _with_held_voltage(records)
+    part = _LAST / 2.0 if as_held else _LAST
+
+    def searched(given: Sequence[Record], first: float) -> tuple[Found, Search]:
+        search = Search(
+            Fitter(given, base, settings, workers),
+            lambda stage, fraction: progress(stage, first + part * fraction),
+            stop,
+            log,
+        )
+        return search.run(), search
+
+    found, search = searched(records, 0.0)
+    held = False
+    if as_held and found.status != "stopped" and not found.judge.is_settled(found.baseline):
+        other, again = searched(as_held, part)
+        found.judge.see([found.best, other.best])
+        held = _score(found, other.best) < _score(found, found.best)
+        if held:
+            found, search = other, again
+    progress("final fits", _LAST)
+    diagnosis = conclude(found, search.fitter, search.without, held)
+    progress("final fits", 1.0)
+    return diagnosis
+
+
+def _with_held_voltage(records: Sequence[Record]) -> list[Record] | None:
+    """Return ``records`` with a voltage that is held between samples; None where it is known.
+
+    A table does not say what the voltage did between its rows. Half a sample too early, the model
+    would be found to lack a lag of half a sample.
+    """
+    known = [r for r in records if isinstance(r, ActuatorRecord) and not r.drive.hold]
+    if len(known) < len(records):
+        return None
+    return [replace(r, drive=replace(r.drive, hold=True)) for r in known]
+
+
+def _score(found: Found, fit: Fit) -> float:
+    """Return the criterion of ``fit`` with the prior odds of its effects."""
+    return found.judge.criterion(fit) + found.judge.settings.odds * len(fit.members)

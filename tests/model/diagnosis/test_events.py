@@ -1,0 +1,60 @@
+"""Events and drift of one recording, beside a model that stays as it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dearig.model.diagnosis.events import own_of
+from tests.tools.engine import NOISE, PLAIN, effect, record_of
+
+KINDS = {
+    "sudden change of force": {"stress": 60.0, "moment": 6.3},
+    "sudden change of reading": {"jump": 2e-5, "moment": 9.1},
+    "sudden loss of field": {"loss": 0.01, "moment": 4.9},
+}
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_an_event_is_found_with_its_moment_and_size(name: str) -> None:
+    own = own_of(record_of(replace(PLAIN, effects=effect(name, **KINDS[name]))), PLAIN)
+    assert own is not None
+    (event,) = own.events
+    size, moment = KINDS[name].values()
+    assert event.kind == name
+    assert event.time == pytest.approx(moment, abs=0.03)
+    assert event.size == pytest.approx(size, rel=0.05)
+    assert not own.drifts
+    assert own.rms == pytest.approx(NOISE, rel=0.05)
+
+
+def test_two_events_of_different_kinds_are_both_found() -> None:
+    effects = tuple(one for name in list(KINDS)[1:] for one in effect(name, **KINDS[name]))
+    own = own_of(record_of(replace(PLAIN, effects=effects)), PLAIN)
+    assert own is not None
+    assert [e.kind for e in own.events] == ["sudden loss of field", "sudden change of reading"]
+    assert own.rms == pytest.approx(NOISE, rel=0.05)
+
+
+def test_noise_has_neither_events_nor_drift() -> None:
+    assert own_of(record_of(PLAIN), PLAIN) is None
+
+
+def test_a_drift_of_the_reading_is_no_event() -> None:
+    record = record_of(PLAIN)
+    walk = 1e-5 * np.sin(0.3 * record.drive.time)
+    own = own_of(replace(record, displacement=record.displacement + walk), PLAIN)
+    assert own is not None
+    assert own.events == ()
+    assert own.drifts
+    assert own.rms < 1.1 * NOISE
+
+
+def test_a_law_that_the_model_lacks_is_not_taken_off_as_events() -> None:
+    truth = replace(PLAIN, effects=effect("sensor curvature", quadratic=15.0))
+    record = record_of(truth)
+    left = record.displacement - PLAIN.simulate(record.drive).displacement
+    assert np.sqrt(np.mean(left**2)) > 10.0 * NOISE
+    assert own_of(record, PLAIN) is None
