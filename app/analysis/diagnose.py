@@ -44,8 +44,10 @@ from dearig.errors import (
 )
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis import diagnose
+from dearig.model.diagnosis.events import Own, own_of
 from dearig.model.diagnosis.results import Diagnosis
 from dearig.model.errors import ModelError
+from dearig.model.records import ActuatorRecord
 from dearig.progress import Progress, quiet
 from dearig.recording.files import check_output
 from dearig.recording.recording import Recording
@@ -339,6 +341,12 @@ def _outcome(
         )
         for stage in models
     )
+    found = models[-1].predicting
+    own = {r.name: _own(r, found, drive) for r in (*recordings, *others)}
+    stands = tuple(
+        _without_own(stand, own) if stage.predicting == found else stand
+        for stand, stage in zip(stands, models, strict=True)
+    )
     noise = _noise(recordings, drive)
     experiment, words = (
         None,
@@ -390,6 +398,30 @@ def _compared(
             # a long search must not be lost because a model cannot follow one drive
             failed.append(f"{recording.name} is left out of the {role} errors: {error}")
     return tuple(found)
+
+
+def _own(recording: Recording, model: Any, drive: str) -> Own | None:
+    """Return the events and the drift of ``recording``; None without any, and of films."""
+    record = as_record(recording, drive)
+    if not (isinstance(record, ActuatorRecord) and isinstance(model, Actuator)):
+        return None
+    return own_of(record, model)
+
+
+def _without_own(stand: Stand, own: dict[str, Own | None]) -> Stand:
+    """Return ``stand`` with each recording's events, and what they leave of untouched ones."""
+
+    def of(comparison: Comparison) -> Comparison:
+        found = own[comparison.name]
+        if found is None:
+            return comparison
+        # the model of a training recording contains its events already
+        left = found.rms if comparison.role == "validation" else None
+        return replace(comparison, events=found.events, rms_without_events=left)
+
+    return replace(
+        stand, train=tuple(map(of, stand.train)), validation=tuple(map(of, stand.validation))
+    )
 
 
 def _noise(recordings: Sequence[Recording], drive: str) -> float:

@@ -17,6 +17,7 @@ from dearig.model.verdict import STOPPED, Judgement, judge
 if TYPE_CHECKING:
     # these import SciPy, which commands that fit nothing do without
     from dearig.config.modelfile import ModelFile
+    from dearig.model.diagnosis.events import Event
     from dearig.model.diagnosis.results import Diagnosis
     from dearig.model.fitting import Identification
     from dearig.model.measures import Errors
@@ -55,7 +56,7 @@ class Comparison:
     the measured unit, None where it could not be read. ``role`` is train or validation. ``table``
     is A, B, or "" for a run that is in neither of the thesis's validation tables, ``row`` its label
     there (f = 0.2 Hz). ``rms_without_events`` is the error in the measured unit without the
-    recording's own drift and events, None where these were not looked for. ``ended`` says how the
+    recording's own drift and ``events``, None where it has none of these. ``ended`` says how the
     run ended if it ended early. ``quiet_count`` are the readings at rest that ``noise`` is from.
     """
 
@@ -73,6 +74,7 @@ class Comparison:
     published: Published | None = None
     warnings: tuple[str, ...] = field(default=())
     rms_without_events: float | None = None
+    events: tuple[Event, ...] = ()
     ended: EarlyEnd | None = None
     quiet_count: int = 0
 
@@ -85,6 +87,11 @@ class Comparison:
         """Return another ``name`` of the recording with the same mark."""
         return name if self.ended is None else f"{name} ({self.ended.mark})"
 
+    @property
+    def steady_rms(self) -> float:
+        """The error in the measured unit, without the recording's own drift and events."""
+        return self.errors.rms if self.rms_without_events is None else self.rms_without_events
+
     def over_noise(self, noise: float) -> float:
         """Return the error, without events where they are known, over the recording's noise.
 
@@ -93,7 +100,7 @@ class Comparison:
         standard deviation from ``quiet_count`` readings): 200 readings give it within 10 % only. A
         film's noise includes the error that its model is allowed.
         """
-        error = self.errors.rms if self.rms_without_events is None else self.rms_without_events
+        error = self.steady_rms
         allowed = 0.0
         if self.kind == "film":
             from dearig.model.diagnosis.preparation import FILM_MODEL_ERROR

@@ -195,6 +195,17 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "verdict": outcome.verdict,
         "verdict_reasons": list(outcome.judgement.reasons),
         "status": outcome.status,
+        "events": [
+            {
+                "record": c.name,
+                "kind": e.kind,
+                "at_s": _number(e.time),
+                "size": _number(e.size),
+                "unit": e.unit,
+            }
+            for c in (*after.train, *after.validation)
+            for e in c.events
+        ],
         "families": [{"family": f, "probability": p} for f, p in finding.families],
         "unnamed": None
         if finding.unnamed is None
@@ -256,14 +267,16 @@ def _stand_json(stand: Stand) -> dict[str, Any]:
 
 def _measures_json(comparisons: tuple[Comparison, ...], kind: str) -> dict[str, Any] | None:
     """Errors pooled over recordings (see ``dearig.report.diagnosis.pooled``); None without any."""
-    from dearig.report.diagnosis import pooled_errors
+    from dearig.report.diagnosis import pooled_errors, pooled_without_events
 
     errors = pooled_errors(comparisons)
     if errors is None:
         return None
     shown = SHOWN[kind]
+    steady = pooled_without_events(comparisons)
     return {
         f"rms_{shown.suffix}": _number(errors.rms * shown.error_factor),
+        f"rms_without_events_{shown.suffix}": _number(steady * shown.error_factor),
         "nrmse_pct": _number(errors.nrmse_pct),
         "e_rms_thesis_pct": None if kind == "film" else _number(errors.e_rms_thesis_pct),
         "e_m_thesis_pct": _number(errors.e_m_thesis_pct),

@@ -10,7 +10,7 @@ import numpy as np
 from dearig.model.diagnosis.evidence import Judge
 from dearig.model.diagnosis.fits import Fit, Fitter
 from dearig.model.diagnosis.race import Candidate, race
-from dearig.model.diagnosis.regression import Regression
+from dearig.model.diagnosis.regression import Regression, is_unseen
 from dearig.model.diagnosis.shapes import Extent, extent_of, strongest_line
 from dearig.model.effects import EFFECTS
 from dearig.model.records import ActuatorRecord, Record
@@ -263,8 +263,10 @@ class Search:
                 Candidate(
                     (name,),
                     tuple(some),
-                    # the grid of springs imitates it: the misfit does not show what it explains
-                    regression.springs_explain and EFFECTS[name].is_viscoelastic,
+                    # the misfit does not show what it explains: the grid of springs imitates it,
+                    # or the regression does not see it
+                    (regression.springs_explain and EFFECTS[name].is_viscoelastic)
+                    or is_unseen(EFFECTS[name]),
                 )
                 for name, some in starts.items()
             ],

@@ -59,13 +59,13 @@ def race(
         return []
     for place, rung in enumerate(rungs[1:], start=1):
         judge.see(runners)
-        runners = _leading(judge.ranked(runners), rung.effects, abreast=place == 1)
+        runners = _leading(judge, runners, rung.effects, abreast=place == 1)
         run = partial(
             _run, fitter, runners, rung.iterations, late=place > 1, last=rung is rungs[-1]
         )
         runners = fitter.map(run, runners)
     judge.see(runners)
-    return _leading(judge.ranked(runners), len(runners), abreast=False)
+    return _leading(judge, runners, len(runners), abreast=False)
 
 
 def _contending(
@@ -86,9 +86,15 @@ def _contending(
     return [*certain, *(c for i, c in enumerate(others) if i < least or c.misfit < limit)]
 
 
-def _leading(ranked: Sequence[Fit], effects: int, abreast: bool) -> list[Fit]:
-    """Return the fits of the first ``effects`` sets of effects; unless ``abreast``, one of each."""
-    keys = list(dict.fromkeys(fit.members for fit in ranked))[:effects]
+def _leading(judge: Judge, runners: Sequence[Fit], effects: int, abreast: bool) -> list[Fit]:
+    """Return the fits of the first ``effects`` sets of effects, and of all that leave noise.
+
+    Those are told apart by converged fits alone. Unless ``abreast``, one fit of each set.
+    """
+    ranked = judge.ranked(runners)
+    keys = list(dict.fromkeys(fit.members for fit in ranked))
+    noise = {fit.members for fit in ranked if judge.is_noise(fit)}
+    keys = [key for i, key in enumerate(keys) if i < effects or key in noise]
     if abreast:
         return [fit for fit in ranked if fit.members in keys]
     return [next(fit for fit in ranked if fit.members == key) for key in keys]

@@ -30,7 +30,7 @@ from dearig.model.diagnosis.imposed import (
 )
 from dearig.model.diagnosis.noise import Drift, DriftSpace, drift_modes
 from dearig.model.diagnosis.settings import DiagnosisSettings
-from dearig.model.diagnosis.shapes import Extent, amplitudes, moved, shape_points
+from dearig.model.diagnosis.shapes import Extent, amplitudes, moved, shape_points, typical_values
 from dearig.model.effects import EFFECTS, PLACES, Effect
 from dearig.model.film import Strip, unit_stresses
 from dearig.model.records import ActuatorRecord, FilmRecord, Record
@@ -104,10 +104,11 @@ def contention(misfit: float, best: float, settings: DiagnosisSettings) -> float
     """Return the misfit up to which an effect may come to lead: ``best`` is the least of all.
 
     What leaves several times as much will not lead, and what explains less than a part of what the
-    best one explains of the ``misfit`` without an effect will not either.
+    best one explains of the ``misfit`` without an effect will not either. The regression errs by
+    about one noise itself: it contains derivatives of a reading.
     """
     explained = misfit**2 - best**2
-    part = math.sqrt(max(misfit**2 - settings.share * explained, 0.0))
+    part = math.sqrt(max(misfit**2 - settings.share * explained, 0.0) + 1.0)
     return min(settings.contenders * max(best, 1.0), part)
 
 
@@ -118,6 +119,11 @@ def electric(name: str) -> bool:
     return any(getattr(module, h, None) is not None for h in hooks) and not hasattr(
         module, "soften"
     )
+
+
+def is_unseen(effect: Effect) -> bool:
+    """Whether an effect has no inverse along a measured motion: it hides a part of the stress."""
+    return hasattr(PLACES[effect.name].module, "measured_stress")
 
 
 class Regression:
@@ -404,10 +410,19 @@ class Regression:
                 )
                 least = min(least, some[0][0])
             self._best[name] = some
-        return {
+        found = {
             name: [self._start([(c, a)], left) for left, a, c in some]
             for name, some in self._best.items()
         }
+        return found | {e.name: [self._unseen(e)] for e in effects if is_unseen(e)}
+
+    def _unseen(self, effect: Effect) -> Start:
+        """Return a start beside the parent's springs of an effect that has no column."""
+        network = self.model.network
+        values = ((effect.name, typical_values(effect)),)
+        moduli = np.array([spring.modulus for spring in network.springs])
+        times = np.array([branch.relaxation_time for branch in network.branches])
+        return Start(values, moduli, times, self.misfit, values, np.zeros(0))
 
     def pairs(self, many: int) -> list[Start]:
         """Return the ``many`` best starts of two effects of different families, best first.

@@ -66,6 +66,7 @@ def diagnose(
         )
         return search.run(), search
 
+    progress("baseline", 0.0)
     found, search = searched(records, 0.0)
     held = False
     if as_held and found.status != "stopped" and not found.judge.is_settled(found.baseline):

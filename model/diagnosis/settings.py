@@ -33,8 +33,8 @@ class DiagnosisSettings:
         Ratio of neighbouring relaxation times of the regression. A branch between two nodes is met
         to (ln ratio)^2/32 of its stress, here 1.5e-3: below the noise of a motion of 500 noises.
     bandwidth_hz
-        Rate of the means that the regression fits. The film rings at 70 Hz: above half of this
-        rate its response to a stress has no more than 1/8 of its power.
+        Rate of the means that the regression fits: the film rings at 70 Hz, and means over whole
+        periods of the mains, 50 or 60 Hz, would hide interference.
     smoothing_s
         Standard deviation of the filter for lam' and lam'': it passes what the means resolve.
     shapes
@@ -93,7 +93,7 @@ class DiagnosisSettings:
     branch_time_min_s: float = 0.1
     branch_time_max: float = 3.0
     grid_ratio: float = 1.25
-    bandwidth_hz: float = 50.0
+    bandwidth_hz: float = 80.0
     smoothing_s: float = 0.010
     shapes: int = 8
     amplitudes: tuple[float, ...] = (0.1, 1.0, 10.0, 100.0)

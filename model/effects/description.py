@@ -83,7 +83,7 @@ class Parameter:
         Value at which an amplitude vanishes.
     starts
         Values from which a fit starts. A shape parameter needs them; an amplitude without them
-        starts at the values that the screening finds.
+        starts at the values that the regression finds.
     logarithmic
         Fitted as the logarithm.
     relative_to

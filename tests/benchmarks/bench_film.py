@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from dearig.analysis.quality import beyond
+from dearig.analysis.quality import extrapolated
 from dearig.recording import open_recording
 from dearig.recording.recording import Recording
 from tests.tools.command import done
@@ -61,7 +61,7 @@ def diagnosed(recordings: dict[str, Recording], train: tuple[str, ...]) -> Itera
         first, last = (
             stage["validation_by_record"][recording.name]["rms_kPa"] for stage in (before, after)
         )
-        yield f"{first:.2f} -> {last:.2f}{' *' if beyond(given, [recording]) else ''}"
+        yield f"{first:.2f} -> {last:.2f}{' *' if extrapolated(given, [recording]) else ''}"
     yield f"{found['seconds']:.0f}"
 
 

@@ -4,7 +4,6 @@
     python -m tests.blind --cases 10 --clean 0 --train thesis
     python -m tests.blind --cases 0 --clean 0 --per-family 4
     python -m tests.blind --seeds 17,41      these alone
-    python -m tests.blind --engine evidence  the diagnosis by regression, race and evidence
     python -m tests.blind --table            the table of what is there
 
 Every case is recorded with ``dearig.acquisition.run.record`` on ``sim:SEED`` and diagnosed by
@@ -28,7 +27,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from dearig.errors import DearigError
-from tests.blind.play import ENGINES, MODES, Bench, Case
+from tests.blind.play import MODES, Bench, Case
 from tests.blind.score import Score, score
 from tests.blind.seeds import LOOKED_AT, chosen
 from tests.blind.table import line, report
@@ -37,7 +36,7 @@ from tests.blind.table import line, report
 def main() -> None:
     given = _arguments()
     modes = tuple(MODES) if given.train == "both" else (given.train,)
-    bench = Bench(given.out, given.rate, given.engine)
+    bench = Bench(given.out, given.rate)
     seeds = given.seeds or chosen(given.first, given.cases, given.clean, given.per_family)
     wanted = [Case(seed, mode) for mode in modes for seed in seeds]
     console = Console(stderr=True)
@@ -123,7 +122,6 @@ def _arguments() -> argparse.Namespace:
     add("--train", choices=(*MODES, "both"), default="both", help="training recordings [both]")
     add("--rate", type=float, choices=(100.0, 200.0, 1000.0), default=200.0, help="Hz [200]")
     add("--jobs", type=int, choices=(1, 2, 3, 4), default=2, help="cases at a time [2]")
-    add("--engine", choices=tuple(ENGINES), default="search", help="of the diagnosis [search]")
     add("--out", type=Path, default=_cache(), help="where results are kept [the user's cache]")
     add("--keep", action="store_true", help="take results of other sources as well")
     add("--table", action="store_true", help="print the table of what is there, play nothing")

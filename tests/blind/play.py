@@ -30,7 +30,7 @@ from dearig.recording import open_recording
 from dearig.sim_backend.streams import Streams
 from tests.blind.seeds import drawn
 
-__all__ = ["ENGINES", "MODES", "VALIDATION", "Bench", "Case", "sources_digest"]
+__all__ = ["MODES", "VALIDATION", "Bench", "Case", "sources_digest"]
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -40,8 +40,6 @@ MODES = {"thesis": ("thesis",), "rich": ("thesis", "rich")}
 #: Other amplitudes, other frequencies, and steps.
 VALIDATION = ("validation-a-0.6", "validation-b-7.0", str(HERE / "ramped-steps.toml"))
 
-#: Modules that run the command, by the engine of the diagnosis.
-ENGINES = {"search": "dearig", "evidence": "tests.blind.by_evidence"}
 
 _TIMEOUT = 900.0  # s: far beyond what any case may take; a hang must not end the row
 _INTERRUPTED = 130
@@ -72,9 +70,8 @@ class Case:
 class Bench:
     """A folder of results at one sample rate, with the rig file that made them."""
 
-    def __init__(self, folder: Path, rate: float, engine: str = "search") -> None:
-        self.engine = engine
-        self.folder = folder / (f"{rate:g}Hz" if engine == "search" else f"{rate:g}Hz-{engine}")
+    def __init__(self, folder: Path, rate: float) -> None:
+        self.folder = folder / f"{rate:g}Hz"
         self.folder.mkdir(parents=True, exist_ok=True)
         self.rig_path = self.folder / "rig.toml"
         text = read_text(HERE / "rig.toml", "rig file")
@@ -125,9 +122,7 @@ class Bench:
             except DearigError as fault:
                 return self._kept(case, sources, None, f"not recorded: {fault}", 0.0)
             before = _processor_seconds()
-            answer, error, seconds = diagnose(
-                train, validation, folder / "out.json", ENGINES[self.engine]
-            )
+            answer, error, seconds = diagnose(train, validation, folder / "out.json")
         # of all cases that run at a time: true of one job only
         processor = _processor_seconds() - before
         return self._kept(case, sources, answer, error, seconds, processor)
@@ -202,13 +197,10 @@ def _processor_seconds() -> float:
 
 
 def diagnose(
-    train: Sequence[Path], validation: Sequence[Path], out: Path, module: str = "dearig"
+    train: Sequence[Path], validation: Sequence[Path], out: Path
 ) -> tuple[dict[str, Any] | None, str, float]:
-    """Run ``dearig diagnose``: its JSON, or None and what went wrong, and the seconds it took.
-
-    ``module`` is the one that runs the command.
-    """
-    command = [sys.executable, "-m", module, "diagnose", *map(str, train)]
+    """Run ``dearig diagnose``: its JSON, or None and what went wrong, and the seconds it took."""
+    command = [sys.executable, "-m", "dearig", "diagnose", *map(str, train)]
     for path in validation:
         command += ["--validate", str(path)]
     command += ["--json", str(out)]

@@ -66,7 +66,9 @@ def require_consistent(found: Diagnosis) -> None:
     assert found.verdict in (NOTHING_MISSING, EXPLAINED, PARTLY_EXPLAINED, UNEXPLAINED)
     assert found.simulations > 0
     assert found.baseline.model.effects == ()
-    assert {n for n, _ in found.final.model.effects} == {s.effect for s in found.steps}
+    # drift is a part of the noise, not of the model
+    laws = {s.effect for s in found.steps if s.family != "drift"}
+    assert {n for n, _ in found.final.model.effects} == laws
     assert found.final.cost <= found.baseline.cost * (1.0 + 1e-6)
     costs = [found.baseline.cost, *(s.stage.cost for s in found.steps)]
     assert all(b < a for a, b in pairwise(costs))
@@ -75,6 +77,8 @@ def require_consistent(found: Diagnosis) -> None:
     }
     for step in found.steps:
         e = EFFECTS[step.effect]
+        if step.family == "drift":
+            continue
         assert (step.family, step.acts_on) == (e.family, e.acts_on)
         assert [x.name for x in step.estimates] == [p.name for p in e.parameters]
         values = dict(dict(found.final.model.effects)[step.effect])
@@ -117,7 +121,9 @@ def test_an_effect_that_branches_imitate_is_found():
     # the drag of a resistor's 5 ms is a fast branch's: fitted from there, it ends at 0 ohm
     thesis = replace(PLAIN, network=TABLE_3)
     hidden = replace(thesis, effects=effect("electrode resistance", resistance=2e7))
-    found = diagnose([record_of(hidden)], thesis, workers=2)
+    # known to be held: otherwise half a sample of delay would explain it
+    record = record_of(hidden, replace(thesis_drive(), hold=True))
+    found = diagnose([record], thesis, workers=2)
     (step,) = found.steps
     assert "electrode_resistance" in (step.family, *step.indistinguishable_from)
     assert found.final.cost == pytest.approx(1.0, abs=0.05)
@@ -156,25 +162,21 @@ def test_the_extended_model_predicts_an_unseen_recording(name):
 
 
 @pytest.mark.parametrize("name", HIDDEN)
-def test_every_family_is_tried(name):
+def test_no_other_family_explains_as_much(name):
     first = of_hidden(name).rounds[0]
     assert first.base == ()
-    tried = {c.family for c in first.candidates}
-    wanted = {
-        e.family
-        for e in EFFECTS.values()
-        if "voltage" in e.drives and not e.is_general and e.drift_basis is None
-    } - {"thermal"}
-    assert wanted <= tried
     chosen = first.candidates[0]
     assert chosen.gained > 0.7
     assert chosen.gain > 100.0
     assert of_hidden(name).final.predicting == of_hidden(name).final.model
-    # none that would do as well was passed over, but laws that can do all that the chosen one does
+    # laws that can do all that the chosen one does may do as well
     for c in first.candidates[1:]:
         other = c.family != chosen.family
         assert not other or c.verdict != "indistinguishable"
         assert c.stage.cost >= chosen.stage.cost * (0.999 if other else 0.99)
+    ((family, probability), *_) = of_hidden(name).families
+    assert family == chosen.family
+    assert probability > 0.99
 
 
 def test_missing_stress_vanishes_with_the_effect():
@@ -191,8 +193,8 @@ def test_a_single_event_is_left_out_of_predictions():
     found = diagnose([record_of(slipped)], PLAIN, workers=1)
     assert found.steps[0].effect == "sudden change of force"
     assert found.verdict == EXPLAINED
-    assert found.final.predicting.effects == ()
-    assert found.final.predicting == found.baseline.model
+    # no law explains half of it: the springs stay as they are beside it
+    assert found.final.predicting == replace(found.final.model, effects=())
     assert any("other recordings are predicted without it" in note for note in found.notes)
 
 
@@ -205,16 +207,13 @@ def of_walking() -> Diagnosis:
     return diagnose([walking], PLAIN, workers=1)
 
 
-def test_drift_that_leaves_more_than_noise_is_refined():
+def test_a_walk_of_the_reading_is_drift():
     found = of_walking()
-    assert [s.effect for s in found.steps] == ["restless drift"]
+    require_consistent(found)
+    (step,) = found.steps
+    assert step.family == "drift"
     assert found.verdict == EXPLAINED
-    closer, coarse = (
-        next(c for r in found.rounds for c in r.candidates if c.effect == name)
-        for name in ("restless drift", "wandering drift")
-    )
-    assert closer.promised == coarse.promised > 0.5
-    assert closer.note == ""
+    assert found.final.cost == pytest.approx(1.0, abs=0.1)
 
 
 @functools.cache
@@ -233,30 +232,15 @@ def of_two_walks() -> Diagnosis:
 
 def test_each_recording_has_its_own_drift():
     found = of_two_walks()
-    assert [s.effect for s in found.steps] == ["wandering drift"]
+    require_consistent(found)
+    (step,) = found.steps
+    assert step.family == "drift"
     assert found.verdict == EXPLAINED
     assert found.baseline.cost > 5.0
-    # one set of numbers for the rig, and a walk of each of the two
-    assert len(found.final.models) == 2
-    one, other = (dict(m.effects)["wandering drift"] for m in found.final.models)
-    assert one != other
-    assert found.final.models[0].network == found.final.models[1].network
-    for model, drift in zip(found.final.models, (2e-5, -1e-5), strict=True):
-        assert np.sign(dict(dict(model.effects)["wandering drift"])["linear"]) == np.sign(drift)
-
-
-def test_drift_is_reported_for_each_recording():
-    (step,) = of_two_walks().steps
-    sizes = ("linear", "quadratic", "cubic", "quartic", "quintic")
-    assert [e.name for e in step.estimates] == [
-        f"{size} in {run}" for run in ("run 0", "run 1") for size in sizes
-    ]
-    hidden = (2e-5, -8e-6, 3e-6, 1e-6, -2e-6, -1e-5, 6e-6, -5e-6, 2e-6, 1e-6)
-    inside = [e.low <= h <= e.high for e, h in zip(step.estimates, hidden, strict=True)]
-    assert sum(inside) >= 8
-    for estimate, model in zip(step.estimates[::5], of_two_walks().final.models, strict=True):
-        assert estimate.value == dict(dict(model.effects)["wandering drift"])["linear"]
-        assert estimate.unit == "m"
+    # one set of numbers for the rig, and a size of the walk of each recording
+    assert [e.name for e in step.estimates] == ["rms in run 0", "rms in run 1"]
+    assert [e.unit for e in step.estimates] == ["m", "m"]
+    assert all(3e-6 < e.value < 5e-5 for e in step.estimates)
 
 
 def test_missing_stress_uses_the_drift_of_its_own_recording():
@@ -406,7 +390,7 @@ def test_an_interrupted_search_returns_what_it_has_found():
 def test_a_search_stops_at_its_computing_budget():
     record = record_of(plant("load inertia"))
     whole = of_hidden("load inertia")
-    small = DiagnosisSettings(effort=1.6e7)
+    small = DiagnosisSettings(effort=4e6)
     found = diagnose([record], PLAIN, workers=1, settings=small)
     require_consistent(found)
     assert not found.interrupted
