@@ -53,9 +53,9 @@ def own_of(
 ) -> Own | None:
     """Return the events and the drift of ``record`` beside ``model``; None without any.
 
-    They are believed where they leave noise: an event explains some part of what any law leaves
-    that the model lacks. An effect can act at one moment of a recording: of two events of one kind
-    the larger is found.
+    They are believed where they leave noise, or a fiftieth of what they explain: an event explains
+    some part of what any law leaves that the model lacks. An effect can act at one moment of a
+    recording: of two events of one kind the larger is found.
     """
     fitter = Fitter([record], replace(model, effects=()), settings or DiagnosisSettings(), 1)
     plain = _unchanged(fitter, model, 0.0)
@@ -71,7 +71,9 @@ def own_of(
     judge.see(ways)
     best = judge.ranked([plain, *ways])[0]
     added = best.effects[len(model.effects) :]
-    if not judge.is_noise(best) or not (added or best.drift):
+    left = max(best.cost - 1.0, 0.0) / max(plain.cost - best.cost, 1e-12)
+    believed = judge.is_noise(best) or left < fitter.settings.form_share
+    if not believed or not (added or best.drift):
         return None
     numbers = dict(best.model.effects)
     events = []
@@ -80,10 +82,10 @@ def own_of(
         found = dict(numbers[name])
         events.append(Event(name, found[moment.name], found[size.name], size.unit))
     whole = _unchanged(fitter, best.model, best.drift, full=True)
-    left, own = whole.plain_residuals(), whole.problem.noise_drift
-    left = left - own.mean(left) if own else left
+    error, own = whole.plain_residuals(), whole.problem.noise_drift
+    error = error - own.mean(error) if own else error
     good = np.isfinite(whole.problem.sigma)
-    rms = fitter.full[0].noise * float(np.sqrt(np.mean(left[good] ** 2)))
+    rms = fitter.full[0].noise * float(np.sqrt(np.mean(error[good] ** 2)))
     return Own(tuple(sorted(events, key=lambda e: e.time)), best.drift > 0.0, rms)
 
 
@@ -131,6 +133,7 @@ def _with_event(fitter: Fitter, best: Fit, name: str, held: int) -> Fit:
     problem = fitter.problem(
         with_effect(best.model, name, typical_values(EFFECTS[name])), best.drift
     )
+    rough = fitter.problem(problem.layout.base, best.drift, kernel.ROUGH)
     layout, time = problem.layout, fitter.records[0].time
     count = fitter.settings.moments
     step = float(np.ptp(time)) / count
@@ -141,7 +144,7 @@ def _with_event(fitter: Fitter, best: Fit, name: str, held: int) -> Fit:
     for among in (np.arange(1, count + 1), np.linspace(-1.0, 1.0, count)):
         rows = np.tile(typical, (count, 1))
         rows[:, -1] = np.clip(at + step * among, time[0], time[-1])
-        _, residuals = problem.evaluate(np.array([layout.coordinates(row) for row in rows]))
+        _, residuals = rough.evaluate(np.array([layout.coordinates(row) for row in rows]))
         shape = np.where(np.isfinite(residuals), residuals - best.residuals, 0.0)
         size = -shape @ best.residuals / np.maximum(np.sum(shape**2, axis=1), 1e-12)
         most = int(np.argmax(-size * (shape @ best.residuals)))

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from dearig.model import kernel
-from dearig.model.diagnosis.evidence import Judge
+from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import Fit, Fitter, spring_count, with_effect
 from dearig.model.diagnosis.regression import Start, contention
 from dearig.model.diagnosis.settings import DiagnosisSettings
@@ -87,14 +87,21 @@ def _contending(
 
 
 def _leading(judge: Judge, runners: Sequence[Fit], effects: int, abreast: bool) -> list[Fit]:
-    """Return the fits of the first ``effects`` sets of effects, and of all that leave noise.
+    """Return the fits of the first ``effects`` sets of effects, and of families that leave noise.
 
-    Those are told apart by converged fits alone. Unless ``abreast``, one fit of each set.
+    Families that leave noise are told apart by converged fits alone. Unless ``abreast``, one fit of
+    each set.
     """
     ranked = judge.ranked(runners)
-    keys = list(dict.fromkeys(fit.members for fit in ranked))
+    sets = list(dict.fromkeys(fit.members for fit in ranked))
     noise = {fit.members for fit in ranked if judge.is_noise(fit)}
-    keys = [key for i, key in enumerate(keys) if i < effects or key in noise]
+    keys: list[frozenset[str]] = []
+    families: set[frozenset[str]] = set()
+    for key in sets:
+        of_family = frozenset(map(family_of, key))
+        if len(keys) < effects or (key in noise and of_family not in families):
+            keys.append(key)
+            families.add(of_family)
     if abreast:
         return [fit for fit in ranked if fit.members in keys]
     return [next(fit for fit in ranked if fit.members == key) for key in keys]
