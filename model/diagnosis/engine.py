@@ -78,7 +78,7 @@ class Search:
         self.fits: dict[frozenset[str], Fit] = {}
         self.races: list[Race] = []
         self._left_out: set[tuple[frozenset[str], str]] = set()
-        self._searching, self._done = False, _BASELINE_PART
+        self._searching, self._done = False, 0.0
         drive = "voltage" if fitter.of_actuator else "stretch"
         warm = any(
             isinstance(r, ActuatorRecord) and r.drive.warmth is not None for r in fitter.full
@@ -102,9 +102,7 @@ class Search:
 
     def run(self) -> Found:
         """Return what the records lack, or the best of what the work or the operator allowed."""
-        baseline = self.keep(
-            self.fitter.baseline(lambda stage, done: self.progress(stage, _BASELINE_PART * done))
-        )
+        baseline = self.keep(self.fitter.baseline(self._of_baseline))
         self.judge = Judge(self.settings, baseline)
         self.log(f"baseline {baseline.cost:.4g}, effort {self.fitter.work.effort:.2e}")
         self._searching, status = True, "complete"
@@ -119,6 +117,11 @@ class Search:
         if status == "budget" and len(best.members) > 1:
             best = self._pruned(best)
         return Found(baseline, best, self.fits, tuple(self.races), self.judge, status)
+
+    def _of_baseline(self, stage: str, fraction: float) -> None:
+        # searches with and without stiffening springs each count from 0 to 1
+        self._done = max(self._done, _BASELINE_PART * fraction)
+        self.progress(stage, self._done)
 
     def keep(self, fit: Fit) -> Fit:
         """Return the best fit with the same members, ``fit`` included, and remember it."""

@@ -24,7 +24,20 @@ _FILM_SAMPLES = 1500
 
 
 def prepared(record: Record, model: Actuator | Strip) -> Record:
-    """The record at a rate that is enough, with its noise read again from its quiet lead-in."""
+    """Return the record at a rate that is enough, with its noise read again from its lead-in.
+
+    Masked readings are bridged: the regression imposes the measured motion on the springs.
+    """
+    thin = _thinned(record, model)
+    if isinstance(thin, FilmRecord) or thin.valid is None or not thin.valid.any():
+        return thin
+    good = thin.valid
+    return replace(
+        thin, displacement=np.interp(thin.time, thin.time[good], thin.displacement[good])
+    )
+
+
+def _thinned(record: Record, model: Actuator | Strip) -> Record:
     if isinstance(record, FilmRecord) or isinstance(model, Strip):
         return record.coarse(_FILM_SAMPLES)
     thin = thinned(record, _RATE, model)
