@@ -11,6 +11,7 @@ import pytest
 
 from dearig.cli.terminal import diagnosis_tables
 from dearig.model import verdict as verdicts
+from dearig.model.diagnosis.events import Event
 from dearig.report.as_json import diagnosis_json
 from dearig.report.diagnosis import (
     HEADLINES,
@@ -332,7 +333,8 @@ class TestJson:
         outcome = OUTCOMES[name]
         found = json.loads(json.dumps(diagnosis_json(outcome), allow_nan=False))
         film = outcome.kind == "film"
-        measures = MEASURES_KPA if film else MEASURES_UM
+        plain = MEASURES_KPA if film else MEASURES_UM
+        measures = plain | {f"rms_without_events_{'kPa' if film else 'um'}"}
         assert found["format"] == "dearig-diagnosis/1"
         assert found["verdict"] == outcome.verdict
         assert found["status"] == "complete"
@@ -352,7 +354,8 @@ class TestJson:
                 "effect", "family", "acts_on", "parameters", "train", "selection", "validation",
                 "indistinguishable_from", "evidence",
             }  # fmt: skip
-            assert step["train"].keys() == step["selection"].keys() == measures
+            assert step["train"].keys() == measures
+            assert step["selection"].keys() == plain
             for p in step["parameters"]:
                 assert {"name", "value", "unit", "ci95"} <= p.keys()
                 assert len(p["ci95"]) == 2
@@ -360,6 +363,19 @@ class TestJson:
         assert (found["experiment"] is None) == (outcome.experiment is None)
         assert (found["unnamed"] is None) == (outcome.finding.unnamed is None)
         assert found["seconds"] == 12.3
+
+    def test_events_of_a_recording_stand_beside_its_error(self):
+        outcome = diagnose_outcome()
+        (first, *others) = outcome.after.validation
+        event = Event("sudden change of reading", 4.2, 3e-5, "m")
+        first = replace(first, events=(event,), rms_without_events=0.5 * first.errors.rms)
+        after = replace(outcome.after, validation=(first, *others))
+        found = diagnosis_json(replace(outcome, stands=(*outcome.stands[:-1], after)))
+        assert found["events"] == [
+            {"record": first.name, "kind": event.kind, "at_s": 4.2, "size": 3e-5, "unit": "m"}
+        ]
+        measures = found["final"]["validation_by_record"][first.name]
+        assert measures["rms_without_events_um"] == pytest.approx(0.5 * measures["rms_um"])
 
     def test_its_numbers_are_those_of_the_outcome(self):
         outcome = diagnose_outcome()
