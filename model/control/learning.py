@@ -46,7 +46,7 @@ CONTRACTION = 0.8
 
 _USABLE = 0.5  # of the path's samples: with fewer a run teaches nothing
 _WORSE = 1.1  # times the smallest error: a run so much worse is stepped back from
-_NEAR_NOISE = 1.5  # times the noise: from here on, half of an error is learned, to average noise
+_NEAR_NOISE = 1.1  # times the noise: an error so small is not learned from
 _SPIKE = 8.0  # noises: a single reading so far from its neighbours is a spike
 _SPIKE_WINDOW = 11  # samples
 _STUCK = 0.05  # s of one and the same reading while the film is predicted to move
@@ -91,7 +91,7 @@ class Lesson:
 class _Run:
     """A run as far as it is remembered."""
 
-    voltage: np.ndarray  # (N,) V
+    played: Inversion
     known: np.ndarray  # (N,) m: Q d before it
     lacking: np.ndarray  # (N,) m: d of it
     rms: float
@@ -179,7 +179,7 @@ class Learner:
         lacking = self._repeated(lacking, notes)
         left = np.abs(np.fft.rfft(np.where(counted, error, 0.0)))
         edge = 0.0 if self._learned is None else self._learned[1]
-        self._best = _Run(self._now.voltage, self._known, lacking, rms, left, edge)
+        self._best = _Run(self._now, self._known, lacking, rms, left, edge)
         return self._follow(self._best, rms, largest, samples, notes)
 
     # ------------------------------------------------------------ next voltage
@@ -194,6 +194,11 @@ class Learner:
         self, run: _Run, rms: float, largest: float, samples: int, notes: list[str]
     ) -> Lesson:
         """Take the next voltage from what ``run`` has shown."""
+        if run.rms <= _NEAR_NOISE * self._noise:
+            notes.append("the smallest error is noise: its voltage is played again")
+            self._known = run.known
+            self._now = run.played
+            return self._lesson(rms, largest, samples, learned=False, notes=notes)
         edge, contraction = self._pass(run)
         if edge <= 0.0:
             notes.append(
@@ -201,11 +206,11 @@ class Learner:
                 "learned; check the sign of the laser, the film and the model"
             )
             return self._lesson(rms, largest, samples, learned=False, notes=notes)
-        part = 1.0 if rms > _NEAR_NOISE * self._noise else 0.5
-        change = low_pass(np.where(self._inside, run.lacking - run.known, 0.0), self._rate, edge)
-        self._known = run.known + part * self._over_ratio(change)
+        change = np.where(self._inside, run.lacking - run.known, 0.0)
+        weight = self._beyond_noise(change)
+        self._known = run.known + self._over_ratio(low_pass(change, self._rate, edge), weight)
         self._learned = (run.left, edge)
-        self._now = self._invert(self.first.reference - self._known, run.voltage)
+        self._now = self._invert(self.first.reference - self._known, run.played.voltage)
         return self._lesson(rms, largest, samples, learned=True, notes=notes, edge=edge,
                             contraction=contraction)  # fmt: skip
 
@@ -350,8 +355,14 @@ class Learner:
         whole[0] = abs(whole[0])
         return whole, max(int(told[-1]), 1)
 
-    def _over_ratio(self, change: np.ndarray) -> np.ndarray:
-        """Return ``change`` (N,) m of the film as one of the model."""
+    def _beyond_noise(self, change: np.ndarray) -> np.ndarray:
+        """Return the part (M,) of the power of ``change`` (N,) m that is not noise (Wiener)."""
+        power = self._around(np.fft.rfft(change))
+        noise = self._noise_around(int(np.count_nonzero(self._inside)))
+        return np.maximum(power - noise, 0.0) / np.maximum(power, noise)
+
+    def _over_ratio(self, change: np.ndarray, weight: np.ndarray) -> np.ndarray:
+        """Return ``change`` (N,) m of the film as one of the model, times ``weight`` (M,)."""
         first = abs(self._ratio[0])
         n, width = change.size, change.size // 2
         padded = np.pad(change, width, mode="edge")  # both ends are at rest
@@ -359,7 +370,8 @@ class Learner:
         ratio = np.interp(lines, self._frequency, self._ratio.real) + 1j * np.interp(
             lines, self._frequency, self._ratio.imag
         )
-        extra = np.fft.irfft(np.fft.rfft(padded) * (first / ratio - 1.0), padded.size)
+        scaled = first * np.interp(lines, self._frequency, weight) / ratio
+        extra = np.fft.irfft(np.fft.rfft(padded) * (scaled - 1.0), padded.size)
         return (change + extra[width : width + n]) / first
 
     def _around(self, amplitudes: np.ndarray) -> np.ndarray:
