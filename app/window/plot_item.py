@@ -139,7 +139,11 @@ class Plot(pg.PlotItem):
             words = escape(words)  # pyqtgraph takes labels as HTML
         if words != self._labels.get(side):
             self._labels[side] = words
-            self.setLabel(side, words, **{"font-size": f"{_KEY_POINTS:g}pt"})
+            # the styles that are given replace all others
+            colour = self.getAxis(side).textPen().color().name()
+            self.setLabel(
+                side, words, **{"font-size": f"{_KEY_POINTS:g}pt", "color": colour}
+            )  # fmt: skip
 
     def set_auto_y(self, auto: bool) -> None:
         """Let the y axis cover what is visible, or keep its range."""

@@ -378,9 +378,11 @@ def test_key_stands_above_the_curves_and_names_are_not_html(shown: Shown) -> Non
 def test_low_plot_has_its_label_in_two_lines(shown: Shown) -> None:
     label = shown.residual.getAxis("left").label
     assert label.toPlainText().strip() == "Residual (\N{MICRO SIGN}m)"
+    shown.residual.restyle(DARK)
     shown.area.resize(900, 260)
     QApplication.processEvents()
     assert label.toPlainText().strip() == "Residual\n(\N{MICRO SIGN}m)"
+    assert f"color:{DARK.text}" in label.toHtml()
 
 
 def test_note_follows_the_entries_of_the_key(shown: Shown) -> None:
