@@ -158,6 +158,7 @@ def summary(outcome: DiagnoseOutcome) -> tuple[str, ...]:
         )
     if outcome.few_data:
         said.append(few_data_sentence(outcome.few_data))
+    said += _events(outcome)
     said += [_rivals_sentence(step) for step in finding.steps if step.indistinguishable_from]
     if finding.unnamed is not None:
         said.append(_unnamed(outcome))
@@ -280,6 +281,25 @@ def _error_change(
         f"{significant(first * shown.error_factor)} to {significant(last * shown.error_factor)} "
         f"{shown.error_unit} RMS, which is {significant(last / outcome.noise)} times {floor}."
     )
+
+
+def _events(outcome: DiagnoseOutcome) -> Iterator[str]:
+    """Yield a sentence on each recording in which something happened once."""
+    shown = SHOWN[outcome.kind]
+    for c in (*outcome.after.train, *outcome.after.validation):
+        if not c.events:
+            continue
+        what = listed(
+            f"a {e.kind} of {significant(e.size)}{f' {e.unit}' if e.unit else ''} at {e.time:.2f} s"
+            for e in c.events
+        )
+        left = ""
+        if c.rms_without_events is not None:
+            left = (
+                f" Without what is its own, the error is "
+                f"{significant(c.rms_without_events * shown.error_factor)} {shown.error_unit} RMS."
+            )
+        yield f"In {c.name} there is {what}: other recordings are predicted without it.{left}"
 
 
 def _rivals_sentence(step: Step) -> str:

@@ -302,5 +302,8 @@ def _round(race: Race, judge: Judge, fitter: Fitter) -> Round:
         )
     added = sorted(race.taken.members - parent.members) if race.taken is not None else []
     chosen = added[0] if len(added) == 1 else None
-    reason = f"{' and '.join(added)} explain most" if added else "no effect is worth its parameters"
+    explain = "explains" if len(added) == 1 else "explain"
+    reason = "no effect is worth its parameters"
+    if added:
+        reason = f"{' and '.join(added)} {explain} most"
     return Round(parent.effects, tuple(candidates), chosen, reason)

@@ -370,7 +370,11 @@ class TestJson:
         event = Event("sudden change of reading", 4.2, 3e-5, "m")
         first = replace(first, events=(event,), rms_without_events=0.5 * first.errors.rms)
         after = replace(outcome.after, validation=(first, *others))
-        found = diagnosis_json(replace(outcome, stands=(*outcome.stands[:-1], after)))
+        outcome = replace(outcome, stands=(*outcome.stands[:-1], after))
+        said = " ".join(summary(outcome))
+        assert f"In {first.name} there is a sudden change of reading of" in said
+        assert "at 4.20 s" in said
+        found = diagnosis_json(outcome)
         assert found["events"] == [
             {"record": first.name, "kind": event.kind, "at_s": 4.2, "size": 3e-5, "unit": "m"}
         ]

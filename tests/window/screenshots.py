@@ -218,7 +218,8 @@ def main() -> None:
                         for file, view in GUIDE.items():
                             if view == (name, look):
                                 small(picture, asked.guide / file)
-        window.close()
+        window.leave()
+        until(lambda: not window.isVisible(), "the end of the last run")
     application.quit()
 
 
