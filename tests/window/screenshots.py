@@ -27,6 +27,7 @@ from dearig.config.sequencefile import load_sequence
 from dearig.window.frame import MainWindow
 from dearig.window.session import Session
 from dearig.window.theme import LIGHT, prepare_plots
+from tests.window.real_window import end
 
 SIZES = ((1366, 768), (1920, 1080))
 LOOKS = ("light", "dark")
@@ -220,6 +221,7 @@ def main() -> None:
                                 small(picture, asked.guide / file)
         window.leave()
         until(lambda: not window.isVisible(), "the end of the last run")
+        end(window)
     application.quit()
 
 
