@@ -220,7 +220,7 @@ def _exhausted(error: Exception) -> str:
     Errors of a disk reach this only from standard output and from temporary files: what writes
     results has a sentence of its own.
     """
-    if isinstance(error, MemoryError) or _nameless(error):
+    if isinstance(error, MemoryError) or _nameless(error) or _misread(error):
         return (
             "the computer has no memory left; close other programs, or give this command less at a "
             "time; files that it had finished are whole"
@@ -239,6 +239,17 @@ def _nameless(error: Exception) -> bool:
     return isinstance(error, SystemError) and (
         "without exception set" in said or "without setting an exception" in said
     )
+
+
+def _misread(error: Exception) -> bool:
+    """Return True if Python refused a source that is right: its parser had no memory."""
+    if not isinstance(error, SyntaxError) or not error.filename:
+        return False
+    try:
+        compile(Path(error.filename).read_bytes(), error.filename, "exec")
+    except (OSError, SyntaxError, ValueError):
+        return False
+    return True
 
 
 def _reader_left() -> int:

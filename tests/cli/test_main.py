@@ -69,9 +69,10 @@ def test_an_unexpected_error_is_one_sentence_and_its_traceback_is_in_the_log(
     [
         (MemoryError(), "no memory left"),
         (SystemError("error return without exception set"), "no memory left"),
+        (SyntaxError("invalid syntax", (__file__, 1, 1, "", 1, 1)), "no memory left"),
         (OSError(errno.ENOSPC, "full"), "free some space"),
     ],
-    ids=["memory", "memory for an error", "disk"],
+    ids=["memory", "memory for an error", "memory for a parser", "disk"],
 )
 def test_a_computer_without_memory_or_disk_is_no_mistake_of_the_program(
     lack: Exception,
