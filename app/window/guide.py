@@ -51,7 +51,7 @@ class _Documents(QTextBrowser):
         self.setSource(QUrl(_FIRST), QTextDocument.ResourceType.HtmlResource)
 
     def loadResource(self, kind: int, name: QUrl | str) -> Any:  # noqa: N802
-        path = QUrl(name).path()
+        path = QUrl(name).path().removeprefix("/")
         if kind == QTextDocument.ResourceType.HtmlResource.value:
             page = page_at(path)
             return None if page is None else to_html(page, _address)
@@ -63,14 +63,18 @@ class _Documents(QTextBrowser):
         if link.scheme():
             QDesktopServices.openUrl(link)
         else:
-            target = link if link.path() else QUrl(self.source().path() + link.toString())
+            target = QUrl(link)
+            target.setPath(link.path().removeprefix("/") or self.source().path())
             self.setSource(target, QTextDocument.ResourceType.HtmlResource)
 
 
 def _address(path: str) -> str | None:
-    """A linked file as the guide names it; None where it is not packaged."""
+    """A linked file as the guide names it; None where it is not packaged.
+
+    With a slash before it: a link is resolved from the folder of its page.
+    """
     known = page_at(path) is not None or (path.endswith(".png") and file_at(path) is not None)
-    return path if known else None
+    return f"/{path}" if known else None
 
 
 def _picture(file: Path | None) -> QImage:
