@@ -15,7 +15,6 @@ from tests.tools.engine import (
 
 HIDDEN = {
     "load inertia": {"moving_mass": 0.2},
-    "dry friction": {"friction": 50.0, "presliding": 1e-4, "damping": 1e-3},
     "sensor curvature": {"quadratic": 15.0},
     "mains interference": {
         "cosine": 3e-6, "sine": 2e-6, "third_cosine": 1e-6, "third_sine": 0.0, "frequency": 49.97,

@@ -180,11 +180,13 @@ def test_no_other_family_explains_as_much(name):
 
 
 def test_missing_stress_vanishes_with_the_effect():
-    found = of_hidden("dry friction")
-    before, after = found.missing_before[0], found.missing_after[0]
-    # friction of 50 Pa one way or the other, most of which the springs could not play
-    assert 10.0 < np.sqrt(np.mean(before.stress**2)) < 50.0
-    assert np.sqrt(np.mean(after.stress**2)) < 3.0
+    found = of_hidden("load inertia")
+    before, after = (
+        np.sqrt(np.mean(m[0].stress ** 2)) for m in (found.missing_before, found.missing_after)
+    )
+    # what is left is the noise of the reading, twice differentiated
+    assert before > 10.0
+    assert after < 0.5 * before
 
 
 def test_a_single_event_is_left_out_of_predictions():
