@@ -34,6 +34,7 @@ __all__ = [
     "ValidateOutcome",
     "pooled_noise",
     "pooled_rms",
+    "pooled_steady_rms",
     "save_fitted_model",
 ]
 
@@ -287,8 +288,18 @@ def save_fitted_model(outcome: _Fitted, path: str | Path, overwrite: bool = Fals
 
 def pooled_rms(comparisons: Sequence[Comparison]) -> float:
     """RMS over all samples of all recordings, in m or Pa."""
-    samples = sum(c.errors.samples for c in comparisons)
-    return math.sqrt(sum(c.errors.rms**2 * c.errors.samples for c in comparisons) / samples)
+    return _pooled(comparisons, [c.errors.rms for c in comparisons])
+
+
+def pooled_steady_rms(comparisons: Sequence[Comparison]) -> float:
+    """As ``pooled_rms``, without each recording's own drift and events."""
+    return _pooled(comparisons, [c.steady_rms for c in comparisons])
+
+
+def _pooled(comparisons: Sequence[Comparison], errors: Sequence[float]) -> float:
+    samples = [c.errors.samples for c in comparisons]
+    squares = sum(e**2 * n for e, n in zip(errors, samples, strict=True))
+    return math.sqrt(squares / sum(samples))
 
 
 def pooled_noise(comparisons: Sequence[Comparison]) -> float | None:

@@ -27,7 +27,7 @@ from dearig.model.excitation import Sampled, Sequence
 
 __all__ = ["EXAMPLE", "LoadedTarget", "load_target", "parse_target", "target_of"]
 
-_M = 1e-6  # m for each V of the sequence that stands for the target: a kilovolt is a millimetre
+_M = 1e-6  # m per V: a target is read as a sequence in which 1 kV means 1 mm
 
 #: A target that the rig of the thesis can follow.
 EXAMPLE = """\
@@ -62,7 +62,7 @@ duration_s = 8.0
 
 
 class _Displacement(Csv):
-    """A path from a CSV file beside the target; straight lines between its points."""
+    """Path from a CSV file in the target's folder, linear between its points."""
 
     columns: ClassVar[Mapping[str, float]] = {
         "displacement_mm": 1e-3 / _M,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from dearig.analysis.outcomes import pooled_noise
+from dearig.analysis.outcomes import pooled_noise, pooled_steady_rms
 from dearig.report.sentences import warnings_of
 from dearig.units import SHOWN
 
@@ -266,14 +266,14 @@ def _stand_json(stand: Stand) -> dict[str, Any]:
 
 
 def _measures_json(comparisons: tuple[Comparison, ...], kind: str) -> dict[str, Any] | None:
-    """Errors pooled over recordings (see ``dearig.report.diagnosis.pooled``); None without any."""
-    from dearig.report.diagnosis import pooled_errors, pooled_without_events
+    """Errors pooled over recordings (see ``report.diagnosis.pooled_errors``); None without any."""
+    from dearig.report.diagnosis import pooled_errors
 
     errors = pooled_errors(comparisons)
     if errors is None:
         return None
     shown = SHOWN[kind]
-    steady = pooled_without_events(comparisons)
+    steady = pooled_steady_rms(comparisons)
     return {
         f"rms_{shown.suffix}": _number(errors.rms * shown.error_factor),
         f"rms_without_events_{shown.suffix}": _number(steady * shown.error_factor),

@@ -86,12 +86,6 @@ def pooled_errors(comparisons: Sequence[Comparison]) -> Errors | None:
     )
 
 
-def pooled_without_events(comparisons: Sequence[Comparison]) -> float:
-    """Return the RMS error over all samples without each recording's own drift and events."""
-    samples = np.array([c.errors.samples for c in comparisons])
-    return float(np.sqrt(samples @ [c.steady_rms**2 for c in comparisons] / samples.sum()))
-
-
 # sentences
 
 

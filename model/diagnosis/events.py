@@ -13,11 +13,11 @@ import numpy as np
 from dearig.model import kernel
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.evidence import Judge
-from dearig.model.diagnosis.fits import Fit, Fitter, with_effect
+from dearig.model.diagnosis.fits import Fit, Fitter, fit_of, with_effect
+from dearig.model.diagnosis.noise import WhitenedProblem
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import typical_values
 from dearig.model.effects import EFFECTS
-from dearig.model.film import Strip
 from dearig.model.fitting.broyden import descend_broyden
 from dearig.model.records import ActuatorRecord
 
@@ -53,21 +53,22 @@ def own_of(
 ) -> Own | None:
     """Return the events and the drift of ``record`` beside ``model``; None without any.
 
-    They are believed where they leave noise, or a fiftieth of what they explain: an event explains
-    some part of what any law leaves that the model lacks. An effect can act at one moment of a
-    recording: of two events of one kind the larger is found.
+    They are accepted only if the remaining error is noise, or a fiftieth of what they explain: an
+    event imitates part of any law that the model lacks. An effect acts at one moment of a
+    recording, so of two events of one kind the larger is found.
     """
     fitter = Fitter([record], replace(model, effects=()), settings or DiagnosisSettings(), 1)
-    plain = _unchanged(fitter, model, 0.0)
+    plain = _as_it_is(fitter.problem(model))
     judge = Judge(fitter.settings, plain)
     if judge.is_noise(plain):
         return None
     drift = fitter.space().most_probable(plain.plain_residuals())
     ways = [_with_events(fitter, judge, plain)]
     later = fitter.space().most_probable(ways[0].plain_residuals())
-    ways.append(_redrifted(fitter, ways[0], later))
+    redrifted = _as_it_is(fitter.problem(ways[0].model, later))
+    ways.append(replace(redrifted, fixed=ways[0].fixed))
     if drift:
-        ways.append(_with_events(fitter, judge, _unchanged(fitter, model, drift)))
+        ways.append(_with_events(fitter, judge, _as_it_is(fitter.problem(model, drift))))
     judge.see(ways)
     best = judge.ranked([plain, *ways])[0]
     added = best.effects[len(model.effects) :]
@@ -81,7 +82,7 @@ def own_of(
         size, moment = EFFECTS[name].parameters
         found = dict(numbers[name])
         events.append(Event(name, found[moment.name], found[size.name], size.unit))
-    whole = _unchanged(fitter, best.model, best.drift, full=True)
+    whole = _as_it_is(fitter.careful_problem(best.model, best.drift))
     error, own = whole.plain_residuals(), whole.problem.noise_drift
     error = error - own.mean(error) if own else error
     good = np.isfinite(whole.problem.sigma)
@@ -89,23 +90,13 @@ def own_of(
     return Own(tuple(sorted(events, key=lambda e: e.time)), best.drift > 0.0, rms)
 
 
-def _unchanged(fitter: Fitter, model: Actuator | Strip, drift: float, full: bool = False) -> Fit:
-    """Return ``model`` as a fit in which nothing was free."""
-    fidelity = kernel.CAREFUL if full else kernel.QUICK
-    if full and drift:
-        # the drift's variance is in units of one reading's noise, which thinning has lowered
-        drift *= (fitter.records[0].noise / fitter.full[0].noise) ** 2
-    problem = fitter.problem(model, drift, fidelity, full)
+def _as_it_is(problem: WhitenedProblem) -> Fit:
+    """Return the model of ``problem`` as a fit in which nothing was free."""
     x = problem.layout.coordinates(problem.layout.initial())
     costs, residuals = problem.evaluate(x[None])
     held = np.ones(x.size, dtype=bool)
     none = np.zeros((residuals.shape[1], 0))
     return Fit(problem, x, held, float(costs[0]), residuals[0], none, converged=True)
-
-
-def _redrifted(fitter: Fitter, fit: Fit, drift: float) -> Fit:
-    again = _unchanged(fitter, fit.model, drift)
-    return replace(again, fixed=fit.fixed)
 
 
 def _with_events(fitter: Fitter, judge: Judge, best: Fit) -> Fit:
@@ -153,6 +144,4 @@ def _with_event(fitter: Fitter, best: Fit, name: str, held: int) -> Fit:
     start = np.clip(layout.coordinates(values), layout.lower, layout.upper)
     fixed = np.arange(layout.size) < held
     found = descend_broyden(problem, start, fixed, None, _ITERATIONS, 1.0, True)
-    return Fit(
-        problem, found.x, fixed, found.cost, found.residuals, found.jacobian, found.converged
-    )
+    return fit_of(problem, fixed, found)

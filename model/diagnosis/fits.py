@@ -45,8 +45,7 @@ class Fit:
     """A model fitted to the records: coordinates ``x`` (d,) in the layout of ``problem``.
 
     ``fixed`` (d,) bool were held. ``cost`` is the mean square of the whitened residuals (N,), in
-    units of the noise; ``jacobian`` (N, f) is one near ``x``, or not finite. ``rough`` fits are of
-    a first look and are not compared closely.
+    units of the noise; ``jacobian`` (N, f) is one near ``x``, or not finite.
     """
 
     problem: WhitenedProblem
@@ -249,7 +248,7 @@ class Fitter:
         """Return the fit after so many secant iterations from coordinates ``x`` (d,)."""
         fixed = self.fixed(problem.layout)
         found = descend_broyden(problem, x, fixed, jacobian, iterations, 1.0, sure)
-        return _fit(problem, fixed, found)
+        return fit_of(problem, fixed, found)
 
     def further(self, fit: Fit, iterations: int, fidelity: int = kernel.QUICK) -> Fit:
         """Return ``fit`` after so many further secant iterations."""
@@ -268,16 +267,20 @@ class Fitter:
         gain = _gain(fit)
         found = descend_broyden(problem, fit.x, fit.fixed, None, 40, gain, True)
         found = descend(problem, found.x, fit.fixed, 15, gain, 1e-3, 3, quick=True)
-        return replace(_fit(problem, fit.fixed, found), converged=True)
+        return replace(fit_of(problem, fit.fixed, found), converged=True)
 
     def careful(self, fit: Fit, iterations: int) -> Fit:
         """Return ``fit`` on every sample, with careful steps and two-sided differences."""
-        # the drift's variance is in units of one reading's noise, which thinning has lowered
-        ratios = [(t.noise / f.noise) ** 2 for t, f in zip(self.records, self.full, strict=True)]
-        drift = fit.drift * sum(ratios) / len(ratios)
-        problem = self.problem(fit.model, drift, kernel.CAREFUL, full=True)
+        problem = self.careful_problem(fit.model, fit.drift)
         found = descend(problem, fit.x, fit.fixed, iterations, _gain(fit), damping=1e-4)
-        return replace(_fit(problem, fit.fixed, found), converged=True)
+        return replace(fit_of(problem, fit.fixed, found), converged=True)
+
+    def careful_problem(self, model: Actuator | Strip, drift: float) -> WhitenedProblem:
+        """Return every sample with careful steps; ``drift`` is that of the thinned records."""
+        # its variance is in units of one reading's noise, which thinning has lowered
+        ratios = [(t.noise / f.noise) ** 2 for t, f in zip(self.records, self.full, strict=True)]
+        scaled = drift * sum(ratios) / len(ratios)
+        return self.problem(model, scaled, kernel.CAREFUL, full=True)
 
     def start_of(self, problem: WhitenedProblem, parent: np.ndarray, effects: Values) -> np.ndarray:
         """Return coordinates (d,) of ``problem``: a ``parent``'s, then its new ``effects``."""
@@ -335,7 +338,7 @@ class Fitter:
             if is_worth_freeing(problem, found.cost, freed, int(fixed.sum())):
                 found, fixed = freed, free
         self._limits = fixed
-        return replace(_fit(problem, fixed, found), converged=True)
+        return replace(fit_of(problem, fixed, found), converged=True)
 
 
 def _gain(fit: Fit) -> float:
@@ -348,7 +351,8 @@ def spring_count(layout: Layout) -> int:
     return sum(q.kind != "effect" for q in layout.quantities)
 
 
-def _fit(problem: WhitenedProblem, fixed: np.ndarray, found: LocalFit) -> Fit:
+def fit_of(problem: WhitenedProblem, fixed: np.ndarray, found: LocalFit) -> Fit:
+    """Return what a descent has ``found`` for ``problem``, with parameters ``fixed`` (d,)."""
     return Fit(
         problem, found.x, fixed, found.cost, found.residuals, found.jacobian, found.converged
     )

@@ -13,7 +13,7 @@ from dearig.model.fitting.thinning import thinned
 from dearig.model.noise import noise_at_rest
 from dearig.model.records import ActuatorRecord, FilmRecord, Record
 
-__all__ = ["FILM_MODEL_ERROR", "prepared", "with_model_error"]
+__all__ = ["FILM_MODEL_ERROR", "bridged", "prepared", "with_model_error"]
 
 #: Of the largest stress: the error to which a model of a rubber is taken to be true.
 FILM_MODEL_ERROR = 5e-3
@@ -29,12 +29,16 @@ def prepared(record: Record, model: Actuator | Strip) -> Record:
     Masked readings are bridged: the regression imposes the measured motion on the springs.
     """
     thin = _thinned(record, model)
-    if isinstance(thin, FilmRecord) or thin.valid is None or not thin.valid.any():
+    if isinstance(thin, FilmRecord):
         return thin
-    good = thin.valid
-    return replace(
-        thin, displacement=np.interp(thin.time, thin.time[good], thin.displacement[good])
-    )
+    return replace(thin, displacement=bridged(thin, thin.displacement))
+
+
+def bridged(record: Record, values: np.ndarray) -> np.ndarray:
+    """Return ``values`` (N,) at the samples of ``record``, interpolated across masked readings."""
+    if record.valid is None or not record.valid.any():
+        return values
+    return np.interp(record.time, record.time[record.valid], values[record.valid])
 
 
 def _thinned(record: Record, model: Actuator | Strip) -> Record:

@@ -14,7 +14,6 @@ from dearig.model.film import Strip
 from dearig.model.fitting import Estimate
 
 __all__ = [
-    "MUCH_LEFT",
     "NOISE_RMS",
     "NOT_BY_CHANCE",
     "Candidate",
@@ -30,9 +29,6 @@ __all__ = [
 
 #: Residual over noise up to which it counts as noise: the noise is known to some per cent.
 NOISE_RMS = 1.08
-#: Mean square of residual over noise above which the family of the missing effect is sought before
-#: its law, in rough simulations.
-MUCH_LEFT = 25.0
 #: Significance level of the test for a white spectrum.
 NOT_BY_CHANCE = 1e-3
 
@@ -208,8 +204,8 @@ class Diagnosis:
     linear between samples, but the data show that it is held until the next. ``notes`` are
     sentences for the operator. ``status`` is ``complete``, ``stopped`` (by the operator) or
     ``budget`` (the search took the work that it may). ``families`` are the probabilities of the
-    families, of ``none`` and of ``unknown``, largest first, which add up to 1; () where the search
-    computes none.
+    families, of ``none`` and of ``unknown``, largest first, which add up to 1; they are not
+    calibrated yet.
     """
 
     verdict: str

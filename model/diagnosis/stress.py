@@ -16,6 +16,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from dearig.model.actuator import Actuator, at_rest
 from dearig.model.coefficients import EFFECTS_AT, ELECTRIC, INERTIA, MODULUS, WIDTH
+from dearig.model.diagnosis.preparation import bridged
 from dearig.model.diagnosis.results import MissingStress
 from dearig.model.effects import MEMORY, NEUTRAL, PARAMETER_COUNT, assembly
 from dearig.model.film import Strip, unit_stresses
@@ -44,13 +45,6 @@ def missing_stress(records: Sequence[Record], model: Actuator | Strip) -> tuple[
     return tuple(found)
 
 
-def _bridged(record: Record, residual: np.ndarray) -> np.ndarray:
-    """Return ``residual`` (N,) interpolated across masked readings."""
-    if record.valid is None or not record.valid.any():
-        return residual
-    return np.interp(record.time, record.time[record.valid], residual[record.valid])
-
-
 def _of_film(record: FilmRecord, model: Strip) -> MissingStress | None:
     answer = model.simulate(record.time, record.stretch)
     if not answer.ok:
@@ -59,7 +53,7 @@ def _of_film(record: FilmRecord, model: Strip) -> MissingStress | None:
     return MissingStress(
         record=record.name,
         time=record.time,
-        stress=_bridged(record, record.stress - answer.stress),
+        stress=bridged(record, record.stress - answer.stress),
         stretch=record.stretch,
         rate=np.gradient(record.stretch, record.time),
         voltage=np.zeros_like(record.time),
@@ -91,7 +85,7 @@ def _of_actuator(record: ActuatorRecord, model: Actuator) -> MissingStress | Non
         network = c[HEAD + MODULUS :: WIDTH] @ parts
         return network + c[INERTIA] * bend, stretch, rate
 
-    residual = _bridged(record, record.displacement - record.seen(response.displacement))
+    residual = bridged(record, record.displacement - record.seen(response.displacement))
     measured, stretch, rate = lacking(response.displacement + residual)
     predicted, there, _ = lacking(response.displacement)
     late = np.interp(time - record.lag, time, record.drive.voltage)

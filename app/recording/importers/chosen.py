@@ -123,9 +123,9 @@ def choose(
 
     ``mapping`` has the column, with its scale if need be, by the name of the target; ``raw`` the
     scales of the rig file from volts at the card, by quantity, empty without one. A time column is
-    not looked for if ``timed``. Only the columns of ``table`` count if it is given; where the file
-    has several and one alone has all that is needed, that one is taken. Raises ``InputError`` for
-    a wrong ``mapping`` or ``table``.
+    not looked for if ``timed``. Only the columns of ``table`` are used if it is given. Of several
+    tables, the only one with all the needed columns is used. Raises ``InputError`` for a wrong
+    ``mapping`` or ``table``.
     """
     tables: Mapping[str, Sequence[str]] = getattr(source, "tables", {})
     if table is not None:
@@ -192,7 +192,7 @@ def _choose(
 
 
 def _suffices(chosen: Chosen, timed: bool) -> bool:
-    """Return True if ``chosen`` is sure, and all that a recording needs."""
+    """Return True if ``chosen`` has every column of a recording, each without a doubt."""
     there, step = chosen.picked, getattr(chosen.source, "step_s", None)
     columns = [pick.column for pick in there.values()]
     if chosen.unsure or not (

@@ -253,7 +253,7 @@ def _text(cell: Cell) -> str:
     if isinstance(cell, time_of_day):
         return cell.isoformat()
     if isinstance(cell, str):
-        # an error such as #DIV/0! stands for a number, and is no comment
+        # a formula's error (#DIV/0!) is a missing number; # does not begin a comment here
         return "nan" if cell.startswith("#") else re.sub(r'[\s"]+', " ", cell).strip()
     return repr(cell)
 
