@@ -16,7 +16,7 @@ from nidaqmx.errors import DaqError, DaqReadError, RpcError
 from nidaqmx.system import Device
 
 from dearig.drivers.contract.rig import RATE
-from dearig.sim_backend.clock import ManualClock
+from dearig.sim_backend.clock import ManualClock, PacedClock
 from tests.tools.command import dearig
 from tests.tools.daqmx import (
     ENABLE,
@@ -82,7 +82,8 @@ def high(device) -> bool:
 @pytest.mark.parametrize("how", ["listening", "reading", "silent"])
 def test_a_killed_client_has_its_voltage_taken_away(heard, how):
     clock = HandClock()
-    with served(clock=clock) as card, victim(card.server.port, how) as process:
+    link = PacedClock()
+    with served(clock=clock, link=link) as card, victim(card.server.port, how) as process:
         assert high(card.device)
         if how == "reading":
             clock.until_somebody_waits()

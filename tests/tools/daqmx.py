@@ -117,7 +117,11 @@ def served(
     sine: bool = False,
     signals: dict[str, str] | None = None,
 ) -> Iterator[Served]:
-    """A server in this process, as fast as it can be, and a client of it without TLS."""
+    """A server in this process, as fast as it can be, and a client of it without TLS.
+
+    Time on the ``link`` stands still unless the caller moves it: a machine that stalls in the
+    middle of a test is not a silent client.
+    """
     settings = settings or RigFile()
     device = open_device(
         address,
@@ -135,7 +139,7 @@ def served(
             device,
             client_timeout=client_timeout,
             link_timeout=link_timeout,
-            link=link,
+            link=link or ManualClock(),
             certificates=certificates,
         ) as server,
         connected(server.port) as session,
