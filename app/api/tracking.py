@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dearig.acquisition.run import RunOptions
-from dearig.analysis import track as tracking
+from dearig.analysis.track import track as follow
+from dearig.analysis.track_target import plan_target
+from dearig.analysis.tracking import TrackedRun, TrackOutcome
 from dearig.api.display import card, drawing, facts, table_html, write_page
 from dearig.api.models import ModelSource, as_model_file
 from dearig.api.recordings import Recording, RigSource, load_rig
@@ -128,7 +130,7 @@ class Inversion:
 class TrackResult:
     """A target that was followed; ``outcome`` has everything that is known of it."""
 
-    outcome: tracking.TrackOutcome
+    outcome: TrackOutcome
 
     @property
     def inversion(self) -> Inversion:
@@ -136,7 +138,7 @@ class TrackResult:
         return Inversion(self.outcome.target.name, self.outcome.inversion)
 
     @property
-    def runs(self) -> tuple[tracking.TrackedRun, ...]:
+    def runs(self) -> tuple[TrackedRun, ...]:
         """All runs with their errors in m, those that were compared first."""
         return self.outcome.runs
 
@@ -207,7 +209,7 @@ def invert(
         raise InputError(
             f"the model {file.name!r} is of a bare film, which a voltage does not move"
         )
-    return Inversion(loaded.name, tracking.plan_target(loaded, file.model, settings)[0])
+    return Inversion(loaded.name, plan_target(loaded, file.model, settings))
 
 
 def track(
@@ -263,7 +265,7 @@ def track(
         plan = FaultPlan.parse(list(faults))
     except ValueError as error:
         raise InputError(str(error)) from error
-    outcome = tracking.track(
+    outcome = follow(
         _target(target), _model(model), rig, settings, Path(out),
         RunOptions(
             text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced, faults=plan

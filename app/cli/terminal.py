@@ -42,7 +42,7 @@ if TYPE_CHECKING:
         Published,
         ValidateOutcome,
     )
-    from dearig.analysis.track import TrackOutcome
+    from dearig.analysis.tracking import TrackOutcome
 
 __all__ = [
     "branch_table",

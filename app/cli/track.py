@@ -15,7 +15,7 @@ from dearig.errors import InputError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from dearig.analysis import track as tracking
+    from dearig.analysis.tracking import TrackOutcome
 
 __all__ = ["commands"]
 
@@ -98,8 +98,9 @@ def track(
     done.
     """
     from dearig.acquisition.run import RunOptions
-    from dearig.analysis.track import TrackOutcome, check_feasible, plan_target
     from dearig.analysis.track import track as follow
+    from dearig.analysis.track_target import check_feasible, plan_target
+    from dearig.analysis.tracking import TrackOutcome
     from dearig.config.modelfile import load_actuator, load_model
     from dearig.config.rigfile import load_rig_file
     from dearig.config.targetfile import load_target
@@ -114,7 +115,7 @@ def track(
     actuator = load_actuator(model)  # refuses that of a bare film
     if check:
         with working(json) as (console, _):
-            found, _, _ = plan_target(loaded, actuator, settings)
+            found = plan_target(loaded, actuator, settings)
         outcome = TrackOutcome(loaded, ours, rig, found, within_um * 1e-6)
         write_result(track_json(outcome), json)
         check_feasible(loaded, found.unreachable, within_um * 1e-6)
@@ -133,7 +134,7 @@ def track(
     report = out / "report.html"
     with working(json) as (console, progress):
 
-        def finish(outcome: tracking.TrackOutcome) -> None:
+        def finish(outcome: TrackOutcome) -> None:
             """Write and show what was done."""
             written = replace(outcome, report=write_track_report(outcome, report))
             _show(console, written)
@@ -147,7 +148,7 @@ def track(
         finish(outcome)
 
 
-def _show(console: Console, outcome: tracking.TrackOutcome) -> None:
+def _show(console: Console, outcome: TrackOutcome) -> None:
     """Print the errors of all runs, the summary, and where the files are."""
     from dearig.cli.terminal import track_table
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from dearig.analysis.track import TrackedRun, TrackOutcome
+    from dearig.analysis.tracking import TrackedRun, TrackOutcome
 
 __all__ = [
     "errors_figure",

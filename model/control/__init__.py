@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dearig.model.control.inversion import BANDWIDTH, CAUSES, Inversion, Unreachable, invert
+from dearig.model.control.inversion import CAUSES, Inversion, Unreachable, invert
 from dearig.model.control.learning import Learner, Lesson
 from dearig.model.control.limits import VoltageLimits
+from dearig.model.control.task import BANDWIDTH, TrackingTask
 
 __all__ = [
     "BANDWIDTH",
@@ -12,6 +13,7 @@ __all__ = [
     "Inversion",
     "Learner",
     "Lesson",
+    "TrackingTask",
     "Unreachable",
     "VoltageLimits",
     "invert",

@@ -30,8 +30,8 @@ from scipy.ndimage import binary_closing, binary_dilation
 from dearig.model.actuator import STATUS_WORDS, Actuator, Drive, at_rest, reading_of
 from dearig.model.coefficients import ELECTRIC, FORCE, HELD, MODULUS, WIDTH
 from dearig.model.control.bands import low_pass
-from dearig.model.control.limits import VoltageLimits
 from dearig.model.control.linear import linearise, repeatable_part
+from dearig.model.control.task import TrackingTask
 from dearig.model.effects import PLACES, SENSOR_MEMORY
 from dearig.model.errors import ModelError
 from dearig.model.film import unit_stresses
@@ -42,11 +42,7 @@ from dearig.model.network import HEAD
 from dearig.model.sensor import at_sensor
 from dearig.model.stability import pull_in_voltage, static_stretch
 
-__all__ = ["BANDWIDTH", "Inversion", "Unreachable", "invert"]
-
-#: Hz: what is faster in a target is taken off. A loaded film rings at 7 Hz and a bare one at 70 Hz;
-#: beyond, the voltage that follows a path grows with the square of the frequency.
-BANDWIDTH = 25.0
+__all__ = ["CAUSES", "Inversion", "Unreachable", "invert"]
 
 _PASSES = 30  # of the quasi-Newton iteration
 _REMEMBERED = 6  # passes of which Anderson's acceleration makes use
@@ -137,33 +133,19 @@ class Inversion:
 
 def invert(
     model: Actuator,
-    target: np.ndarray,
-    rate: float,
-    limits: VoltageLimits,
+    task: TrackingTask,
     *,
-    lead_in: int = 0,
-    tail: int = 0,
-    lag: float = 0.0,
-    bandwidth: float = BANDWIDTH,
     tolerance: float = 1e-6,
     start: np.ndarray | None = None,
 ) -> Inversion:
-    """Compute the voltage with which the reading of ``model`` follows ``target``.
+    """Compute the voltage with which the reading of ``model`` follows the target of ``task``.
 
     Parameters
     ----------
     model : Actuator
         Film, load, springs and effects. The reading is what its sensor effects make of the film.
-    target : (N,) array
-        Displacement from the loaded rest state in m, at ``rate`` Hz.
-    limits : VoltageLimits
-        The voltage stays within them, whatever the target asks for.
-    lead_in, tail : int
-        Samples at the begin and at the end in which the voltage is 0 V and nothing is followed.
-    lag : float
-        Known age of a reading in s.
-    bandwidth : float
-        Frequency in Hz above which the target is smoothed.
+    task : TrackingTask
+        Target, rests and limits.
     tolerance : float
         Distance in m from the target beyond which it counts as unreachable.
     start : (N,) array, optional
@@ -172,14 +154,9 @@ def invert(
     Raises
     ------
     ModelError
-        For a target that is not a row of finite numbers, and for a model without a rest state.
+        For a model without a rest state.
     """
-    target = np.asarray(target, dtype=np.float64)
-    if target.ndim != 1 or target.size < 4 or not np.isfinite(target).all():
-        raise ModelError("a target is a row of at least 4 finite displacements")
-    if lead_in + tail > target.size - 2:
-        raise ModelError("a target has samples between its lead-in and its tail")
-    job = _Job(model, target, rate, limits, lead_in, tail, lag, bandwidth)
+    job = _Job(model, task)
     first = job.from_balance() if start is None else np.square(start)
     return job.result(job.within_field(job.follow(first)), tolerance)
 
@@ -205,35 +182,23 @@ class _Pass:
 class _Job:
     """The inversion of one target."""
 
-    def __init__(
-        self,
-        model: Actuator,
-        target: np.ndarray,
-        rate: float,
-        limits: VoltageLimits,
-        lead_in: int,
-        tail: int,
-        lag: float,
-        bandwidth: float,
-    ) -> None:
+    def __init__(self, model: Actuator, task: TrackingTask) -> None:
         model = repeatable_part(model)
-        self.model, self.target, self.rate, self.limits, self.lag = model, target, rate, limits, lag
-        self.time = np.arange(target.size) / rate
-        self.bandwidth = min(bandwidth, 0.2 * rate)
+        self.model, self.target, self.rate = model, task.target, task.rate
+        self.limits, self.lag, self.bandwidth = task.limits, task.lag, task.edge
+        self.time, self.inside = task.time, task.inside
         self.c = model.coefficients()
         status, self.rest = at_rest(self.c)
         if status != OK:
             raise ModelError(STATUS_WORDS[status])
-        self.inside = np.zeros(target.size, dtype=bool)
-        self.inside[lead_in : target.size - tail] = True
         highest = self._highest_displacement()
-        self.pulls_in = target > highest
-        self.smooth = low_pass(np.minimum(target, highest), rate, self.bandwidth)
+        self.pulls_in = self.target > highest
+        self.smooth = low_pass(np.minimum(self.target, highest), self.rate, self.bandwidth)
         self.moved = self._without_sensor()
         self.stretch = self.rest + self.moved / model.film.length
         thickness = model.film.thickness / thinning(int(self.c[HELD]), self.stretch)
-        self.ceiling = np.where(self.inside, limits.ceiling(thickness), 0.0)
-        self.needed = np.zeros(target.size)
+        self.ceiling = np.where(self.inside, self.limits.ceiling(thickness), 0.0)
+        self.needed = np.zeros(self.target.size)
         self.passes = 0
 
     def _highest_displacement(self) -> float:

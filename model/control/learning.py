@@ -27,16 +27,16 @@ nothing does, nothing is learned.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import binary_dilation, maximum_filter1d, median_filter, uniform_filter1d
 
 from dearig.model.actuator import Actuator
 from dearig.model.control.bands import low_pass, pass_band
-from dearig.model.control.inversion import BANDWIDTH, Inversion, invert
-from dearig.model.control.limits import VoltageLimits
+from dearig.model.control.inversion import Inversion, invert
 from dearig.model.control.linear import linearise
+from dearig.model.control.task import TrackingTask
 from dearig.model.errors import ModelError
 
 __all__ = ["CONTRACTION", "Learner", "Lesson"]
@@ -104,32 +104,20 @@ class Learner:
 
     Parameters
     ----------
-    model, target, rate, limits, lead_in, tail, lag, bandwidth
+    model, task
         As of ``invert``; ``first`` is its result.
     alternatives : sequence of Actuator
         Models that the data allow as well, such as those at the ends of the parameters' intervals.
     """
 
     def __init__(
-        self,
-        model: Actuator,
-        target: np.ndarray,
-        rate: float,
-        limits: VoltageLimits,
-        *,
-        lead_in: int = 0,
-        tail: int = 0,
-        lag: float = 0.0,
-        bandwidth: float = BANDWIDTH,
-        alternatives: Sequence[Actuator] = (),
+        self, model: Actuator, task: TrackingTask, *, alternatives: Sequence[Actuator] = ()
     ) -> None:
-        self._model, self._rate, self._limits, self._noise = model, rate, limits, 0.0
-        self._lead_in, self._tail, self._lag, self._bandwidth = lead_in, tail, lag, bandwidth
-        self.first: Inversion = self._invert(np.asarray(target, dtype=np.float64), None)
-        self._inside = np.zeros(self.first.time.size, dtype=bool)
-        self._inside[lead_in : self.first.time.size - tail] = True
-        self._edge = min(bandwidth, 0.2 * rate)
-        self._frequency = np.fft.rfftfreq(self.first.time.size, 1.0 / rate)
+        self._model, self._task, self._rate, self._noise = model, task, task.rate, 0.0
+        self.first: Inversion = invert(model, task)
+        self._inside = task.inside
+        self._edge = task.edge
+        self._frequency = np.fft.rfftfreq(task.samples, 1.0 / task.rate)
         self._uncertain = self._spread(alternatives)
         self._now = self.first
         self._known = np.zeros(self.first.time.size)
@@ -143,6 +131,11 @@ class Learner:
     def voltage(self) -> np.ndarray:
         """The voltage (N,) in V of the next run."""
         return self._now.voltage
+
+    @property
+    def expected(self) -> np.ndarray:
+        """The displacement (N,) in m that is expected of the next run."""
+        return self._now.reading + self._known
 
     @property
     def best_rms(self) -> float:
@@ -184,12 +177,6 @@ class Learner:
 
     # ------------------------------------------------------------ next voltage
 
-    def _invert(self, target: np.ndarray, start: np.ndarray | None) -> Inversion:
-        return invert(
-            self._model, target, self._rate, self._limits, lead_in=self._lead_in, tail=self._tail,
-            lag=self._lag, bandwidth=self._bandwidth, start=start,
-        )  # fmt: skip
-
     def _follow(
         self, run: _Run, rms: float, largest: float, samples: int, notes: list[str]
     ) -> Lesson:
@@ -210,7 +197,8 @@ class Learner:
         weight = self._beyond_noise(change)
         self._known = run.known + self._over_ratio(low_pass(change, self._rate, edge), weight)
         self._learned = (run.left, edge)
-        self._now = self._invert(self.first.reference - self._known, run.played.voltage)
+        wanted = replace(self._task, target=self.first.reference - self._known)
+        self._now = invert(self._model, wanted, start=run.played.voltage)
         return self._lesson(rms, largest, samples, learned=True, notes=notes, edge=edge,
                             contraction=contraction)  # fmt: skip
 
@@ -253,11 +241,11 @@ class Learner:
         if not alternatives or not square.any():
             return spread
         n, level = square.size, float(np.mean(square[square > 0.01 * square.max()]))
-        own = linearise(self._model, n, self._rate, level, self._lag)
+        own = linearise(self._model, n, self._rate, level, self._task.lag)
         power = np.abs(np.fft.rfft(self.first.reading, own.length)) ** 2
         for other in alternatives:
             try:
-                gain = linearise(other, n, self._rate, level, self._lag).gain
+                gain = linearise(other, n, self._rate, level, self._task.lag).gain
             except ModelError:  # it does not stand this voltage: the data rule it out
                 continue
             ratio = gain / own.gain
@@ -385,7 +373,7 @@ class Learner:
         low, high = self._near()
         power = self._noise**2 * samples * (high - low)
         # the zero is the median of the lead-in, and its error is that of all samples
-        at_rest = max(self._lead_in, 1)
+        at_rest = max(self._task.lead_in, 1)
         power[:_LOWEST] += 0.5 * np.pi / at_rest * (self._noise * samples) ** 2
         return power
 
@@ -420,7 +408,7 @@ class Learner:
         if valid is not None:
             usable &= np.asarray(valid, dtype=bool)
         given = np.where(usable, given, 0.0)
-        lead = usable & (np.arange(n) < self._lead_in)
+        lead = usable & (np.arange(n) < self._task.lead_in)
         if lead.any():
             given = given - float(np.median(given[lead]))
         off = given - self._now.reading
@@ -437,7 +425,7 @@ class Learner:
         highest = maximum_filter1d(self._now.voltage, width, origin=(width - 1) // 2)
         away = uniform_filter1d(reading - self.first.reference, width, mode="nearest")
         least = max(2.0 * self._noise, _WEAK**2 * float(self.first.reference.max()))
-        found = self._inside & (highest <= _WEAK * self._limits.voltage) & (away > least)
+        found = self._inside & (highest <= _WEAK * self._task.limits.voltage) & (away > least)
         if np.count_nonzero(found) < width:
             return np.zeros(found.size, dtype=bool)
         time = self.first.time[found]

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from dearig.acquisition.run import RunObserver, RunOptions
-from dearig.analysis.track import alternatives_of, plan_target, track
+from dearig.analysis.track import track
+from dearig.analysis.track_target import plan_target
+from dearig.analysis.tracking import alternatives_of
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence

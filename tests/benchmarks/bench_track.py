@@ -33,7 +33,9 @@ import numpy as np
 from dearig.acquisition.run import RunOptions, record
 from dearig.analysis.diagnose import diagnose_recordings
 from dearig.analysis.records import as_record
-from dearig.analysis.track import TrackOutcome, limits_of, track
+from dearig.analysis.track import track
+from dearig.analysis.track_target import limits_of
+from dearig.analysis.tracking import TrackOutcome
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence

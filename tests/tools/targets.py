@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dearig.model.control import VoltageLimits
+from dearig.model.control import TrackingTask, VoltageLimits
 
-__all__ = ["LEAD_IN", "LIMITS", "RATE", "TAIL", "path"]
+__all__ = ["LEAD_IN", "LIMITS", "RATE", "TAIL", "path", "task"]
 
 RATE = 250.0  # Hz
 LEAD_IN = TAIL = 50  # samples
@@ -20,3 +20,8 @@ def path(frequency=1.0, amplitude=50e-6, offset=450e-6, seconds=4.0):
     envelope = part * part * (3.0 - 2.0 * part)
     moved = envelope * (offset + amplitude * np.sin(2.0 * np.pi * frequency * time))
     return np.concatenate([np.zeros(LEAD_IN), moved, np.zeros(TAIL)])
+
+
+def task(target, limits=LIMITS):
+    """The task of following ``target`` (N,) m, with the rests of ``path``."""
+    return TrackingTask(target, RATE, limits, LEAD_IN, TAIL)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from dearig.model.actuator import Drive
-from dearig.model.control import VoltageLimits, invert
+from dearig.model.control import TrackingTask, VoltageLimits, invert
 from dearig.model.control.linear import repeatable_part
 from dearig.model.errors import ModelError
 from dearig.model.stability import pull_in_voltage, static_stretch
 from tests.tools.effect_cases import BY_VOLTAGE, THESIS, numbers, with_effect
-from tests.tools.targets import LEAD_IN, LIMITS, RATE, TAIL, path
+from tests.tools.targets import LEAD_IN, LIMITS, RATE, TAIL, path, task
 
 CLOSE = 0.05e-6  # m
 SETTLED = 0.2  # s: from here on, after the start at 0 V
@@ -54,7 +54,7 @@ FREQUENCIES = {0.1: 50e-6, 1.0: 50e-6, 10.0: 5e-6}  # Hz to the amplitude in m
 
 
 def inverted(model, target, limits=LIMITS, **options):
-    return invert(model, target, RATE, limits, lead_in=LEAD_IN, tail=TAIL, **options)
+    return invert(model, task(target, limits), **options)
 
 
 def missed(model, found):
@@ -158,7 +158,7 @@ def test_a_target_beyond_pull_in_is_cut_off_below_it():
 )
 def test_a_target_that_is_no_path_is_refused(target):
     with pytest.raises(ModelError, match="finite displacements"):
-        invert(THESIS, target, RATE, LIMITS)
+        TrackingTask(target, RATE, LIMITS)
 
 
 def test_a_target_of_nothing_takes_no_voltage():

@@ -9,18 +9,17 @@ from dearig.acquisition.prediction import PredictedFilm
 from dearig.drivers.gate import Limits, admit
 from dearig.drivers.samples import Listed
 from dearig.model.actuator import Drive
-from dearig.model.control import Learner, VoltageLimits
+from dearig.model.control import Learner, TrackingTask, VoltageLimits
 from dearig.model.control.learning import CONTRACTION
 from dearig.model.errors import ModelError
 from tests.tools.effect_cases import THESIS, numbers, with_effect
-from tests.tools.targets import LEAD_IN, LIMITS, RATE, TAIL, path
+from tests.tools.targets import LEAD_IN, RATE, TAIL, path, task
 
 NOISE = 1e-6
 
 
 def learner(model=THESIS, target=None, **options):
-    options = {"lead_in": LEAD_IN, "tail": TAIL, **options}
-    return Learner(model, path() if target is None else target, RATE, LIMITS, **options)
+    return Learner(model, task(path() if target is None else target), **options)
 
 
 class Rig:
@@ -193,7 +192,7 @@ _KINDS = ("nan", "spikes", "stuck", "flipped", "large", "noise", "ended", "sound
 def test_no_reading_makes_a_voltage_beyond_a_limit(kinds, seed):
     rng = np.random.default_rng(seed)
     limits = VoltageLimits(_GATE.voltage_max, _GATE.slew, _GATE.field)
-    teacher = Learner(THESIS, _SHORT, RATE, limits, lead_in=LEAD_IN, tail=TAIL)
+    teacher = Learner(THESIS, TrackingTask(_SHORT, RATE, limits, LEAD_IN, TAIL))
     rig = hiding("slow branch")
     for kind in kinds:
         lesson = teacher.learn(_spoil(rig.play(teacher), kind, rng), NOISE)

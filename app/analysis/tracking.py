@@ -1,0 +1,460 @@
+"""Tracking: the film is made to follow a displacement, run after run.
+
+A ``Tracking`` says which voltage is played next and learns from the recording. It plays nothing:
+whoever plays runs, a command or the window, plays the proposed sequence as any other, through the
+gate, the interlocks and the guardian.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import tomli_w
+
+from dearig.analysis.quality import inspect
+from dearig.analysis.track_target import WITHIN, missed_parts, task_of
+from dearig.config.modelfile import ModelFile
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import LoadedSequence, load_sequence
+from dearig.config.targetfile import LoadedTarget
+from dearig.drivers.gate import Margin
+from dearig.errors import InputError
+from dearig.model.actuator import Actuator
+from dearig.model.control import Inversion, Learner, TrackingTask, invert
+from dearig.model.effects import EFFECTS
+from dearig.model.errors import ModelError
+from dearig.model.excitation import Sampled, Sequence
+from dearig.model.noise import noise_of
+from dearig.model.stability import static_stretch
+from dearig.recording.recording import Recording
+
+__all__ = ["KINDS", "Proposal", "TrackOutcome", "TrackedRun", "Tracking", "alternatives_of"]
+
+log = logging.getLogger(__name__)
+
+#: Kinds of runs, in their order.
+KINDS = ("linear", "thesis", "model", "learned")
+
+_FALLBACK = 1e-7  # m: the noise of a sensor whose reading never changes
+_FINISHED = "finished"  # outcome of a recording whose run came to its end
+
+
+def _label(kind: str, iteration: int) -> str:
+    return {
+        "linear": "linear map",
+        "thesis": "compared model",
+        "model": "model",
+        "learned": f"learned, iteration {iteration}",
+    }[kind]
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """The next run of a target, before it is played.
+
+    ``kind`` is one of ``KINDS``, ``iteration`` counts from 0. ``voltage`` (N,) in V is held between
+    samples at ``rate`` Hz. ``expected`` (N,) in m is the displacement that is expected under it,
+    None without a model. ``model`` is the one that computed the voltage, None for a linear map.
+    ``target`` is the name of the target.
+    """
+
+    kind: str
+    iteration: int
+    voltage: np.ndarray
+    expected: np.ndarray | None
+    rate: float
+    target: str
+    model: ModelFile | None
+
+    @property
+    def label(self) -> str:
+        """The run in words."""
+        return _label(self.kind, self.iteration)
+
+    @property
+    def stem(self) -> str:
+        """Name of its files, without an ending."""
+        return f"{self.kind}-{self.iteration}" if self.kind == "learned" else self.kind
+
+    @property
+    def name(self) -> str:
+        """Name of its sequence."""
+        return f"{self.target}, {self.stem}"
+
+    @property
+    def time(self) -> np.ndarray:
+        """Time (N,) in s."""
+        return np.arange(self.voltage.size) / self.rate
+
+    def sequence(self) -> LoadedSequence:
+        """Return its sequence, in no file: the gate can check it before anything is written."""
+        path = Sampled(self.time, self.voltage)
+        return LoadedSequence(Sequence(self.name, (path,), 0.0, 0.0, ("csv",)), "", (0.0,), (0,))
+
+    def write(self, folder: Path) -> LoadedSequence:
+        """Write its sequence to ``folder``, TOML and table, and return it as it is read.
+
+        Raises ``InputError``.
+        """
+        table = np.column_stack([self.time, self.voltage])
+        text = tomli_w.dumps(
+            {
+                "name": self.name,
+                "lead_in_s": 0.0,  # the table has both
+                "tail_s": 0.0,
+                "segment": [{"kind": "csv", "file": f"{self.stem}.csv"}],
+            }
+        )
+        path = folder / f"{self.stem}.toml"
+        try:
+            np.savetxt(
+                folder / f"{self.stem}.csv", table, fmt="%.12g", delimiter=",",
+                header="time_s,voltage_V", comments="",
+            )  # fmt: skip
+            path.write_text(text, encoding="utf-8", newline="\n")
+        except OSError as error:
+            raise InputError(
+                f"the sequence {path} cannot be written: {error.strerror or error}"
+            ) from error
+        return load_sequence(path)
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedRun:
+    """A run of a target.
+
+    ``kind`` is one of ``KINDS``, ``iteration`` counts from 0. ``rms`` and ``largest`` in m are of
+    reference minus measured, over the ``samples`` that the film can reach and that were usable;
+    NaN where there are none. ``recording`` is the file, ``margins`` those of the gate. ``time``,
+    ``measured`` (NaN where unusable), ``predicted`` and ``voltage`` are (N,) in SI units.
+    ``noise`` in m is the standard deviation of a reading at rest.
+    ``edge`` in Hz is up to where the next run learned from this one, 0 where it did not.
+    """
+
+    kind: str
+    iteration: int
+    rms: float
+    largest: float
+    samples: int
+    recording: Path
+    margins: tuple[Margin, ...]
+    time: np.ndarray
+    measured: np.ndarray
+    predicted: np.ndarray | None
+    voltage: np.ndarray
+    noise: float
+    edge: float = 0.0
+    contraction: float = math.nan
+    notes: tuple[str, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """The run in words."""
+        return _label(self.kind, self.iteration)
+
+
+@dataclass(frozen=True, eq=False)
+class TrackOutcome:
+    """A target that was followed: what can be reached, and every run.
+
+    ``status`` is ``complete``, ``interrupted`` by the operator, or ``stopped`` by a limit, an
+    instrument or the gate, with the ``reason``. ``noise`` in m is that of a reading, ``within`` in
+    m the distance from the target that is accepted.
+    """
+
+    target: LoadedTarget
+    model: ModelFile
+    rig: str
+    inversion: Inversion
+    within: float
+    runs: tuple[TrackedRun, ...] = ()
+    noise: float = math.nan
+    status: str = "complete"
+    reason: str = ""
+    warnings: tuple[str, ...] = ()
+    report: Path | None = None
+
+    @property
+    def feasible(self) -> bool:
+        """True if the film can follow the whole target, within the accepted distance."""
+        return not missed_parts(self.inversion.unreachable, self.within)
+
+    @property
+    def best(self) -> TrackedRun | None:
+        """The run of the model, or learned from it, with the smallest error."""
+        ours = [r for r in self.runs if r.kind in ("model", "learned") and math.isfinite(r.rms)]
+        return min(ours, key=lambda r: r.rms, default=None)
+
+
+class Tracking:
+    """A target that is followed run after run: which voltage comes next, and what the runs showed.
+
+    Parameters
+    ----------
+    target, model, rig_file
+        What is followed, with the voltage of which model, within which limits.
+    iterations : int or None
+        Runs that learn from the one before; None proposes one after another.
+    compare : ModelFile, optional
+        The voltages of a linear map and of this model are proposed before.
+    within : float
+        Distance in m from the target that is accepted.
+
+    Attributes
+    ----------
+    inversion : Inversion
+        What the model says can be reached.
+    proposed : Proposal or None
+        The next run, None after the last.
+    runs : tuple of TrackedRun
+        The finished runs.
+
+    Raises
+    ------
+    InputError
+        For a target that is too long, and for a model that cannot be inverted.
+    """
+
+    def __init__(
+        self,
+        target: LoadedTarget,
+        model: ModelFile,
+        rig_file: RigFile,
+        *,
+        iterations: int | None = 5,
+        compare: ModelFile | None = None,
+        within: float = WITHIN,
+    ) -> None:
+        self.target, self.model, self.within = target, model, within
+        ours = _actuator(model, "--model")
+        self.task = task_of(target, rig_file)
+        self._iterations = iterations
+        self._others: list[Proposal] = []
+        try:
+            self._learner = Learner(ours, self.task, alternatives=alternatives_of(model))
+            self.inversion: Inversion = self._learner.first
+            if compare is not None:
+                self._others = self._compared(compare)
+        except ModelError as error:
+            raise InputError(f"target {target.name!r}: {error}") from error
+        self.warnings = tuple(_warnings(ours, rig_file))
+        self.runs: tuple[TrackedRun, ...] = ()
+        self.proposed: Proposal | None = self._next()
+
+    def add(self, recording: Recording, margins: tuple[Margin, ...] = ()) -> TrackedRun:
+        """Take the ``recording`` of the proposed run, learn from it, and propose the next.
+
+        ``margins`` are those of the gate. Raises ``InputError`` for a run that ended early: nothing
+        is learned from it, and it stays proposed.
+        """
+        played = self.proposed
+        if played is None:
+            raise InputError(f"target {self.target.name!r}: all runs are made")
+        if recording.outcome != _FINISHED:
+            raise InputError(
+                f"the run {played.label!r} ended early ({recording.outcome}): nothing is learned "
+                f"from it; play its voltage again"
+            )
+        run = self._measured(played, recording, margins)
+        if played.kind in ("model", "learned"):
+            last = played.iteration == self._iterations
+            try:
+                lesson = self._learner.learn(run.measured, run.noise)
+            except ModelError as error:
+                raise InputError(f"target {self.target.name!r}: {error}") from error
+            run = replace(
+                run,
+                rms=lesson.rms,
+                largest=lesson.largest,
+                samples=lesson.samples,
+                edge=0.0 if last else lesson.edge,
+                contraction=math.nan if last else lesson.contraction,
+                notes=lesson.notes,
+            )
+        self.runs = (*self.runs, run)
+        self.proposed = self._next()
+        return run
+
+    def outcome(self, rig: str, status: str = "complete", reason: str = "") -> TrackOutcome:
+        """Return what was done on the rig at the address ``rig``."""
+        return TrackOutcome(
+            self.target, self.model, rig, self.inversion, self.within, self.runs,
+            noise=self.runs[-1].noise if self.runs else math.nan,
+            status=status, reason=reason, warnings=self.warnings,
+        )  # fmt: skip
+
+    def _next(self) -> Proposal | None:
+        done = len(self.runs)
+        if done < len(self._others):
+            return self._others[done]
+        iteration = done - len(self._others)
+        if self._iterations is not None and iteration > self._iterations:
+            return None
+        kind = "learned" if iteration else "model"
+        learner = self._learner
+        return self._proposal(kind, learner.voltage, learner.expected, self.model, iteration)
+
+    def _proposal(
+        self,
+        kind: str,
+        voltage: np.ndarray,
+        expected: np.ndarray | None,
+        model: ModelFile | None,
+        iteration: int = 0,
+    ) -> Proposal:
+        rate, name = self.task.rate, self.target.name
+        return Proposal(kind, iteration, voltage, expected, rate, name, model)
+
+    def _compared(self, compare: ModelFile) -> list[Proposal]:
+        """Return the runs of a linear map and of another model, for the same reference."""
+        theirs = _actuator(compare, "--compare")
+        linear = _linear_map(self.task, self.inversion, theirs)
+        found = invert(theirs, replace(self.task, target=self.inversion.reference))
+        return [
+            self._proposal("linear", linear, None, None),
+            self._proposal("thesis", found.voltage, found.reading, compare),
+        ]
+
+    def _measured(
+        self, played: Proposal, recording: Recording, margins: tuple[Margin, ...]
+    ) -> TrackedRun:
+        """Return a run with its errors from the reference."""
+        inversion = self.inversion
+        reading, valid = _reading(recording)
+        n = min(reading.size, inversion.time.size)
+        usable = np.isfinite(reading[:n]) if valid is None else valid[:n] & np.isfinite(reading[:n])
+        rest = usable & (np.arange(n) < self.task.lead_in)
+        measured = np.full(inversion.time.size, np.nan)
+        zero = float(np.median(reading[:n][rest])) if rest.any() else 0.0
+        measured[:n] = np.where(usable, reading[:n] - zero, np.nan)
+        error = (inversion.reference - measured)[inversion.reachable & np.isfinite(measured)]
+        commanded = recording.voltage_command
+        voltage = np.zeros(inversion.time.size)
+        if commanded is not None:
+            voltage[:n] = commanded[:n]
+        predicted = recording.displacement_model
+        return TrackedRun(
+            kind=played.kind,
+            iteration=played.iteration,
+            rms=float(np.sqrt(np.mean(error**2))) if error.size else math.nan,
+            largest=float(np.abs(error).max()) if error.size else math.nan,
+            samples=int(error.size),
+            recording=recording.path,
+            margins=margins,
+            time=inversion.time,
+            measured=measured,
+            predicted=None if predicted is None or predicted.size != n else predicted,
+            voltage=voltage,
+            noise=_noise(recording),
+        )
+
+
+def alternatives_of(model: ModelFile) -> tuple[Actuator, ...]:
+    """Return models with one parameter each at an end of its 95 % interval.
+
+    They are taken from the history that ``dearig identify`` writes; without one there are none.
+    """
+    estimates = model.history.get("estimate")
+    actuator = model.model
+    if not isinstance(actuator, Actuator) or not isinstance(estimates, list):
+        return ()
+    found = []
+    for estimate in estimates:
+        if not isinstance(estimate, dict) or not estimate.get("determined"):
+            continue
+        for end in ("low95", "high95"):
+            value = estimate.get(end)
+            if isinstance(value, int | float):
+                found += _with(actuator, str(estimate.get("name", "")), float(value))
+    return tuple(found)
+
+
+def _with(actuator: Actuator, name: str, value: float) -> list[Actuator]:
+    """Return ``actuator`` with the parameter ``name`` at ``value``; nothing where it has none."""
+    network = actuator.network
+    try:
+        effect, colon, parameter = name.partition(": ")
+        if colon and effect in EFFECTS:
+            effects = tuple(
+                (n, tuple((p, value if n == effect and p == parameter else v) for p, v in values))
+                for n, values in actuator.effects
+            )
+            return [replace(actuator, effects=effects)]
+        symbol, _, number = name.partition("_")
+        if symbol not in ("mu", "T") or not number.isdigit():
+            return []  # a limit J hardly changes a film that is stretched so little
+        i = int(number)
+        if i == 0 and symbol == "mu":
+            spring = replace(network.equilibrium, modulus=value)
+            return [replace(actuator, network=replace(network, equilibrium=spring))]
+        branches = list(network.branches)
+        branch = branches[i - 1]
+        branches[i - 1] = (
+            replace(branch, relaxation_time=value)
+            if symbol == "T"
+            else replace(branch, spring=replace(branch.spring, modulus=value))
+        )
+        return [replace(actuator, network=replace(network, branches=tuple(branches)))]
+    except (ModelError, IndexError):
+        return []
+
+
+def _actuator(model: ModelFile, option: str) -> Actuator:
+    if isinstance(model.model, Actuator):
+        return model.model
+    raise InputError(
+        f"{option}: the model {model.name!r} is of a bare film, which a voltage does not move: "
+        f"give one of an actuator"
+    )
+
+
+def _warnings(model: Actuator, rig_file: RigFile) -> Iterator[str]:
+    if model.film != rig_file.as_film():
+        yield "the model is of another film than the rig file's"
+    if model.load.mass != rig_file.load.mass_g / 1e3:
+        yield (
+            f"the model is of a load of {model.load.mass * 1e3:g} g, the rig file of "
+            f"{rig_file.load.mass_g:g} g"
+        )
+
+
+def _linear_map(task: TrackingTask, inversion: Inversion, model: Actuator) -> np.ndarray:
+    """Return the voltage (N,) in V of a film whose displacement is a straight line over V^2.
+
+    The line is that of ``model`` at rest, through 0 and the largest displacement of the reference:
+    what a person has who measured one displacement at one voltage.
+    """
+    largest = float(inversion.reference.max())
+    volts = np.zeros(inversion.time.size)
+    if largest > 0.0:
+        low, high = 0.0, task.limits.voltage
+        for _ in range(50):  # halvings of the voltage's range: to the last digit
+            middle = 0.5 * (low + high)
+            try:
+                moved = (static_stretch(model, middle) - model.rest()) * model.film.length
+            except ModelError:  # beyond pull-in
+                moved = math.inf
+            low, high = (middle, high) if moved < largest else (low, middle)
+        volts = high * np.sqrt(np.maximum(inversion.reference, 0.0) / largest)
+    ceiling = np.where(task.inside, task.limits.voltage, 0.0)
+    return task.limits.nearest(volts, ceiling, inversion.rate)
+
+
+def _noise(recording: Recording) -> float:
+    """Return the standard deviation in m of a reading at rest."""
+    floor = recording.noise_floor or noise_of(recording.signal)
+    return floor if floor > 0.0 else _FALLBACK
+
+
+def _reading(recording: Recording) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return the displacement (N,) m of a recording, and which readings may be used."""
+    try:
+        return recording.signal, inspect(recording, to_fit=False).valid
+    except InputError as error:
+        log.info("%s: nothing is learned from it: %s", recording.path, error)
+        return recording.signal, np.zeros(recording.samples, dtype=bool)
