@@ -18,6 +18,7 @@ from dearig.model.records import ActuatorRecord, Record
 __all__ = ["diagnose"]
 
 _LAST = 0.94  # of the progress: then come the final fits
+_HELD_ITERATIONS = 20  # of fits that begin beside a fit to the same readings
 
 
 def _quiet(stage: str, fraction: float) -> None:
@@ -69,7 +70,7 @@ def diagnose(
     progress("baseline", 0.0)
     found, search = searched(records, 0.0)
     held = False
-    if as_held and found.status != "stopped" and not found.judge.is_settled(found.baseline):
+    if as_held and found.status != "stopped" and _may_be_held(found, search, as_held):
         other, again = searched(as_held, part)
         found.judge.see([found.best, other.best])
         held = _score(found, other.best) < _score(found, found.best)
@@ -91,6 +92,28 @@ def _with_held_voltage(records: Sequence[Record]) -> list[Record] | None:
     if len(known) < len(records):
         return None
     return [replace(r, drive=replace(r.drive, hold=True)) for r in known]
+
+
+def _may_be_held(found: Found, search: Search, as_held: Sequence[Record]) -> bool:
+    """Whether a search with a held voltage is worth its time.
+
+    It is where the first one leaves something, and where what it has found, or a part of it,
+    explains as much with a held voltage: an effect may stand for the half sample.
+    """
+    best = found.best
+    if not found.judge.is_settled(best):
+        return True
+    if best is found.baseline:
+        return False
+    fitter = Fitter(as_held, found.baseline.model, search.settings, search.fitter.workers)
+    for left_out in (None, *best.effects):
+        effects = tuple(e for e in best.model.effects if e[0] != left_out)
+        problem = fitter.problem(replace(best.model, effects=effects), best.drift)
+        start = problem.layout.coordinates(problem.layout.initial())
+        fit = fitter.refined(fitter.descend(problem, start, _HELD_ITERATIONS))
+        if _score(found, fit) < _score(found, best):
+            return True
+    return False
 
 
 def _score(found: Found, fit: Fit) -> float:

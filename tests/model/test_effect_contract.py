@@ -9,7 +9,7 @@ from dearig.model import effects
 from dearig.model.effects import EFFECTS
 from dearig.model.effects.contract import check_effect
 from dearig.model.errors import ModelError
-from tests.tools.effect_plugin import add_distribution, run_with
+from tests.tools.effect_plugin import FEW, add_distribution, run_with
 
 HEAD = '''"""A made effect."""
 
@@ -143,11 +143,7 @@ EXPECTED = {
     "hysteresis that is not declared": r"without is_hysteretic, quick steps change",
     "another drift": r"its drift_basis differs from what sense adds",
 }
-PROGRAM = """
-import pkgutil
-every = pkgutil.iter_modules
-# the made effects need places, and general laws take long to compile
-pkgutil.iter_modules = lambda *a, **k: (m for m in every(*a, **k) if "general_" not in m.name)
+PROGRAM = FEW + """
 from dearig.model.effects import EFFECTS, ORIGINS, PROBLEMS
 from dearig.model.effects.contract import faults_of_effect
 assert not PROBLEMS, PROBLEMS

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.tools.effect_plugin import add_distribution, made_effect, run_with
+from tests.tools.effect_plugin import FEW, add_distribution, made_effect, run_with
 
 FOUND = """
 from dearig.model.effects import ORIGINS, PROBLEMS
@@ -22,7 +22,7 @@ print(np.round(added, 6).tolist())
 save_model("model.toml", "made", pulled, {})
 print(load_model("model.toml").model.effects)
 """
-HOOK = """
+HOOK = FEW + """
 import numpy as np
 from dearig.model.effects import MEMORY, PLACES, assembly
 from dearig.model.film import Strip

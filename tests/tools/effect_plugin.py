@@ -22,6 +22,16 @@ def stress(c, k, m, j, lam, rate, lam0, since, t):
     return {factor!r} * c[k] * rate
 '''
 
+#: Before a program: of the effects of dearig only two, one of the film and one of the sensor.
+#: Kernels compile in a quarter of the time.
+FEW = """
+import pkgutil
+every = pkgutil.iter_modules
+pkgutil.iter_modules = lambda path: (
+    m for m in every(path) if m.name in ("linear_drag", "linear_drift")
+)
+"""
+
 
 def made_effect(name, factor=1.0, more=""):
     """Source of a module with a linear drag, and ``more``."""
