@@ -9,9 +9,13 @@ from bootstrap import prepare, prepare_screen, run
 def test(python: Path, *arguments: str) -> int:
     """Run pytest with ``python`` on two processes, and return its exit code."""
     prepare_screen(python)
-    # two processes have two cores: threads of their linear algebra would only wait for each other
-    pytest = [str(python), "-m", "pytest", "-n", "2", *arguments]
-    return run(pytest, OPENBLAS_NUM_THREADS="1")
+    return run(
+        [str(python), "-m", "pytest", "-n", "2", *arguments],
+        # two processes have two cores: threads of linear algebra would wait for each other
+        OPENBLAS_NUM_THREADS="1",
+        # hundreds of tests start a program of their own, which would compile its modules anew
+        PYTHONDONTWRITEBYTECODE="",
+    )
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.signal import lfilter
 
 __all__ = ["NOISES", "WHITE", "LaserNoise"]
 
@@ -60,6 +59,9 @@ class LaserNoise:
             return drawn * math.sqrt((_FREEDOM - 2.0) / _FREEDOM), state
         if self._kind == "pink":
             drawn = generator.standard_normal((_PINK_TIMES.size, chunk))[:, :samples]
+            # takes a second to import, and one noise of six needs it
+            from scipy.signal import lfilter
+
             pink, after = np.zeros(samples), np.empty_like(state)
             for i, left in enumerate(self._left):
                 size = math.sqrt(1.0 - left * left)

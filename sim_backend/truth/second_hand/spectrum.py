@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.optimize import nnls
 
 __all__ = ["asymmetric", "stretched_exponential"]
 
@@ -25,6 +24,9 @@ def stretched_exponential(exponent: float) -> tuple[np.ndarray, np.ndarray]:
     """
     times = np.geomspace(*_TIMES, _TERMS)
     instants = np.geomspace(*_INSTANTS, _POINTS)
+    # takes half a second to import, and few truths need it
+    from scipy.optimize import nnls
+
     weights, _ = nnls(np.exp(-instants[:, None] / times), np.exp(-(instants**exponent)))
     weights /= weights.sum()
     kept = weights > 0.0
