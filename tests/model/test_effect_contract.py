@@ -143,7 +143,9 @@ EXPECTED = {
     "hysteresis that is not declared": r"without is_hysteretic, quick steps change",
     "another drift": r"its drift_basis differs from what sense adds",
 }
-PROGRAM = FEW + """
+PROGRAM = (
+    FEW
+    + """
 from dearig.model.effects import EFFECTS, ORIGINS, PROBLEMS
 from dearig.model.effects.contract import faults_of_effect
 assert not PROBLEMS, PROBLEMS
@@ -151,6 +153,7 @@ for name, origin in ORIGINS.items():
     if origin != "dearig":
         print(f"{name}: {'; '.join(faults_of_effect(name))}")
 """
+)
 
 
 @pytest.mark.parametrize("name", EFFECTS)

@@ -22,7 +22,9 @@ print(np.round(added, 6).tolist())
 save_model("model.toml", "made", pulled, {})
 print(load_model("model.toml").model.effects)
 """
-HOOK = FEW + """
+HOOK = (
+    FEW
+    + """
 import numpy as np
 from dearig.model.effects import MEMORY, PLACES, assembly
 from dearig.model.film import Strip
@@ -34,6 +36,7 @@ print(assembly.stress(on, c, m, 1.1, 0.5, 1.1, 0.0, 0.0))
 print(assembly.stiffness(on, c, m, 1.1, 0.5)[1])
 print(cache_folder().name)
 """
+)
 EXAMINED = """
 from dearig.cli.doctor import examine
 for item in examine():
