@@ -4,6 +4,8 @@
     python -m tests.blind --cases 10 --clean 0 --train thesis
     python -m tests.blind --cases 0 --clean 0 --per-family 4
     python -m tests.blind --seeds 17,41      these alone
+    python -m tests.blind --hand second      laws that neither the library nor the first hand has
+    python -m tests.blind --cases 0 --clean 20 --noise coarse
     python -m tests.blind --table            the table of what is there
 
 Every case is recorded with ``dearig.acquisition.run.record`` on ``sim:SEED`` and diagnosed by
@@ -27,7 +29,9 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from dearig.errors import DearigError
-from tests.blind.play import MODES, Bench, Case
+from dearig.sim_backend.laser_noise import NOISES, WHITE
+from dearig.sim_backend.truth.cases import HANDS
+from tests.blind.play import MODES, Bench, Case, case_of
 from tests.blind.score import Score, score
 from tests.blind.seeds import LOOKED_AT, chosen
 from tests.blind.table import line, report
@@ -37,8 +41,10 @@ def main() -> None:
     given = _arguments()
     modes = tuple(MODES) if given.train == "both" else (given.train,)
     bench = Bench(given.out, given.rate)
-    seeds = given.seeds or chosen(given.first, given.cases, given.clean, given.per_family)
-    wanted = [Case(seed, mode) for mode in modes for seed in seeds]
+    seeds = given.seeds or chosen(
+        given.first, given.cases, given.clean, given.per_family, given.hand
+    )
+    wanted = [Case(seed, mode, given.hand, given.noise) for mode in modes for seed in seeds]
     console = Console(stderr=True)
     if given.table:
         _print(bench, None, given.keep, console)
@@ -70,7 +76,8 @@ def _play_all(bench: Bench, cases: list[Case], jobs: int, console: Console) -> N
 
 def _in_turn(bench: Bench, cases: list[Case], jobs: int) -> Iterator[dict[str, Any]]:
     """Results as they come; each case waits in a process of its own, ``jobs`` of them at a time."""
-    bench.floor_um()
+    for noise in {case.noise for case in cases}:
+        bench.floor_um(noise)
     with ThreadPoolExecutor(jobs) as pool:
         running: set[Future[dict[str, Any]]] = set()
         left = iter(cases)
@@ -94,8 +101,8 @@ def _print(bench: Bench, wanted: list[Case] | None, keep: bool, console: Console
     """The table of ``wanted``, or of all that is there."""
     kept = bench.all_kept()
     if wanted is not None:
-        asked = {(case.seed, case.mode) for case in wanted}
-        kept = [r for r in kept if (r["seed"], r["mode"]) in asked]
+        asked = set(wanted)
+        kept = [r for r in kept if case_of(r) in asked]
     fresh = [r for r in kept if keep or bench.is_fresh(r)]
     if len(fresh) < len(kept):
         console.print(
@@ -119,6 +126,8 @@ def _arguments() -> argparse.Namespace:
     add("--clean", type=_natural, default=50, help="further rigs that hide nothing [50]")
     add("--per-family", type=_natural, default=0, help="further rigs of each family [0]")
     add("--seeds", type=_seeds, help="these seeds and no others, such as 3,17")
+    add("--hand", choices=tuple(HANDS), default="first", help="who draws the effects [first]")
+    add("--noise", choices=NOISES, default=WHITE, help="noise of the laser [white]")
     add("--train", choices=(*MODES, "both"), default="both", help="training recordings [both]")
     add("--rate", type=float, choices=(100.0, 200.0, 1000.0), default=200.0, help="Hz [200]")
     add("--jobs", type=int, choices=(1, 2, 3, 4), default=2, help="cases at a time [2]")

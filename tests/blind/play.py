@@ -27,10 +27,12 @@ from dearig.config.toml_input import read_text
 from dearig.errors import DearigError
 from dearig.model.records import counted
 from dearig.recording import open_recording
+from dearig.sim_backend.laser_noise import WHITE
 from dearig.sim_backend.streams import Streams
-from tests.blind.seeds import drawn
+from dearig.sim_backend.truth.cases import TruthCase, address_of
+from tests.blind.seeds import clean_seeds, drawn
 
-__all__ = ["MODES", "VALIDATION", "Bench", "Case", "sources_digest"]
+__all__ = ["MODES", "VALIDATION", "Bench", "Case", "case_of", "sources_digest"]
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -61,10 +63,29 @@ def sources_digest() -> str:
 
 @dataclass(frozen=True)
 class Case:
-    """One seed in one mode."""
+    """One seed in one mode, its effect drawn by a hand, its laser with a kind of noise."""
 
     seed: int
     mode: str
+    hand: str = "first"
+    noise: str = WHITE
+
+    @property
+    def truth(self) -> TruthCase:
+        """What its rig hides."""
+        return drawn(self.seed, self.hand, self.noise)
+
+    @property
+    def address(self) -> str:
+        """Address of its rig."""
+        return address_of(self.seed, self.hand, self.noise)
+
+
+def case_of(result: Mapping[str, Any]) -> Case:
+    """The case of a kept ``result``."""
+    return Case(
+        result["seed"], result["mode"], result.get("hand", "first"), result.get("noise", WHITE)
+    )
 
 
 class Bench:
@@ -79,21 +100,23 @@ class Bench:
             f"{text}\n[card]\nsample_rate_Hz = {rate:.1f}\n", encoding="utf-8", newline="\n"
         )
         self._rig = load_rig_file(self.rig_path)
-        self._floor: float | None = None
+        self._floors: dict[str, float] = {}
 
-    def floor_um(self) -> float:
+    def floor_um(self, noise: str = WHITE) -> float:
         """RMS in um of what the rig's laser and card add, read from a film that hangs still."""
-        if self._floor is None:
+        if noise not in self._floors:
+            still = clean_seeds(1)[0]
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / "quiet.h5"
-                self._record(str(HERE / "quiet.toml"), "sim", path, seed=0)
-                still = open_recording(path).signal
-            self._floor = float(np.std(still)) * 1e6
-        return self._floor
+                quiet = str(HERE / "quiet.toml")
+                self._record(quiet, address_of(still, noise=noise), path, seed=0)
+                reading = open_recording(path).signal
+            self._floors[noise] = float(np.std(reading)) * 1e6
+        return self._floors[noise]
 
     def own_um(self, case: Case) -> float:
         """RMS in um of what the validation recordings of ``case`` have each of their own."""
-        rate, truth = float(self._rig.card.sample_rate_Hz), drawn(case.seed)
+        rate, truth = float(self._rig.card.sample_rate_Hz), case.truth
         parts = []
         for i, name in enumerate(VALIDATION, start=len(MODES[case.mode])):
             time, voltage = load_sequence(name).sample(rate)
@@ -108,7 +131,7 @@ class Bench:
         names = [*MODES[case.mode], *VALIDATION]
         paths = [folder / f"{Path(name).name.removesuffix('.toml')}.h5" for name in names]
         for i, (name, path) in enumerate(zip(names, paths, strict=True)):
-            self._record(name, f"sim:{case.seed}", path, seed=i)
+            self._record(name, case.address, path, seed=i)
         split = len(MODES[case.mode])
         return paths[:split], paths[split:]
 
@@ -136,13 +159,15 @@ class Bench:
         seconds: float,
         processor: float = 0.0,
     ) -> dict[str, Any]:
-        truth = drawn(case.seed)
+        truth = case.truth
         time, voltage = load_sequence("thesis").sample(float(self._rig.card.sample_rate_Hz))
         result = {
             "seed": case.seed,
             "mode": case.mode,
+            "hand": case.hand,
+            "noise": case.noise,
             "sources": sources,
-            "floor_um": self.floor_um(),
+            "floor_um": self.floor_um(case.noise),
             "own_um": self.own_um(case),
             "truth": {
                 "families": list(truth.families),
@@ -183,7 +208,8 @@ class Bench:
         )
 
     def _path(self, case: Case) -> Path:
-        return self.folder / f"{case.mode}-{case.seed}.json"
+        name = case.address.removeprefix("sim:").replace(":", "-")
+        return self.folder / f"{case.mode}-{name}.json"
 
     def _record(self, sequence: str, rig: str, out: Path, seed: int) -> None:
         text = read_text(self.rig_path, "rig file")

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from itertools import count
 
 from dearig.config.rigfile import RigFile
+from dearig.sim_backend.laser_noise import WHITE
 from dearig.sim_backend.truth import cases
-from dearig.sim_backend.truth.cases import FORMS, UNKNOWN, TruthCase
+from dearig.sim_backend.truth.cases import HANDS, UNKNOWN, TruthCase
 
 __all__ = [
     "CLEAN_FROM",
@@ -28,28 +29,30 @@ LOOKED_AT = range(60000, 60040)
 _RIG = RigFile()
 
 
-def drawn(seed: int) -> TruthCase:
-    """What the rig ``sim:seed`` hides."""
-    return cases.draw(seed, _RIG.as_film(), _RIG.as_load())
+def drawn(seed: int, hand: str = "first", noise: str = WHITE) -> TruthCase:
+    """What the rig ``sim:seed`` hides, or that of another hand or noise."""
+    return cases.draw(seed, _RIG.as_film(), _RIG.as_load(), hand=hand, noise=noise)
 
 
-def clean_seeds(number: int) -> list[int]:
+def clean_seeds(number: int, hand: str = "first") -> list[int]:
     """The first ``number`` seeds from ``CLEAN_FROM`` on whose rig hides nothing."""
-    return _first(number, ())
+    return _first(number, (), hand)
 
 
-def family_seeds(family: str, number: int) -> list[int]:
+def family_seeds(family: str, number: int, hand: str = "first") -> list[int]:
     """The first ``number`` seeds from ``FAMILY_FROM`` on whose rig hides this family alone."""
-    return _first(number, (family,))
+    return _first(number, (family,), hand)
 
 
-def chosen(first: int, any_kind: int, clean: int, per_family: int) -> list[int]:
+def chosen(
+    first: int, any_kind: int, clean: int, per_family: int, hand: str = "first"
+) -> list[int]:
     """Every seed to be played once, in the order of playing."""
     seeds = [*range(first, first + any_kind)]
     if per_family:
-        for family in FORMS:
-            seeds += family_seeds(family, per_family)
-    return list(dict.fromkeys([*seeds, *clean_seeds(clean)]))
+        for family in HANDS[hand]:
+            seeds += family_seeds(family, per_family, hand)
+    return list(dict.fromkeys([*seeds, *clean_seeds(clean, hand)]))
 
 
 def kind_of(families: tuple[str, ...]) -> str:
@@ -61,11 +64,11 @@ def kind_of(families: tuple[str, ...]) -> str:
     return "covered" if len(families) == 1 else "pair"
 
 
-def _first(number: int, families: tuple[str, ...]) -> list[int]:
+def _first(number: int, families: tuple[str, ...], hand: str) -> list[int]:
     start = FAMILY_FROM if families else CLEAN_FROM
-    hits = _hiding(start, families)
+    hits = _hiding(start, families, hand)
     return [next(hits) for _ in range(number)]
 
 
-def _hiding(start: int, families: tuple[str, ...]) -> Iterator[int]:
-    return (seed for seed in count(start) if drawn(seed).families == families)
+def _hiding(start: int, families: tuple[str, ...], hand: str) -> Iterator[int]:
+    return (seed for seed in count(start) if drawn(seed, hand).families == families)

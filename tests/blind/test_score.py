@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.blind import play
-from tests.blind.play import Bench, Case
+from tests.blind.play import Bench, Case, case_of
 from tests.blind.score import Score, score
 from tests.blind.seeds import CLEAN_FROM, chosen, clean_seeds, drawn, family_seeds, kind_of
 from tests.blind.table import line, report
@@ -251,6 +251,21 @@ def test_seeds_are_chosen_by_what_they_hide() -> None:
     assert seeds[-3:] == clean
     assert len(set(seeds)) == len(seeds)
     assert len(chosen(CLEAN_FROM, clean[0] - CLEAN_FROM + 1, 1, 0)) == clean[0] - CLEAN_FROM + 1
+    second = chosen(5, 0, 1, 1, "second")
+    families = [drawn(seed, "second").families for seed in second]
+    assert ("viscoplasticity",) in families
+    assert families[-1] == ()
+
+
+def test_cases_of_hands_and_noises_are_kept_apart(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, 200.0)
+    case = Case(7, "thesis", "second", "spikes")
+    assert case.address == "sim:7:second:spikes"
+    there = {**result(("drag",), seed=7), "hand": "second", "noise": "spikes"}
+    (tmp_path / "200Hz" / "thesis-7-second-spikes.json").write_text(json.dumps(there), "utf-8")
+    assert bench.kept(case, any_sources=True) == there
+    assert case_of(there) == case
+    assert bench.kept(Case(7, "thesis"), any_sources=True) is None
 
 
 def test_kinds() -> None:
