@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dearig.model.diagnosis.evidence import Judge
+from dearig.model.diagnosis.evidence import Judge, family_of
 from dearig.model.diagnosis.fits import Fit, Fitter
 from dearig.model.diagnosis.race import Candidate, race
 from dearig.model.diagnosis.regression import Regression, is_unseen
@@ -84,14 +84,13 @@ class Search:
             isinstance(r, ActuatorRecord) and r.drive.warmth is not None for r in fitter.full
         )
         # drift of one record is noise here; a thermometer's effect needs a thermometer
-        self.effects = [
+        known = [
             e
             for e in EFFECTS.values()
-            if drive in e.drives
-            and e.drift_basis is None
-            and (warm or e.name != "temperature")
-            and not e.is_general  # their weights are not raced yet
+            if drive in e.drives and e.drift_basis is None and (warm or e.name != "temperature")
         ]
+        self.effects = [e for e in known if not e.is_general]
+        self.general = [e for e in known if e.is_general]
 
     def watch(self) -> None:
         """End the search where it is asked to, or has taken the work that it may."""
@@ -274,6 +273,8 @@ class Search:
                 for name, some in starts.items()
             ],
         )
+        if fits and not self.judge.is_noise(fits[0]):
+            fits = self._with_general(parent, regression, extent, fits)
         if pairs and fits and not self.judge.is_noise(fits[0]):
             both = race(
                 self.fitter,
@@ -293,6 +294,23 @@ class Search:
             )
         )
         return fits
+
+    def _with_general(
+        self, parent: Fit, regression: Regression, extent: Extent, fits: list[Fit]
+    ) -> list[Fit]:
+        """Return ``fits``, and those of the general laws of their families.
+
+        The laws with a name have been fitted; where the best leaves more than noise, its family may
+        have another form.
+        """
+        families = {family_of(name) for fit in fits for name in fit.members - parent.members}
+        laws = [
+            e for e in self.general if e.family in families and e.name not in parent.effects
+        ]
+        starts = regression.starts(laws, extent)
+        candidates = [Candidate((name,), tuple(some), True) for name, some in starts.items()]
+        raced = race(self.fitter, self.judge, parent, regression.misfit, candidates)
+        return self.judge.ranked([*fits, *raced])
 
     def _regression(self, parent: Fit) -> tuple[Regression, Extent]:
         fitter, records = self.fitter, self.fitter.records

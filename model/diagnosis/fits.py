@@ -36,6 +36,7 @@ DRIFT = "drift"
 _GAIN = 0.5  # of chi-square: what is left to gain changes no choice, whose odds are 12
 _GAIN_PART = 1e-3  # of chi-square: the same, where more than twice the noise's power is left
 _POLISHED = 2.0  # mean square over noise: what leaves more only polishes a misfit
+_NO_WEIGHT = 1e-6  # of the typical one: what the bounds of a descent leave of a weight at 0
 _BASELINE_STARTS = 5  # of the global search
 _BASELINE_ITERATIONS = 20
 
@@ -79,8 +80,28 @@ class Fit:
 
     @property
     def free(self) -> int:
-        """Number of fitted parameters; the drift's variance is one."""
-        return int(np.count_nonzero(~self.fixed)) + bool(self.drift)
+        """Number of fitted parameters; the drift's variance is one.
+
+        Weights of a general law that end at nothing are none: the grid offers more than the law is
+        made of.
+        """
+        used = ~self.fixed & ~self._is_without_weight
+        return int(np.count_nonzero(used)) + bool(self.drift)
+
+    @property
+    def _is_without_weight(self) -> np.ndarray:
+        """Return which parameters (d,) are weights of a general law that end at nothing."""
+        layout = self.problem.layout
+        values = layout.values(self.x)
+        return np.array(
+            [
+                q.kind == "effect"
+                and EFFECTS[q.effect].is_general
+                and q.parameter.neutral is not None
+                and abs(value - q.parameter.neutral) < _NO_WEIGHT * q.parameter.typical
+                for q, value in zip(layout.quantities, values, strict=True)
+            ]
+        )
 
     @cached_property
     def correlation(self) -> float:
@@ -204,8 +225,18 @@ class Fitter:
         self.watched()
 
     def fixed(self, layout: Layout) -> np.ndarray:
-        """Return which parameters (d,) are held: the locking limits, unless the baseline asks."""
-        held = np.zeros(layout.size, dtype=bool)
+        """Return which parameters (d,) are held: the locking limits, unless the baseline asks.
+
+        And the grids of general laws: with weights between their nodes there is nothing to move.
+        """
+        held = np.array(
+            [
+                q.kind == "effect"
+                and EFFECTS[q.effect].is_general
+                and q.parameter.neutral is None
+                for q in layout.quantities
+            ]
+        )
         held[layout.column("J")] = True
         if self._limits.size:
             held[: self._limits.size] = self._limits

@@ -399,20 +399,21 @@ class Regression:
             some = sorted((row for row in tried if row is not None), key=lambda row: row[0])
             if some:
                 rows[effect.name] = _distinct(some, self.settings.starts)
-        self._best = {}
+        best: dict[str, list[_Row]] = {}
         least = min((some[0][0] for some in rows.values()), default=self.misfit)
         for name in sorted(rows, key=lambda n: rows[n][0][0]):
             some = rows[name]
             limit = contention(self.misfit, least, self.settings)
-            if some[0][0] < limit or len(self._best) < _SHARPENED_MIN:
+            if some[0][0] < limit or len(best) < _SHARPENED_MIN:
                 some = sorted(
                     (self._sharpened(row, extent) for row in some), key=lambda row: row[0]
                 )
                 least = min(least, some[0][0])
-            self._best[name] = some
+            best[name] = some
+        self._best |= best
         found = {
             name: [self._start([(c, a)], left) for left, a, c in some]
-            for name, some in self._best.items()
+            for name, some in best.items()
         }
         return found | {e.name: [self._unseen(e)] for e in effects if is_unseen(e)}
 
@@ -427,10 +428,12 @@ class Regression:
     def pairs(self, many: int) -> list[Start]:
         """Return the ``many`` best starts of two effects of different families, best first.
 
-        ``starts`` must have been called. Of two families together at most three pairs.
+        ``starts`` must have been called. Of two families together at most three pairs, and none of
+        general laws: two forms can be had in too many ways.
         """
         ranked = []
-        for m, n in combinations(self._best, 2):
+        named = [name for name in self._best if not EFFECTS[name].is_general]
+        for m, n in combinations(named, 2):
             if EFFECTS[m].family != EFFECTS[n].family:
                 (_, _, c), (_, _, d) = self._best[m][0], self._best[n][0]
                 a, left = self._solve([c, d])
