@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         ValidateOutcome,
     )
     from dearig.model.diagnosis.results import Candidate, Signature, Stage, Step
+    from dearig.model.effects import Curve
     from dearig.model.fitting import Estimate
 
 __all__ = ["diagnosis_json", "outcome_json"]
@@ -183,6 +184,8 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
                 "validation": _measures_json(stand.validation, outcome.kind),
                 "indistinguishable_from": list(step.indistinguishable_from),
                 "evidence": _evidence_json(step),
+                "nearest_named": step.nearest or None,
+                "curve": _curve_json(step.curve),
             }
             for step, stand in zip(finding.steps, outcome.stands[1:], strict=False)
         ],
@@ -314,6 +317,17 @@ def _effect_number_json(estimate: Estimate) -> dict[str, Any]:
         "ci95": [_number(estimate.low), _number(estimate.high)],
         "determined": bool(estimate.determined),
         "note": estimate.note,
+    }
+
+
+def _curve_json(curve: Curve | None) -> dict[str, Any] | None:
+    if curve is None:
+        return None
+    return {
+        "axis": [_number(v) for v in curve.axis.tolist()],
+        "values": [_number(v) for v in curve.values.tolist()],
+        "axis_label": curve.axis_label,
+        "values_label": curve.values_label,
     }
 
 

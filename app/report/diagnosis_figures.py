@@ -19,10 +19,12 @@ if TYPE_CHECKING:
 
     from dearig.analysis.outcomes import Comparison
     from dearig.model.diagnosis.results import Dependence, MissingStress, Signature
+    from dearig.model.effects import Curve
 
 __all__ = [
     "bars_figure",
     "before_after_figure",
+    "curve_figure",
     "dependence_figure",
     "missing_figures",
     "missing_time_figure",
@@ -218,6 +220,19 @@ def missing_figures(missing: MissingStress, kind: str) -> list[tuple[str, Figure
             _small_legend(ax, 4.0)
         drawn.append((name, figure))
     return drawn
+
+
+def curve_figure(curve: Curve) -> Figure:
+    """Draw the form that a general law has found."""
+    with base.style():
+        figure = base.blank(0.6 * base.WIDTH, 2.5)
+        ax = figure.subplots()
+        ax.plot(curve.axis, curve.values, color=AFTER, linewidth=1.4)
+        ax.axhline(0.0, color=base.UNSURE, linewidth=0.6, zorder=0.6)
+        ax.set_xlabel(_labelled(curve.axis_label, ""))
+        ax.set_ylabel(_labelled(curve.values_label, ""))
+        base.few_ticks(ax, x=5, y=6)
+    return figure
 
 
 def bars_figure(

@@ -64,6 +64,7 @@ class FoundEffect:
     title: str
     about: str
     evidence: tuple[str, ...]
+    curves: tuple[Picture, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,7 @@ def _page(outcome: DiagnoseOutcome, title: str, names: Iterator[str]) -> Diagnos
         errors=tuple(errors),
         bars=bars,
         step_table=step_table(outcome),
-        steps=_steps(outcome),
+        steps=_steps(outcome, names),
         effects=effect_table(outcome),
         unnamed=_unnamed(outcome),
         residuals=tuple(_residual(s, outcome, changed, names) for s in worst),
@@ -170,7 +171,7 @@ def _paired(
     return [(first[c.name], c) for c in after if c.name in first]
 
 
-def _steps(outcome: DiagnoseOutcome) -> tuple[FoundEffect, ...]:
+def _steps(outcome: DiagnoseOutcome, names: Iterator[str]) -> tuple[FoundEffect, ...]:
     from dearig.model.effects import EFFECTS
 
     found = []
@@ -180,11 +181,15 @@ def _steps(outcome: DiagnoseOutcome) -> tuple[FoundEffect, ...]:
         if step.indistinguishable_from:
             others = ", ".join(family_label(f) for f in step.indistinguishable_from)
             against = (f"Evidence against: {others} would explain these data equally well.",)
+        curves: tuple[Picture, ...] = ()
+        if (curve := step.curve) is not None:
+            curves = (picture(drawn.curve_figure(curve), names, "The form that was found."),)
         found.append(
             FoundEffect(
                 _capitalised(step_label(step)),
                 _capitalised(about),
                 (*(readable(_with_full_stop(_capitalised(w))) for w in step.evidence), *against),
+                curves,
             )
         )
     return tuple(found)

@@ -105,6 +105,24 @@ class _Conclusion:
                 taken[family] = (behind, other, fit)
         return [(other, fit) for _, other, fit in sorted(taken.values(), key=lambda t: t[0])]
 
+    def nearest(self, member: str) -> tuple[str, float] | None:
+        """Return the best law with a name in place of a general one, and its RMS over the noise."""
+        if member == DRIFT or not EFFECTS[member].is_general:
+            return None
+        others = self.found.best.members - {member}
+        family = EFFECTS[member].family
+        named = [
+            (fit.cost, name)
+            for members, fit in self.found.fits.items()
+            if others <= members and len(members - others) == 1
+            for name in members - others
+            if name != DRIFT and EFFECTS[name].family == family and not EFFECTS[name].is_general
+        ]
+        if not named:
+            return None
+        cost, name = min(named)
+        return name, math.sqrt(cost)
+
     def _form(self) -> float:
         """Return the difference of costs by which no two laws are told apart."""
         s = self.judge.settings
@@ -150,6 +168,12 @@ class _Conclusion:
                 f"without it the information criterion is worse by {worth:.0f}",
                 *(f"{_label(other)} explains these data as well" for other, _ in alike),
             ]
+            nearest = self.nearest(member)
+            if nearest is not None:
+                said.append(
+                    f"its form is that of no law with a name: {nearest[0]} comes nearest, and "
+                    f"leaves {nearest[1]:.3g} times the noise"
+                )
             stage = final
             if i < len(order) - 1:
                 stage = stage_of(
@@ -169,6 +193,7 @@ class _Conclusion:
                     families,
                     tuple(said),
                     (("criterion_without", worth),),
+                    nearest[0] if nearest else "",
                 )
             )
         return steps, rivals

@@ -304,9 +304,7 @@ class Search:
         have another form.
         """
         families = {family_of(name) for fit in fits for name in fit.members - parent.members}
-        laws = [
-            e for e in self.general if e.family in families and e.name not in parent.effects
-        ]
+        laws = [e for e in self.general if e.family in families and e.name not in parent.effects]
         starts = regression.starts(laws, extent)
         candidates = [Candidate((name,), tuple(some), True) for name, some in starts.items()]
         raced = race(self.fitter, self.judge, parent, regression.misfit, candidates)

@@ -231,9 +231,7 @@ class Fitter:
         """
         held = np.array(
             [
-                q.kind == "effect"
-                and EFFECTS[q.effect].is_general
-                and q.parameter.neutral is None
+                q.kind == "effect" and EFFECTS[q.effect].is_general and q.parameter.neutral is None
                 for q in layout.quantities
             ]
         )

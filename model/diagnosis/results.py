@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dearig.model.actuator import Actuator
+from dearig.model.effects import EFFECTS, Curve
 from dearig.model.film import Strip
 from dearig.model.fitting import Estimate
 
@@ -173,6 +174,7 @@ class Step:
     ``stage`` is the model with this and all earlier steps' effects. ``estimates`` are this
     effect's parameters with 95 % intervals in the final model. ``indistinguishable_from`` names
     the families that explain these data as well. ``evidence`` are sentences for and against.
+    ``nearest`` is the best law with a name where the effect is the general law of its family.
     """
 
     effect: str
@@ -183,6 +185,13 @@ class Step:
     indistinguishable_from: tuple[str, ...]
     evidence: tuple[str, ...]
     numbers: tuple[tuple[str, float], ...] = ()
+    nearest: str = ""
+
+    @property
+    def curve(self) -> Curve | None:
+        """Return the form that a general law has found; None for a law with a name."""
+        draw = EFFECTS[self.effect].curve
+        return draw({e.name: e.value for e in self.estimates}) if draw else None
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import pytest
 from dearig.cli.terminal import diagnosis_tables
 from dearig.model import verdict as verdicts
 from dearig.model.diagnosis.events import Event
+from dearig.model.fitting import Estimate
 from dearig.report.as_json import diagnosis_json
 from dearig.report.diagnosis import (
     HEADLINES,
@@ -352,7 +353,7 @@ class TestJson:
         for step in found["steps"]:
             assert step.keys() == {
                 "effect", "family", "acts_on", "parameters", "train", "selection", "validation",
-                "indistinguishable_from", "evidence",
+                "indistinguishable_from", "evidence", "nearest_named", "curve",
             }  # fmt: skip
             assert step["train"].keys() == measures
             assert step["selection"].keys() == plain
@@ -403,6 +404,38 @@ class TestJson:
             assert candidate["predicted_share"] == candidate["promised"]
             assert candidate["explained_share"] == candidate["gained"]
             assert candidate["criterion_behind_best"] == candidate["behind"]
+
+
+class TestGeneralLaw:
+    """A form without a name is told by its curve, and by the named law that is nearest."""
+
+    @staticmethod
+    def outcome():
+        weights = {f"error_{i}": 3e-6 * i for i in range(1, 9)} | {"travel": 4e-4}
+        step = replace(
+            finding().steps[0], effect="general sensor curve", family="sensor_nonlinearity",
+            estimates=tuple(Estimate(n, "m", v, v, v, True) for n, v in weights.items()),
+            nearest="sensor curvature",
+        )  # fmt: skip
+        return diagnose_outcome(finding=finding(steps=(step,)))
+
+    def test_in_json(self):
+        (step,) = diagnosis_json(self.outcome())["steps"]
+        assert step["nearest_named"] == "sensor curvature"
+        curve = step["curve"]
+        assert curve["values"][-1] == pytest.approx(3.0 * 36, rel=1e-6)
+        assert len(curve["axis"]) == len(curve["values"])
+        assert (curve["axis_label"], curve["values_label"]) == (
+            "position (mm)", "error of the reading (um)",
+        )  # fmt: skip
+        (named,) = diagnosis_json(diagnose_outcome())["steps"]
+        assert named["curve"] is named["nearest_named"] is None
+
+    def test_in_the_report(self, tmp_path):
+        page = write_diagnosis_report(self.outcome(), tmp_path / "r.html").read_text("utf-8")
+        assert "The form that was found." in page
+        plain = write_diagnosis_report(diagnose_outcome(), tmp_path / "p.html").read_text("utf-8")
+        assert "The form that was found." not in plain
 
 
 class TestFigures:

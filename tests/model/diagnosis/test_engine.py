@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from dearig.model.diagnosis import Diagnosis, diagnose
+from dearig.model.diagnosis import diagnose
 from dearig.model.diagnosis.settings import DiagnosisSettings
-from tests.tools.diagnoses import HIDDEN, plant
-from tests.tools.engine import PLAIN, STRIP, effect, film_record_of, record_of
-
-
-@functools.cache
-def of_hidden(name: str) -> Diagnosis:
-    return diagnose([record_of(plant(name))], PLAIN, workers=1)
+from dearig.model.effects import EFFECTS
+from tests.tools.diagnoses import HIDDEN, of_hidden, plant
+from tests.tools.engine import PLAIN, STRIP, effect, film_record_of, record_of, thesis_drive
 
 
 def test_a_hidden_effect_is_named_with_its_parameters() -> None:
@@ -47,6 +43,26 @@ def test_nothing_is_missing_where_nothing_is_hidden() -> None:
     assert found.verdict == "nothing_missing"
     assert found.steps == ()
     assert dict(found.families) == {"none": 1.0}
+
+
+def test_a_form_that_no_law_with_a_name_has_is_found_by_the_general_law() -> None:
+    # a reading that gains 24 um at two places of the travel
+    steps = {f"error_{i}": 24e-6 if i in (2, 5) else 0.0 for i in range(1, 9)}
+    hidden = effect("general sensor curve", **steps, travel=4e-4)
+    record = record_of(replace(PLAIN, effects=hidden), replace(thesis_drive(), hold=True))
+    found = diagnose([record], PLAIN, workers=1)
+    assert found.verdict == "explained"
+    (step,) = found.steps
+    assert (step.effect, step.family) == ("general sensor curve", "sensor_nonlinearity")
+    assert EFFECTS[step.nearest].family == "sensor_nonlinearity"
+    assert any(f"{step.nearest} comes nearest" in said for said in step.evidence)
+    (truth,) = (EFFECTS[name].curve(dict(values)) for name, values in hidden)
+    reached = truth.axis < 1e3 * record.displacement.max()
+    there = np.interp(truth.axis, step.curve.axis, step.curve.values)
+    # but for a slope, which is the film's as well
+    apart = np.polynomial.Polynomial.fit(truth.axis[reached], (there - truth.values)[reached], 1)
+    left = (there - truth.values)[reached] - apart(truth.axis[reached])
+    assert np.max(np.abs(left)) < 0.05 * np.ptp(truth.values)
 
 
 def test_a_film_driven_by_stretch_is_diagnosed_alike() -> None:
