@@ -43,9 +43,11 @@ if TYPE_CHECKING:
         ValidateOutcome,
     )
     from dearig.analysis.tracking import TrackOutcome
+    from dearig.batch.campaign import CampaignOutcome
 
 __all__ = [
     "branch_table",
+    "campaign_runs",
     "diagnosis_tables",
     "identify_table",
     "track_table",
@@ -99,6 +101,15 @@ def track_table(outcome: TrackOutcome) -> RenderableType:
     return _Fitted([*track_summary(outcome), runs_table(outcome)], track_warnings(outcome))
 
 
+def campaign_runs(outcome: CampaignOutcome) -> RenderableType:
+    """Return how a campaign stands as sentences, and its last and next runs."""
+    from dearig.report.campaign_page import campaign_summary, campaign_table
+
+    warnings = (outcome.queue.halted,) if outcome.queue.halted else ()
+    return _Fitted([*campaign_summary(outcome), campaign_table(outcome, _RUNS)], warnings)
+
+
+_RUNS = 40  # runs of a campaign that a terminal shows
 _RANKED = 6  # candidates of a round that a terminal shows
 
 

@@ -1,4 +1,4 @@
-"""Commands that help to set up: rig-file, sequence-file, target-file, presets, doctor, docs."""
+"""Commands that help to set up: files to begin with, presets, doctor, docs."""
 
 from __future__ import annotations
 
@@ -60,6 +60,24 @@ def target_file(
     print_line(
         console_for(),
         f"{out}: edit it, then run dearig track {out} --model MODEL.toml --out DIR",
+    )
+
+
+@commands.command("campaign-file", rich_help_panel=_PANEL)
+def campaign_file(
+    out: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.")],
+    force: Force = False,
+) -> None:
+    """Write a plan file of a campaign, with every key and its meaning."""
+    from dearig.config.campaignfile import EXAMPLE
+    from dearig.recording.files import replaced_when_done
+
+    check_files(force, (), out, json=None)
+    with replaced_when_done(out, overwrite=force) as partial:
+        partial.write_text(EXAMPLE, encoding="utf-8", newline="\n")
+    print_line(
+        console_for(),
+        f"{out}: edit it, then see with dearig campaign {out} --out DIR --check how long it takes",
     )
 
 

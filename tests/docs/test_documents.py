@@ -18,6 +18,7 @@ import pytest
 from typer.main import get_command
 
 from dearig.cli.main import app
+from dearig.config.campaignfile import parse_campaign
 from dearig.config.modelfile import load_model
 from dearig.config.rigfile import load_rig_file
 from dearig.config.segments import SEGMENT_KINDS
@@ -114,6 +115,8 @@ def accept_toml(text: str, folder: Path) -> None:
             SEGMENT_KINDS[table["kind"]].model_validate(table)
     elif "segment" in content:
         parse_sequence(text, "example", folder)
+    elif "sequence" in content:
+        parse_campaign(text, "example", folder)
     elif content.get("format", "").startswith("dearig-model/"):
         load_model(write(folder / "model.toml", text))
     elif not {"project", "tool"} & set(content):  # those are parts of a pyproject.toml

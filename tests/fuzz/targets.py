@@ -17,6 +17,8 @@ from nptdms import ChannelObject, TdmsWriter
 from openpyxl import Workbook
 from scipy.io import savemat
 
+from dearig.config.campaignfile import EXAMPLE as CAMPAIGN
+from dearig.config.campaignfile import load_campaign
 from dearig.config.modelfile import load_model
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import load_rig_file, write_default
@@ -169,6 +171,16 @@ def paths(folder: Path) -> list[bytes]:
     return [EXAMPLE.encode(), LOBE.replace("kV", "mm").encode()]
 
 
+def plans(folder: Path) -> list[bytes]:
+    listed = '[[run]]\nsequence = "rich"\nrepeat = 2\n[run.set]\ntail_s = 2.0\n'
+    return [CAMPAIGN.encode(), f'name = "a"\nsequence = "thesis"\n{listed}'.encode()]
+
+
+def read_plan(path: Path) -> None:
+    plan = load_campaign(path)
+    plan.load(plan.runs[-1])
+
+
 def rig_files(folder: Path) -> list[bytes]:
     write_default(folder / "rig.toml")
     return [(folder / "rig.toml").read_bytes(), b"[card]\nsample_rate_Hz = 200.0\n"]
@@ -184,6 +196,7 @@ def models(folder: Path) -> list[bytes]:
 TARGETS: dict[str, Target] = {
     "sequences": Target(".toml", sequences, mutated_text, load_sequence, 0.2),
     "paths": Target(".toml", paths, mutated_text, load_target, 0.01),
+    "plans": Target(".toml", plans, mutated_text, read_plan, 0.05),
     "rig files": Target(".toml", rig_files, mutated_text, load_rig_file, 0.12),
     "model files": Target(".toml", models, mutated_text, load_model, 0.2),
     "CSV": Target(".csv", exported("csv"), mutated_text, read_table, 0.2),

@@ -1,0 +1,1 @@
+"""Many runs, one after the other without a person beside them, and many fits."""

@@ -1,0 +1,38 @@
+"""Ask a running campaign to pause, go on, end, leave out a run or play one next."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from pathlib import Path
+
+from dearig.batch.journal import JOURNAL, REQUESTS, append_line, read_lines
+from dearig.batch.queue import WAITING, Queue
+from dearig.errors import InputError
+
+__all__ = ["ask"]
+
+
+def ask(folder: Path, wishes: Sequence[tuple[str, str]], by: str = "") -> None:
+    """Append ``wishes`` to the requests of the campaign in ``folder``.
+
+    Each is one of ``REQUEST_KINDS`` and the name of a run, "" where it needs none. Raises
+    ``InputError`` for a folder without a campaign, and for a run that does not wait.
+    """
+    queue = Queue.of(read_lines(folder / JOURNAL)) if folder.is_dir() else Queue()
+    if not queue.runs:
+        raise InputError(f"{folder} has no campaign: there is no journal {JOURNAL}")
+    for _, name in wishes:
+        if not name:
+            continue
+        run = queue.runs.get(name)
+        if run is None:
+            near = difflib.get_close_matches(name, queue.runs, n=1)
+            raise InputError(
+                f"{name} is not a run of the campaign in {folder}"
+                + (f"; did you mean {near[0]}?" if near else "")
+            )
+        if run.state != WAITING:
+            raise InputError(f"run {name} is {run.state}; only a run that waits can be moved")
+    for what, name in wishes:
+        append_line(folder / REQUESTS, {"event": what, "run": name, "by": by})

@@ -1,0 +1,540 @@
+"""Play the runs of a campaign one after the other, and continue it after any end.
+
+Each run goes through ``dearig.acquisition.run.record``, as a single run does: this module sets no
+voltage. Between two runs no rig is open. The journal is written before and after each step, so that
+a kill at any moment leaves a campaign that can be continued where it stood.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from dearig.acquisition.plan import plan
+from dearig.acquisition.rigs import is_simulated, kind_of
+from dearig.acquisition.run import RunObserver, RunOptions, record
+from dearig.batch.after import compute, left_band
+from dearig.batch.extremes import write_extremes
+from dearig.batch.forecast import Forecast, foresee
+from dearig.batch.journal import FORMAT, JOURNAL, REQUESTS, Journal, read_lines
+from dearig.batch.queue import DONE, LOST, REQUEST_KINDS, STOPPED, Queue, RunState
+from dearig.config.campaignfile import Campaign, PlannedRun, digest_of, settings_text
+from dearig.config.modelfile import load_actuator
+from dearig.config.rigfile import RigFile
+from dearig.config.sequencefile import LoadedSequence
+from dearig.errors import (
+    DearigError,
+    DiskFault,
+    InputError,
+    InstrumentFault,
+    Interrupted,
+    NotSafe,
+    SafetyStop,
+)
+from dearig.output_state import Known, OutputState
+from dearig.progress import Progress, quiet
+from dearig.recording.files import write_whole
+from dearig.recording.opening import read_from
+from dearig.recording.reader import open_recording
+from dearig.recording.recover import recover
+from dearig.recording.text import text_of
+
+__all__ = ["Arming", "CampaignOutcome", "play_campaign"]
+
+log = logging.getLogger(__name__)
+
+#: Time in s between two looks at the requests, while nothing is played.
+_POLL = 0.5
+
+
+@dataclass(frozen=True)
+class Arming:
+    """What a person has released: so many ``runs`` within so many ``hours``; None for no limit.
+
+    ``by`` names the person. ``acknowledged`` says what the person looked at after an interlock or
+    a doubt about 0 V, "" for nothing.
+    """
+
+    by: str = ""
+    runs: int | None = None
+    hours: float | None = None
+    acknowledged: str = ""
+
+
+@dataclass(frozen=True)
+class CampaignOutcome:
+    """State of a campaign at the end of a session.
+
+    ``status`` is complete, ended (on request), armed_runs or armed_time (what was armed is used
+    up), band (a number has left its band), halted (a person must look), refused (a run was not
+    admitted) or interrupted; ``reason`` is a sentence, "" for complete.
+    """
+
+    name: str
+    folder: Path
+    queue: Queue
+    status: str
+    reason: str
+
+
+def play_campaign(
+    campaign: Campaign,
+    address: str,
+    rig_file: RigFile,
+    folder: Path,
+    options: RunOptions,
+    arming: Arming,
+    *,
+    resume: bool = False,
+    observer: RunObserver | None = None,
+    ended: Callable[[CampaignOutcome], None] | None = None,
+    progress: Progress = quiet,
+    now: Callable[[], float] = time.time,
+    wait: Callable[[float], None] = time.sleep,
+) -> CampaignOutcome:
+    """Play the runs of ``campaign`` on the rig at ``address``; recordings go to ``folder``.
+
+    With ``resume`` the campaign in ``folder`` is continued. A rig that is not simulated needs an
+    ``arming`` with a number of runs, hours and a name, or what is left of an earlier one. ``now``
+    is Unix time in s, ``wait`` waits for so many s. A simulated rig that is not paced has no rests.
+    ``ended`` is called with the outcome before an error is raised.
+
+    Raises ``InputError`` before anything is played, and for a run that the gate refuses at its
+    turn; ``SafetyStop``, ``InstrumentFault`` or ``NotSafe`` where a run ended so that a person must
+    look; ``Interrupted`` where the operator ended it. The journal has it all.
+    """
+    kind_of(address)  # refuses what is no rig
+    if options.actuator is not None and address != "sim":
+        raise InputError(f"rig {address!r} has a film of its own; only sim takes a model")
+    _check_folder(folder, resume)
+    if not resume:
+        _check_arming(arming, address, left=False)
+    progress("planning", 0.0)
+    forecast = foresee(campaign, rig_file, folder, options.actuator, options.film_id, progress)
+    if not resume:
+        forecast.check_room(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder} cannot be created: {error.strerror or error}") from error
+    with Journal(folder, now) as journal:
+        session = _Session(
+            campaign, address, rig_file, folder, options, journal, observer, progress, now, wait
+        )
+        session.begin(forecast, arming)
+        stop: DearigError | None
+        try:
+            status, reason, stop = session.play()
+        except (KeyboardInterrupt, Interrupted):
+            left = len(session.queue.waiting) + (session.queue.running is not None)
+            stop = Interrupted(
+                f"interrupted between two runs, at 0 V; {left} runs are left: continue the "
+                f"campaign with --resume"
+            )
+            status, reason = "interrupted", str(stop)
+        session.note("session-ended", status=status, reason=reason)
+        outcome = CampaignOutcome(campaign.name, folder, session.queue, status, reason)
+        if ended is not None:
+            ended(outcome)
+        if stop is not None:
+            raise stop
+        return outcome
+
+
+def _check_folder(folder: Path, resume: bool) -> None:
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder} is a file; give a folder for the campaign")
+    entries = Queue.of(read_lines(folder / JOURNAL)) if folder.is_dir() else Queue()
+    if resume and not entries.runs:
+        raise InputError(f"{folder} has no campaign to continue; leave --resume out to begin one")
+    if entries.runs and not resume:
+        raise InputError(
+            f"{folder} has the campaign {entries.name!r} with {entries.count(DONE)} of "
+            f"{len(entries.runs)} runs done; continue it with --resume, or give another folder"
+        )
+    if (
+        not resume
+        and folder.is_dir()
+        and any(p.name not in (JOURNAL, REQUESTS) for p in folder.iterdir())
+    ):
+        raise InputError(f"{folder} is not empty; give another folder with --out")
+
+
+def _check_arming(arming: Arming, address: str, left: bool) -> None:
+    """Refuse a real rig that no person arms for so many runs and hours.
+
+    ``left``: there is an earlier arming, which may not be used up.
+    """
+    if is_simulated(address):
+        return
+    given = (arming.runs is not None, arming.hours is not None)
+    if (all(given) and arming.by) or (left and not any(given)):
+        return
+    raise InputError(
+        f"rig {address!r} carries high voltage while nobody may be beside it: say with --operator "
+        f"NAME, --runs N and --hours H who arms it, for how many runs, and for how long"
+    )
+
+
+class _Session:
+    """The runs that one process plays of a campaign."""
+
+    def __init__(
+        self,
+        campaign: Campaign,
+        address: str,
+        rig_file: RigFile,
+        folder: Path,
+        options: RunOptions,
+        journal: Journal,
+        observer: RunObserver | None,
+        progress: Progress,
+        now: Callable[[], float],
+        wait: Callable[[float], None],
+    ) -> None:
+        self._campaign, self._address, self._rig_file = campaign, address, rig_file
+        self._folder, self._options, self._journal = folder, options, journal
+        self._observer, self._progress, self._now, self._wait = observer, progress, now, wait
+        self._simulated = is_simulated(address)
+        self._planned = {run.name: run for run in campaign.runs}
+        self.queue = Queue.of(journal.entries)
+        # a session that continues another one does not know how long the film has rested
+        self._rested = not any(run.attempts for run in self.queue.runs.values())
+
+    def note(self, event: str, **facts: Any) -> None:
+        """Write an entry to the journal, and change the state as it says."""
+        self.queue.take(self._journal.append(event, **facts))
+
+    # ------------------------------------------------------------ begin
+
+    def begin(self, forecast: Forecast, arming: Arming) -> None:
+        """Check that the campaign is the one in the folder, settle open runs, and arm."""
+        queue = self.queue
+        if not queue.runs:
+            self.note("planned", **self._plan_entry(forecast))
+        else:
+            self._check_same(forecast)
+            seen = queue.halted
+            self._settle()
+            if queue.halted != seen:
+                # nobody has seen this one: what is acknowledged is something else
+                raise InputError(_halted(queue.halted))
+            if arming.acknowledged and not queue.halted:
+                raise InputError(
+                    f"there is nothing to acknowledge in {self._folder}: leave --acknowledge out"
+                )
+            if queue.halted:
+                if not arming.acknowledged:
+                    raise InputError(_halted(queue.halted))
+                if not arming.by:
+                    raise InputError("--acknowledge needs --operator, the name of who looked")
+            _check_arming(arming, self._address, left=queue.armed and not queue.halted)
+            if queue.halted:
+                self.note("acknowledged", by=arming.by, note=arming.acknowledged)
+        copy = self._folder / "plan.toml"
+        if not copy.exists():
+            write_whole(copy, self._campaign.toml.encode())
+        given = arming.runs is not None or arming.hours is not None or not queue.armed
+        if given or self._simulated:
+            hours = arming.hours
+            self.note(
+                "armed", by=arming.by, rig=self._address, runs=arming.runs,
+                until=None if hours is None else self._now() + 3600.0 * hours,
+            )  # fmt: skip
+        elif queue.status:
+            # what is left of the earlier arming
+            self.note(
+                "armed", by=arming.by, rig=self._address, runs=queue.armed_runs,
+                until=queue.armed_until,
+            )  # fmt: skip
+
+    def _plan_entry(self, forecast: Forecast) -> dict[str, Any]:
+        campaign = self._campaign
+        return {
+            "format": FORMAT,
+            "name": campaign.name,
+            "rig": self._address,
+            "plan_sha256": _digest(campaign.toml),
+            "rig_file_sha256": _digest(self._options.configuration),
+            "rest_s": campaign.rest,
+            "repeat_lost": campaign.repeat_lost,
+            "seconds": forecast.seconds,
+            "bytes": forecast.size,
+            "runs": [
+                {
+                    "name": run.name,
+                    "sequence_sha256": digest,
+                    "duration_s": duration,
+                    "settings": dict(run.settings),
+                    "warm_up": run.warm_up,
+                }
+                for run, digest, duration in zip(
+                    campaign.runs, forecast.digests, forecast.durations, strict=True
+                )
+            ],
+        }
+
+    def _check_same(self, forecast: Forecast) -> None:
+        """Refuse to continue a campaign with another plan, rig or sequence than it began with."""
+        queue, campaign = self.queue, self._campaign
+        changed = ""
+        if queue.plan != _digest(campaign.toml):
+            changed = f"the plan has changed since (it began with {self._folder / 'plan.toml'})"
+        elif queue.rig != self._address:
+            changed = f"it began on the rig {queue.rig}, not on {self._address}"
+        elif queue.rig_file != _digest(self._options.configuration):
+            changed = "the rig file has changed since"
+        else:
+            for run, digest in zip(campaign.runs, forecast.digests, strict=True):
+                known = queue.runs.get(run.name)
+                if known is None or known.digest != digest:
+                    changed = f"the sequence of run {run.name} has changed since"
+                    break
+        if changed:
+            raise InputError(
+                f"the campaign in {self._folder} cannot be continued: {changed}; continue it with "
+                f"what it began with, or begin another one in another folder"
+            )
+
+    def _settle(self) -> None:
+        """Settle what a kill cut off: a run is done, lost, or was not started."""
+        for done in self.queue.runs.values():
+            if done.state == DONE and done.extremes:
+                (self._folder / done.recording).unlink(missing_ok=True)
+        run = self.queue.running
+        if run is None:
+            return
+        if run.recorded:
+            self._finish(run)
+            return
+        path = self._folder / run.recording
+        if not path.exists():
+            # the file is made before the output is armed
+            if not self._simulated:
+                self._halt(f"the program ended while run {run.name} was about to start")
+            self.note("not-started", run=run.name, reason="the program ended before the run")
+            return
+        whole, confirmed = _ended_well(path)
+        if not self._simulated and not confirmed:
+            self._halt(
+                f"the program ended during run {run.name}, and whether the output is at 0 V is not "
+                f"known: look at the amplifier"
+            )
+        if whole:
+            self.note("recorded", run=run.name, recording=run.recording, output="settled later")
+            self._finish(run)
+            return
+        with contextlib.suppress(InputError):  # killed before its first sample
+            recover(path)
+        self._end(run, LOST, "the program was killed during the run")
+
+    # ------------------------------------------------------------ play
+
+    def play(self) -> tuple[str, str, DearigError | None]:
+        """Play until the end; return status, reason, and an error that the end is."""
+        while True:
+            self._take_requests()
+            queue = self.queue
+            if queue.halted:
+                return "halted", queue.halted, SafetyStop(queue.halted)
+            if not queue.waiting:
+                return "complete", "", None
+            if queue.ending:
+                return "ended", f"ended on request; {len(queue.waiting)} runs are left", None
+            run = queue.waiting[0]
+            if queue.armed_runs is not None and queue.armed_runs <= 0:
+                return "armed_runs", self._left("the armed number of runs was played"), None
+            until = queue.armed_until
+            if until is not None and self._now() + run.duration > until:
+                return "armed_time", self._left("the armed time does not last for a run"), None
+            if queue.paused:
+                self._progress("paused", self._part())
+                self._wait(_POLL)
+                continue
+            if not self._rested:
+                self._rest()
+                continue
+            ended = self._play_run(run)
+            if ended is not None:
+                return ended
+
+    def _left(self, why: str) -> str:
+        return f"{why}; {len(self.queue.waiting)} runs are left: arm them with --resume"
+
+    def _part(self) -> float:
+        return 1.0 - len(self.queue.waiting) / max(len(self.queue.runs), 1)
+
+    def _rest(self) -> None:
+        """Rest at 0 V, and take requests meanwhile."""
+        self._rested = True
+        if self._simulated and not self._options.paced:
+            return
+        end = self._now() + self._campaign.rest
+        while (left := end - self._now()) > 0.0 and not self.queue.ending:
+            self._progress("resting", self._part())
+            self._wait(min(left, _POLL))
+            self._take_requests()
+
+    def _take_requests(self) -> None:
+        entries = read_lines(self._folder / REQUESTS, tolerant=True)
+        for number, entry in enumerate(entries, start=1):
+            if number > self.queue.requests and entry["event"] in REQUEST_KINDS:
+                self.note(
+                    "request", number=number, what=entry["event"], run=str(entry.get("run", "")),
+                    by=str(entry.get("by", "")),
+                )  # fmt: skip
+
+    def _play_run(self, state: RunState) -> tuple[str, str, DearigError | None] | None:
+        """Play one run; return how the session ends by it, None if it goes on."""
+        run = self._planned[state.name]
+        attempt = state.attempts + 1
+        name = f"{run.name}.h5" if attempt == 1 else f"{run.name}-attempt-{attempt}.h5"
+        path = self._folder / name
+        try:
+            loaded = self._admit(run, path)
+        except InputError as error:
+            return "refused", f"run {run.name}: {error}", InputError(f"run {run.name}: {error}")
+        self.note("started", run=run.name, attempt=attempt, recording=name)
+        try:
+            result = record(
+                loaded, self._address, self._rig_file, path, self._run_options(run),
+                observer=self._observer, progress=self._progress,
+            )  # fmt: skip
+        except DearigError as error:
+            return self._failed(state, path, error)
+        finally:
+            self._rested = False
+        recording = result.path.name if result.path.parent == path.parent else str(result.path)
+        # a halt is written before what it is about, so that no kill comes between them
+        if not result.output_state.confirmed:
+            self._halt(f"after run {run.name}: {result.output_state.sentence}")
+        self.note(
+            "recorded", run=run.name, recording=recording, samples=result.samples,
+            **_output(result.output_state),
+        )  # fmt: skip
+        self._finish(state)
+        return None
+
+    def _admit(self, run: PlannedRun, path: Path) -> LoadedSequence:
+        """Return the sequence of ``run``, which the gate admits with the film's present model."""
+        if path.exists():
+            raise InputError(f"{path} exists already, and the campaign did not make it")
+        loaded = self._campaign.load(run)
+        if digest_of(loaded) != self.queue.runs[run.name].digest:
+            raise InputError("its sequence has changed since the campaign was planned")
+        if self.queue.model:
+            fitted = load_actuator(self._folder / self.queue.model)
+            planned = plan(loaded, self._rig_file, fitted, self._options.film_id)
+            try:
+                planned.admitted()
+            except InputError as error:
+                raise InputError(
+                    f"with the film's present model ({self.queue.model}), {error}; leave the run "
+                    f"out with dearig campaign-queue {self._folder} --skip {run.name}"
+                ) from error
+        return loaded
+
+    def _run_options(self, run: PlannedRun) -> RunOptions:
+        about = f"campaign {self._campaign.name!r}, run {run.name}"
+        if run.settings:
+            about += f": {settings_text(run.settings)}"
+        notes = f"{self._options.notes}; {about}" if self._options.notes else about
+        position = [r.name for r in self._campaign.runs].index(run.name)
+        # the noise of two runs is independent, and that of a run the same after a crash
+        return replace(self._options, notes=notes[:1000], seed=self._options.seed + position)
+
+    def _failed(
+        self, state: RunState, path: Path, error: DearigError
+    ) -> tuple[str, str, DearigError | None] | None:
+        """Note a run that ended early; return how the session ends by it, None if it goes on."""
+        if isinstance(error, InputError) and not path.exists():
+            self.note("not-started", run=state.name, reason=str(error))
+            reason = f"run {state.name}: {error}"
+            return "refused", reason, InputError(reason)
+        output = error.output_state
+        doubt = output is None or not output.confirmed
+        looks = isinstance(error, SafetyStop | InstrumentFault | NotSafe) or doubt
+        if looks:
+            self._halt(f"run {state.name}: {error}")
+        if not path.exists():
+            self.note("not-started", run=state.name, reason=str(error))
+        else:
+            self._end(state, STOPPED if isinstance(error, SafetyStop) else LOST, str(error))
+        if looks:
+            return "halted", self.queue.halted, error
+        if isinstance(error, DiskFault):
+            return None
+        status = "interrupted" if isinstance(error, Interrupted) else "refused"
+        return status, str(error), error
+
+    def _halt(self, reason: str) -> None:
+        self.note("halted", reason=reason)
+
+    # ------------------------------------------------------------ after a run
+
+    def _finish(self, state: RunState) -> None:
+        """Compute what the plan asks for after a run, and note that the run is done."""
+        run = self._planned[state.name]
+        recording = self._folder / state.recording
+        if run.warm_up:
+            self._end(state, DONE, "")
+            return
+        found = compute(
+            self._campaign, recording, self._folder, self.queue.model, self._rig_file,
+            self._progress,
+        )  # fmt: skip
+        extremes = "" if self._campaign.is_kept(run) else self._reduce(state, recording)
+        band = left_band(self._campaign.stop_when, found.numbers)
+        if band:
+            self._halt(f"after run {run.name}: {band}")
+        self._end(state, DONE, "; ".join(found.problems), numbers=found.numbers, model=found.model)
+        if extremes:
+            recording.unlink(missing_ok=True)
+
+    def _reduce(self, state: RunState, recording: Path) -> str:
+        """Write the extremes of a recording that is not kept; return their file, "" for none."""
+        out = recording.with_suffix(".csv")
+        try:
+            write_extremes(recording, out)
+        except InputError as error:
+            log.warning("%s is kept whole: %s", recording, error)
+            return ""
+        self.note("reduced", run=state.name, extremes=out.name)
+        return out.name
+
+    def _end(self, state: RunState, how: str, reason: str, **facts: Any) -> None:
+        self.note(
+            "ended", run=state.name, state=how, reason=reason, recording=state.recording, **facts
+        )
+
+
+def _halted(reason: str) -> str:
+    return (
+        f"the campaign is halted: {reason}; look at the rig and the film, and then continue with "
+        f'--resume --operator NAME --acknowledge "what was seen"'
+    )
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _output(state: OutputState) -> dict[str, Any]:
+    return {"output": state.known.value, "monitor_V": state.monitor}
+
+
+def _ended_well(path: Path) -> tuple[bool, bool]:
+    """Return whether the recording is whole, and whether it says that 0 V was confirmed."""
+    try:
+        recording = open_recording(path)
+        output = read_from(path, lambda file: text_of(file["entry"].attrs.get("output_state", "")))
+    except InputError:
+        return False, False
+    whole = recording.complete and recording.outcome == "finished"
+    return whole, output == Known.CONFIRMED.value

@@ -1,0 +1,96 @@
+"""What a campaign will take: each sequence checked by the gate, total time and disk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from dearig.acquisition.plan import plan
+from dearig.config.campaignfile import Campaign, digest_of
+from dearig.config.rigfile import RigFile
+from dearig.drivers.gate import Margin
+from dearig.errors import InputError
+from dearig.model.actuator import Actuator
+from dearig.progress import Progress, quiet
+from dearig.recording.disk_space import LEFT_FREE, estimate_bytes, free_bytes
+
+__all__ = ["Forecast", "foresee"]
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Sizes of a campaign before anything is played.
+
+    ``durations`` in s and ``digests`` are of the runs, in their order. ``seconds`` is the time of
+    all runs and rests, without computations between them; ``size`` the bytes of the recordings
+    that are kept, with one more that is not reduced yet; ``free`` the free bytes of the disk.
+    ``margins`` are the smallest distances to each limit of the gate.
+    """
+
+    durations: tuple[float, ...]
+    digests: tuple[str, ...]
+    seconds: float
+    size: int
+    free: int
+    margins: tuple[Margin, ...]
+
+    def check_room(self, folder: Path) -> None:
+        """Raise ``InputError`` where the recordings do not fit on the disk of ``folder``."""
+        if self.size + LEFT_FREE > self.free:
+            raise InputError(
+                f"the campaign needs {self.size / 1e9:.3g} GB and the disk of {folder} has "
+                f"{self.free / 1e9:.3g} GB free, of which {LEFT_FREE / 1e9:.2g} GB must stay free: "
+                f"free some space, or keep fewer recordings whole with [keep] every"
+            )
+
+
+def foresee(
+    campaign: Campaign,
+    rig_file: RigFile,
+    folder: Path,
+    model: Actuator | None = None,
+    film: str = "",
+    progress: Progress = quiet,
+) -> Forecast:
+    """Return what ``campaign`` takes with this rig file.
+
+    Each different sequence is checked by the gate once, as a run does it; ``model`` and ``film`` as
+    of a run. Raises ``InputError`` for the first run that is refused.
+    """
+    rate, channels = float(rig_file.card.sample_rate_Hz), len(rig_file.terminals())
+    known: dict[str, tuple[float, int]] = {}
+    margins: dict[str, Margin] = {}
+    durations, digests = [], []
+    size = largest = 0
+    for i, run in enumerate(campaign.runs):
+        progress("planning", i / len(campaign.runs))
+        loaded = campaign.load(run)
+        digest = digest_of(loaded)
+        if digest not in known:
+            planned = plan(loaded, rig_file, model, film)
+            try:
+                waveform = planned.admitted()
+            except InputError as error:
+                raise InputError(f"run {run.name}: {error}") from error
+            known[digest] = (planned.duration, planned.samples)
+            for margin in waveform.margins:
+                before = margins.get(margin.quantity)
+                if before is None or _part(margin) > _part(before):
+                    margins[margin.quantity] = margin
+        duration, samples = known[digest]
+        durations.append(duration)
+        digests.append(digest)
+        needs = estimate_bytes(channels, rate, samples)
+        largest = max(largest, needs)
+        size += needs if campaign.is_kept(run) else 0
+    size += largest if campaign.keep_every > 1 else 0
+    rests = campaign.rest * (len(campaign.runs) - 1)
+    there = next(p for p in (folder, *folder.absolute().parents) if p.is_dir())
+    return Forecast(
+        tuple(durations), tuple(digests), sum(durations) + rests, size, free_bytes(there / "x"),
+        tuple(margins.values()),
+    )  # fmt: skip
+
+
+def _part(margin: Margin) -> float:
+    return margin.reached / margin.allowed if margin.allowed else 0.0

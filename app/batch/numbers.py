@@ -1,0 +1,81 @@
+"""Numbers that a fit, a validation or a diagnosis gives, by names that end in their units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome, ValidateOutcome
+from dearig.units import SHOWN, parameter_unit
+
+__all__ = ["errors_of", "numbers_of", "parameters_of"]
+
+
+def parameters_of(outcome: IdentifyOutcome | DiagnoseOutcome) -> list[dict[str, Any]]:
+    """Return name, value, interval and whether the data determine it, for each parameter.
+
+    Names end in the unit of the value: ``mu_0_kPa``. The parameters of an effect begin with its
+    name. Bounds that are not known are None.
+    """
+    estimates: Iterable[tuple[str, Any]]
+    if isinstance(outcome, IdentifyOutcome):
+        estimates = [("", e) for e in outcome.fit.estimates]
+    else:
+        estimates = [
+            (f"{step.effect}.", e) for step in outcome.finding.steps for e in step.estimates
+        ]
+    found = []
+    for before, estimate in estimates:
+        factor, unit = parameter_unit(estimate.unit)
+        name = estimate.name.replace(": ", ".").replace(" ", "_")
+        if "." not in name:
+            name = before.replace(" ", "_") + name
+        ending = unit.replace("/", "_per_").replace("²", "2").replace("³", "3").replace(" ", "_")
+        found.append(
+            {
+                "name": f"{name}_{ending}" if ending else name,
+                "value": _finite(estimate.value * factor),
+                "low95": _finite(estimate.low * factor) if estimate.low != 0.0 else None,
+                "high95": _finite(estimate.high * factor),
+                "determined": bool(estimate.determined),
+            }
+        )
+    return found
+
+
+def errors_of(comparison: Comparison) -> dict[str, float]:
+    """Return the errors of a model on a recording, in µm or kPa and in percent."""
+    shown, errors = SHOWN[comparison.kind], comparison.errors
+    found = {
+        f"rms_{shown.suffix}": errors.rms * shown.error_factor,
+        "nrmse_pct": errors.nrmse_pct,
+        f"max_{shown.suffix}": errors.max * shown.error_factor,
+    }
+    return {name: float(value) for name, value in found.items() if math.isfinite(value)}
+
+
+def numbers_of(
+    outcome: IdentifyOutcome | ValidateOutcome | DiagnoseOutcome,
+) -> dict[str, float]:
+    """Return the numbers of an outcome; of a fit the parameters that the data determine."""
+    if isinstance(outcome, ValidateOutcome):
+        return dict(_named("validation", outcome.comparisons))
+    what = "fit" if isinstance(outcome, IdentifyOutcome) else "diagnosis"
+    train = outcome.train if isinstance(outcome, IdentifyOutcome) else outcome.after.train
+    parameters = {
+        p["name"]: p["value"]
+        for p in parameters_of(outcome)
+        if p["determined"] and p["value"] is not None
+    }
+    return {**parameters, **dict(_named(what, train))}
+
+
+def _named(what: str, comparisons: Iterable[Comparison]) -> Iterator[tuple[str, float]]:
+    for comparison in comparisons:
+        for name, value in errors_of(comparison).items():
+            yield f"{what}_{name}", value
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

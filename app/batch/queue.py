@@ -1,0 +1,202 @@
+"""State of a campaign: what its journal says of every run, and what is played next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from dearig.batch.journal import FORMAT
+from dearig.errors import InputError
+
+__all__ = ["LOST", "PLAYED", "REQUEST_KINDS", "Queue", "RunState"]
+
+#: States of a run whose voltage was played, or may have been.
+DONE, LOST, STOPPED = "done", "lost", "stopped"
+PLAYED = (DONE, LOST, STOPPED)
+WAITING, RUNNING, SKIPPED = "waiting", "running", "skipped"
+
+#: What another program may ask of a campaign: pause and continue it, end it after the present run,
+#: leave a run out, and play a run next.
+REQUEST_KINDS = ("pause", "continue", "end", "skip", "first")
+
+
+@dataclass
+class RunState:
+    """What is known of one run.
+
+    ``state`` is waiting, running, done, lost (without a whole recording), stopped (by an
+    interlock) or skipped. ``recording`` is the last file, relative to the campaign's folder.
+    ``attempts`` counts the recordings. ``recorded`` is True while the computation after the run is
+    not done.
+    """
+
+    name: str
+    digest: str = ""
+    duration: float = 0.0
+    settings: dict[str, Any] = field(default_factory=dict)
+    warm_up: bool = False
+    state: str = WAITING
+    attempts: int = 0
+    recorded: bool = False
+    recording: str = ""
+    reason: str = ""
+    numbers: dict[str, float] = field(default_factory=dict)
+    model: str = ""
+    extremes: str = ""
+
+
+@dataclass
+class Queue:
+    """State of a campaign, made by ``take`` from the entries of its journal in their order.
+
+    ``order`` has the names of all runs as they are played. ``halted`` says why a person must look
+    before anything is played, "" if nothing is in the way. ``status`` is how the last session
+    ended, "" while one goes on. ``armed_until`` is Unix time in s, None for no limit, and
+    ``armed_runs`` how many runs may still be started, None for no limit.
+    """
+
+    repeat_lost: int = 0
+    name: str = ""
+    rig: str = ""
+    plan: str = ""
+    rig_file: str = ""
+    rest: float = 0.0
+    runs: dict[str, RunState] = field(default_factory=dict)
+    order: list[str] = field(default_factory=list)
+    halted: str = ""
+    paused: bool = False
+    ending: bool = False
+    requests: int = 0
+    armed: bool = False
+    armed_until: float | None = None
+    armed_runs: int | None = None
+    status: str = ""
+    reason: str = ""
+    started: str = ""
+
+    @classmethod
+    def of(cls, entries: Iterable[Mapping[str, Any]]) -> Queue:
+        """Return the state that the ``entries`` of a journal lead to."""
+        queue = cls()
+        for i, entry in enumerate(entries):
+            try:
+                queue.take(entry)
+            except (KeyError, TypeError, AttributeError, ValueError) as error:
+                raise InputError(
+                    f"entry {i + 1} of the journal is not complete: the file was changed by hand"
+                ) from error
+        return queue
+
+    def take(self, entry: Mapping[str, Any]) -> None:
+        """Change the state as ``entry`` says."""
+        match entry["event"]:
+            case "planned":
+                self._plan(entry)
+            case "armed":
+                self.armed, self.status, self.reason = True, "", ""
+                self.ending = False
+                self.armed_until, self.armed_runs = entry["until"], entry["runs"]
+            case "request":
+                self._request(entry)
+            case "started":
+                run = self.runs[entry["run"]]
+                run.state, run.recording, run.reason = RUNNING, entry["recording"], ""
+                run.attempts = int(entry["attempt"])
+                if self.armed_runs is not None:
+                    self.armed_runs -= 1
+            case "not-started":
+                run = self.runs[entry["run"]]
+                run.state, run.recording, run.reason = WAITING, "", entry["reason"]
+                run.attempts -= 1
+                if self.armed_runs is not None:
+                    self.armed_runs += 1
+            case "recorded":
+                run = self.runs[entry["run"]]
+                run.recorded, run.recording = True, entry["recording"]
+            case "reduced":
+                self.runs[entry["run"]].extremes = entry["extremes"]
+            case "ended":
+                self._end(entry)
+            case "halted":
+                self.halted = str(entry["reason"])
+            case "acknowledged":
+                self.halted = ""
+            case "session-ended":
+                self.status, self.reason = str(entry["status"]), str(entry["reason"])
+
+    def _plan(self, entry: Mapping[str, Any]) -> None:
+        if entry["format"] != FORMAT:
+            raise InputError(
+                f"the journal has the format {entry['format']}, and this version reads {FORMAT}"
+            )
+        self.name, self.rig, self.plan = entry["name"], entry["rig"], entry["plan_sha256"]
+        self.rig_file = entry["rig_file_sha256"]
+        self.repeat_lost, self.rest = int(entry["repeat_lost"]), float(entry["rest_s"])
+        self.started = entry["at"]
+        for run in entry["runs"]:
+            self.runs[run["name"]] = RunState(
+                run["name"], run["sequence_sha256"], float(run["duration_s"]),
+                dict(run["settings"]), bool(run["warm_up"]),
+            )  # fmt: skip
+        self.order = list(self.runs)
+
+    def _request(self, entry: Mapping[str, Any]) -> None:
+        self.requests = int(entry["number"])
+        name = entry.get("run", "")
+        match entry["what"]:
+            case "pause":
+                self.paused = True
+            case "continue":
+                self.paused = False
+            case "end":
+                self.ending = True
+            case "skip" if name in self.runs and self.runs[name].state == WAITING:
+                self.runs[name].state = SKIPPED
+                self.runs[name].reason = "left out on request"
+            case "first" if name in self.runs and self.runs[name].state == WAITING:
+                self.order.remove(name)
+                at = next(
+                    (i for i, n in enumerate(self.order) if self.runs[n].state == WAITING),
+                    len(self.order),
+                )
+                self.order.insert(at, name)
+
+    def _end(self, entry: Mapping[str, Any]) -> None:
+        run = self.runs[entry["run"]]
+        run.state, run.reason, run.recorded = entry["state"], entry["reason"], False
+        run.recording = entry["recording"]
+        run.numbers = dict(entry.get("numbers") or {})
+        run.model = entry.get("model", "")
+        if run.state == LOST and run.attempts <= self.repeat_lost:
+            run.state = WAITING
+
+    @property
+    def listed(self) -> Sequence[RunState]:
+        """All runs in the order in which they are played."""
+        return [self.runs[name] for name in self.order]
+
+    @property
+    def waiting(self) -> Sequence[RunState]:
+        """Runs that are still to be played, in their order."""
+        return [run for run in self.listed if run.state == WAITING]
+
+    @property
+    def running(self) -> RunState | None:
+        """The run that was started and has no end in the journal."""
+        return next((run for run in self.runs.values() if run.state == RUNNING), None)
+
+    @property
+    def time_left(self) -> float:
+        """Time in s that the waiting runs take, with the rests between them."""
+        waiting = self.waiting
+        return sum(run.duration for run in waiting) + self.rest * max(len(waiting) - 1, 0)
+
+    def count(self, *states: str) -> int:
+        """Return the number of runs in one of ``states``."""
+        return sum(run.state in states for run in self.runs.values())
+
+    @property
+    def model(self) -> str:
+        """File of the last fitted model, relative to the folder, "" for none."""
+        return next((run.model for run in reversed(self.listed) if run.model), "")

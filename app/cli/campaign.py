@@ -1,0 +1,216 @@
+"""Commands for many runs without a person beside them: campaign, campaign-queue."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dearig.cli.options import Faults, FilmName, Force, Json, Notes, Rig, RigFileOption, Seed
+from dearig.cli.output import (
+    check_files,
+    console_for,
+    print_line,
+    print_lines,
+    working,
+    write_result,
+)
+from dearig.errors import InputError
+
+if TYPE_CHECKING:
+    from dearig.batch.campaign import CampaignOutcome
+
+__all__ = ["commands"]
+
+commands = typer.Typer()
+_PANEL = "Rig"
+
+CampaignFolder = Annotated[
+    Path, typer.Argument(metavar="DIR", help="Folder of a campaign.", show_default=False)
+]
+
+
+@commands.command(rich_help_panel=_PANEL)
+def campaign(
+    plan: Annotated[
+        Path,
+        typer.Argument(
+            metavar="PLAN.toml",
+            help="A plan file; dearig campaign-file writes one.",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for recordings and the journal.")
+    ],
+    rig: Rig = "sim",
+    rig_file: RigFileOption = None,
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check", help="Only check every run, and say how long they take; play nothing."
+        ),
+    ] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue the campaign in DIR where it stands.")
+    ] = False,
+    runs: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=1_000_000,
+            help="Number of runs that are armed; needed on a rig that is not simulated.",
+            show_default="all",
+        ),
+    ] = None,
+    hours: Annotated[
+        float | None,
+        typer.Option(
+            min=0.001,
+            max=8760.0,
+            help="Time from now on within which runs are armed; needed on a rig that is not "
+            "simulated.",
+            show_default="no limit",
+        ),
+    ] = None,
+    operator: Annotated[
+        str, typer.Option(help="Name of the person who arms the rig, kept in recordings.")
+    ] = "",
+    acknowledge: Annotated[
+        str,
+        typer.Option(
+            metavar="TEXT",
+            help="What was seen at the rig after the campaign was halted; needs --operator.",
+        ),
+    ] = "",
+    model: Annotated[
+        Path | None,
+        typer.Option(metavar="MODEL.toml", help="Simulate this model in place of the thesis's."),
+    ] = None,
+    fsync: Annotated[
+        bool,
+        typer.Option(
+            "--fsync", help="Write every block through to the disk, so it survives a power cut."
+        ),
+    ] = False,
+    paced: Annotated[
+        bool,
+        typer.Option("--paced", help="Simulate in real time.", show_default="as fast as possible"),
+    ] = False,
+    fault: Faults = None,
+    seed: Seed = 0,
+    film: FilmName = "",
+    notes: Notes = "",
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Play many runs, one after the other, and continue after any end.
+
+    Every run passes the gate at its turn and is recorded as by `dearig record`. An interlock, a
+    fault of an instrument or a doubt about 0 V halts the campaign until a person acknowledges it.
+    Ctrl-C ramps the voltage down to 0 V and ends the campaign; --resume continues it.
+    """  # fmt: skip
+    from dearig.acquisition.run import RunOptions
+    from dearig.analysis.compatibility import of_rig
+    from dearig.batch.campaign import Arming, play_campaign
+    from dearig.batch.forecast import foresee
+    from dearig.cli.terminal import campaign_runs
+    from dearig.config.campaignfile import load_campaign
+    from dearig.config.modelfile import load_actuator
+    from dearig.config.rigfile import load_rig_file
+    from dearig.config.toml_input import read_text
+    from dearig.report.campaign_page import (
+        campaign_json,
+        forecast_json,
+        forecast_sentences,
+        write_campaign_report,
+    )
+    from dearig.sim_backend.faults import FaultPlan
+
+    check_files(force, (plan, rig_file, model), json=json)
+    loaded, settings = load_campaign(plan), load_rig_file(rig_file)
+    text = "" if rig_file is None else read_text(rig_file, "rig file")
+    actuator = None
+    if model is not None:
+        actuator = load_actuator(model)
+        settings = of_rig(settings, actuator.film, actuator.load)
+    if check:
+        with working(json) as (console, progress):
+            found = foresee(loaded, settings, out, actuator, film, progress)
+        found.check_room(out)
+        print_lines(console, forecast_sentences(loaded, found))
+        write_result(forecast_json(loaded, found), json)
+        return
+    try:
+        faults = FaultPlan.parse(fault or ())
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    options = RunOptions(
+        text, operator, film, notes, fsync=fsync, seed=seed, paced=paced, actuator=actuator,
+        faults=faults,
+    )  # fmt: skip
+    with working(json) as (console, progress):
+
+        def finish(outcome: CampaignOutcome) -> None:
+            """Write and show what was done."""
+            report = write_campaign_report(outcome, out / "report.html")
+            console.print(campaign_runs(outcome))
+            print_line(console, f"Report: {report}")
+            write_result(campaign_json(outcome), json)
+
+        play_campaign(
+            loaded, rig, settings, out, options, Arming(operator, runs, hours, acknowledge),
+            resume=resume, ended=finish, progress=progress,
+        )  # fmt: skip
+
+
+@commands.command("campaign-queue", rich_help_panel=_PANEL)
+def campaign_queue(
+    folder: CampaignFolder,
+    pause: Annotated[bool, typer.Option("--pause", help="Start no run until --continue.")] = False,
+    proceed: Annotated[bool, typer.Option("--continue", help="Go on after --pause.")] = False,
+    end: Annotated[
+        bool, typer.Option("--end", help="End the campaign after the present run.")
+    ] = False,
+    skip: Annotated[
+        list[str] | None,
+        typer.Option(metavar="RUN", help="Leave out this waiting run. Can be repeated."),
+    ] = None,
+    first: Annotated[
+        list[str] | None,
+        typer.Option(metavar="RUN", help="Play this waiting run next. Can be repeated."),
+    ] = None,
+    operator: Annotated[str, typer.Option(help="Name of the person who asks.")] = "",
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Show the runs of a campaign, or change the order of those that wait.
+
+    The running campaign reads what is asked between two runs; it never starts a run by itself that
+    was not armed. A run that goes on is ended with ctrl-C where the campaign runs.
+    """
+    from dearig.batch.ask import ask
+    from dearig.batch.watching import seen
+    from dearig.cli.terminal import campaign_runs
+    from dearig.report.campaign_page import campaign_json
+
+    check_files(force, (), json=json)
+    if pause and proceed:
+        raise InputError("--pause and --continue exclude each other; give one of them")
+    wishes = [
+        *([("pause", "")] if pause else []), *([("continue", "")] if proceed else []),
+        *(("skip", name) for name in skip or ()),
+        # the last one that is put first is played first
+        *(("first", name) for name in reversed(first or [])),
+        *([("end", "")] if end else []),
+    ]  # fmt: skip
+    console = console_for(json)
+    if wishes:
+        ask(folder, wishes, operator)
+        what = ", ".join(f"{kind} {name}".strip() for kind, name in wishes)
+        print_line(console, f"{folder}: asked to {what}; it takes effect between two runs")
+    outcome = seen(folder)
+    if not wishes:
+        console.print(campaign_runs(outcome))
+    write_result(campaign_json(outcome), json)

@@ -1,0 +1,241 @@
+"""A campaign as a table of runs, as JSON for programs, and as an HTML page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dearig.batch.campaign import CampaignOutcome
+from dearig.batch.forecast import Forecast
+from dearig.batch.queue import DONE, LOST, PLAYED, RUNNING, SKIPPED, STOPPED, WAITING, Queue
+from dearig.config.campaignfile import Campaign, settings_text
+from dearig.report.html import picture, prefixes, write_page
+from dearig.report.numbers import NO_VALUE, seconds, significant
+from dearig.report.tables import Row, Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from dearig.batch.queue import RunState
+
+__all__ = [
+    "campaign_json",
+    "campaign_summary",
+    "campaign_table",
+    "forecast_json",
+    "forecast_sentences",
+    "write_campaign_report",
+]
+
+#: Numbers of a run in the table, at most; all are in the JSON.
+_NUMBERS = 4
+#: Numbers that the page draws, at most.
+_DRAWN = 8
+_SHOWN_FIRST = ("mu_0_kPa", "fit_rms_um", "validation_rms_um", "diagnosis_rms_um")
+
+
+def campaign_json(outcome: CampaignOutcome) -> dict[str, Any]:
+    """Return ``outcome`` for ``--json``."""
+    queue = outcome.queue
+    return {
+        "format": "dearig-campaign/1",
+        "name": outcome.name,
+        "folder": str(outcome.folder),
+        "status": outcome.status,
+        "reason": outcome.reason,
+        "planned": len(queue.runs),
+        "done": queue.count(DONE),
+        "failed": queue.count(LOST, STOPPED),
+        "waiting": queue.count(WAITING, RUNNING),
+        "skipped": queue.count(SKIPPED),
+        "needs_acknowledgement": queue.halted or None,
+        "runs": [
+            {
+                "name": run.name,
+                "state": run.state,
+                "recording": _recording(outcome.folder, run) or None,
+                "extremes": str(outcome.folder / run.extremes) if run.extremes else None,
+                "settings": run.settings,
+                "warm_up": run.warm_up,
+                "attempts": run.attempts,
+                "reason": run.reason,
+                "model": str(outcome.folder / run.model) if run.model else None,
+                "numbers": run.numbers,
+            }
+            for run in queue.listed
+        ],
+    }
+
+
+def _recording(folder: Path, run: RunState) -> str:
+    """Return the recording of a run, "" where there is none or where it was reduced."""
+    played = run.state in (*PLAYED, RUNNING) and not run.extremes
+    return str(folder / run.recording) if run.recording and played else ""
+
+
+def forecast_json(campaign: Campaign, forecast: Forecast) -> dict[str, Any]:
+    """Return what a campaign will take for ``--json``."""
+    return {
+        "format": "dearig-campaign-check/1",
+        "name": campaign.name,
+        "planned": len(campaign.runs),
+        "seconds": forecast.seconds,
+        "bytes": forecast.size,
+        "free_bytes": forecast.free,
+        "runs": [
+            {
+                "name": run.name,
+                "sequence": run.sequence,
+                "duration_s": duration,
+                "settings": dict(run.settings),
+                "warm_up": run.warm_up,
+                "kept": campaign.is_kept(run),
+            }
+            for run, duration in zip(campaign.runs, forecast.durations, strict=True)
+        ],
+    }
+
+
+def forecast_sentences(campaign: Campaign, forecast: Forecast) -> Iterator[str]:
+    """Yield sentences on runs, time, disk and margins of a campaign that was not begun."""
+    warm = sum(run.warm_up for run in campaign.runs)
+    extra = f", of which {warm} to warm up" if warm else ""
+    yield (
+        f"{campaign.name}: {len(campaign.runs)} runs{extra}, {duration_text(forecast.seconds)} "
+        f"without computations, {forecast.size / 1e6:.3g} MB of {forecast.free / 1e9:.3g} GB free"
+    )
+    for margin in forecast.margins:
+        yield (
+            f"  {margin.quantity}: {margin.reached:.4g} of {margin.allowed:.4g} {margin.unit} at "
+            f"most"
+        )
+
+
+def duration_text(duration: float) -> str:
+    """Return a duration in s as text: 26 s, 14 min, 3 h 20 min, 4 days 3 h."""
+    minutes = round(duration / 60.0)
+    if duration < 600.0:
+        return seconds(duration)
+    if minutes < 60:
+        return f"{minutes} min"
+    hours, minutes = divmod(minutes, 60)
+    if hours < 48:
+        return f"{hours} h {minutes} min"
+    return f"{hours // 24} days {hours % 24} h"
+
+
+def campaign_summary(outcome: CampaignOutcome) -> tuple[str, ...]:
+    """Return sentences on how a campaign stands."""
+    queue = outcome.queue
+    counts = {
+        "done": queue.count(DONE), "lost": queue.count(LOST),
+        "stopped by an interlock": queue.count(STOPPED), "left out": queue.count(SKIPPED),
+        "left": queue.count(WAITING, RUNNING),
+    }  # fmt: skip
+    counted = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
+    found = [f"{len(queue.runs)} runs: {counted}."]
+    if queue.count(WAITING, RUNNING):
+        found.append(f"What is left takes {duration_text(queue.time_left)}.")
+    if outcome.reason:
+        found.append(f"{outcome.reason[0].upper()}{outcome.reason[1:]}.")
+    return tuple(found)
+
+
+def numbers_shown(queue: Queue, most: int) -> list[str]:
+    """Return the names of at most ``most`` numbers, those of the first interest first."""
+    known = dict.fromkeys(name for run in queue.listed for name in run.numbers)
+    first = [name for name in _SHOWN_FIRST if name in known]
+    return [*first, *(name for name in known if name not in first)][:most]
+
+
+def campaign_table(outcome: CampaignOutcome, most: int | None = None) -> Table:
+    """Return the runs as a table; of more than ``most`` the last that were played and the next."""
+    queue = outcome.queue
+    names = numbers_shown(queue, _NUMBERS)
+    runs = list(queue.listed)
+    left_out = 0
+    if most is not None and len(runs) > most:
+        played = sum(run.state != WAITING for run in runs)
+        start = min(max(played - most * 3 // 4, 0), len(runs) - most)
+        left_out = len(runs) - most
+        runs = runs[start : start + most]
+    rows = [
+        Row(
+            (
+                run.name,
+                run.state,
+                run.extremes or (run.recording if _recording(outcome.folder, run) else NO_VALUE),
+                *(_shown(run, name) for name in names),
+            ),
+            detail=run.reason,
+            muted=run.state in (WAITING, SKIPPED),
+            mark=run.state in (LOST, STOPPED),
+        )
+        for run in runs
+    ]
+    head = (("", ""), ("State", ""), ("Recording", ""), *((name, "") for name in names))
+    note = f"{left_out} more runs are not listed." if left_out else ""
+    return Table("Runs", head, tuple(rows), note)
+
+
+def _shown(run: RunState, name: str) -> str:
+    value = run.numbers.get(name)
+    return NO_VALUE if value is None else significant(value, 4)
+
+
+def write_campaign_report(outcome: CampaignOutcome, path: str | Path) -> Path:
+    """Write the page of a campaign to the HTML file ``path``. Raises ``InputError``."""
+    return write_page(path, "campaign.html.j2", _contents(outcome))
+
+
+def _contents(outcome: CampaignOutcome) -> Callable[[], dict[str, Any]]:
+    def contents() -> dict[str, Any]:
+        queue = outcome.queue
+        names = numbers_shown(queue, _DRAWN)
+        figures = [numbers_figure(queue, names)] if names else []
+        settings = tuple(
+            f"{run.name}: {settings_text(run.settings)}" for run in queue.listed if run.settings
+        )
+        return {
+            "title": outcome.name,
+            "summary": campaign_summary(outcome),
+            "warnings": [queue.halted] if queue.halted else [],
+            "runs": campaign_table(outcome),
+            "pictures": [
+                picture(
+                    f, prefixes(), "Numbers of the runs, in the order in which they were played."
+                )
+                for f in figures
+            ],
+            "provenance": (
+                ("Folder", (str(outcome.folder),)),
+                ("Rig", (queue.rig,)),
+                ("Begun", (queue.started,)),
+                ("Settings", settings or ("none",)),
+            ),
+        }
+
+    return contents
+
+
+def numbers_figure(queue: Queue, names: Sequence[str]) -> Figure:
+    """Draw each number of the runs against the order of the runs, one below the other."""
+    from dearig.report.figure_style import WIDTH, blank, few_ticks, style
+
+    runs = [run for run in queue.listed if run.numbers]
+    with style():
+        figure = blank(WIDTH, 0.8 + 1.1 * len(names))
+        axes = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
+        for ax, name in zip(axes, names, strict=True):
+            places = [i + 1 for i, run in enumerate(runs) if name in run.numbers]
+            ax.plot(
+                places, [r.numbers[name] for r in runs if name in r.numbers], ".-", linewidth=0.8
+            )
+            ax.set_ylabel(name, fontsize="x-small")
+            few_ticks(ax, y=3)
+        axes[-1].set_xlabel("Run with numbers")
+        figure.align_ylabels(list(axes))
+    return figure
