@@ -1,7 +1,9 @@
 """Gate: every sample passes it before it reaches a rig's output.
 
-Drivers take only a ``GatedWaveform``, and only ``admit`` can make one. Ordinary code enforces the
-limits and raises errors. It never uses ``assert``, which an optimising interpreter removes.
+Drivers take only a ``GatedWaveform``. ``admit`` makes one of samples that are known before a run.
+``open_block_gate`` makes one that is corrected while it is played: its ``BlockGate`` admits block
+after block. Ordinary code enforces the limits and raises errors. It never uses ``assert``, which an
+optimising interpreter removes.
 """
 
 from __future__ import annotations
@@ -19,59 +21,38 @@ from typing import NoReturn, Protocol, final
 import numpy as np
 
 from dearig.drivers.errors import ChangedWaveform, RefusedWaveform, RigError
-from dearig.drivers.samples import Listed, Repeated, Samples
+from dearig.drivers.judgement import (
+    Limits,
+    Margin,
+    Reached,
+    end_reasons,
+    judged,
+    require_above_zero,
+    require_film,
+    require_finite,
+)
+from dearig.drivers.samples import Computed, Listed, Repeated, Samples
 
 __all__ = [
+    "BlockGate",
     "FilmPrediction",
     "GatedWaveform",
     "Limits",
     "Margin",
     "Prediction",
     "admit",
+    "open_block_gate",
     "ramp_down",
 ]
 
 _KEY = object()
 _BYTES = 8  # of one sample, a float64
+_ROUNDING = 1e-9  # of a change: that of a difference of two corrections
 # Samples that are computed, checked and hashed together: 0.5 MB, which stays in a processor's cache
 _PIECE = 2**16
 # Pieces that are kept: 64 MB. They hold every waveform of up to 8.4 million samples, and 8 s at
 # 1 MHz, which is longer than the card's output buffer: the interlocks read what was written before.
 _KEPT = 128
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Limits of the film and the amplifier, in SI units.
-
-    ``voltage_min`` and ``voltage_max`` in V bound the voltage at the film; their signs give the
-    allowed polarity. ``slew`` in V/s bounds its rate and ``field`` in V/m the true electric field.
-    ``energy`` in J bounds the energy that the amplifier charges into the film over all rises of a
-    run, and ``time_at_voltage`` in s the time at ``at_voltage`` V or more without a pause. ``film``
-    names the film of these limits; an empty name stands for any film.
-    """
-
-    voltage_min: float
-    voltage_max: float
-    slew: float
-    field: float
-    energy: float
-    at_voltage: float
-    time_at_voltage: float
-    film: str = ""
-
-    def within(self, other: Limits) -> bool:
-        """Return True where ``other`` admits every waveform that these limits admit."""
-        return (
-            self.voltage_max <= other.voltage_max
-            and self.voltage_min >= other.voltage_min
-            and self.slew <= other.slew
-            and self.field <= other.field
-            and self.energy <= other.energy
-            and self.at_voltage <= other.at_voltage
-            and self.time_at_voltage <= other.time_at_voltage
-            and (self.film == other.film or not other.film)
-        )
 
 
 class FilmPrediction(Protocol):
@@ -129,16 +110,6 @@ class Prediction:
         return Repeated(np.asarray(self.field_per_volt), self.stride, stop).window(start, stop)
 
 
-@dataclass(frozen=True)
-class Margin:
-    """Margin of a waveform to one limit: ``reached`` and ``allowed`` in ``unit``."""
-
-    quantity: str
-    reached: float
-    allowed: float
-    unit: str
-
-
 @final
 class GatedWaveform:
     """A voltage waveform that has passed the gate; it cannot be changed or copied.
@@ -146,6 +117,9 @@ class GatedWaveform:
     Its ``samples`` in V at the film are even at ``rate`` Hz, and start and end at 0 V. A long
     waveform is not held in memory: ``window`` computes samples again and gives them only where they
     are, bit for bit, those that passed the gate. Its methods may be called from any thread.
+
+    A waveform of a ``BlockGate`` grows while it is played: its first ``admitted`` samples have
+    passed, and a driver must not expect the others before they have.
     """
 
     __slots__ = ("_limits", "_margins", "_pieces", "_rate")
@@ -185,13 +159,23 @@ class GatedWaveform:
         """Return the number of samples."""
         return self._pieces.samples
 
+    @property
+    def admitted(self) -> int:
+        """Return the number of samples that have passed so far: all, unless it grows."""
+        return self._pieces.admitted
+
+    @property
+    def block(self) -> int:
+        """Return the samples that are admitted together while it grows, 0 where it does not."""
+        return self._pieces.length if self._pieces.grows else 0
+
     def window(self, start: int = 0, stop: int | None = None) -> np.ndarray:
         """Return the samples ``start`` to ``stop`` (n,) V, read-only; by default all of them.
 
-        ``start`` and ``stop`` are those of a slice. Raises ``ChangedWaveform`` where the samples,
-        computed again, are not those that passed the gate.
+        ``start`` and ``stop`` are those of a slice of the admitted samples. Raises
+        ``ChangedWaveform`` where the samples, computed again, are not those that passed the gate.
         """
-        start, stop, _ = slice(start, stop).indices(self.samples)
+        start, stop, _ = slice(start, stop).indices(self.admitted)
         if stop <= start:
             return np.empty(0)
         length = self._pieces.length
@@ -243,13 +227,14 @@ class _Pieces:
 
     The first reading hashes each piece. A piece that is read again is compared with its hash. The
     newest pieces are kept as bytes, which nobody can change; a waveform that is kept whole is never
-    read again.
+    read again. Pieces of a waveform that ``grows`` are taken in one by one, by ``grow``.
     """
 
-    def __init__(self, source: Samples, length: int) -> None:
+    def __init__(self, source: Samples, length: int, *, grows: bool = False) -> None:
         self._source: Samples | None = source
         self.samples = int(source.samples)
         self.length = length
+        self.grows = grows
         self._count = -(-self.samples // length)
         self._digests: list[bytes] = []
         self._kept: OrderedDict[int, bytes] = OrderedDict()
@@ -272,6 +257,21 @@ class _Pieces:
                     yield i * self.length, self._note(piece, digest)
         if self._count <= _KEPT:
             self._source = None
+
+    @property
+    def admitted(self) -> int:
+        """Return the number of samples in the pieces that were taken in."""
+        return min(len(self._digests) * self.length, self.samples)
+
+    def following(self) -> np.ndarray:
+        """Return the samples (n,) V of the piece that is next to be taken in."""
+        return np.frombuffer(self._read(len(self._digests))[0])
+
+    def grow(self, checked: np.ndarray) -> None:
+        """Take in the next piece, whose samples (n,) V were ``checked``."""
+        piece = checked.tobytes()
+        with self._lock:
+            self._note(piece, hashlib.sha256(piece).digest())
 
     def take(self, i: int) -> bytes:
         """Return piece ``i`` as it was read first. Raises ``ChangedWaveform`` where it is not."""
@@ -348,30 +348,45 @@ def admit(
     pieces = _Pieces(source, _PIECE)
     _require_comparable(pieces.samples, rate, limits, prediction)
     volume = float(prediction.electric_volume)
-    _require_above_zero("the film's permittivity times its volume", volume, "F m")
+    require_above_zero("the film's permittivity times its volume", volume, "F m")
 
-    reached = _Reached(rate, limits, volume)
+    reached = Reached(rate, limits, volume)
     with (
         np.errstate(over="ignore", invalid="ignore"),  # an overflow exceeds every limit
         closing(pieces.first_reading()) as reading,
     ):
         for start, voltage in reading:
-            _require_finite(voltage, start, rate)
-            reached.take_voltage(start, voltage)
-            field_per_volt = np.asarray(prediction.follow(start, voltage), dtype=np.float64)
-            _require_film(field_per_volt, voltage.size, start, rate)
-            reached.take_field(start, voltage, field_per_volt)
+            _follow(reached, prediction, start, voltage, rate)
             if progress is not None:
                 progress((start + voltage.size) / pieces.samples)
-    margins, reasons = _judged(reached, rate, limits)
+    margins, reasons = judged(reached, rate, limits)
+    reasons += end_reasons(reached)
+    reasons += _film_reasons(prediction, limits)
+    if reasons:
+        raise RefusedWaveform(tuple(reasons))
+    return GatedWaveform(pieces, rate, limits, margins, _KEY)
+
+
+def _follow(
+    reached: Reached, prediction: FilmPrediction, start: int, voltage: np.ndarray, rate: float
+) -> None:
+    """Include in ``reached`` the samples (n,) V from ``start`` on, and the film under them."""
+    require_finite(voltage, start, rate)
+    reached.take_voltage(start, voltage)
+    field_per_volt = np.asarray(prediction.follow(start, voltage), dtype=np.float64)
+    require_film(field_per_volt, voltage.size, start, rate)
+    reached.take_field(start, voltage, field_per_volt)
+
+
+def _film_reasons(prediction: FilmPrediction, limits: Limits) -> list[str]:
+    """Return a sentence for a predicted pull-in, and for limits of another film."""
+    reasons = []
     if prediction.pull_in:
         reasons.append(f"the model predicts {prediction.pull_in}")
     if limits.film and prediction.film != limits.film:
         asked = f"film {prediction.film!r}" if prediction.film else "a film without a name"
         reasons.append(f"the limits are declared for film {limits.film!r}, not for {asked}")
-    if reasons:
-        raise RefusedWaveform(tuple(reasons))
-    return GatedWaveform(pieces, rate, limits, margins, _KEY)
+    return reasons
 
 
 def _require_comparable(
@@ -391,129 +406,162 @@ def _require_comparable(
         )
 
 
-def _require_finite(values: np.ndarray, start: int, rate: float) -> None:
-    """Raise ``RefusedWaveform`` where one of ``values`` (n,) from ``start`` on is not finite."""
-    if np.isfinite(values.sum()):  # fast; a sum may overflow, so check each value then
-        return
-    at = int(np.argmin(np.isfinite(values)))
-    if not np.isfinite(values[at]):
-        at += start
-        raise RefusedWaveform((f"sample {at} (at {at / rate:.4g} s) is not a finite number",))
+@final
+class BlockGate:
+    """Gate of a waveform that is corrected while it is played; ``open_block_gate`` makes it.
 
+    A correction is a part of the feedforward's voltage: sample k of ``waveform`` is
+    ``feedforward[k] * (1 + c[k])`` and is computed here, from samples that have passed. Whoever
+    corrects gives one number for each block, the correction at its last sample. From the end of the
+    block before it changes linearly. Nothing else that it gives can reach an output.
 
-def _require_film(field_per_volt: np.ndarray, samples: int, start: int, rate: float) -> None:
-    """Raise ``RefusedWaveform`` where the predicted field per volt (n,) is not that of a film."""
-    if field_per_volt.shape != (samples,):
-        raise RefusedWaveform(
-            (f"{samples} samples from {start} on have {field_per_volt.shape} predictions",)
-        )
-    _require_finite(field_per_volt, start, rate)
-    _require_above_zero("one over the thickness", float(field_per_volt.min()), "1/m")
+    Every block is checked before it can be played: the correction against the ``authority`` and the
+    ``rate_limit`` in 1/s, and its samples, with all before them, against every limit of the gate.
+    After a refusal no further block is admitted.
+    """
 
+    def __init__(
+        self,
+        feedforward: GatedWaveform,
+        edge: GatedWaveform,
+        prediction: FilmPrediction,
+        block: int,
+        authority: float,
+        rate_limit: float,
+        key: object,
+    ) -> None:
+        if key is not _KEY:
+            raise TypeError("only drivers.gate.open_block_gate can make a BlockGate")
+        self._feedforward = feedforward
+        self._prediction = prediction
+        self._authority, self._rate_limit = authority, rate_limit
+        self._ends = [0.0]  # correction at the last sample of each block, one more than blocks
+        self._closed = False
+        rate, limits = feedforward.rate, feedforward.limits
+        self._reached = Reached(rate, limits, float(prediction.electric_volume))
+        self._margins = edge.margins
+        source = Computed(feedforward.samples, self._corrected)
+        self._pieces = _Pieces(source, block, grows=True)
+        self._waveform = GatedWaveform(self._pieces, rate, limits, edge.margins, _KEY)
 
-def _require_above_zero(quantity: str, value: float, unit: str) -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise RefusedWaveform((f"{quantity} is predicted as {value:.4g} {unit}, not above 0",))
+    @property
+    def waveform(self) -> GatedWaveform:
+        """Return the waveform that grows; its margins are those of the most that is allowed."""
+        return self._waveform
 
+    @property
+    def complete(self) -> bool:
+        """Return True once the last block is admitted."""
+        return self._pieces.admitted == self._pieces.samples
 
-class _Reached:
-    """Maximum of each quantity in the pieces so far, with its sample."""
+    @property
+    def correction(self) -> float:
+        """Return the correction at the last admitted sample."""
+        return self._ends[-1]
 
-    def __init__(self, rate: float, limits: Limits, electric_volume: float) -> None:
-        self._rate = rate
-        self._at_voltage = limits.at_voltage
-        self._electric_volume = electric_volume
-        self.high = self.low = self.slew = self.field = (-math.inf, 0)
-        self.energy = 0.0
-        self.longest = 0  # samples in a row at voltage
-        self.first = self.last = math.nan  # V, of the first and the last sample so far
-        self._standing = 0  # samples in a row at voltage at the end of the last piece
-        self._last = (0.0, 0.0)  # V and C, of the last sample whose field was taken
+    @property
+    def margins(self) -> tuple[Margin, ...]:
+        """Return the margins of the admitted samples to each limit."""
+        return self._margins
 
-    def take_voltage(self, start: int, voltage: np.ndarray) -> None:
-        """Include the samples (n,) V from ``start`` on, which continue those before."""
-        self.high = _higher(self.high, voltage, start)
-        self.low = _higher(self.low, -voltage, start)
-        steps = np.abs(np.diff(voltage))
-        if start:
-            step = np.array([abs(float(voltage[0]) - self.last)]) * self._rate
-            self.slew = _higher(self.slew, step, start - 1)
-        else:
-            self.first = float(voltage[0])
-        self.slew = _higher(self.slew, steps * self._rate, start)
-        self.last = float(voltage[-1])
-        self._take_standing(voltage)
+    def admit(self, correction: float) -> None:
+        """Admit the next block, at whose last sample the correction is ``correction``.
 
-    def take_field(self, start: int, voltage: np.ndarray, field_per_volt: np.ndarray) -> None:
-        """Include the field and the energy of the same samples."""
-        self.field = _higher(self.field, np.abs(voltage) * field_per_volt, start)
-        # in this order no overflow makes a NaN where the voltage is 0
-        charge = (self._electric_volume * field_per_volt) * (field_per_volt * voltage)
-        rises = 0.5 * (voltage[1:] + voltage[:-1]) * np.diff(charge)
-        before, held = self._last
-        # a waveform starts at 0 V and without charge, or it is refused
-        rise = 0.5 * (float(voltage[0]) + before) * (float(charge[0]) - held)
-        # a NaN propagates and is refused
-        self.energy += float(np.sum(np.maximum(rises, 0.0))) + float(np.maximum(rise, 0.0))
-        self._last = (float(voltage[-1]), float(charge[-1]))
+        Raises ``RefusedWaveform`` with a sentence for each broken limit. ``waveform`` then stays as
+        it is, and every later block is refused.
+        """
+        if self._closed:
+            raise RefusedWaveform(("a block was refused before: no further one is admitted",))
+        if self.complete:
+            raise RefusedWaveform(("every block of the waveform is admitted already",))
+        self._closed = True  # until it has passed
+        start = self._pieces.admitted
+        samples = min(self._pieces.length, self._pieces.samples - start)
+        self._check_correction(correction, start, samples)
+        self._ends.append(float(correction))
+        try:
+            self._check_and_grow(start, start + samples == self._pieces.samples)
+        except BaseException:
+            self._ends.pop()
+            raise
+        self._closed = False
 
-    def _take_standing(self, voltage: np.ndarray) -> None:
-        standing = ~(np.abs(voltage) < self._at_voltage)
-        if not standing.any():
-            self._standing = 0
-            return
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], standing, [False]))))
-        lengths = edges[1::2] - edges[::2]
-        if edges[0] == 0:
-            lengths[0] += self._standing
-        self.longest = int(np.max(lengths, initial=self.longest))
-        self._standing = int(lengths[-1]) if standing[-1] else 0
+    def _check_and_grow(self, start: int, last: bool) -> None:
+        """Check the samples of the next block, and let the waveform grow by them."""
+        rate, limits = self._waveform.rate, self._waveform.limits
+        with np.errstate(over="ignore", invalid="ignore"):
+            voltage = self._pieces.following()
+            _follow(self._reached, self._prediction, start, voltage, rate)
+        margins, reasons = judged(self._reached, rate, limits)
+        reasons += end_reasons(self._reached) if last else []
+        reasons += _film_reasons(self._prediction, limits)
+        if reasons:
+            raise RefusedWaveform(tuple(reasons))
+        self._pieces.grow(voltage)
+        self._margins = margins
 
-
-def _higher(peak: tuple[float, int], values: np.ndarray, first: int) -> tuple[float, int]:
-    """Return the greater of ``peak`` and the maximum of ``values`` (n,) from ``first`` on."""
-    if values.size == 0 or math.isnan(peak[0]):
-        return peak
-    value = float(values.max())  # NaN if there is one
-    return peak if peak[0] >= value else (value, first + int(np.argmax(values)))
-
-
-def _judged(reached: _Reached, rate: float, limits: Limits) -> tuple[tuple[Margin, ...], list[str]]:
-    """Return the margin to each limit, and a sentence for each limit that is broken."""
-    reasons: list[str] = []
-
-    def check(
-        quantity: str, peak: tuple[float, int], allowed: float, unit: str, scale: float
-    ) -> Margin:
-        value, at = peak
-        # not (<=), so that NaN is refused
-        if not value <= allowed:
-            where = f" at {at / rate:.4g} s" if at >= 0 else ""
-            reasons.append(
-                f"{quantity} reaches {value * scale:.6g} {unit}{where}, "
-                f"{allowed * scale:.6g} {unit} is allowed"
+    def _check_correction(self, correction: float, start: int, samples: int) -> None:
+        """Raise ``RefusedWaveform`` for a correction beyond its own limits."""
+        at = f"the correction from sample {start} on (at {start / self._waveform.rate:.4g} s)"
+        if not (isinstance(correction, int | float) and math.isfinite(correction)):
+            raise RefusedWaveform((f"{at} is {correction!r}, which is not a finite number",))
+        if not abs(correction) <= self._authority:
+            raise RefusedWaveform(
+                (f"{at} is {correction:.6g}, {self._authority:.6g} is allowed either way",)
             )
-        # + 0.0: show 0 instead of -0 for a waveform without negative voltage
-        return Margin(quantity, value * scale + 0.0, allowed * scale + 0.0, unit)
+        change = abs(correction - self._ends[-1])
+        seconds = samples / self._waveform.rate
+        if not change <= self._rate_limit * seconds * (1.0 + _ROUNDING):
+            raise RefusedWaveform(
+                (
+                    f"{at} changes by {change / seconds:.6g} 1/s, {self._rate_limit:.6g} 1/s is "
+                    f"allowed",
+                )
+            )
 
-    standing = reached.longest / rate
-    margins = (
-        check("voltage", reached.high, limits.voltage_max, "kV", 1e-3),
-        check("negative voltage", reached.low, 0.0 - limits.voltage_min, "kV", 1e-3),
-        check("slew", reached.slew, limits.slew, "kV/s", 1e-3),
-        check("true field", reached.field, limits.field, "MV/m", 1e-6),
-        check("energy", (reached.energy, -1), limits.energy, "J", 1.0),
-        check(
-            f"time at {limits.at_voltage * 1e-3:.4g} kV or more", (standing, -1),
-            limits.time_at_voltage, "s", 1.0,
-        ),
-    )  # fmt: skip
-    reasons.extend(
-        f"the waveform {end} at {value * 1e-3:.6g} kV, not at 0"
-        for end, value in (("starts", reached.first), ("ends", reached.last))
-        if value != 0.0
+    def _corrected(self, start: int, stop: int) -> np.ndarray:
+        """Return the corrected samples ``start`` to ``stop``, which are one block."""
+        i = start // self._pieces.length
+        before, end = self._ends[i : i + 2]
+        part = np.arange(1, stop - start + 1) / (stop - start)
+        return self._feedforward.window(start, stop) * (1.0 + before + (end - before) * part)
+
+
+def open_block_gate(
+    feedforward: GatedWaveform,
+    *,
+    block: int,
+    authority: float,
+    rate_limit: float,
+    edge: FilmPrediction,
+    prediction: FilmPrediction,
+    progress: Callable[[float], None] | None = None,
+) -> BlockGate:
+    """Return the gate for corrections of ``feedforward`` in blocks of ``block`` samples.
+
+    A correction is a part of the voltage, up to ``authority`` either way, and changes by at most
+    ``rate_limit`` in 1/s. The feedforward with the whole authority must pass the gate too, with the
+    prediction ``edge``; ``prediction`` is for the samples that are played. Raises
+    ``RefusedWaveform`` where it does not pass, and for values that are no limits.
+    """
+    if not block >= 1:
+        raise RefusedWaveform((f"a block has 1 sample or more, not {block}",))
+    if not 0.0 <= authority < 1.0:
+        raise RefusedWaveform((f"the authority {authority!r} is not from 0 to below 1",))
+    if not (math.isfinite(rate_limit) and rate_limit > 0.0):
+        raise RefusedWaveform((f"the rate limit {rate_limit!r} 1/s is not finite and above 0",))
+    if not prediction.fits(feedforward.samples):
+        raise RefusedWaveform(
+            (f"the prediction is not that of a waveform of {feedforward.samples} samples",)
+        )
+    if feedforward.admitted < feedforward.samples:
+        raise RefusedWaveform(("a waveform that still grows cannot be corrected",))
+    most = Computed(
+        feedforward.samples,
+        lambda start, stop: feedforward.window(start, stop) * (1.0 + authority),
     )
-    return margins, reasons
+    highest = admit(most, feedforward.rate, feedforward.limits, edge, progress)
+    return BlockGate(feedforward, highest, prediction, block, authority, rate_limit, _KEY)
 
 
 def ramp_down(waveform: GatedWaveform, last: int, duration: float) -> np.ndarray:

@@ -48,6 +48,9 @@ class Interlocks:
     one; without ``predicted`` it is off. Without ``planned`` every command counts as the planned
     one. Each interlock trips at most once.
 
+    A reading at the end of the laser's range is tolerated for ``laser_grace`` s; ``displacement``,
+    ``jump`` and ``following`` judge the last reading before it meanwhile.
+
     Raises ``ValueError`` for a prediction and a plan of different lengths.
     """
 
@@ -58,7 +61,10 @@ class Interlocks:
         rate: float,
         predicted: Samples | np.ndarray | None,
         planned: Samples | np.ndarray | None = None,
+        *,
+        laser_grace: float = 0.0,
     ) -> None:
+        self._bridges = laser_grace > 0.0
         self._predicted = None if predicted is None else as_samples(predicted)
         self._planned = None if planned is None else as_samples(planned)
         if (
@@ -98,6 +104,7 @@ class Interlocks:
         self._watched = 0  # samples
         self._last_command = self._zero
         self._last_readings = np.empty(0, dtype=np.int32)
+        self._last_seen: int | None = None  # newest reading within the laser's range
         self._lead_in_sum = self._lead_in_samples = 0  # readings of the lead-in
         self._rest: float | None = None  # m, the laser's reading at the loaded rest state
         self._rest_from = 0  # sample
@@ -109,7 +116,7 @@ class Interlocks:
                 ("monitor", locks.monitor_debounce_ms * 1e-3),
                 ("breakdown", locks.breakdown_debounce_ms * 1e-3),
                 ("current", locks.current_debounce_ms * 1e-3),
-                ("laser", locks.laser_debounce_ms * 1e-3),
+                ("laser", max(locks.laser_debounce_ms * 1e-3, laser_grace)),
                 ("displacement", locks.displacement_debounce_ms * 1e-3),
                 ("jump", 0.0),
                 ("following", locks.following_debounce_ms * 1e-3),
@@ -133,14 +140,15 @@ class Interlocks:
         current = block.counts[self._rows["current_monitor"]]
         reading = block.counts[self._rows["displacement"]]
         self._find_rest(command, reading)
+        seen = self._bridged(reading) if self._bridges else reading
         trips = [
             *self._watch_voltage(command, monitor, current),
             *self._watch_current(current),
             *self._watch_laser(reading),
             *self._watch_stuck(command, reading),
-            *self._watch_displacement(reading),
-            *self._watch_jump(reading),
-            *self._watch_following(command, reading),
+            *self._watch_displacement(seen),
+            *self._watch_jump(seen),
+            *self._watch_following(command, seen),
             *self._watch_declared(block.counts),
         ]
         self._last_command = int(command[-1])
@@ -188,6 +196,17 @@ class Interlocks:
             mean = self._lead_in_sum / samples if samples else float(reading[0])
             self._rest = _physical(self._laser, mean)
             self._rest_from = self._watched + quiet
+
+    def _bridged(self, reading: np.ndarray) -> np.ndarray:
+        """Return ``reading`` (n,) with the last one before it where the laser sees no target."""
+        low, high = self._laser_ends
+        sees = (reading > low) & (reading < high)
+        if self._last_seen is None:
+            self._last_seen = int(reading[np.argmax(sees)])
+        newest = np.maximum.accumulate(np.where(sees, np.arange(reading.size), -1))
+        bridged = np.where(newest >= 0, reading[newest], self._last_seen)
+        self._last_seen = int(bridged[-1])
+        return bridged
 
     def _watch_voltage(
         self, command: np.ndarray, monitor: np.ndarray, current: np.ndarray
@@ -344,6 +363,7 @@ class Interlocks:
         planned = predicted.size
         if self._planned is not None:
             volts = self._planned.window(self._watched, self._watched + planned)
+            planned = volts.size  # of a waveform that grows, only what was admitted is planned
             plan = self._command.counts(volts)
             other = np.abs(np.subtract(command[:planned], plan, dtype=np.int32)) > _PLAN_TOLERANCE
             planned = int(np.argmax(other)) if other.any() else planned

@@ -90,6 +90,10 @@ class Rig(Protocol):
     A rig may have a property ``zero_reading``: the ``ZeroReading`` of its last ``make_safe``, None
     where the monitor could not be read. Without it, the end of a run counts as confirmed only by
     the last samples.
+
+    A rig with the attribute ``plays_growing_waveforms = True`` also plays a waveform that grows: it
+    outputs only what is admitted, takes what was admitted since the last ``read`` with the next
+    one, and raises ``RigError`` where nothing is left to output. Without it no run is corrected.
     """
 
     @property

@@ -60,6 +60,8 @@ class _Run:
         self.replied: set[Fault] = set()  # late replies that are over
         self.silent_until = 0.0  # s on the rig's clock
         self.events: list[Event] = []
+        # samples of a waveform that grows are known block by block
+        self._chunk = command.block or CHUNK
         self._path = path
         self._state = state  # after the newest chunk
         self._before = state  # before the newest chunk
@@ -72,7 +74,7 @@ class _Run:
 
     def take(self, end: int) -> np.ndarray:
         """Return counts (channels, n) of the samples after the delivered ones, up to ``end``."""
-        while self._chunks * CHUNK < end:
+        while self._chunks * self._chunk < end:
             self._compute()
         samples = end - self.delivered
         counts, self._ready = self._ready[:, :samples], self._ready[:, samples:]
@@ -86,19 +88,19 @@ class _Run:
         that were computed ahead and are no longer valid. That chunk is computed again.
         """
         ramp = self.command.ramp_from(sample, seconds)
-        if self._chunks * CHUNK > sample:
+        if self._chunks * self._chunk > sample:
             self._chunks -= 1
             self._state = self._before
             self._ready = self._ready[:, :0]
             # the new computation also returns the undelivered samples of this chunk
-            self.events = [e for e in self.events if e.sample < self._chunks * CHUNK]
+            self.events = [e for e in self.events if e.sample < self._chunks * self._chunk]
         return ramp
 
     def _compute(self) -> None:
-        first = self._chunks * CHUNK
+        first = self._chunks * self._chunk
         self._before = self._state
         counts, events, self._state = self._path.advance(
-            self._chunks, self.command.window(first, first + CHUNK), self._before
+            self._chunks, self.command.window(first, first + self._chunk), self._before
         )
         counts = counts[:, max(0, self.delivered - first) :]
         self._ready = np.concatenate((self._ready, counts), axis=1) if self._ready.size else counts
@@ -111,9 +113,12 @@ class SimulatedRig:
 
     ``plant`` is the film at rest. Every run starts from it, as if the operator had let the film
     relax. Blocks hold ``block_samples`` samples, or a tenth of a second where that is None; the
-    data do not depend on their length. ``faults`` occur in every run. ``noise`` is the laser's kind
-    of noise, one of ``laser_noise.NOISES``. All methods are thread-safe.
+    data do not depend on their length. A waveform that grows is computed in its own blocks.
+    ``faults`` occur in every run. ``noise`` is the laser's kind of noise, one of
+    ``laser_noise.NOISES``. All methods are thread-safe.
     """
+
+    plays_growing_waveforms = True
 
     def __init__(
         self,
@@ -170,7 +175,7 @@ class SimulatedRig:
             run = self._run
             if self._state is not RigState.RUNNING or run is None:
                 return 0.0
-            at = min(self._ticks(run), run.total - 1)
+            at = max(0, min(self._ticks(run), run.command.available - 1))
             scaling = self._card.channels[0].scaling
             return float(scaling.physical(run.command.window(at, at + 1))[0])
 
@@ -214,6 +219,7 @@ class SimulatedRig:
                 rate,
                 self._faults,
                 self._noise,
+                waveform.block or CHUNK,
             )
             command = Command(waveform, self._card.channels[0].scaling)
             self._run = _Run(command, path, path.start(self._plant))
@@ -256,6 +262,7 @@ class SimulatedRig:
                 acquired = min(self._ticks(run), run.total)
                 try:
                     self._card.check_buffer(acquired - run.delivered)
+                    self._check_output(run, acquired)
                     self._card_fails(run)
                     silent = self._silent(run)
                     if acquired >= end and not silent:
@@ -283,7 +290,8 @@ class SimulatedRig:
                 return  # the waveform ended just before the call
             self._expect("stop", RigState.RUNNING)
             run = self._running()
-            played = self._ticks(run) + 1  # with the sample that is on the output now
+            # with the sample that is on the output now
+            played = min(self._ticks(run) + 1, run.command.available)
             if run.stopped or played >= run.total:
                 return
             volts, samples = run.ramp_from(played, self._settings.limits.ramp_down_s)
@@ -348,6 +356,12 @@ class SimulatedRig:
             if first < run.delivered < end:
                 return max(1, size // 2)
         return size
+
+    def _check_output(self, run: _Run, acquired: int) -> None:
+        """Raise ``RigError`` where the waveform has not grown as fast as it was played."""
+        if acquired > run.command.available:
+            _, words = _CARD_ERRORS[FaultKind.AO_UNDERFLOW]
+            raise RigError(f"card {self._settings.card.device}: {words}", OUTPUT_STARVED)
 
     def _card_fails(self, run: _Run) -> None:
         for fault in self._faults.of(*_CARD_ERRORS):

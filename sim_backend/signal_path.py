@@ -52,7 +52,10 @@ class PathState:
 
 
 class SignalPath:
-    """Signal path in one run at ``rate`` Hz with ``faults``; the state is passed in and out."""
+    """Signal path in one run at ``rate`` Hz with ``faults``; the state is passed in and out.
+
+    It is computed in chunks of ``chunk`` samples.
+    """
 
     def __init__(
         self,
@@ -63,7 +66,9 @@ class SignalPath:
         rate: float,
         faults: FaultPlan | None = None,
         noise: str = WHITE,
+        chunk: int = CHUNK,
     ) -> None:
+        self._chunk = chunk
         self._settings = settings
         self._rate = rate
         self._faults = faults or FaultPlan()
@@ -86,11 +91,11 @@ class SignalPath:
     def advance(
         self, chunk: int, command: np.ndarray, state: PathState
     ) -> tuple[np.ndarray, list[Event], PathState]:
-        """Play chunk number ``chunk``: ``command`` (n,) int16 counts, n up to ``CHUNK``.
+        """Play chunk number ``chunk``: ``command`` (n,) int16 counts, n up to a chunk.
 
         Returns counts (channels, n) int16, events, and the state after the chunk.
         """
-        first, samples, nodes = chunk * CHUNK, command.size, self._nodes
+        first, samples, nodes = chunk * self._chunk, command.size, self._nodes
         dead = self._active(first, samples, *_DEAD)
         rows, amplifier = self._amplify(command, dead, state)
         time = np.arange(first * nodes, (first + samples) * nodes + 1) * self._spacing
@@ -103,7 +108,7 @@ class SignalPath:
 
         monitors = self._settings.amplifier
         generator = self._streams.of_chunk("amplifier", self._run, chunk)
-        noise = generator.standard_normal((2, CHUNK))
+        noise = generator.standard_normal((2, self._chunk))
         noise = noise[:, :samples] * (monitors.monitor_noise_mV * 1e-3)
 
         at, into = self._converted("voltage_monitor", samples)
@@ -125,7 +130,7 @@ class SignalPath:
         )
         at, into = self._converted("displacement", samples)
         reading, laser = self._laser.read(
-            motion.displacement, motion.velocity, time[at] + into, chunk, CHUNK, state.laser
+            motion.displacement, motion.velocity, time[at] + into, chunk, self._chunk, state.laser
         )
         # the burst draws last from this generator, so that all other noise stays the same
         reading = self._disturb(reading, first, generator)
@@ -217,7 +222,7 @@ class SignalPath:
         lost = self._active(first, samples, FaultKind.SENSOR_OUT_OF_RANGE)
         if not (burst | lost).any():
             return reading
-        noise = generator.standard_normal(CHUNK)[:samples] * _BURST * 1e3 / laser.mm_per_V
+        noise = generator.standard_normal(self._chunk)[:samples] * _BURST * 1e3 / laser.mm_per_V
         rail = laser.analog_range_V
         volts = np.clip(reading.volts + np.where(burst, noise, 0.0), -rail, rail)
         return LaserRows(np.where(lost, rail, volts), reading.alarm | lost)
@@ -256,7 +261,7 @@ class SignalPath:
         self, thermometer: ThermometerSettings, heating: np.ndarray, chunk: int
     ) -> np.ndarray:
         generator = self._streams.of_chunk("thermometer", self._run, chunk)
-        noise = generator.standard_normal(CHUNK)[: heating.size] * thermometer.noise_mK * 1e-3
+        noise = generator.standard_normal(self._chunk)[: heating.size] * thermometer.noise_mK * 1e-3
         celsius = thermometer.room_celsius + heating + noise
         volts = (celsius - thermometer.celsius_at_0_V) / thermometer.celsius_per_V
         return self._card.convert("temperature", volts)
@@ -265,7 +270,7 @@ class SignalPath:
         """Return counts (channels, samples) of the channels that the rig file declares."""
         channels = self._settings.channel
         noise = self._streams.of_chunk("channels", self._run, chunk)
-        drawn = noise.standard_normal((len(channels), CHUNK))[:, :samples]
+        drawn = noise.standard_normal((len(channels), self._chunk))[:, :samples]
         return np.array(
             [
                 self._card.convert(c.name, c.volts(c.simulated_value + c.simulated_noise * row))

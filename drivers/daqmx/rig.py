@@ -57,6 +57,8 @@ class DaqmxRig:
     measures the time without samples.
     """
 
+    plays_growing_waveforms = True
+
     def __init__(
         self,
         address: Address,

@@ -178,11 +178,11 @@ class ClockedTasks:
 
     def refill(self, delivered: int) -> None:
         """Write further samples where there is room; at least ``delivered`` have been output."""
-        left = self._commanded().samples - self._written
-        if left == 0:
+        left = self._commanded().available - self._written
+        if left <= 0:
             return
         room = self._buffer - (self._written - max(delivered, self._first))
-        # wait for room for a large piece
+        # wait for room for a large piece; what became available while it is played goes out at once
         if room >= self._buffer // 4 or room >= left:
             self._write(room)
 
