@@ -17,7 +17,7 @@ from dearig.drivers.rig import Block
 from dearig.drivers.samples import Samples, as_samples
 from dearig.drivers.settings import Action, RigSettings
 
-__all__ = ["Interlocks", "Trip", "would_trip"]
+__all__ = ["Interlocks", "Trip", "laser_reach", "would_trip"]
 
 _JUMP_WITHIN = 2e-3  # s
 # s; at longer sample intervals the film's ordinary motion between samples looks like a jump
@@ -90,7 +90,7 @@ class Interlocks:
         # thresholds in counts, so that samples within bounds need no scaling
         limit = locks.current_max_mA * 1e-3
         self._current_ends = _sorted(self._current.counts(np.array([-limit, limit])))
-        reach = settings.laser.range_mm * 1e-3 * _RANGE_END
+        reach = laser_reach(settings)
         self._laser_ends = _sorted(self._laser.counts(np.array([-reach, reach])))
         self._zero = int(self._command.counts(np.zeros(1))[0])
         self._swing = round(locks.laser_stuck_swing_kV * 1e3 / _step(self._command))
@@ -422,6 +422,11 @@ class Interlocks:
         self._tripped.add(name)
         sample = self._watched + at
         return Trip(name, sample, action, f"at {sample / self._rate:.4g} s {words}")
+
+
+def laser_reach(settings: RigSettings) -> float:
+    """Return the reading in m, either way, from which the laser counts as without its target."""
+    return settings.laser.range_mm * 1e-3 * _RANGE_END
 
 
 def would_trip(

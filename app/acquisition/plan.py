@@ -11,7 +11,7 @@ from dearig.acquisition.prediction import PredictedFilm
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
 from dearig.drivers.errors import RefusedWaveform
-from dearig.drivers.gate import GatedWaveform, admit
+from dearig.drivers.gate import BlockGate, GatedWaveform, admit, open_block_gate
 from dearig.drivers.samples import Repeated, Samples
 from dearig.errors import InputError
 from dearig.model.actuator import Actuator
@@ -19,7 +19,7 @@ from dearig.model.errors import ModelError
 from dearig.model.material import TABLE_3
 from dearig.progress import Progress, quiet
 
-__all__ = ["Plan", "plan"]
+__all__ = ["Plan", "correctable", "plan"]
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def plan(
     waveform: GatedWaveform | None = None
     reasons: tuple[str, ...] = ()
     try:
-        actuator = model or Actuator(rig_file.as_film(), rig_file.as_load(), TABLE_3)
+        actuator = _planned_film(rig_file, model)
         response = PredictedFilm(actuator, voltage.samples, rate, limits, film, observe)
         waveform = admit(voltage, rate, limits, response, lambda part: progress("planning", part))
     except RefusedWaveform as error:
@@ -104,3 +104,47 @@ def plan(
         name, rate, voltage, response.stride, response.displacement, response.field, waveform,
         reasons,
     )  # fmt: skip
+
+
+def correctable(
+    planned: Plan,
+    rig_file: RigFile,
+    model: Actuator | None = None,
+    film: str = "",
+    *,
+    block: int,
+    authority: float,
+    rate_limit: float,
+    progress: Progress = quiet,
+) -> BlockGate:
+    """Return the gate through which ``planned`` is corrected while it is played.
+
+    ``block`` is the least number of samples that are corrected together, see ``open_block_gate``;
+    ``model`` and ``film`` are those of ``plan``. Raises ``InputError`` where the limits leave no
+    room for the ``authority``.
+    """
+    waveform = planned.admitted()
+    film = film or rig_file.film.name
+    actuator = _planned_film(rig_file, model)
+
+    def predicted() -> PredictedFilm:
+        return PredictedFilm(
+            actuator, waveform.samples, waveform.rate, waveform.limits, film, observe=None
+        )
+
+    try:
+        return open_block_gate(
+            waveform, block=-(-block // planned.stride) * planned.stride, authority=authority,
+            rate_limit=rate_limit, edge=predicted(), prediction=predicted(),
+            progress=lambda part: progress("planning", part),
+        )  # fmt: skip
+    except RefusedWaveform as error:
+        raise InputError(
+            f"{planned.name!r} cannot be corrected by {authority:.3g} of its voltage: "
+            f"{'; '.join(error.reasons)} (limits of the rig file): lower the authority or the "
+            f"voltage"
+        ) from error
+
+
+def _planned_film(rig_file: RigFile, model: Actuator | None) -> Actuator:
+    return model or Actuator(rig_file.as_film(), rig_file.as_load(), TABLE_3)

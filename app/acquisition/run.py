@@ -13,8 +13,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from dearig.acquisition import ending
 from dearig.acquisition.check import check_rig
 from dearig.acquisition.event_log import EventLog
+from dearig.acquisition.feedback import Feedback, FeedbackLoop, FeedbackReport
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.marks import RunMarks
 from dearig.acquisition.output import LastSamples, after_run, unknown
@@ -36,6 +38,7 @@ from dearig.errors import (
     SafetyStop,
 )
 from dearig.model.actuator import Actuator
+from dearig.model.control import HoldAnswer
 from dearig.model.errors import ModelError
 from dearig.output_state import Known, OutputState
 from dearig.progress import Progress, quiet
@@ -93,8 +96,8 @@ class RunResult:
     ``path`` is not the wanted one where another program has deleted, moved or replaced that file;
     the ``events`` say so.
 
-    ``margins`` are the distances of the plan from each limit of the gate, and ``output_state`` is
-    what was known of the rig's output after the run.
+    ``margins`` are the distances of the voltage from each limit of the gate, and ``output_state``
+    is what was known of the rig's output after the run. ``feedback`` is what a feedback did.
     """
 
     path: Path
@@ -104,6 +107,7 @@ class RunResult:
     events: tuple[str, ...]
     margins: tuple[Margin, ...]
     output_state: OutputState
+    feedback: FeedbackReport | None = None
 
 
 class RunObserver:
@@ -118,6 +122,9 @@ class RunObserver:
 
     def block(self, block: Block) -> None:
         """Receive the next samples, as they were recorded."""
+
+    def answered(self, time: float, answer: HoldAnswer) -> None:
+        """Receive the feedback's answer to the readings about ``time`` s of the run."""
 
     def event(self, event: Event) -> None:
         """Receive an event that is in the recording."""
@@ -189,12 +196,14 @@ def record(
     marks: RunMarks | None = None,
     progress: Progress = quiet,
     clock: Callable[[], float] = time.monotonic,
+    feedback: Feedback | None = None,
 ) -> RunResult:
     """Play ``loaded`` on the rig at ``address`` and record it to ``out``.
 
     ``overlay`` is a model that runs in step with the data and is recorded with them; ``observer``
     receives them. ``interrupts`` lets another thread end the run; by default ctrl-C does. ``marks``
-    lets other threads set marks and notes, which are recorded as events.
+    lets other threads set marks and notes, which are recorded as events. ``feedback`` corrects the
+    voltage while it is played, see ``dearig.acquisition.feedback``.
 
     Raises ``InputError`` before anything is changed. After the rig was made safe and the recording
     was closed, it raises ``SafetyStop`` where an interlock ended the run, ``InstrumentFault`` or
@@ -210,12 +219,22 @@ def record(
             f"sequence {planned.name!r} is not the one that was armed: its voltage has changed "
             f"since the plan was shown; look at the new plan, then arm it again"
         )
+    loop = None
+    if feedback is not None:
+        loop = FeedbackLoop(
+            feedback, planned, rig_file, options.actuator, options.film_id, progress
+        )
+        waveform = loop.gate.waveform
     rig = open_rig(address, rig_file, options)
     try:
+        if loop is not None and not getattr(rig, "plays_growing_waveforms", False):
+            raise InputError(f"rig {address!r}: its driver cannot correct a run while it goes on")
         with interrupts or Interrupts() as interrupts:
             try:
                 rate = rig.load(waveform)
                 identity = rig.identify()
+                if loop is not None:
+                    loop.begin(identity.channels)
             except RefusedWaveform as error:
                 raise InputError(f"the rig refuses the sequence: {error}") from error
             except RigError as error:
@@ -237,6 +256,7 @@ def record(
                 model_toml=overlay.toml if overlay is not None else "",
                 configuration=options.configuration,
                 seed=options.seed if is_simulated(address) else None,
+                provenance={} if loop is None else {"feedback": loop.toml()},
             )
             writer = RecordingWriter(
                 out, identity, rate, waveform.samples, metadata,
@@ -245,7 +265,12 @@ def record(
             observer = observer or RunObserver()
             observer.started(planned, identity, rate)
             interlocks = Interlocks(
-                rig_file, identity.channels, rate, planned.displacement_of_samples, waveform
+                rig_file if loop is None else loop.watched(),
+                identity.channels,
+                rate,
+                planned.displacement_of_samples,
+                waveform,
+                laser_grace=0.0 if feedback is None else feedback.laser_loss,
             )
             recorder = Recorder(
                 writer,
@@ -260,7 +285,7 @@ def record(
                 last = LastSamples(identity.channels, rig_file.limits.zero_tolerance_kV * 1e3)
                 run = _Run(
                     rig, recorder, interlocks, interrupts, marks or RunMarks(), observer,
-                    event_log, last, progress, clock,
+                    event_log, last, progress, clock, loop,
                 )  # fmt: skip
                 try:
                     events = run.follow(waveform.samples)
@@ -268,11 +293,12 @@ def record(
                     error.output_state = run.output_state
                     raise
         return RunResult(
-            recorder.path, recorder.samples, rate, "finished", events, waveform.margins,
-            run.output_state,
+            recorder.path, recorder.samples, rate, "finished", events,
+            waveform.margins if loop is None else loop.gate.margins, run.output_state,
+            None if loop is None else loop.report(),
         )  # fmt: skip
     finally:
-        _close(rig, sys.exc_info()[1])
+        ending.close(rig, sys.exc_info()[1])
 
 
 class _Run:
@@ -290,8 +316,10 @@ class _Run:
         last: LastSamples,
         progress: Progress,
         clock: Callable[[], float],
+        loop: FeedbackLoop | None,
     ) -> None:
         self._rig = rig
+        self._loop = loop
         self._recorder = recorder
         self._interlocks = interlocks
         self._interrupts = interrupts
@@ -302,6 +330,7 @@ class _Run:
         self.output_state = unknown()  # until it is at 0 V
         self._progress = progress
         self._clock = clock
+        self._unread = 0.0  # s of samples that wait for this program
         self._events: list[str] = []
         self._trip: Trip | None = None  # the first one; later ones follow from it
         self._waiting_since: float | None = None  # for the disk, at 0 V
@@ -326,6 +355,7 @@ class _Run:
                     self._bring_to_zero(played)
                 finally:
                     self._note_events(self._marks.close())
+                    self._report_feedback()
             if self._trip is not None:
                 kept = self._end(f"stopped by an interlock: {self._trip.message}")
                 raise SafetyStop(
@@ -386,6 +416,7 @@ class _Run:
                     return
                 if stopping:
                     continue
+                trip = trip or self._correct(block)
                 if (fault := recorder.fault) is not None:
                     what = fault if isinstance(fault, DearigError) else "an error of the program"
                     self._note(recorder.received, "fault", f"{what}: ramping down to 0 V")
@@ -403,7 +434,7 @@ class _Run:
             raise
         except BaseException:
             # the instruments work: after an error of the program the voltage is ramped down
-            _ramp_down(rig)
+            ending.ramp_down(rig)
             raise
 
     def _take(self, block: Block) -> None:
@@ -419,16 +450,37 @@ class _Run:
         self._tell_notices()
         free = self._recorder.free_bytes()
         trips = self._interlocks.watch(block)
-        late = self._interlocks.late(self._rig.waiting)
+        self._unread = self._rig.waiting
+        late = self._interlocks.late(self._unread)
         full = None if free is None else self._interlocks.disk(free)
         trips += [trip for trip in (late, full) if trip is not None]
         for trip in trips:
-            self._note(trip.sample, "fault", f"interlock {trip.interlock}: {trip.message}")
-            self._trip = self._trip or trip
+            self._note_trip(trip)
         if not trips:
             return None
         # the stronger action is taken
         return next((trip for trip in trips if trip.action == "at once"), trips[0])
+
+    def _correct(self, block: Block) -> Trip | None:
+        """Let the feedback answer ``block``; return a trip where the run must end."""
+        if self._loop is None:
+            return None
+        answers, events, trip = self._loop.take(block, self._unread)
+        for at, answer in answers:
+            self._observer.answered(at, answer)
+        self._note_events(events)
+        if trip is not None:
+            self._note_trip(trip)
+        return trip
+
+    def _report_feedback(self) -> None:
+        """Record what the feedback did, whatever ended the run."""
+        if self._loop is not None and self._recorder.received:
+            self._note(self._recorder.received - 1, "info", self._loop.report().sentence)
+
+    def _note_trip(self, trip: Trip) -> None:
+        self._note(trip.sample, "fault", f"interlock {trip.interlock}: {trip.message}")
+        self._trip = self._trip or trip
 
     def _note(self, sample: int, level: str, message: str) -> None:
         event = Event(sample, level, message)
@@ -489,7 +541,7 @@ class _Run:
         """
         rig, failure = self._rig, None
         try:
-            _make_safe(rig)
+            ending.make_safe(rig)
         except NotSafe as error:
             failure = error
             self._show_output(unknown(rig))
@@ -539,40 +591,5 @@ class _Run:
         self._observer.event(event)
 
 
-def _ramp_down(rig: Rig) -> None:
-    """Ramp down to 0 V in the set time; the samples read meanwhile are discarded."""
-    try:
-        rig.stop()
-        while rig.read() is not None:
-            pass
-    except RigError as error:
-        log.warning("the ramp down failed (%s); the output is taken to 0 V at once", error)
-
-
-def _make_safe(rig: Rig) -> None:
-    try:
-        rig.make_safe()
-    except RigError as error:
-        raise NotSafe(f"THE RIG COULD NOT BE MADE SAFE ({error}): {_NOT_CONFIRMED}") from error
-
-
-def _close(rig: Rig, ended_by: BaseException | None) -> None:
-    """Close the rig after a run that ended by an error, or by none."""
-    try:
-        rig.close()
-    except RigError as error:
-        if isinstance(ended_by, NotSafe):
-            log.warning("the rig could not be closed either: %s", error)
-            return
-        also = f"; {ended_by}" if isinstance(ended_by, DearigError) else ""
-        fault = NotSafe(f"THE RIG COULD NOT BE CLOSED ({error}): {_NOT_CONFIRMED}{also}")
-        fault.output_state = unknown(rig)
-        raise fault from error
-    if isinstance(ended_by, DearigError) and ended_by.output_state is None:
-        # the run ended before its first sample: opening and closing the rig has set 0 V
-        ended_by.output_state = after_run(rig)
-
-
-_NOT_CONFIRMED = "0 V IS NOT CONFIRMED, switch the amplifier's high voltage off by hand"
 _LEVELS = {Known.CONFIRMED: "info", Known.COMMANDED: "warning", Known.UNKNOWN: "fault"}
 _DONE = {"ramp": "the voltage was ramped down", "at once": "the output was taken at once"}

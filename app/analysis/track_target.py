@@ -15,6 +15,7 @@ __all__ = [
     "SAMPLES_MAX",
     "WITHIN",
     "check_feasible",
+    "lag_of",
     "limits_of",
     "missed_parts",
     "plan_target",
@@ -50,7 +51,7 @@ def task_of(target: LoadedTarget, rig_file: RigFile) -> TrackingTask:
     _, wanted, lead_in, tail = target.sample(rate)
     if wanted.size - lead_in - tail < 4:
         raise InputError(f"target {target.name!r} has fewer than 4 samples at {rate:g} Hz")
-    return TrackingTask(wanted, rate, limits_of(rig_file), lead_in, tail, _lag(rig_file))
+    return TrackingTask(wanted, rate, limits_of(rig_file), lead_in, tail, lag_of(rig_file))
 
 
 def plan_target(target: LoadedTarget, model: Actuator, rig_file: RigFile) -> Inversion:
@@ -87,7 +88,7 @@ def check_feasible(
         )
 
 
-def _lag(rig_file: RigFile) -> float:
+def lag_of(rig_file: RigFile) -> float:
     """Return by how much a reading is older than the sample at which it is recorded, in s."""
     inputs = [name for name in rig_file.terminals() if name != "voltage_command"]
     return rig_file.laser.delay - rig_file.skew(inputs.index("displacement"))

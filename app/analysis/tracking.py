@@ -33,7 +33,15 @@ from dearig.model.noise import noise_of
 from dearig.model.stability import static_stretch
 from dearig.recording.recording import Recording
 
-__all__ = ["KINDS", "Proposal", "TrackOutcome", "TrackedRun", "Tracking", "alternatives_of"]
+__all__ = [
+    "KINDS",
+    "Proposal",
+    "TrackOutcome",
+    "TrackedRun",
+    "Tracking",
+    "alternatives_of",
+    "misfits_of",
+]
 
 log = logging.getLogger(__name__)
 
@@ -242,7 +250,7 @@ class Tracking:
                 self._others = self._compared(compare)
         except ModelError as error:
             raise InputError(f"target {target.name!r}: {error}") from error
-        self.warnings = tuple(_warnings(ours, rig_file))
+        self.warnings = tuple(misfits_of(ours, rig_file))
         self.runs: tuple[TrackedRun, ...] = ()
         self.proposed: Proposal | None = self._next()
 
@@ -413,7 +421,8 @@ def _actuator(model: ModelFile, option: str) -> Actuator:
     )
 
 
-def _warnings(model: Actuator, rig_file: RigFile) -> Iterator[str]:
+def misfits_of(model: Actuator, rig_file: RigFile) -> Iterator[str]:
+    """Yield a sentence for film and load of ``model`` that are not those of the rig file."""
     if model.film != rig_file.as_film():
         yield "the model is of another film than the rig file's"
     if model.load.mass != rig_file.load.mass_g / 1e3:

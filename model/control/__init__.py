@@ -1,7 +1,8 @@
-"""Control: the voltage with which the film follows a path, and how it is learned run by run."""
+"""Control: the voltage with which the film follows a path, learned run by run, and the hold."""
 
 from __future__ import annotations
 
+from dearig.model.control.hold import HoldAnswer, HoldController, HoldSettings, sensitivity_of
 from dearig.model.control.inversion import CAUSES, Inversion, Unreachable, invert
 from dearig.model.control.learning import Learner, Lesson
 from dearig.model.control.limits import VoltageLimits
@@ -10,6 +11,9 @@ from dearig.model.control.task import BANDWIDTH, TrackingTask
 __all__ = [
     "BANDWIDTH",
     "CAUSES",
+    "HoldAnswer",
+    "HoldController",
+    "HoldSettings",
     "Inversion",
     "Learner",
     "Lesson",
@@ -17,4 +21,5 @@ __all__ = [
     "Unreachable",
     "VoltageLimits",
     "invert",
+    "sensitivity_of",
 ]
