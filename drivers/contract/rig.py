@@ -18,7 +18,14 @@ import pytest
 from dearig.drivers import gate
 from dearig.drivers.channels import CHANNEL_NAMES
 from dearig.drivers.errors import ChangedWaveform, RigError, RigStateError
-from dearig.drivers.gate import GatedWaveform, Limits, Prediction, admit
+from dearig.drivers.gate import (
+    BlockGate,
+    GatedWaveform,
+    Limits,
+    Prediction,
+    admit,
+    open_block_gate,
+)
 from dearig.drivers.rig import Block, Event, Rig, RigState
 from dearig.drivers.samples import Computed
 from dearig.drivers.settings import LimitsSettings
@@ -29,6 +36,7 @@ __all__ = [
     "Record",
     "RigContract",
     "begin",
+    "corrected",
     "drain",
     "foreseen",
     "lobes",
@@ -58,6 +66,14 @@ def lobes(
     still = np.zeros(round(quiet * rate))
     voltage = np.concatenate((still, *(peak * lobe for peak in peaks), still))
     return admit(voltage, rate, limits, foreseen(voltage.size))
+
+
+def corrected(waveform: GatedWaveform, block: int = 50) -> BlockGate:
+    """Return the gate for corrections of ``waveform`` by up to 4 %, in blocks of 50 ms."""
+    return open_block_gate(
+        waveform, block=block, authority=0.04, rate_limit=10.0,
+        edge=foreseen(waveform.samples), prediction=foreseen(waveform.samples),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -132,6 +148,10 @@ def bring_to(rig: Rig, state: RigState) -> None:
     rig.start()
     if state is RigState.DONE:
         drain(rig)
+
+
+def _plays_growing(rig: Rig) -> bool:
+    return bool(getattr(rig, "plays_growing_waveforms", False))
 
 
 class RigContract:
@@ -322,6 +342,84 @@ class RigContract:
             record = play(rig, admit(source, RATE, LIMITS, foreseen(checked.size)))
             command = record.physical(rig, "voltage_command")
         assert np.abs(command - checked).max() < 1.0
+
+    def test_a_waveform_that_grows_is_played_as_it_is_admitted(self) -> None:
+        waveform = lobes(peaks=(6000.0,) * 8)
+        gate_ = corrected(waveform)
+        with self.opened(block_samples=50) as rig:
+            if not _plays_growing(rig):
+                pytest.skip("this rig does not play waveforms that grow")
+            for _ in range(4):
+                gate_.admit(0.0)
+            begin(rig, gate_.waveform)
+            blocks = []
+            while (block := rig.read()) is not None:
+                blocks.append(block)
+                if not gate_.complete:
+                    gate_.admit(0.03 if block.start < 600 else -0.03)
+            command = (
+                rig.identify()
+                .channels[0]
+                .scaling.physical(np.concatenate([block.counts[0] for block in blocks]))
+            )
+        assert command.size == waveform.samples
+        assert np.abs(command - gate_.waveform.window()).max() < 1.0
+        # the first answer is output after the four blocks that were admitted before the start
+        differs = np.flatnonzero(np.abs(command - waveform.window()) > 1.0)
+        assert 200 <= differs[0] < 230
+        assert not np.array_equal(command, waveform.window())
+
+    @pytest.mark.parametrize("answered", [0, 3])
+    def test_a_waveform_that_stops_growing_ends_in_an_error(self, answered: int) -> None:
+        gate_ = corrected(lobes(peaks=(6000.0,) * 8))
+        with self.opened(block_samples=50) as rig:
+            if not _plays_growing(rig):
+                pytest.skip("this rig does not play waveforms that grow")
+            for _ in range(2):
+                gate_.admit(0.0)
+            begin(rig, gate_.waveform)
+            counts = [np.empty(0, dtype=np.int16)]
+
+            def run() -> None:
+                while (block := rig.read()) is not None:
+                    counts.append(block.counts[0])
+                    if len(counts) <= answered + 1:
+                        gate_.admit(0.0)
+
+            with pytest.raises(RigError):
+                run()
+            rig.make_safe()
+            assert rig.state is RigState.SAFE
+            command = rig.identify().channels[0].scaling.physical(np.concatenate(counts))
+        assert command.size <= gate_.waveform.admitted
+        assert np.abs(command - gate_.waveform.window(0, command.size)).max(initial=0.0) < 1.0
+
+    @pytest.mark.parametrize("blocks_read", [0, 1, 7])
+    def test_a_waveform_that_grows_can_be_stopped_at_any_time(self, blocks_read: int) -> None:
+        gate_ = corrected(lobes(peaks=(6000.0,) * 8))
+        with self.opened(block_samples=50) as rig:
+            if not _plays_growing(rig):
+                pytest.skip("this rig does not play waveforms that grow")
+            for _ in range(4):
+                gate_.admit(0.03)
+            begin(rig, gate_.waveform)
+            head = []
+            for _ in range(blocks_read):
+                block = rig.read()
+                assert block is not None
+                head.append(block)
+                gate_.admit(0.03)
+            rig.stop()
+            tail = drain(rig)
+            assert rig.state is RigState.DONE
+            counts = np.concatenate([*(b.counts[0] for b in head), tail.counts[0]])
+            command = rig.identify().channels[0].scaling.physical(counts)
+        assert command[-1] == pytest.approx(0.0, abs=1.0)
+        assert np.all(np.abs(np.diff(command)) * RATE <= LIMITS.slew * 1.01)
+        played = gate_.waveform.window(0, command.size)
+        left = np.flatnonzero(np.abs(command[: played.size] - played) > 1.0)
+        at = left[0] if left.size else min(played.size, command.size)
+        assert np.all(np.diff(command[at - 1 :]) <= 1.0)
 
     def test_stop_after_the_end_changes_nothing(self, rig: Rig) -> None:
         play(rig, lobes())
