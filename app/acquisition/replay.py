@@ -62,6 +62,11 @@ def original_of(path: str | Path) -> Original:
     if not recording.sequence_toml:
         raise InputError(f"{path} holds no sequence: only a run that was recorded can be repeated")
     noted = recording.provenance
+    if "feedback" in noted:
+        raise InputError(
+            f"{path} was corrected while it was recorded: its voltage followed the readings, and "
+            f"its sequence alone does not repeat it; use dearig hold again"
+        )
     configuration = str(noted.get("configuration", ""))
     name = f"the rig file in {path}"
     try:
