@@ -25,13 +25,10 @@ from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
 from dearig.model.diagnosis.results import Dependence, MissingStress, Signature
 from dearig.progress import Progress, quiet
-from dearig.recording.files import in_words
 from dearig.recording.reader import open_recording
+from dearig.recording.result_folder import numbered_folder
 
 __all__ = ["Residual", "Study", "Task", "Trace", "study"]
-
-#: More studies than this in one folder are a mistake.
-_STUDIES_MAX = 10_000
 
 
 @dataclass(frozen=True)
@@ -124,7 +121,7 @@ def study(
             task.train, validation=task.validation, branches=(task.branches,), spring=task.spring,
             drive=task.drive, ended_early=task.ended_early, clock=clock, progress=progress,
         )  # fmt: skip
-    where = _new_folder(folder)
+    where = numbered_folder(folder, "study")
     model, report = where / "model.toml", where / "report.html"
     found = save_fitted_model(found, model)
     progress("report", 1.0)
@@ -133,24 +130,6 @@ def study(
         return Study(task, found, _diagnosed(found), model, report)
     residuals = tuple(_compared(c) for c in (*found.train, *found.validation))
     return Study(task, found, residuals, model, report)
-
-
-def _new_folder(folder: Path) -> Path:
-    """Make and return a new folder: study-1, or the next number that is free."""
-    where = folder
-    try:
-        for number in range(1, _STUDIES_MAX):
-            where = folder / f"study-{number}"
-            try:
-                where.mkdir()
-            except FileExistsError:
-                continue
-            return where
-    except OSError as error:
-        raise InputError(f"{where} cannot be made: {in_words(error)}") from error
-    raise InputError(
-        f"{folder} holds {_STUDIES_MAX} studies; choose another folder for the results"
-    )
 
 
 def _rig_of(task: Task) -> RigFile | None:

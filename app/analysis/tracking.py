@@ -61,6 +61,10 @@ def _label(kind: str, iteration: int) -> str:
     }[kind]
 
 
+def _stem(kind: str, iteration: int) -> str:
+    return f"{kind}-{iteration}" if kind == "learned" else kind
+
+
 @dataclass(frozen=True, eq=False)
 class Proposal:
     """The next run of a target, before it is played.
@@ -87,7 +91,7 @@ class Proposal:
     @property
     def stem(self) -> str:
         """Name of its files, without an ending."""
-        return f"{self.kind}-{self.iteration}" if self.kind == "learned" else self.kind
+        return _stem(self.kind, self.iteration)
 
     @property
     def name(self) -> str:
@@ -164,6 +168,11 @@ class TrackedRun:
     def label(self) -> str:
         """The run in words."""
         return _label(self.kind, self.iteration)
+
+    @property
+    def stem(self) -> str:
+        """Name of its sequence's files, without an ending."""
+        return _stem(self.kind, self.iteration)
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,6 +276,11 @@ class Tracking:
             raise InputError(
                 f"the run {played.label!r} ended early ({recording.outcome}): nothing is learned "
                 f"from it; play its voltage again"
+            )
+        if recording.rate != self.task.rate:
+            raise InputError(
+                f"{recording.path} was not recorded at {self.task.rate:g} Hz, for which its "
+                f"voltage was computed: nothing is learned from it; compute the voltage again"
             )
         run = self._measured(played, recording, margins)
         if played.kind in ("model", "learned"):

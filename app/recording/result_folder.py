@@ -1,12 +1,16 @@
-"""The folder for the results of a command."""
+"""Folders for results."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from dearig.errors import InputError
+from dearig.recording.files import in_words
 
-__all__ = ["result_folder"]
+__all__ = ["numbered_folder", "result_folder"]
+
+#: More results of one kind than this in one folder are a mistake.
+_NUMBERED_MAX = 10_000
 
 
 def result_folder(out: Path, overwrite: bool) -> Path:
@@ -20,3 +24,25 @@ def result_folder(out: Path, overwrite: bool) -> Path:
     except OSError as error:
         raise InputError(f"{out} cannot be created: {error.strerror or error}") from error
     return out
+
+
+def numbered_folder(folder: Path, name: str) -> Path:
+    """Make and return a new folder in ``folder``: ``name`` and the first number that is free.
+
+    Raises ``InputError``.
+    """
+    where = folder
+    try:
+        for number in range(1, _NUMBERED_MAX):
+            where = folder / f"{name}-{number}"
+            try:
+                where.mkdir()
+            except FileExistsError:
+                continue
+            return where
+    except OSError as error:
+        raise InputError(f"{where} cannot be made: {in_words(error)}") from error
+    raise InputError(
+        f"{folder} holds {_NUMBERED_MAX} results of this kind; choose another folder for the "
+        f"results"
+    )

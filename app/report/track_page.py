@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dearig.analysis.decimate import decimate
+from dearig.analysis.track_target import missed_parts
 from dearig.report.figure_style import (
     COLUMNS,
     ERROR,
@@ -31,16 +32,21 @@ from dearig.report.tables import Row, Table
 from dearig.units import readable
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from dearig.analysis.tracking import TrackedRun, TrackOutcome
+    from dearig.drivers.gate import Margin
 
 __all__ = [
     "errors_figure",
+    "limits_table",
     "margins_table",
     "runs_figure",
     "runs_table",
+    "track_headline",
     "track_json",
     "track_summary",
     "track_warnings",
@@ -49,6 +55,22 @@ __all__ = [
 
 _UM = 1e6  # um in a metre
 _COLOURS = {"linear": UNSURE, "thesis": THESIS, "model": MODEL, "learned": MEASURED}
+
+
+def track_headline(outcome: TrackOutcome) -> str:
+    """Return how far the runs of a target have come, in one line."""
+    name = outcome.target.name
+    if not outcome.runs:
+        many = len(missed_parts(outcome.inversion.unreachable, outcome.within))
+        what = "the whole target" if many == 0 else f"{many} part{'s' if many > 1 else ''} of it"
+        return f"{name}: the film can{'not' if many else ''} follow {what}"
+    last, best = outcome.runs[-1], outcome.best
+    said = f"{name}: {last.label}, {_um(last.rms)} um RMS"
+    if math.isfinite(last.rms):
+        said += f", {significant(last.rms / outcome.noise)} times the noise"
+    if best is not None and best is not last:
+        said += f"; the best is {best.label}, {_um(best.rms)} um"
+    return readable(said)
 
 
 def track_summary(outcome: TrackOutcome) -> tuple[str, ...]:
@@ -129,6 +151,25 @@ def margins_table(outcome: TrackOutcome) -> Table:
         for i, margin in enumerate(runs[0].margins)
     )
     return Table("Margins", head, rows)
+
+
+def limits_table(margins: Sequence[Margin]) -> Table:
+    """Return how near a run that is not played yet comes to the limits of the rig."""
+    head = (("Limit", ""), ("Reached", ""), ("Allowed", ""))
+    return Table(
+        "Margins of the next run",
+        head,
+        tuple(
+            Row(
+                (
+                    f"{margin.quantity} ({margin.unit})",
+                    significant(margin.reached),
+                    significant(margin.allowed),
+                )
+            )
+            for margin in margins
+        ),
+    )
 
 
 def runs_figure(outcome: TrackOutcome) -> Figure:

@@ -22,10 +22,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from dearig.config.toml_input import read_text
+from dearig.errors import InputError
 from dearig.window.banners import Banners
 from dearig.window.compilation import Compilation, CompilationBar
 from dearig.window.dialogs import run_dialog
 from dearig.window.error_panel import ErrorPanel
+from dearig.window.follow_page import FollowPage
 from dearig.window.guide import Guide
 from dearig.window.hv_bar import HighVoltageBar
 from dearig.window.layout_state import GROUP
@@ -69,12 +72,14 @@ class MainWindow(QMainWindow):
         self.run_page = RunPage(session)
         self.recordings_page = RecordingsPage(session)
         self.study_page = StudyPage(session)
+        self.follow_page = FollowPage(session)
         self.pages: tuple[QWidget, ...] = (
             self.rig_page,
             self.sequence_page,
             self.run_page,
             self.recordings_page,
             self.study_page,
+            self.follow_page,
         )
         self.stop_keys = StopKeys(self.run_page.stop, lambda: session.busy, self)
         self._guide: Guide | None = None
@@ -111,7 +116,7 @@ class MainWindow(QMainWindow):
         """Give all parts the sizes and places of the first start."""
         for key in ("geometry", "page", GROUP):
             self.session.settings.remove(key)
-        for page in (self.sequence_page, self.recordings_page, self.study_page):
+        for page in (self.sequence_page, self.recordings_page, self.study_page, self.follow_page):
             page.reset_layout()
         self._default_geometry()
         self.show_page(self.run_page)
@@ -154,7 +159,8 @@ class MainWindow(QMainWindow):
         self.bar.close_work()
         self.planner.close()
         for page in (
-            self.rig_page, self.sequence_page, self.recordings_page, self.study_page
+            self.rig_page, self.sequence_page, self.recordings_page, self.study_page,
+            self.follow_page,
         ):  # fmt: skip
             page.close_work()
         event.accept()
@@ -173,7 +179,11 @@ class MainWindow(QMainWindow):
         offer_unsaved(
             self,
             self.session,
-            {"sequence": self.sequence_page.restore, "rig file": self.rig_page.restore},
+            {
+                "sequence": self.sequence_page.restore,
+                "rig file": self.rig_page.restore,
+                "target": self.follow_page.target.restore,
+            },
         )
 
     def _ask_to_close(self) -> bool:
@@ -291,6 +301,11 @@ class MainWindow(QMainWindow):
         self.recordings_page.open_sequence.connect(self._read_sequence)
         self.study_page.open_sequence.connect(self._play_sequence)
         self.study_page.show_model.connect(self._show_model)
+        self.study_page.study_finished.connect(self.follow_page.model.find_studies)
+        self.follow_page.play_sequence.connect(self._play_file)
+        self.follow_page.use_model.connect(run.show_model)
+        self.follow_page.waits.connect(run.follow_button.setVisible)
+        run.show_follow.connect(lambda: self.show_page(self.follow_page))
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_colour_scheme)
         session.running_changed.connect(self._watch_keys)
         self.addActions(run.display.mark_bar.actions())  # the key M on every page
@@ -327,6 +342,19 @@ class MainWindow(QMainWindow):
         """Show a proposed experiment on the Run page; the operator arms it as usual."""
         if self.sequence_page.take(toml):
             self.show_page(self.run_page)
+
+    @Slot(Path)
+    def _play_file(self, path: Path) -> None:
+        """Show the sequence in the file ``path`` on the Run page; the operator arms it as usual."""
+        if not self.sequence_page.may_replace():
+            return
+        try:
+            toml = read_text(path, "sequence")
+        except InputError as error:
+            self.follow_page.message.show_text(str(error))
+            return
+        self.session.set_sequence(toml, path.parent, path)
+        self.show_page(self.run_page)
 
     @Slot(Path)
     def _show_model(self, path: Path) -> None:

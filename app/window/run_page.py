@@ -42,6 +42,7 @@ class RunPage(QWidget):
 
     show_recording = Signal(Path)
     show_sequence = Signal()
+    show_follow = Signal()
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -348,8 +349,14 @@ class RunPage(QWidget):
         self.show_button = button("Show the &recording", "Go to the Recordings page")
         self.show_button.clicked.connect(self._show_last)
         self.show_button.hide()
+        self.follow_button = button(
+            "&Back to Follow", "What is learned from the run is shown there"
+        )
+        self.follow_button.clicked.connect(self.show_follow)
+        self.follow_button.hide()
         row.addWidget(self.result, 1)
         row.addWidget(self.show_button)
+        row.addWidget(self.follow_button)
         column.addLayout(row)
         return column
 

@@ -77,14 +77,19 @@ class Unreachable:
     allowed: float
 
     @property
+    def why(self) -> str:
+        """The cause in words."""
+        words = CAUSES[self.cause]
+        if self.cause in ("voltage", "field") and math.isfinite(self.needed):
+            words += f" ({self.needed * 1e-3:.4g} kV, {self.allowed * 1e-3:.4g} kV is allowed)"
+        return words
+
+    @property
     def sentence(self) -> str:
         """When, by how much and why, in one sentence."""
         when = f"{self.start:.4g} s to {self.stop:.4g} s"
         off = f"{self.worst * 1e6:.3g} um at {self.at:.4g} s"
-        words = CAUSES[self.cause]
-        if self.cause in ("voltage", "field") and math.isfinite(self.needed):
-            words += f" ({self.needed * 1e-3:.4g} kV, {self.allowed * 1e-3:.4g} kV is allowed)"
-        return f"{when}: {words}; the film misses the target by up to {off}"
+        return f"{when}: {self.why}; the film misses the target by up to {off}"
 
 
 #: Why a target is unreachable, by its short name.

@@ -34,6 +34,9 @@ LOOKS = ("light", "dark")
 #: It leaks, which the thesis's run alone cannot tell from a permittivity: so there is something to
 #: propose.
 LEAKING = "sim:30"
+#: Much softer than the thesis's film: so there is something to learn.
+SOFT = "sim:8"
+LEARNED = 3  # runs that learn from the one before
 PATIENCE = 600_000  # ms
 
 REFUSED = """\
@@ -56,6 +59,7 @@ GUIDE = {
     "rig.png": ("rig", "light"),
     "recordings.png": ("recordings-several", "light"),
     "study.png": ("study-residual", "light"),
+    "follow.png": ("follow-learned", "light"),
     "dark.png": ("run-going", "dark"),
 }
 
@@ -160,6 +164,34 @@ def views(window: MainWindow) -> Iterator[str]:
     for index in range(study.tabs.count()):
         study.tabs.setCurrentIndex(index)
         yield f"study-{study.tabs.tabText(index).lower()}"
+    yield from following(window)
+
+
+def following(window: MainWindow) -> Iterator[str]:
+    """The page Follow: a target that cannot be reached, and one that is learned."""
+    session, run, follow = window.session, window.run_page, window.follow_page
+    session.set_address(SOFT)
+    run.paced.setChecked(False)
+    window.show_page(follow)
+    yield "follow"
+    example = follow.target.toml
+    for view, toml in (
+        ("refused", example.replace("duration_s = 4.0", "duration_s = 0.3")),
+        ("ready", example),
+    ):
+        follow.target.edit.setPlainText(toml)
+        follow.compute()
+        until(follow.compute_button.isEnabled, "a voltage")
+        yield f"follow-{view}"
+    for _ in range(LEARNED + 1):
+        follow.run_button.click()
+        until(run.arm_button.isEnabled, "the plan of a run")
+        run.arm_button.click()
+        run.start_button.click()
+        until(lambda: not run.runner.running, "the end of a run")
+        until(follow.compute_button.isEnabled, "what is learned")
+    window.show_page(follow)
+    yield "follow-learned"
 
 
 def planned(session: Session, toml: str) -> None:
