@@ -12,7 +12,7 @@ import pytest
 from dearig.acquisition.run import RunObserver, RunOptions
 from dearig.analysis.track import track
 from dearig.analysis.track_target import plan_target
-from dearig.analysis.tracking import alternatives_of
+from dearig.analysis.tracking import Tracking, alternatives_of
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence
@@ -167,6 +167,14 @@ def test_a_fault_keeps_what_was_done(tmp_path):
     assert outcome.status == "stopped"
     assert outcome.runs == ()
     assert "0 V" in outcome.reason
+
+
+def test_nothing_is_learned_from_a_run_at_another_rate(learned):
+    faster = RIG.model_copy(update={"card": CardSettings(sample_rate_Hz=250.0)})
+    tracking = Tracking(target(), WRONG, faster)
+    with pytest.raises(InputError, match="was not recorded at 250 Hz"):
+        tracking.add(open_recording(learned.runs[0].recording))
+    assert tracking.proposed.kind == "model"  # it can still be played
 
 
 class _SecondRunInterrupted(RunObserver):
