@@ -101,15 +101,14 @@ def track_table(outcome: TrackOutcome) -> RenderableType:
     return _Fitted([*track_summary(outcome), runs_table(outcome)], track_warnings(outcome))
 
 
-def campaign_runs(outcome: CampaignOutcome) -> RenderableType:
-    """Return how a campaign stands as sentences, and its last and next runs."""
+def campaign_runs(outcome: CampaignOutcome, most: int = 40) -> RenderableType:
+    """Return how a campaign stands, and the ``most`` runs around the one that is played."""
     from dearig.report.campaign_page import campaign_summary, campaign_table
 
     warnings = (outcome.queue.halted,) if outcome.queue.halted else ()
-    return _Fitted([*campaign_summary(outcome), campaign_table(outcome, _RUNS)], warnings)
+    return _Fitted([*campaign_summary(outcome), campaign_table(outcome, most)], warnings)
 
 
-_RUNS = 40  # runs of a campaign that a terminal shows
 _RANKED = 6  # candidates of a round that a terminal shows
 
 
