@@ -133,14 +133,21 @@ def import_(
         _columns(column or []), gauge_length_mm, area_mm2,
         None if kinematics is None else kinematics.value, rate, names_line, skip_bad_rows,
         {} if settings is None else raw_scales(settings), table,
+        typed=_typed(
+            film_length_mm=film_length_mm, film_width_mm=film_width_mm,
+            film_thickness_um=film_thickness_um, permittivity=permittivity, load_g=load_g,
+            rig_file=rig_file, film=film or None, notes=notes or None, force=force or None,
+        ),
     )  # fmt: skip
     metadata = imported_metadata(
         rig_file, settings, film, notes,
         length_mm=film_length_mm, width_mm=film_width_mm, thickness_um=film_thickness_um,
         permittivity=permittivity, load_g=load_g, kinematics=options.kinematics,
     )  # fmt: skip
-    with working(json, computes=False) as (console, _):
-        done = import_file(source, out, options, metadata=metadata, overwrite=force)
+    with working(json, computes=False, whole=True) as (console, report):
+        done = import_file(
+            source, out, options, metadata=metadata, overwrite=force, progress=report
+        )
     recording = open_recording(out)
     print_line(
         console,
@@ -154,6 +161,17 @@ def import_(
         print_line(console, f"Check this: {doubt}", style="yellow")
     told = {"took": list(done.took), "notes": list(done.notes), "doubts": list(done.doubts)}
     write_result({**describe(recording), **told}, json)
+
+
+def _typed(**given: object) -> tuple[str, ...]:
+    """Return the options that were ``given`` as words of a command line."""
+    words: list[str] = []
+    for name, value in given.items():
+        if value is not None:
+            words.append(f"--{name.replace('_', '-')}")
+            if value is not True:
+                words.append(f"{value:g}" if isinstance(value, float) else str(value))
+    return tuple(words)
 
 
 def _list_columns(source: Path, names_line: int | None, json: str | None) -> None:

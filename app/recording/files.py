@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import Event
 
 from dearig.errors import InputError
 from dearig.recording.lock import (
@@ -277,7 +278,10 @@ def put_back(old: Path | None, path: Path) -> bool:
     return True
 
 
-def file_sha256(path: Path) -> str:
-    """Return the SHA-256 of a file, in hexadecimal."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+def file_sha256(path: Path, stop: Event | None = None) -> str:
+    """Return the SHA-256 of a file, in hexadecimal; of a part of it once ``stop`` is set."""
+    digest = hashlib.sha256()
+    with path.open("rb", buffering=0) as stream:
+        while (stop is None or not stop.is_set()) and (piece := stream.read(2**20)):
+            digest.update(piece)
+    return digest.hexdigest()

@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 
 from dearig.drivers.rig import Event
+from dearig.progress import Progress, quiet
 from dearig.recording.files import check_output, replaced_when_done
 from dearig.recording.layout import (
     EVENT_TYPE,
@@ -32,6 +33,9 @@ from dearig.recording.text import clip_text, fixed, put_text
 
 __all__ = ["save_recording"]
 
+#: Samples that are written at once: a multiple of a chunk, and some tens of milliseconds.
+WRITTEN = 2**22
+
 
 def save_recording(
     path: str | Path,
@@ -45,14 +49,15 @@ def save_recording(
     events: Iterable[Event] = (),
     overwrite: bool = False,
     now: Callable[[], float] = time.time,
+    progress: Progress = quiet,
 ) -> Path:
     """Write arrays as a recording.
 
     ``values`` are (N,) each, by their names in ``layout.UNITS`` and in those units. ``kind`` is
     actuator or film, ``hold`` and ``kinematics`` are as in ``Recording``, ``rest_reading`` in m has
-    been subtracted from the displacement. The file appears complete or not at all. Raises
-    ``InputError`` if it may not be written, and ``ValueError`` for values that no recording of
-    that kind has.
+    been subtracted from the displacement. ``progress`` gets the part that is written. The file
+    appears complete or not at all. Raises ``InputError`` if it may not be written, and
+    ``ValueError`` for values that no recording of that kind has.
     """
     if kind not in KINDS:
         raise ValueError(f"kind {kind!r} is not one of {', '.join(KINDS)}")
@@ -74,8 +79,11 @@ def save_recording(
     ):
         entry = lay_out(file, kind, metadata.title, started)
         data = entry["data"]
-        for name, array in values.items():
-            create_field(data, name, size)[...] = np.asarray(array, dtype=np.float64)
+        for number, (name, array) in enumerate(values.items()):
+            field, numbers = create_field(data, name, size), np.asarray(array, dtype=np.float64)
+            for first in range(0, size, WRITTEN):
+                progress("writing", (number + first / size) / len(values))
+                field[first : first + WRITTEN] = numbers[first : first + WRITTEN]
         attach_time(data)
         if kinematics is not None:
             data.attrs["kinematics"] = fixed(kinematics)

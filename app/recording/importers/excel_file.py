@@ -22,6 +22,7 @@ from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.files import in_words, one_line
 from dearig.recording.importers.cells import complaint_about, number_in
+from dearig.recording.importers.columns import unseen
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import PARSER_FAILURES, listing, printable
 from dearig.recording.importers.stored import Stored, StoredColumns
@@ -46,6 +47,8 @@ TEXTS_MAX, TEXTS_PACKED_MAX = 2**22, 10
 PART_MAX, ROW_MAX = 2**20, 2**20
 #: Cells without a number whose content is kept for messages.
 TOLD_MAX = 1000
+#: Rows between two reports of progress.
+REPORTED = 2000
 _ZIP, _OLD = b"PK\x03\x04", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _NO_VALUE = (
     "a formula without its value: open the workbook in a spreadsheet program, save it, and import "
@@ -83,6 +86,8 @@ class ExcelFile(StoredColumns):
                     cell=_cell(sheet, column), row=sheet.row,
                 )  # fmt: skip
         super().__init__(path, "an Excel workbook", columns)
+        for sheet in sheets:
+            sheet.report = lambda part: self.progress(part)
         self.block = [row for sheet in sheets for row in sheet.layout.block]
 
 
@@ -103,6 +108,7 @@ class _Sheet:
         self._formulas = self._empty_formulas(head)
         lines = ["\t".join(_texts(row, self._formulas, _has_number(row))) for row in head]
         self.layout: Layout = layout_of("\n".join(lines), "utf-8", path, names_line, ("\t",))
+        self.report: Callable[[float], None] = unseen
         self._numbers: dict[int, array[float]] | None = None
         self._wrong: dict[tuple[int, int], str] = {}  # by place of the column and row of the sheet
         self._kept = np.empty(0, dtype=np.int64)  # rows of the sheet of what was read last
@@ -170,6 +176,7 @@ class _Sheet:
         """Yield the first ``most`` rows; of formulas, their ``values`` or themselves."""
         with _opened(self.path, values) as book:
             sheet = book[self.name]
+            told = max(sheet.max_row or 0, 1)
             sheet.reset_dimensions()  # what a file says of them may be wrong
             rows = iter(sheet.iter_rows(values_only=True))
             for number in itertools.count(1):
@@ -182,6 +189,8 @@ class _Sheet:
                         f"{len(row):,} columns; {COLUMNS_MAX:,} are read at most"
                     )
                 yield row
+                if number % REPORTED == 0:
+                    self.report(min(number / told, 1.0))
         if row is not None and most == ROWS_MAX:
             raise InputError(
                 f"{self.path}, sheet {printable(self.name)!r}: there are more than {ROWS_MAX:,} "

@@ -7,24 +7,32 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from threading import Event as Flag
 
 from dearig.drivers.rig import Event
 from dearig.errors import InputError
 from dearig.model.specimen import KINEMATICS, Film, Load
+from dearig.progress import Progress, part, quiet
 from dearig.recording.assumed import ASSUMED, FILM_VALUES, assumed_of
 from dearig.recording.files import check_output, file_sha256
-from dearig.recording.importers.chosen import Chosen, choose
+from dearig.recording.importers.choose import choose
+from dearig.recording.importers.chosen import Chosen, command_line
 from dearig.recording.importers.exported import exported
 from dearig.recording.importers.plausible import doubts
 from dearig.recording.importers.registry import source_at
+from dearig.recording.importers.source import NeedsOptionError
+from dearig.recording.importers.specimen import Specimen
 from dearig.recording.importers.units import Scale
-from dearig.recording.importers.values import Specimen, Values, values_of
+from dearig.recording.importers.values import Values, values_of
 from dearig.recording.metadata import RunMetadata
 from dearig.recording.rest_noise import MIN_QUIET, lead_in, mean_beyond_noise
 from dearig.recording.save import save_recording
 
-__all__ = ["ImportOptions", "Imported", "import_file"]
+__all__ = ["ImportOptions", "Imported", "Prepared", "UnsureError", "import_file", "prepare"]
 
+#: Parts of the time of an import at which the file is open, the numbers are read, and the checks
+#: are done: a text of three million rows takes as long.
+OPENED, READ, WRITING = 0.05, 0.7, 0.85
 _EVENTS_MAX = 50  # events of rows that were left out, at most
 
 
@@ -53,6 +61,10 @@ class ImportOptions:
         all the columns that are needed.
     raw : mapping of str to Scale
         Scales of a rig file from volts at the card, by quantity.
+    guess : bool
+        Choose columns by their names too. Without it, ``columns`` are all.
+    typed : tuple of str
+        Further words of the command line, for commands in messages.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -64,6 +76,8 @@ class ImportOptions:
     skip_bad_rows: bool = False
     raw: Mapping[str, Scale] = field(default_factory=dict)
     table: str | None = None
+    guess: bool = True
+    typed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.kinematics is not None and self.kinematics not in KINEMATICS:
@@ -72,6 +86,17 @@ class ImportOptions:
         for name, given in (("gauge length", self.gauge_length_mm), ("area", self.area_mm2)):
             if given is not None and not 0.0 < given < float("inf"):
                 raise InputError(f"the {name} is {given!r}; it must be a finite number above 0")
+
+
+class UnsureError(InputError):
+    """It is not sure which columns are ``chosen`` for what."""
+
+    def __init__(self, chosen: Chosen) -> None:
+        super().__init__(
+            f"{chosen.source.path}: it is not sure what its columns are "
+            f"({'; '.join(chosen.unsure)})"
+        )
+        self.chosen = chosen
 
 
 @dataclass(frozen=True)
@@ -83,6 +108,25 @@ class Imported:
     doubts: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Prepared:
+    """A recording that an import would write: ``values`` with doubts and notes, and metadata."""
+
+    chosen: Chosen
+    values: Values
+    metadata: RunMetadata
+    hold: bool
+    kinematics: str | None
+    rest_reading: float
+    events: tuple[Event, ...]
+
+    @property
+    def imported(self) -> Imported:
+        """What was taken for what, what was done, and what is doubtful."""
+        took = tuple(pick.said for pick in self.chosen.picked.values())
+        return Imported(took, tuple(self.values.notes), tuple(self.values.warnings))
+
+
 def import_file(
     source: str | Path,
     out: str | Path,
@@ -91,6 +135,7 @@ def import_file(
     metadata: RunMetadata | None = None,
     overwrite: bool = False,
     now: Callable[[], float] = time.time,
+    progress: Progress = quiet,
 ) -> Imported:
     """Import a file of measured data as the recording ``out``.
 
@@ -98,27 +143,78 @@ def import_file(
     Displacement and voltage of an actuator are counted from their means over the lead-in at rest,
     if there is one. A recording that was exported keeps the metadata of that file: film, load,
     kinematics, sequence, and how its voltage was held. ``metadata`` has precedence; its title is
-    the file's name by default.
+    the file's name by default. ``progress`` gets the fraction of the whole import.
 
     Raises ``InputError``, with nothing written, for data that cannot be a recording, and where it
-    is not sure which column is which: then with the command that imports what seems right.
+    is not sure which column is which: then with the command that imports what seems right. An
+    interrupt leaves nothing behind.
     """
     options = options or ImportOptions()
-    path, metadata = Path(source), metadata or RunMetadata()
+    path = Path(source)
     out = check_output(out, overwrite, path)
-    table = source_at(path, names_line=options.names_line, skip_bad_rows=options.skip_bad_rows)
-    chosen = choose(
-        table, options.columns, options.raw, timed=options.rate_Hz is not None, table=options.table
-    )
-    if chosen.unsure:
+    try:
+        found = prepare(path, options, metadata=metadata, progress=part(progress, 0.0, WRITING))
+    except UnsureError as error:
+        line = command_line(path, out, error.chosen.pairs, error.chosen.table, _typed(options))
         raise InputError(
-            f"{path}: it is not sure what its columns are ({'; '.join(chosen.unsure)}). If this is "
-            f"right, or after correcting it, run: {chosen.command(Path(out), _typed(options))}"
-        )
+            f"{error}. If this is right, or after correcting it, run: {line}"
+        ) from error
+    except NeedsOptionError as error:
+        more = [*_typed(options), *error.words]
+        line = command_line(path, out, options.columns, options.table, more)
+        raise InputError(f"{error}; run: {line}") from error
+    save_recording(
+        out,
+        found.values.kind,
+        found.values.columns,
+        found.metadata,
+        hold=found.hold,
+        kinematics=found.kinematics,
+        rest_reading=found.rest_reading,
+        events=found.events,
+        overwrite=overwrite,
+        now=now,
+        progress=part(progress, WRITING, 1.0),
+    )
+    return found.imported
+
+
+def prepare(
+    path: Path,
+    options: ImportOptions,
+    *,
+    metadata: RunMetadata | None = None,
+    progress: Progress = quiet,
+) -> Prepared:
+    """Return the recording that the file at ``path`` would become; nothing is written.
+
+    Raises ``UnsureError`` where it is not sure which column is which, ``NeedsOptionError`` where an
+    option is missing, and other ``InputError`` as ``import_file`` does.
+    """
+    metadata = metadata or RunMetadata()
+    progress("opening", 0.0)
+    table = source_at(path, names_line=options.names_line, skip_bad_rows=options.skip_bad_rows)
+    if hasattr(table, "progress"):
+        reading = part(progress, OPENED, READ)
+        table.progress = lambda done: reading("reading", done)
+    progress("reading", OPENED)
+    chosen = choose(
+        table, options.columns, options.raw,
+        timed=options.rate_Hz is not None, table=options.table, guess=options.guess,
+    )  # fmt: skip
+    if chosen.unsure:
+        raise UnsureError(chosen)
     specimen = Specimen(options.gauge_length_mm, options.area_mm2)
-    with ThreadPoolExecutor(1) as beside:  # hashing a file takes as long as reading its numbers
-        digest = beside.submit(file_sha256, path)
-        values = values_of(chosen, specimen, options.rate_Hz, options.skip_bad_rows)
+    stop = Flag()
+    # hashing a file takes as long as reading its numbers
+    with ThreadPoolExecutor(1) as beside:
+        digest = beside.submit(file_sha256, path, stop)
+        try:
+            values = values_of(chosen, specimen, options.rate_Hz, options.skip_bad_rows)
+        except BaseException:
+            stop.set()  # of a wrong cell, or an interrupt, one hears at once
+            raise
+    progress("checking", READ)
     noted = {**_provenance(path, digest.result(), chosen, options), **metadata.provenance}
     was = exported(table.about)
     film, kinematics = metadata.film or was.film, options.kinematics or was.kinematics
@@ -127,10 +223,9 @@ def import_file(
         rest = _from_rest(values)
         film = _of_actuator(values, film, metadata.load or was.load, kinematics, noted)
     values.warnings += doubts(values.columns, film)
-    save_recording(
-        out,
-        values.kind,
-        values.columns,
+    return Prepared(
+        chosen,
+        values,
         replace(
             metadata,
             title=metadata.title or path.stem,
@@ -142,12 +237,8 @@ def import_file(
         hold=was.hold and values.kind == "actuator",
         kinematics=kinematics or (None if values.kind == "actuator" else "uniaxial"),
         rest_reading=rest,
-        events=_events(values),
-        overwrite=overwrite,
-        now=now,
+        events=tuple(_events(values)),
     )
-    took = tuple(pick.said for pick in chosen.picked.values())
-    return Imported(took, tuple(values.notes), tuple(values.warnings))
 
 
 def _typed(options: ImportOptions) -> list[str]:
@@ -162,7 +253,9 @@ def _typed(options: ImportOptions) -> list[str]:
     ):
         if value is not None:
             words += [name, f"{value:g}" if isinstance(value, float) else str(value)]
-    return [*words, "--skip-bad-rows"] if options.skip_bad_rows else words
+    if options.skip_bad_rows:
+        words.append("--skip-bad-rows")
+    return [*words, *options.typed]
 
 
 def _provenance(

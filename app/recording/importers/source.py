@@ -13,7 +13,15 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.recording.importers.labels import suggestion
 
-__all__ = ["PARSER_FAILURES", "Source", "listing", "no_such_column", "part_of", "printable"]
+__all__ = [
+    "PARSER_FAILURES",
+    "NeedsOptionError",
+    "Source",
+    "listing",
+    "no_such_column",
+    "part_of",
+    "printable",
+]
 
 #: Exceptions of the libraries that parse binary formats, on damaged files.
 PARSER_FAILURES = (
@@ -33,6 +41,18 @@ PARSER_FAILURES = (
     zlib.error,
 )
 
+
+class NeedsOptionError(InputError):
+    """A file needs something that only the user knows, or agrees to.
+
+    ``words`` are those of the command line that give it, such as ``--skip-bad-rows``.
+    """
+
+    def __init__(self, message: str, *words: str) -> None:
+        super().__init__(message)
+        self.words = words
+
+
 #: Names listed in a message, at most.
 LISTED = 12
 
@@ -48,7 +68,9 @@ class Source(Protocol):
     the file for a value that is no number; ``block``, the cells of the lines above a table;
     ``rows(indices)``, the places of several samples at once;
     ``skipped``, the rows before each one that was left out, and its place in words;
-    ``cut_short``, True if columns may end early; ``notes``, sentences on what was found.
+    ``cut_short``, True if columns may end early; ``notes``, sentences on what was found;
+    ``progress``, a callable that can be set, which gets the part of ``read`` that is done;
+    ``overview(names, count)``, first values and number of values of columns in one reading.
     """
 
     @property

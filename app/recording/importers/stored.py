@@ -12,6 +12,7 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.recording.files import one_line
+from dearig.recording.importers.columns import NamedColumns
 from dearig.recording.importers.source import PARSER_FAILURES, listing, no_such_column
 
 __all__ = ["Stored", "StoredColumns", "as_numbers", "rate_step"]
@@ -53,7 +54,7 @@ class Stored:
     row: Callable[[int], str] | None = None
 
 
-class StoredColumns:
+class StoredColumns(NamedColumns[Stored]):
     """The ``columns`` of the file at ``path``, by their paths; see ``Source``.
 
     ``what`` the file should be ("an HDF5 file") is for messages. ``separator`` stands between the
@@ -80,22 +81,12 @@ class StoredColumns:
         single = {name for name, column in columns.items() if column.size == 1}
         if len(single) == len(columns):
             single = set()
-        self._columns = {n: c for n, c in columns.items() if n not in single}
+        super().__init__({n: c for n, c in columns.items() if n not in single})
         self._settings = {n: columns[n] for n in single}
         self.step_from = ""
         self._row: Callable[[int], str] | None = None
         if not self._columns:
             raise InputError(f"{path} holds no columns of numbers")
-
-    @property
-    def names(self) -> list[str]:
-        """Paths of all columns."""
-        return list(self._columns)
-
-    @property
-    def units(self) -> dict[str, str]:
-        """Units by column, where the file gives them."""
-        return {name: column.unit for name, column in self._columns.items() if column.unit}
 
     @property
     def labels(self) -> dict[str, str]:
@@ -183,7 +174,7 @@ class StoredColumns:
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return columns by name; see ``Source``."""
         found = {}
-        for name in names:
+        for number, name in enumerate(names, 1):
             column = self._columns[name]
             try:
                 found[name] = as_numbers(column.load())
@@ -192,6 +183,7 @@ class StoredColumns:
                     f"{self.path} cannot be read as {self._what}: {name}: {one_line(error)}"
                 ) from error
             self._row = column.row
+            self.progress(number / len(names))
         return found
 
 

@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -21,8 +22,9 @@ from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.files import in_words
 from dearig.recording.importers.cells import complaint_about, number_in
+from dearig.recording.importers.columns import NamedColumns
 from dearig.recording.importers.importer import Importer
-from dearig.recording.importers.source import no_such_column
+from dearig.recording.importers.source import NeedsOptionError, no_such_column
 from dearig.recording.importers.text_blocks import BytesReader, blocks_of, halves_of
 from dearig.recording.importers.text_layout import (
     HEAD_CHARACTERS,
@@ -43,10 +45,12 @@ SHORT = 2**15
 THREADS = 2
 #: Room for rows, in multiples of those that the first block lets expect.
 ROOM = 1.05
+#: Bytes of an ASCII character in encodings where it has several.
+_WIDTHS = MappingProxyType({"utf-16": 2, "utf-32": 4})
 _HEAD = 4 * HEAD_CHARACTERS  # bytes: a character has four at most
 
 
-class TextFile:
+class TextFile(NamedColumns[Column]):
     """The text file at ``path``. Raises ``InputError`` if it holds no table of numbers.
 
     ``names_line`` is the number of the line of names, from 1, where it is not found by itself. With
@@ -72,18 +76,19 @@ class TextFile:
         if len(head) == HEAD_CHARACTERS:
             head = head.rpartition("\n")[0] or head
         self.layout: Layout = layout_of(head, encoding, path, names_line)
-        self._columns = {column.name: column for column in self.layout.columns}
+        columns = {column.name: column for column in self.layout.columns}
         self._section_of: dict[str, Section] = {}
         lines = head.replace("\r\n", "\n").replace("\r", "\n").split("\n")
         sections = sections_of(path, self.layout, lines[self.layout.names_line])
         if sections:
-            self._columns = {}
+            columns = {}
             for section in sections:
                 for column in self.layout.columns:
                     name = f"{section.title}/{column.name}"
                     group = f"{section.title}/{column.group}" if column.group else section.title
-                    self._columns[name] = replace(column, name=name, group=group)
+                    columns[name] = replace(column, name=name, group=group)
                     self._section_of[name] = section
+        super().__init__(columns)
         self._skip = skip_bad_rows
         # it costs a third of the parsing
         self._is_spaced = f"{self.layout.delimiter} " in head
@@ -93,16 +98,6 @@ class TextFile:
         #: rows before each row that was left out, and its line, in words
         self.skipped: list[tuple[int, str]] = []
         self._spans: list[_Span] = []
-
-    @property
-    def names(self) -> list[str]:
-        """Names of all columns; ``#2`` for the second one if it has none."""
-        return list(self._columns)
-
-    @property
-    def units(self) -> dict[str, str]:
-        """Units of the columns from the line below the names; of a date, s."""
-        return {name: column.unit for name, column in self._columns.items() if column.unit}
 
     @property
     def labels(self) -> dict[str, str]:
@@ -124,10 +119,6 @@ class TextFile:
             if column.group:
                 found.setdefault(column.group, []).append(name)
         return found
-
-    def own_name(self, name: str) -> str:
-        """Return ``name`` without its specimen or table."""
-        return self._columns[name].own
 
     @property
     def block(self) -> Sequence[Sequence[str]]:
@@ -159,10 +150,12 @@ class TextFile:
         wanted = [self._columns[name] for name in dict.fromkeys(names)]
         self.skipped, self._spans, self._wanted = [], [], wanted
         table = _Table(len(wanted))
-        left = self.path.stat().st_size
+        # blocks are in UTF-8
+        size = left = max(self.path.stat().st_size // _WIDTHS.get(self.layout.encoding[:6], 1), 1)
         for line, block, values in self._parsed():
             self._keep(line, block, values, table, left)
             left -= len(block)
+            self.progress(1.0 - max(left, 0) / size)
         return {column.name: values for column, values in zip(wanted, table.values, strict=True)}
 
     def row(self, index: int) -> str:
@@ -280,8 +273,9 @@ class TextFile:
             elif self._skip:
                 self.skipped.append((before + len(rows), f"line {number}"))
             else:
-                raise InputError(
-                    f"{self.path}, line {number}{fault}; --skip-bad-rows leaves such rows out"
+                raise NeedsOptionError(
+                    f"{self.path}, line {number}{fault}; --skip-bad-rows leaves such rows out",
+                    "--skip-bad-rows",
                 )
         return list(np.array(rows, dtype=np.float64).reshape(len(rows), len(self._wanted)).T)
 

@@ -11,10 +11,11 @@ import numpy as np
 from dearig.errors import InputError
 from dearig.recording.importers.chosen import Chosen
 from dearig.recording.importers.labels import names_of, suggestion
-from dearig.recording.importers.source import listing
+from dearig.recording.importers.source import NeedsOptionError, listing
+from dearig.recording.importers.specimen import Specimen, specimen_told
 from dearig.recording.timestamps import not_forward
 
-__all__ = ["Specimen", "Values", "values_of"]
+__all__ = ["Values", "values_of"]
 
 #: Where the optional columns go, by quantity.
 OPTIONAL = MappingProxyType(
@@ -26,14 +27,6 @@ OPTIONAL = MappingProxyType(
 )
 #: Time in s above which a first time stamp counts from a fixed day, not from the start of a run.
 LONG_AGO = 1e7
-
-
-@dataclass(frozen=True)
-class Specimen:
-    """Size of a film's specimen at rest, to convert displacement and force; None: not given."""
-
-    gauge_length_mm: float | None = None
-    area_mm2: float | None = None
 
 
 @dataclass
@@ -66,7 +59,8 @@ def values_of(
             values.warnings.append("the force was not used: actuator data have none")
         if specimen != Specimen():
             values.warnings.append("gauge length and area are for film data, and were not used")
-        _need(chosen, "displacement")
+        if "displacement" not in chosen.picked:
+            raise _no_column(chosen, "displacement")
         found = _read(chosen, values, ["time", "voltage", "displacement", *OPTIONAL], rate_Hz,
                       skip_bad_rows)  # fmt: skip
         values.columns = {
@@ -75,8 +69,7 @@ def values_of(
             "voltage_command": found["voltage"],
         } | {OPTIONAL[q]: found[q] for q in OPTIONAL if q in found}
         return values
-    wanted = ["time", "temperature", _length(chosen, specimen, values),
-              _pull(chosen, specimen, values)]  # fmt: skip
+    wanted = ["time", "temperature", *_film_columns(chosen, specimen, values)]
     found = _read(chosen, values, wanted, rate_Hz, skip_bad_rows)
     if "strain" in found:
         found["stretch"] = 1.0 + found.pop("strain")
@@ -120,37 +113,42 @@ def _kind(chosen: Chosen) -> str:
     )
 
 
-def _length(chosen: Chosen, specimen: Specimen, values: Values) -> str:
-    for quantity in ("stretch", "strain"):
-        if quantity in chosen.picked:
-            if specimen.gauge_length_mm is not None:
-                values.warnings.append(
-                    f"the gauge length was not used: there is a column of {quantity}"
-                )
-            return quantity
-    if "displacement" not in chosen.picked:
-        _need(chosen, "stretch", "or displacement with --gauge-length-mm")
-    if specimen.gauge_length_mm is None:
-        raise InputError(
-            f"{chosen.source.path} has displacement and no stretch; give the specimen's length at "
-            f"rest with --gauge-length-mm{_hint(chosen, 'length')}"
+def _film_columns(chosen: Chosen, specimen: Specimen, values: Values) -> tuple[str, str]:
+    """Return the quantities that stretch and stress come from.
+
+    Raises ``NeedsOptionError`` for a size of the specimen that is missing, for both at once.
+    """
+    there, told = chosen.picked, specimen_told(getattr(chosen.source, "block", ()))
+    length = next((q for q in ("stretch", "strain", "displacement") if q in there), None)
+    pull = next((q for q in ("nominal_stress", "force") if q in there), None)
+    if length is None:
+        raise _no_column(chosen, "stretch", "or displacement with --gauge-length-mm")
+    if pull is None:
+        raise _no_column(chosen, "nominal_stress", "or force_N with --area-mm2")
+    missing, words = [], []
+    if length == "displacement" and specimen.gauge_length_mm is None:
+        missing.append(
+            f"displacement and no stretch; give the specimen's length at rest with "
+            f"--gauge-length-mm{_hint(chosen, 'length')}"
         )
-    return "displacement"
+        words += ["--gauge-length-mm", _typed(told.gauge_length_mm, "LENGTH")]
+    if pull == "force" and specimen.area_mm2 is None:
+        missing.append(
+            f"force and no nominal stress; give the specimen's cross-section at rest with "
+            f"--area-mm2{_hint(chosen, 'width', 'thickness', 'section')}"
+        )
+        words += ["--area-mm2", _typed(told.area_mm2, "AREA")]
+    if missing:
+        raise NeedsOptionError(f"{chosen.source.path} has {'; and '.join(missing)}", *words)
+    if length != "displacement" and specimen.gauge_length_mm is not None:
+        values.warnings.append(f"the gauge length was not used: there is a column of {length}")
+    if pull != "force" and specimen.area_mm2 is not None:
+        values.warnings.append("the area was not used: there is a column of nominal stress")
+    return length, pull
 
 
-def _pull(chosen: Chosen, specimen: Specimen, values: Values) -> str:
-    if "nominal_stress" in chosen.picked:
-        if specimen.area_mm2 is not None:
-            values.warnings.append("the area was not used: there is a column of nominal stress")
-        return "nominal_stress"
-    if "force" not in chosen.picked:
-        _need(chosen, "nominal_stress", "or force_N with --area-mm2")
-    if specimen.area_mm2 is None:
-        raise InputError(
-            f"{chosen.source.path} has force and no nominal stress; give the specimen's "
-            f"cross-section at rest with --area-mm2{_hint(chosen, 'width', 'thickness', 'section')}"
-        )
-    return "force"
+def _typed(value: float | None, unknown: str) -> str:
+    return unknown if value is None else f"{value:g}"
 
 
 def _hint(chosen: Chosen, *words: str) -> str:
@@ -160,10 +158,9 @@ def _hint(chosen: Chosen, *words: str) -> str:
     return f"; the file says: {listing(said)}" if said else ""
 
 
-def _need(chosen: Chosen, quantity: str, otherwise: str = "") -> None:
-    if quantity in chosen.picked:
-        return
-    raise InputError(
+def _no_column(chosen: Chosen, quantity: str, otherwise: str = "") -> InputError:
+    """Return the error for a quantity that no column has."""
+    return InputError(
         f"{chosen.source.path} has no column for {quantity} "
         f"({names_of(quantity)}{', ' if otherwise else ''}{otherwise}); there are: "
         f"{listing(chosen.source.names)}"
@@ -239,10 +236,12 @@ def _step(chosen: Chosen, columns: Sequence[str], rate_Hz: float | None) -> floa
     given = getattr(chosen.source, "step_s", None)
     step = given(columns) if given is not None else None
     if step is None:
-        raise InputError(
+        raise NeedsOptionError(
             f"{chosen.source.path} has no column for time ({names_of('time')}); there are: "
             f"{listing(chosen.source.names)}{suggestion(['time_s'], chosen.source.names)}; give "
-            f"--rate-Hz if the samples are evenly spaced"
+            f"--rate-Hz if the samples are evenly spaced",
+            "--rate-Hz",
+            "RATE",
         )
     return float(step)
 
@@ -264,18 +263,21 @@ def _good_rows(
         quantity = next(q for q in table if not finite[q][at])
         cell = getattr(source, "cell", None)
         wrong = "" if cell is None else cell(at, names[quantity])
-        raise InputError(
+        raise NeedsOptionError(
             f"{source.path}, {source.row(at)}, column {names[quantity]!r}: "
             f"{wrong or f'{table[quantity][at]} is not a finite number'}; --skip-bad-rows leaves "
-            f"such rows out"
+            f"such rows out",
+            "--skip-bad-rows",
         )
     seconds = table["time"]
     if not skip:
         if (back := not_forward(seconds)) is not None:
             at, how = back
-            raise InputError(
+            raise NeedsOptionError(
                 f"{source.path}, {source.row(at)}, column {names['time']!r}: time {how}, from "
-                f"{seconds[at - 1]:.9g} to {seconds[at]:.9g}; --skip-bad-rows leaves such rows out"
+                f"{seconds[at - 1]:.9g} to {seconds[at]:.9g}; --skip-bad-rows leaves such rows "
+                f"out, and --rate-Hz replaces the time of evenly spaced samples",
+                "--skip-bad-rows",
             )
         return good
     latest = np.maximum.accumulate(np.where(good, seconds, -np.inf))

@@ -1,0 +1,49 @@
+"""What all sources that keep their columns by name have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Generic, Protocol, TypeVar
+
+__all__ = ["NamedColumns", "unseen"]
+
+
+class _Column(Protocol):
+    @property
+    def own(self) -> str: ...
+
+    @property
+    def unit(self) -> str: ...
+
+
+C = TypeVar("C", bound=_Column)
+
+
+class NamedColumns(Generic[C]):
+    """Columns ``C`` of a file by their names; the base of a ``Source``.
+
+    ``progress`` is called with the part of a reading that is done, 0 to 1; whoever waits for it
+    sets it.
+    """
+
+    def __init__(self, columns: Mapping[str, C]) -> None:
+        self._columns = dict(columns)
+        self.progress: Callable[[float], None] = unseen
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all columns, as in ``--column NAME=SOURCE``."""
+        return list(self._columns)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units by column, where the file gives them beside the name."""
+        return {name: column.unit for name, column in self._columns.items() if column.unit}
+
+    def own_name(self, name: str) -> str:
+        """Return ``name`` without its path, specimen or table."""
+        return self._columns[name].own
+
+
+def unseen(part: float) -> None:
+    """Show nothing."""
