@@ -118,6 +118,7 @@ def import_(
     """Convert measured data (text, Excel, MAT, TDMS, HDF5, JSON, Parquet) to a recording."""
     from dearig.config.imports import imported_metadata, raw_scales
     from dearig.config.rigfile import load_rig_file
+    from dearig.config.toml_input import read_text
     from dearig.recording.importers import ImportOptions, import_file
     from dearig.recording.reader import open_recording
     from dearig.recording.summary import describe
@@ -140,7 +141,7 @@ def import_(
         ),
     )  # fmt: skip
     metadata = imported_metadata(
-        rig_file, settings, film, notes,
+        "" if rig_file is None else read_text(rig_file, "rig file"), settings, film, notes,
         length_mm=film_length_mm, width_mm=film_width_mm, thickness_um=film_thickness_um,
         permittivity=permittivity, load_g=load_g, kinematics=options.kinematics,
     )  # fmt: skip

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 from dearig.config.rigfile import RigFile
-from dearig.config.toml_input import read_text
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
 from dearig.model.material import THESIS_FILM, THESIS_LOAD
@@ -31,7 +29,7 @@ def raw_scales(rig: RigFile) -> dict[str, Scale]:
 
 
 def imported_metadata(
-    rig_file: Path | None,
+    configuration: str,
     settings: RigFile | None,
     film_name: str,
     notes: str,
@@ -45,6 +43,7 @@ def imported_metadata(
 ) -> RunMetadata:
     """Return the film, load and remarks of imported data.
 
+    ``configuration`` is the text of the rig file, whose ``settings`` are used; "" and None without.
     Values that are given replace those of the rig file; without one, those of the thesis, and the
     provenance names the others. Nothing given leaves the film and the load open. Raises
     ``InputError`` for a size that none can have.
@@ -76,7 +75,7 @@ def imported_metadata(
         film_id=film_name,
         notes=notes,
         provenance={ASSUMED: ", ".join(not_given)} if not_given else {},
-        configuration="" if rig_file is None else read_text(rig_file, "rig file"),
+        configuration=configuration,
     )
 
 

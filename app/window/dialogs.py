@@ -15,7 +15,15 @@ from PySide6.QtWidgets import QDialog, QFileDialog, QInputDialog, QMessageBox, Q
 
 from dearig.window.session import Session
 
-__all__ = ["ask", "ask_text", "choose_file", "choose_folder", "run_dialog", "save_as"]
+__all__ = [
+    "ask",
+    "ask_text",
+    "choose_file",
+    "choose_files",
+    "choose_folder",
+    "run_dialog",
+    "save_as",
+]
 
 _BELOW_BAR = 96  # px below the top of the main window: the bar with STOP stays uncovered
 
@@ -48,6 +56,15 @@ def choose_file(
     dialog = QFileDialog(parent, title, str(folder), kinds)
     dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
     return _chosen(dialog, session)
+
+
+def choose_files(
+    parent: QWidget, session: Session, title: str, folder: Path | str, kinds: str
+) -> list[Path]:
+    """Return existing files of ``kinds``; none where none was chosen."""
+    dialog = QFileDialog(parent, title, str(folder), kinds)
+    dialog.setFileMode(QFileDialog.FileMode.ExistingFiles)
+    return [Path(n) for n in dialog.selectedFiles() if n] if run_dialog(dialog, session) else []
 
 
 def save_as(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer, Signal, Slot
-from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent, QKeySequence
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -35,6 +35,7 @@ from dearig.window.conditions_table import ConditionsTable
 from dearig.window.curves_plot import CurvesPlot
 from dearig.window.dialogs import choose_file, choose_folder, save_as
 from dearig.window.folder_table import FolderModel
+from dearig.window.imports import Imports
 from dearig.window.layout_state import remember
 from dearig.window.library import shared_library
 from dearig.window.recording_analysis import RecordingAnalysis
@@ -68,6 +69,8 @@ class RecordingsPage(QWidget):
         super().__init__(parent)
         self._session = session
         self._library = shared_library(session)
+        self.imports = Imports(session, self)
+        self.setAcceptDrops(True)
         self._reading: list[Job] = []
         self._read: dict[Path, Curves] = {}
         self._wanted: list[Path] = []
@@ -147,6 +150,8 @@ class RecordingsPage(QWidget):
         self.filter.textChanged.connect(self._find)
         self.files.arranged.connect(self._rows_changed)
         self.trend.picked.connect(self._pick)
+        self.imports.said.connect(self.message.show_text)
+        self.imports.written.connect(self._imported)
         self.analysis.trouble.connect(self.message.show_text)
         self._library.listed.connect(self._listed)
         self._library.summarised.connect(self._summarised)
@@ -158,6 +163,12 @@ class RecordingsPage(QWidget):
     def _top_row(self) -> QHBoxLayout:
         self.folder_button = button("", "")
         self.folder_button.clicked.connect(self._ask_folder)
+        self.import_button = button(
+            "&Import …",
+            "Import measured data of other programs (Ctrl+I); files can be dropped on this page",
+        )
+        self.import_button.setShortcut(QKeySequence("Ctrl+I"))
+        self.import_button.clicked.connect(self.imports.ask)
         self.filter = QLineEdit(placeholderText="Search in all columns")
         self.filter.setClearButtonEnabled(True)
         self.filter.setToolTip(
@@ -181,6 +192,7 @@ class RecordingsPage(QWidget):
         columns = menu_button("Columns", "Choose the columns of the table", self.table.columns_menu)
         row = QHBoxLayout()
         row.addWidget(self.folder_button)
+        row.addWidget(self.import_button)
         row.addWidget(self.subfolders)
         row.addWidget(self.filter, 1)
         row.addWidget(self.count)
@@ -247,6 +259,7 @@ class RecordingsPage(QWidget):
         """End the process that reads recordings."""
         self._choose.stop()
         self._round += 1
+        self.imports.close()
         self._library.close()
 
     # selection
@@ -434,6 +447,23 @@ class RecordingsPage(QWidget):
         if len(self.plot.shown) == 1:
             self.open_sequence.emit(self.plot.shown[0].sequence_toml)
 
+    # import
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802
+        if _files(event):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:  # noqa: N802
+        event.acceptProposedAction()
+        files = _files(event)
+        # the program that the files come from waits for the end of this call
+        QTimer.singleShot(0, lambda: self.imports.import_files(files))
+
+    @Slot(list)
+    def _imported(self, paths: list[Path]) -> None:
+        self._library.refresh()
+        self.choose(paths)
+
     # folder and model
 
     @Slot()
@@ -556,6 +586,11 @@ class RecordingsPage(QWidget):
     @Slot(Path)
     def _pick(self, path: Path) -> None:
         self.choose([path])
+
+
+def _files(event: QDropEvent) -> list[Path]:
+    """Return the local files that are dropped."""
+    return [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
 
 
 def _rms(curves: Curves) -> str:

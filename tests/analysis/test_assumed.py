@@ -51,7 +51,7 @@ WHOLE = "75 mm long, 72 mm wide, 1000 um thick, relative permittivity 4.7, const
 def test_values_that_were_not_given_are_told(
     tmp_path: Path, given: dict[str, float], kinematics: str | None, words: str
 ) -> None:
-    metadata = imported_metadata(None, None, "", "", **given, kinematics=kinematics)
+    metadata = imported_metadata("", None, "", "", **given, kinematics=kinematics)
     run = recorded(tmp_path, metadata, kinematics=kinematics)
     assert words in assumed_by([run], None)
     assert assumed_by([run], RigFile()) == ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 from collections.abc import Mapping, Sequence
@@ -19,14 +20,14 @@ from dearig.recording.importers.labels import (
     target_of,
 )
 from dearig.recording.importers.source import Source, listing, no_such_column, part_of
-from dearig.recording.importers.units import Scale
+from dearig.recording.importers.units import UNITS, Scale
 
 __all__ = ["choose"]
 
 #: Tables of a file in which columns are looked for; measurements have fewer specimens.
 TABLES_TRIED = 64
 _SCALE = re.compile(
-    r"(?P<column>.+?)\s*(?:(?P<sign>[*/])\s*(?P<factor>[\d.]+(?:[eE][+-]?\d+)?))?"
+    r"(?P<column>.+?)\s*(?:(?P<sign>[*/])\s*(?P<factor>[+-]?[\d.]+(?:[eE][+-]?\d+)?))?"
     r"\s*(?P<plus>[+-]\s*[\d.]+(?:[eE][+-]?\d+)?)?"
 )
 
@@ -116,6 +117,7 @@ def _choose(source: Source, wanted: _Wanted) -> Chosen:
                 f"{pick.target.quantity} is given twice, as {before.target.name} and as {name}"
             )
         chosen.picked[pick.target.quantity] = pick
+        chosen.notes += _overruled(pick, labels[pick.column])
     if not wanted.guess:
         use_monitor(chosen)
         return chosen
@@ -179,7 +181,7 @@ def _asked(
         )
     scale = raw[target.quantity] if target.raw else target.scale
     if own is not None:
-        return Pick(target, column, _both(own, scale))
+        return Pick(target, column, _both(own, scale), _behind(own))
     label = labels[column]
     if not label.unit:
         return Pick(target, column, scale)
@@ -198,6 +200,26 @@ def _asked(
             f"wrong, such as {shlex.quote(f'{target.name}={column}*1')}"
         )
     return Pick(target, column, scale)
+
+
+def _behind(scale: Scale) -> str:
+    """Return ``scale`` as it stands behind a column in a command line."""
+    factor = f"/{scale.over:g}" if scale.over != 1.0 else f"*{scale.times:g}"
+    return factor + (f"{scale.plus:+g}" if scale.plus else "")
+
+
+def _overruled(pick: Pick, label: Label) -> list[str]:
+    """Return a sentence if a scale gives ``pick`` another unit than its name says."""
+    units = UNITS[DIMENSIONS[pick.target.quantity]]
+    if not pick.behind or label.unit not in units:
+        return []
+    named, taken = units[label.unit], pick.scale
+    if math.isclose(named.times / named.over, taken.times / taken.over, rel_tol=1e-9):
+        return []
+    return [
+        f"{pick.column!r} is taken as {pick.target.name} with the scale {pick.behind}, although "
+        f"its name says {label.unit}"
+    ]
 
 
 def _column(source: Source, text: str) -> tuple[str, Scale | None]:

@@ -38,7 +38,8 @@ class Pick:
         """What was taken for what, for a message."""
         target = self.target
         unit = "V at the card" if target.raw else "no unit" if target.unit == "1" else target.unit
-        return f"{target.quantity.replace('_', ' ')} in {unit} from {self.column!r}"
+        scaled = f", scaled {self.behind}" if self.behind else ""
+        return f"{target.quantity.replace('_', ' ')} in {unit} from {self.column!r}{scaled}"
 
 
 @dataclass

@@ -265,7 +265,7 @@ def _provenance(
     found: dict[str, object] = {
         "source": path.name,
         "source_sha256": digest,
-        "columns": ", ".join(f"{p.target.name}={p.column}" for p in chosen.picked.values()),
+        "columns": ", ".join(f"{name}={column}" for name, column in chosen.pairs.items()),
     }
     for name in ("gauge_length_mm", "area_mm2", "rate_Hz"):
         if (value := getattr(options, name)) is not None:

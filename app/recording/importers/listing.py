@@ -1,19 +1,26 @@
-"""List of the columns of a file of measured data, for a person to choose from."""
+"""Content of a file of measured data, for a person to choose from: columns, tables, guesses."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from dearig.errors import InputError
-from dearig.recording.importers.chosen import label_in
+from dearig.progress import Progress, part, quiet
+from dearig.recording.importers.choose import TABLES_TRIED, choose
+from dearig.recording.importers.chosen import Chosen, label_in, own_name
+from dearig.recording.importers.importing import OPENED
 from dearig.recording.importers.registry import source_at
-from dearig.recording.importers.source import printable
+from dearig.recording.importers.source import Source, part_of, printable
+from dearig.recording.importers.specimen import Specimen, specimen_told
+from dearig.recording.importers.units import Scale
 
-__all__ = ["ColumnPreview", "preview"]
+__all__ = ["ColumnPreview", "Content", "Guessed", "Proposal", "content_of", "preview"]
 
 _SHOWN = 5  # values of each column
 
@@ -34,9 +41,142 @@ class ColumnPreview:
     table: str = ""
 
 
+@dataclass(frozen=True)
+class Guessed:
+    """Guess for a column: ``unit`` is "" where it is not sure.
+
+    ``doubt`` says what of it is not sure: "column", "unit" or "scale"; "" if nothing is. ``raw``:
+    in volts at the card, which the rig file scales.
+    """
+
+    quantity: str
+    unit: str
+    doubt: str = ""
+    raw: bool = False
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Guesses for the columns of one table, by number, and what is not sure of them.
+
+    ``signature`` is the same for tables of the same layout, names and units; ``numbers`` are those
+    of its columns, in order.
+    """
+
+    guesses: Mapping[int, Guessed]
+    numbers: tuple[int, ...]
+    signature: str
+    unsure: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Content:
+    """Content of the file at ``path``.
+
+    ``proposals`` are by table, "" for all columns; ``table`` is the one that is taken, None where
+    the user must choose. ``told`` is the size of the specimen that the file's head tells.
+    """
+
+    path: Path
+    columns: tuple[ColumnPreview, ...]
+    proposals: Mapping[str, Proposal]
+    table: str | None
+    is_text: bool = False
+    told: Specimen = field(default_factory=Specimen)
+    block: tuple[str, ...] = ()
+
+
 def preview(path: Path, names_line: int | None = None) -> list[ColumnPreview]:
     """Return the columns of the file at ``path``. Raises ``InputError``."""
+    return _columns(source_at(path, names_line=names_line, skip_bad_rows=True), _SHOWN)
+
+
+def content_of(
+    path: Path,
+    names_line: int | None = None,
+    raw: Mapping[str, Scale] | None = None,
+    *,
+    shown: int = 12,
+    progress: Progress = quiet,
+) -> Content:
+    """Return the content of the file at ``path``, with ``shown`` first values of each column.
+
+    ``raw`` are the scales of a rig file from volts at the card, by quantity. Raises ``InputError``.
+    """
+    progress("opening", 0.0)
     source = source_at(path, names_line=names_line, skip_bad_rows=True)
+    if hasattr(source, "progress"):
+        reading = part(progress, OPENED, 0.9)
+        source.progress = lambda done: reading("reading", done)
+    columns = tuple(_columns(source, shown))
+    numbers = {column.name: column.number for column in columns}
+    progress("finding quantities", 0.9)
+    tables: Mapping[str, Sequence[str]] = getattr(source, "tables", {})
+    scales = raw or {}
+    # without tables, and where several columns of several make up a recording
+    proposals = {"": _proposal(source, None, scales, numbers)}
+    for name in list(tables)[:TABLES_TRIED]:
+        proposals[printable(name)] = _proposal(source, name, scales, numbers)
+    block: Sequence[Sequence[str]] = getattr(source, "block", ())
+    return Content(
+        path, columns, proposals, _taken(source, scales),
+        is_text=hasattr(source, "layout"), told=specimen_told(block),
+        block=tuple(printable(" ".join(row)) for row in block if row),
+    )  # fmt: skip
+
+
+def _taken(source: Source, raw: Mapping[str, Scale]) -> str | None:
+    """Return the table that is taken without being asked, "" for all columns; else None."""
+    try:
+        chosen = choose(source, {}, raw, timed=False)
+    except InputError:
+        return ""
+    return None if chosen.table_choices else printable(chosen.table or "")
+
+
+def _proposal(
+    source: Source, table: str | None, raw: Mapping[str, Scale], numbers: Mapping[str, int]
+) -> Proposal:
+    tables: Mapping[str, Sequence[str]] = getattr(source, "tables", {})
+    names = list(source.names if table is None else tables[table])
+    of_table = source if table is None else part_of(source, names)
+    places = tuple(numbers[printable(name)] for name in names if printable(name) in numbers)
+    digest = _signature(source, names)
+    try:
+        chosen = choose(of_table, {}, raw, timed=False)
+    except InputError as error:
+        return Proposal({}, places, digest, (str(error),))
+    if chosen.table is not None:  # the columns of a table are proposed with that table
+        return Proposal({}, places, digest)
+    return Proposal(
+        _guesses(chosen, numbers), places, digest, tuple(chosen.unsure), tuple(chosen.notes)
+    )
+
+
+def _guesses(chosen: Chosen, numbers: Mapping[str, int]) -> dict[int, Guessed]:
+    found: dict[int, Guessed] = {}
+    for quantity, pick in chosen.picked.items():
+        number = numbers.get(printable(pick.column))
+        if number is not None and number not in found:  # the monitor may be the voltage too
+            unit = "" if pick.doubt else pick.target.unit
+            found[number] = Guessed(quantity, unit, pick.doubt, pick.target.raw)
+    return found
+
+
+def _signature(source: Source, names: Sequence[str]) -> str:
+    """Return what tables of the same layout, names and units have in common."""
+    layout = getattr(source, "layout", None)
+    units: Mapping[str, str] = getattr(source, "units", {})
+    told = [
+        type(source).__name__,
+        getattr(layout, "delimiter", None),
+        [[own_name(source, name), units.get(name, "")] for name in names],
+    ]
+    return hashlib.sha256(json.dumps(told).encode()).hexdigest()[:32]
+
+
+def _columns(source: Source, shown: int) -> list[ColumnPreview]:
     units: Mapping[str, str] = getattr(source, "units", {})
     places: Mapping[int, str] = getattr(source, "places", None) or dict(enumerate(source.names, 1))
     tables: Mapping[str, Sequence[str]] = getattr(source, "tables", {})
@@ -44,23 +184,39 @@ def preview(path: Path, names_line: int | None = None) -> list[ColumnPreview]:
     for table, names in tables.items():
         for name in names:
             owners.setdefault(name, []).append(table)
+    values = _first_values(source, list(places.values()), shown)
     found = []
     for number, name in places.items():
-        try:
-            values = source.read([name])[name]
-        except InputError:
-            values = np.empty(0)
         label = label_in(source, name)
         raw = (label.raw,) if label.raw and not label.quantities else ()
+        first, count = values[name]
         found.append(
             ColumnPreview(
                 number,
                 printable(name),
                 label.quantities or raw,
                 label.unit or units.get(name, ""),
-                tuple(float(v) for v in values[:_SHOWN]),
-                int(values.size),
+                tuple(float(v) for v in first),
+                count,
                 owners[name][0] if len(owners.get(name, ())) == 1 else "",
             )
         )
+    return found
+
+
+def _first_values(
+    source: Source, names: Sequence[str], shown: int
+) -> dict[str, tuple[np.ndarray, int]]:
+    """Return the first values and the number of values of each column; none if it has none."""
+    overview = getattr(source, "overview", None)
+    if overview is not None:
+        found: dict[str, tuple[np.ndarray, int]] = overview(names, shown)
+        return found
+    found = {}
+    for name in names:
+        try:
+            values = source.read([name])[name]
+        except InputError:
+            values = np.empty(0)
+        found[name] = values[:shown], int(values.size)
     return found

@@ -158,6 +158,26 @@ class TextFile(NamedColumns[Column]):
             self.progress(1.0 - max(left, 0) / size)
         return {column.name: values for column, values in zip(wanted, table.values, strict=True)}
 
+    def overview(self, names: Sequence[str], count: int) -> dict[str, tuple[np.ndarray, int]]:
+        """Return the first ``count`` values of columns, and how many each has, in one reading.
+
+        Cells that are no numbers are passed over, in each column by itself.
+        """
+        found: dict[str, tuple[np.ndarray, int]] = {}
+        for section in dict.fromkeys(self._section_of.get(name) for name in names):
+            self._section = section or self._section
+            self._wanted = [self._columns[n] for n in names if self._section_of.get(n) == section]
+            first = [np.empty(0) for _ in self._wanted]
+            sizes = [0 for _ in self._wanted]
+            for _, block, values in self._parsed():
+                columns = self._apart(block) if values is None else values
+                for place, numbers in enumerate(columns):
+                    first[place] = np.append(first[place], numbers[: count - first[place].size])
+                    sizes[place] += numbers.size
+            for column, begin, size in zip(self._wanted, first, sizes, strict=True):
+                found[column.name] = begin, size
+        return found
+
     def row(self, index: int) -> str:
         """Return the line of sample ``index`` of what was read last."""
         return self.rows([index])[0]
@@ -257,6 +277,32 @@ class TextFile(NamedColumns[Column]):
         last = table[layout.cells - 1]
         whole = last.dtype.kind == "f" or bool((last.astype(str) != "").all())
         return values if whole and all(np.isfinite(v).all() for v in values) else None
+
+    def _apart(self, block: bytes) -> list[np.ndarray]:
+        """Return the numbers of each column of ``block``, without cells that are none."""
+        import pandas as pd
+
+        layout = self.layout
+        try:
+            table = pd.read_csv(
+                BytesReader(block), header=None, names=range(layout.cells), index_col=False,
+                sep=r"\s+" if layout.delimiter is None else layout.delimiter, comment="#",
+                usecols=sorted({c.place for c in self._wanted}), dtype=str, na_filter=False,
+                skipinitialspace=self._is_spaced, on_bad_lines="skip", engine="c",
+                low_memory=False,
+            )  # fmt: skip
+        except (ValueError, OverflowError):  # nothing is left of it
+            return [np.empty(0) for _ in self._wanted]
+        found = []
+        for column in self._wanted:
+            cells = table[column.place].astype(str)
+            if self._is_plain and column.decimal == ".":
+                numbers = pd.to_numeric(cells, errors="coerce").to_numpy(np.float64)
+            else:
+                read = (number_in(cell.strip(), column) for cell in cells)
+                numbers = np.array([math.nan if n is None else n for n in read], dtype=np.float64)
+            found.append(numbers[np.isfinite(numbers)])
+        return found
 
     def _read_slowly(self, before: int, line: int, block: bytes) -> list[np.ndarray]:
         """Return the columns (rows,), read line by line; ``before`` are the rows above.
