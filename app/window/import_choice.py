@@ -33,14 +33,15 @@ _UNIT_LABELS = MappingProxyType(
 #: What the fields of the window are called where a message names an option of the command.
 _LABELS = MappingProxyType(
     {
-        "--gauge-length-mm": "Gauge length",
-        "--area-mm2": "Cross-section",
-        "--skip-bad-rows": "Leave out bad rows",
-        "--rate-Hz": "Rate",
-        "--names-line": "Names in line",
+        ", or replace it with --force": "",
+        "--skip-bad-rows leaves such rows out": "“Leave out bad rows” leaves them out",
+        "--gauge-length-mm": "“Gauge length”",
+        "--area-mm2": "“Cross-section”",
+        "--rate-Hz": "“Rate”",
+        "--names-line": "“Names in line”",
         "--table takes one": "one must be chosen",
-        "--rig-file or the options of the film": "the field Film and load",
-        "--rig-file": "Film and load",
+        "--rig-file or the options of the film": "“Film and load”",
+        "--rig-file": "“Film and load”",
     }
 )
 
@@ -110,10 +111,13 @@ def problems(
                 f"for {column.name!r}: choose one."
             )
         used[choice.quantity] = column.name
+        guess = guesses.get(number)
         if not choice.unit:
-            found.append(f"Choose the unit of {column.name!r}.")
+            scaled = guess is not None and guess.doubt == "scale"
+            more = f", the output of an instrument in {column.unit}, and enter its scale"
+            found.append(f"Choose the unit of {column.name!r}{more if scaled else ''}.")
             continue
-        if (said := _contradiction(choice, column, guesses.get(number))) is not None:
+        if (said := _contradiction(choice, column, guess)) is not None:
             found.append(said)
     if not kind_of(choices):
         found.append("Choose the columns: voltage and displacement, or stretch and stress.")

@@ -177,7 +177,7 @@ class ImportDialog(QDialog):
         self.fields.names_line.editingFinished.connect(self._names_line_changed)
         self.table_box.activated.connect(self._table_chosen)
         self.forget.clicked.connect(self._forget)
-        self.out.textEdited.connect(self._changed)
+        self.out.textEdited.connect(self._show_state)
         self.start.clicked.connect(self.begin)
         self.cancel.clicked.connect(self.reject)
 
@@ -440,7 +440,7 @@ class ImportDialog(QDialog):
         try:
             out = self.out_path()
         except InputError as error:
-            self.to_do.show_text(str(error))
+            self.to_do.show_text(in_window_words(str(error)))
             return
         self._submit(
             lambda said: self._take_import(out, said),
@@ -483,6 +483,7 @@ class ImportDialog(QDialog):
         self._drop()
         super().reject()
 
+    @Slot()
     def _show_state(self) -> None:
         """Enable what can be done, and say what is still open."""
         found = self._problems()
@@ -490,7 +491,7 @@ class ImportDialog(QDialog):
             try:
                 self.out_path()
             except InputError as error:
-                found = [str(error)]
+                found = [in_window_words(str(error))]
         if self.content is not None and len(self._proposal().numbers) > COLUMNS_MAX:
             found.append(f"The first {COLUMNS_MAX} of {len(self._proposal().numbers)} columns are "
                          f"shown, those with a known name before others.")  # fmt: skip

@@ -28,7 +28,7 @@ __all__ = ["Boxes", "ImportTable"]
 
 #: Columns that are shown: those with a guess, and the first others.
 COLUMNS_MAX = 40
-_HEADS = 4  # rows of boxes
+_HEADS = 5  # rows above the values: boxes, and the range
 _WIDTH = 168  # px of a column: its boxes have room for their texts
 _OPEN = "choose …"
 
@@ -91,12 +91,12 @@ class ImportTable(QTableWidget):
         self._boxes = {}
         self.setRowCount(_HEADS + rows)
         self.setColumnCount(len(self._shown))
-        heads = ("Quantity", "Unit", "Scale", "Offset")
+        heads = ("Quantity", "Unit", "Scale", "Offset", "Range")
         self.setVerticalHeaderLabels([*heads, *(str(n) for n in range(1, rows + 1))])
         for place, column in enumerate(self._shown):
             self._show_column(place, column, choices, guesses)
         for row in range(_HEADS + rows):
-            self.setRowHeight(row, 30 if row < _HEADS else 22)
+            self.setRowHeight(row, 30 if row < _HEADS - 1 else 22)
 
     def _show_column(
         self,
@@ -108,8 +108,9 @@ class ImportTable(QTableWidget):
         head = QTableWidgetItem(column.name)
         head.setToolTip(plain_tip(f"{column.name}: column {column.number}, {column.count} values"))
         self.setHorizontalHeaderItem(place, head)
-        for row, value in enumerate(column.values, _HEADS):
-            item = QTableWidgetItem(f"{value:.9g}")
+        span = "" if column.low is None else f"{column.low:.6g} to {column.high:.6g}"
+        for row, text in enumerate((span, *(f"{v:.9g}" for v in column.values)), _HEADS - 1):
+            item = QTableWidgetItem(text)
             item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             self.setItem(row, place, item)
         choice = choices.get(column.number, ColumnChoice())
@@ -175,7 +176,7 @@ class ImportTable(QTableWidget):
         """Show the numbers of a column that is not used in grey."""
         used = bool(self._boxes[self._shown[place].number].quantity.currentData())
         colour = self._session.theme.text if used else self._session.theme.muted
-        for row in range(_HEADS, self.rowCount()):
+        for row in range(_HEADS - 1, self.rowCount()):
             if (item := self.item(row, place)) is not None:
                 item.setForeground(QColor(colour))
 

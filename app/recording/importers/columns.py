@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar
 
-__all__ = ["NamedColumns", "unseen"]
+import numpy as np
+
+__all__ = ["NamedColumns", "Overview", "unseen"]
 
 
 class _Column(Protocol):
@@ -14,6 +18,27 @@ class _Column(Protocol):
 
     @property
     def unit(self) -> str: ...
+
+
+@dataclass(frozen=True)
+class Overview:
+    """First values (k,) of a column, how many it has, and the least and the greatest of them."""
+
+    first: np.ndarray = field(default_factory=lambda: np.empty(0))
+    count: int = 0
+    low: float = math.inf
+    high: float = -math.inf
+
+    def with_values(self, values: np.ndarray, shown: int) -> Overview:
+        """Return the overview with more ``values`` (n,), and ``shown`` first ones at most."""
+        if not values.size:
+            return self
+        return Overview(
+            np.append(self.first, values[: shown - self.first.size]),
+            self.count + int(values.size),
+            min(self.low, float(values.min())),
+            max(self.high, float(values.max())),
+        )
 
 
 C = TypeVar("C", bound=_Column)

@@ -104,11 +104,11 @@ class _Sheet:
 
     def __init__(self, path: Path, name: str, names_line: int | None) -> None:
         self.path, self.name = path, name
+        self.report: Callable[[float], None] = unseen
         head = list(self._rows(HEAD_ROWS, values=True))
         self._formulas = self._empty_formulas(head)
         lines = ["\t".join(_texts(row, self._formulas, _has_number(row))) for row in head]
         self.layout: Layout = layout_of("\n".join(lines), "utf-8", path, names_line, ("\t",))
-        self.report: Callable[[float], None] = unseen
         self._numbers: dict[int, array[float]] | None = None
         self._wrong: dict[tuple[int, int], str] = {}  # by place of the column and row of the sheet
         self._kept = np.empty(0, dtype=np.int64)  # rows of the sheet of what was read last

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from dearig.errors import InputError
 from dearig.progress import Progress, part, quiet
 from dearig.recording.importers.choose import TABLES_TRIED, choose
 from dearig.recording.importers.chosen import Chosen, label_in, own_name
+from dearig.recording.importers.columns import Overview
 from dearig.recording.importers.importing import OPENED
 from dearig.recording.importers.registry import source_at
 from dearig.recording.importers.source import Source, part_of, printable
@@ -30,6 +32,7 @@ class ColumnPreview:
     """A column of a file: its name, what the name says of quantity and unit, and first values.
 
     ``table`` is the sheet, specimen or group that it belongs to, empty where it belongs to all.
+    ``low`` and ``high`` are the least and the greatest of its ``count`` values, None without any.
     """
 
     number: int
@@ -39,6 +42,8 @@ class ColumnPreview:
     values: tuple[float, ...]
     count: int
     table: str = ""
+    low: float | None = None
+    high: float | None = None
 
 
 @dataclass(frozen=True)
@@ -184,39 +189,40 @@ def _columns(source: Source, shown: int) -> list[ColumnPreview]:
     for table, names in tables.items():
         for name in names:
             owners.setdefault(name, []).append(table)
-    values = _first_values(source, list(places.values()), shown)
+    overviews = _overviews(source, list(places.values()), shown)
     found = []
     for number, name in places.items():
         label = label_in(source, name)
         raw = (label.raw,) if label.raw and not label.quantities else ()
-        first, count = values[name]
+        seen = overviews[name]
         found.append(
             ColumnPreview(
                 number,
                 printable(name),
                 label.quantities or raw,
                 label.unit or units.get(name, ""),
-                tuple(float(v) for v in first),
-                count,
+                tuple(float(v) for v in seen.first),
+                seen.count,
                 owners[name][0] if len(owners.get(name, ())) == 1 else "",
+                seen.low if math.isfinite(seen.low) else None,
+                seen.high if math.isfinite(seen.high) else None,
             )
         )
     return found
 
 
-def _first_values(
-    source: Source, names: Sequence[str], shown: int
-) -> dict[str, tuple[np.ndarray, int]]:
-    """Return the first values and the number of values of each column; none if it has none."""
-    overview = getattr(source, "overview", None)
-    if overview is not None:
-        found: dict[str, tuple[np.ndarray, int]] = overview(names, shown)
-        return found
+def _overviews(source: Source, names: Sequence[str], shown: int) -> dict[str, Overview]:
+    """Return first values, number and range of each column; none where it cannot be read."""
+    whole = getattr(source, "overview", None)
+    if whole is not None:
+        told: dict[str, Overview] = whole(names, shown)
+        return told
     found = {}
     for name in names:
         try:
             values = source.read([name])[name]
         except InputError:
             values = np.empty(0)
-        found[name] = values[:shown], int(values.size)
+        seen = Overview().with_values(values[np.isfinite(values)], shown)
+        found[name] = replace(seen, first=values[:shown], count=int(values.size))
     return found

@@ -22,7 +22,7 @@ from dearig.errors import InputError
 from dearig.input_file import open_input
 from dearig.recording.files import in_words
 from dearig.recording.importers.cells import complaint_about, number_in
-from dearig.recording.importers.columns import NamedColumns
+from dearig.recording.importers.columns import NamedColumns, Overview
 from dearig.recording.importers.importer import Importer
 from dearig.recording.importers.source import NeedsOptionError, no_such_column
 from dearig.recording.importers.text_blocks import BytesReader, blocks_of, halves_of
@@ -150,33 +150,36 @@ class TextFile(NamedColumns[Column]):
         wanted = [self._columns[name] for name in dict.fromkeys(names)]
         self.skipped, self._spans, self._wanted = [], [], wanted
         table = _Table(len(wanted))
-        # blocks are in UTF-8
-        size = left = max(self.path.stat().st_size // _WIDTHS.get(self.layout.encoding[:6], 1), 1)
+        size = left = self._size
         for line, block, values in self._parsed():
             self._keep(line, block, values, table, left)
             left -= len(block)
             self.progress(1.0 - max(left, 0) / size)
         return {column.name: values for column, values in zip(wanted, table.values, strict=True)}
 
-    def overview(self, names: Sequence[str], count: int) -> dict[str, tuple[np.ndarray, int]]:
-        """Return the first ``count`` values of columns, and how many each has, in one reading.
+    def overview(self, names: Sequence[str], count: int) -> dict[str, Overview]:
+        """Return the first ``count`` values of columns, how many there are, and their range.
 
-        Cells that are no numbers are passed over, in each column by itself.
+        All are read at once. Cells that are no numbers are passed over, in each column by itself.
         """
-        found: dict[str, tuple[np.ndarray, int]] = {}
+        found: dict[str, Overview] = {}
         for section in dict.fromkeys(self._section_of.get(name) for name in names):
             self._section = section or self._section
             self._wanted = [self._columns[n] for n in names if self._section_of.get(n) == section]
-            first = [np.empty(0) for _ in self._wanted]
-            sizes = [0 for _ in self._wanted]
+            seen = [Overview() for _ in self._wanted]
+            size, done = self._size, 0
             for _, block, values in self._parsed():
                 columns = self._apart(block) if values is None else values
-                for place, numbers in enumerate(columns):
-                    first[place] = np.append(first[place], numbers[: count - first[place].size])
-                    sizes[place] += numbers.size
-            for column, begin, size in zip(self._wanted, first, sizes, strict=True):
-                found[column.name] = begin, size
+                seen = [o.with_values(v, count) for o, v in zip(seen, columns, strict=True)]
+                done += len(block)
+                self.progress(min(done / size, 1.0))
+            found |= {column.name: o for column, o in zip(self._wanted, seen, strict=True)}
         return found
+
+    @property
+    def _size(self) -> int:
+        """Size of the file in bytes, if it were in UTF-8 as the blocks are; 1 at least."""
+        return max(self.path.stat().st_size // _WIDTHS.get(self.layout.encoding[:6], 1), 1)
 
     def row(self, index: int) -> str:
         """Return the line of sample ``index`` of what was read last."""
