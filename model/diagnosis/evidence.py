@@ -14,16 +14,32 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from dearig.model.diagnosis.fits import DRIFT, Fit
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
+from dearig.model.fitting.intervals import correlation_time, has_spectrum_of, is_flat
 
 __all__ = ["Evidence", "Judge", "family_of"]
+
+_REST_MIN = 100  # readings: fewer do not show whether the noise is white
 
 
 def family_of(member: str) -> str:
     """Return the family of an effect, or of ``DRIFT``."""
     return "drift" if member == DRIFT else EFFECTS[member].family
+
+
+def _coloured_rest(baseline: Fit) -> tuple[np.ndarray, ...]:
+    """Return each record's readings before its voltage, where they are not white; else ()."""
+    rest = [
+        part[: getattr(record, "lead_in", 0)]
+        for part, record in zip(baseline.by_record(), baseline.problem.records, strict=True)
+    ]
+    if min(part.size for part in rest) < _REST_MIN or all(map(is_flat, rest)):
+        return ()
+    return tuple(rest)
 
 
 @dataclass(frozen=True)
@@ -48,6 +64,7 @@ class Judge:
         self.readings = baseline.problem.samples
         self.base_cost = baseline.cost
         self._correlation = max(1.0, baseline.correlation)
+        self._rest = _coloured_rest(baseline) if self._sensed(baseline) else ()
 
     def see(self, fits: Iterable[Fit]) -> None:
         """Take account of the correlation times of ``fits``."""
@@ -93,15 +110,27 @@ class Judge:
     def is_settled(self, fit: Fit) -> bool:
         """Whether nothing is left that any effect could explain.
 
-        The residual is white, or so small a part of what is explained that it may be the form of a
-        law.
+        The residual is white, or as coloured as the reading at rest, or so small a part of what is
+        explained that it may be the form of a law.
         """
         if not self.is_noise(fit):
             return False
         if not self._sensed(fit):
             return True
-        white = fit.correlation <= self.settings.white_correlation and fit.is_flat
-        return white or fit.cost - 1.0 < self.settings.form_share * (self.base_cost - fit.cost)
+        return self._is_like_rest(fit) or fit.cost - 1.0 < self.settings.form_share * (
+            self.base_cost - fit.cost
+        )
+
+    def _is_like_rest(self, fit: Fit) -> bool:
+        """Whether the residual is white, or has the spectrum of the reading at rest."""
+        margin = self.settings.white_correlation
+        if not self._rest:
+            return fit.correlation <= margin and fit.is_flat
+        return all(
+            has_spectrum_of(part, rest)
+            and correlation_time(part) <= margin * max(correlation_time(rest), 1.0)
+            for part, rest in zip(fit.by_record(), self._rest, strict=True)
+        )
 
     @staticmethod
     def _sensed(fit: Fit) -> bool:

@@ -81,7 +81,8 @@ class DiagnosisSettings:
         RMS over noise up to which a residual counts as noise. A lead-in of 2 s at 200 Hz gives the
         noise to 1/sqrt(2 * 400) = 3.5 %; this is 2.3 of these.
     white_correlation
-        Correlation time in samples up to which a residual counts as white.
+        Correlation time up to which a residual counts as white, in samples, or in the correlation
+        time of the reading at rest where that is not white.
     drift_modes
         Cosines of the drift of one record; slower than the drive's lobes are the first half.
     tempering

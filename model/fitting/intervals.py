@@ -12,7 +12,15 @@ from scipy.special import kolmogorov
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.problem import Problem
 
-__all__ = ["CHI2_95", "correlation_time", "covariance", "is_flat", "profile", "unevenness"]
+__all__ = [
+    "CHI2_95",
+    "correlation_time",
+    "covariance",
+    "has_spectrum_of",
+    "is_flat",
+    "profile",
+    "unevenness",
+]
 
 CHI2_95 = 3.841458820694124  #: 95 % of chi-square with one degree of freedom
 _POINTS_MAX = 8  # on one side of a profile
@@ -62,6 +70,28 @@ def unevenness(residuals: np.ndarray, by_chance: float = _BY_CHANCE) -> float:
     line = np.arange(1, m + 1) / (m + 1.0)
     away = float(np.max(np.abs(summed[:-1] / summed[-1] - line)))
     return away if kolmogorov(away * math.sqrt(m)) <= by_chance else 0.0
+
+
+def has_spectrum_of(residuals: np.ndarray, noise: np.ndarray) -> bool:
+    """Whether the spectrum of ``residuals`` (N,) is that of a sample of ``noise`` (M,), by chance.
+
+    The test of Kolmogorov and Smirnov on two summed periodograms, each divided by its total. A
+    line of a periodogram has the variance of its mean squared, so that a spectrum of few lines
+    counts as few.
+    """
+    sums, lines = [], []
+    for values in (residuals, noise):
+        power = np.abs(np.fft.rfft(values - values.mean()))[1:-1] ** 2
+        total = float(power.sum())
+        if power.size < 2 or total <= 0.0:
+            return True
+        place = np.arange(1, power.size + 1) / power.size
+        sums.append((place, np.cumsum(power) / total))
+        lines.append(2.0 * total**2 / float(power @ power))
+    (place, summed), (other, also) = sums
+    away = float(np.max(np.abs(np.interp(other, place, summed) - also)))
+    counted = 1.0 / (1.0 / lines[0] + 1.0 / lines[1])
+    return bool(kolmogorov(away * math.sqrt(counted)) > _BY_CHANCE)
 
 
 def covariance(normal: np.ndarray, inflation: float) -> np.ndarray:

@@ -68,6 +68,21 @@ def test_correlated_residuals_count_as_fewer_samples_until_a_fit_is_white() -> N
     assert before < 0.3 * judge.samples
 
 
+def test_a_residual_as_coloured_as_the_reading_at_rest_is_noise() -> None:
+    # a laser that averages over four samples, and a slow wave of half its noise
+    white = np.random.default_rng(3).standard_normal(fit(PLAIN, 1.0).residuals.size + 4)
+    walk = np.cumsum(white)
+    averaged = (walk[4:] - walk[:-4]) / 2.0
+    plain = replace(fit(PLAIN, 1.0), residuals=averaged)
+    wave = np.sin(2.0 * math.pi * 0.4 * plain.problem.records[0].time)
+    wave[: plain.problem.records[0].lead_in] = 0.0
+    judge = Judge(SETTINGS, plain)
+    assert judge.is_settled(plain)
+    assert not judge.is_settled(replace(plain, residuals=averaged + 0.7 * wave))
+    # beside a white reading at rest it is not
+    assert not Judge(SETTINGS, fit(PLAIN, 1.0)).is_settled(plain)
+
+
 def test_probabilities_add_up_to_one_and_follow_the_evidence() -> None:
     baseline = fit(PLAIN, 1.1)
     judge = Judge(SETTINGS, baseline)

@@ -16,7 +16,13 @@ from dearig.model.errors import ModelError
 from dearig.model.excitation import Sequence
 from dearig.model.film import Strip
 from dearig.model.fitting import identify
-from dearig.model.fitting.intervals import correlation_time, covariance, is_flat, unevenness
+from dearig.model.fitting.intervals import (
+    correlation_time,
+    covariance,
+    has_spectrum_of,
+    is_flat,
+    unevenness,
+)
 from dearig.model.fitting.levenberg import descend
 from dearig.model.fitting.parallel import parallel_map
 from dearig.model.fitting.parameters import Layout
@@ -314,6 +320,20 @@ def test_correlation_time():
     # (1 + a)/(1 - a) of an AR(1) process
     assert correlation_time(red) == pytest.approx(9.0, rel=0.25)
     assert correlation_time(np.zeros(100)) == 1.0
+
+
+def test_two_samples_of_one_noise_have_one_spectrum():
+    rng = np.random.default_rng(5)
+
+    def averaged(n, over):
+        walk = np.cumsum(rng.standard_normal(n + over))
+        return (walk[over:] - walk[:-over]) / math.sqrt(over)
+
+    for over in (1, 4, 8):
+        alike = [has_spectrum_of(averaged(3000, over), averaged(400, over)) for _ in range(100)]
+        assert sum(alike) >= 95
+    assert not any(has_spectrum_of(averaged(3000, 4), averaged(400, 1)) for _ in range(20))
+    assert has_spectrum_of(np.zeros(100), np.ones(100))
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-6])
