@@ -314,7 +314,7 @@ class Search:
         fitter, records = self.fitter, self.fitter.records
         went: np.ndarray | None = None
         drift = parent.problem.noise_drift
-        if drift is not None:
+        if drift is not None and parent.drift:
             noise = np.concatenate([np.full(r.measured.size, r.noise) for r in records])
             went = drift.mean(parent.plain_residuals()) * noise
         times = fitter.times if fitter.of_actuator else _film_times(records)

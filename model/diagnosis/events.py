@@ -84,7 +84,7 @@ def own_of(
         events.append(Event(name, found[moment.name], found[size.name], size.unit))
     whole = _as_it_is(fitter.careful_problem(best.model, best.drift))
     error, own = whole.plain_residuals(), whole.problem.noise_drift
-    error = error - own.mean(error) if own else error
+    error = error - own.mean(error) if own and best.drift else error
     good = np.isfinite(whole.problem.sigma)
     rms = fitter.full[0].noise * float(np.sqrt(np.mean(error[good] ** 2)))
     return Own(tuple(sorted(events, key=lambda e: e.time)), best.drift > 0.0, rms)

@@ -12,7 +12,12 @@ import numpy as np
 
 from dearig.model import kernel
 from dearig.model.actuator import Actuator
-from dearig.model.diagnosis.noise import Drift, DriftSpace, WhitenedProblem, drift_modes
+from dearig.model.diagnosis.noise import (
+    DriftSpace,
+    WhitenedProblem,
+    drift_modes,
+    pink_density,
+)
 from dearig.model.diagnosis.preparation import prepared, with_model_error
 from dearig.model.diagnosis.regression import Values
 from dearig.model.diagnosis.settings import DiagnosisSettings
@@ -195,9 +200,19 @@ class Fitter:
         if full not in self._space:
             records = self.full if full else self.records
             modes = self.settings.drift_modes
-            bases = [drift_modes(r, modes) for r in records if isinstance(r, ActuatorRecord)]
-            self._space[full] = DriftSpace(bases)
+            rigs = [r for r in records if isinstance(r, ActuatorRecord)]
+            self._space[full] = DriftSpace(
+                [drift_modes(r, modes) for r in rigs], self._pink(rigs, modes)
+            )
         return self._space[full]
+
+    def _pink(self, records: Sequence[ActuatorRecord], modes: int) -> list[np.ndarray] | None:
+        """Return the variances (K,) of each record's 1/f noise in its modes; None without any."""
+        density = pink_density(records, self.settings.odds)
+        number = np.arange(1.0, modes + 1.0)
+        # of a cosine of amplitude 1: the density at its frequency over the record's duration; the
+        # modes are lower by j^-2
+        return [2.0 * density * number**3 / r.noise**2 for r in records] if density else None
 
     def problem(
         self,
@@ -211,7 +226,7 @@ class Fitter:
         problem = WhitenedProblem(
             self.full if full else self.records,
             layout,
-            Drift(self.space(full), drift) if drift else None,
+            self.space(full).drift(drift) if self.of_actuator else None,
             workers=self.workers,
             fidelity=fidelity,
             on_simulations=self._count,

@@ -1,15 +1,18 @@
-"""Noise of readings with slow drift, marginalised: r ~ N(0, I + B L B') in units of the noise.
+"""Noise of readings with slow parts, marginalised: r ~ N(0, I + B L B') in units of the noise.
 
-Every record drifts by itself. The columns of B are cosines over the record, the variances on the
-diagonal of L fall as ``amplitude`` j^-4 with the number j of half waves: an integrated random walk,
-as of a bench that warms. A fit that whitens with (I + B L B')^(-1/2) finds the most probable
-parameters whatever the drift has been; no polynomial competes with an effect.
+Every record has its own. The columns of B are cosines over the record. The variances on the
+diagonal of L are those of two noises. Drift: they fall as ``amplitude`` j^-4 with the number j of
+half waves, an integrated random walk, as of a bench that warms. 1/f noise of the sensor: they fall
+as 1/j, and the readings at rest say how large they are. A fit that whitens with
+(I + B L B')^(-1/2) finds the most probable parameters whatever the slow parts have been; no
+polynomial competes with an effect.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,11 +20,15 @@ from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
 from dearig.model.records import ActuatorRecord, Record
 
-__all__ = ["Drift", "DriftSpace", "WhitenedProblem", "drift_modes"]
+__all__ = ["Drift", "DriftSpace", "WhitenedProblem", "drift_modes", "pink_density"]
 
 _POWER = 2.0  # of 1/j in a mode's standard deviation: an integrated random walk
 #: Variances of the slowest mode, in units of the noise, among which the evidence chooses.
 _AMPLITUDES = 10.0 ** np.arange(0.0, 9.0, 0.5)
+_PINK_MAX = 15.0  # Hz: faster, a sensor that averages is not white, and mains may stand out
+_PINK_LINES = 16  # of a spectrum: fewer do not show its slope
+#: Frequencies in Hz below which 1/f noise is larger than white noise, among which is chosen.
+_CORNERS = 10.0 ** np.arange(-1.0, 3.01, 0.05)
 
 
 def drift_modes(record: ActuatorRecord, modes: int, every: int = 1) -> np.ndarray:
@@ -42,48 +49,96 @@ def drift_modes(record: ActuatorRecord, modes: int, every: int = 1) -> np.ndarra
     return basis
 
 
+def pink_density(records: Sequence[Record], odds: float) -> float:
+    """Return p in m^2 of a density p/f of the readings at rest, 0 where they are white.
+
+    Whittle's likelihood of the lead-ins' periodograms below 15 Hz, of a density w + p/f over one of
+    w; p is believed where twice the logarithm of their ratio is above ``odds``.
+    """
+    frequency: list[np.ndarray] = [np.zeros(0)]
+    power: list[np.ndarray] = [np.zeros(0)]
+    for record in records:
+        if not isinstance(record, ActuatorRecord) or record.lead_in < 2 * _PINK_LINES:
+            continue
+        rest = record.displacement[: record.lead_in]
+        step = float(np.median(np.diff(record.time)))
+        f = np.fft.rfftfreq(rest.size, step)[1:]
+        density = 2.0 * step / rest.size * np.abs(np.fft.rfft(rest - rest.mean())[1:]) ** 2
+        frequency.append(f[f < _PINK_MAX])
+        power.append(density[f < _PINK_MAX])
+    f, density = np.concatenate(frequency), np.concatenate(power)
+    if f.size < _PINK_LINES or not density.any():
+        return 0.0
+    shapes = 1.0 + _CORNERS[:, None] / f
+    white = np.mean(density / shapes, axis=1)
+    scores = f.size * np.log(white) + np.sum(np.log(shapes), axis=1)
+    best = int(np.argmin(scores))
+    gain = 2.0 * (f.size * math.log(float(np.mean(density))) - float(scores[best]))
+    return float(white[best] * _CORNERS[best]) if gain > odds else 0.0
+
+
 class DriftSpace:
     """Directions in which the records' noise is larger: the modes of each record, orthogonalised.
 
-    ``bases`` are the modes (N_i, K) of each record, in units of one reading's noise.
+    ``bases`` are the modes (N_i, K) of each record, in units of one reading's noise. ``pink`` are
+    the variances (K,) of each record's 1/f noise in these modes; none where it is not given.
     """
 
-    def __init__(self, bases: Sequence[np.ndarray]) -> None:
+    def __init__(
+        self, bases: Sequence[np.ndarray], pink: Sequence[np.ndarray] | None = None
+    ) -> None:
         self.edges = np.cumsum([0, *(len(b) for b in bases)])
-        self.parts: list[tuple[np.ndarray, np.ndarray]] = []
-        for basis in bases:
-            u, s, _ = np.linalg.svd(basis, full_matrices=False)
-            self.parts.append((u, s * s))
+        self._bases, self._pink = bases, pink
+        self._units = [self._parts(basis, np.ones(basis.shape[1])) for basis in bases]
+
+    @staticmethod
+    def _parts(basis: np.ndarray, variances: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return directions (N, K), and the variance (K,) along each."""
+        u, s, _ = np.linalg.svd(basis * np.sqrt(variances), full_matrices=False)
+        return u, s * s
+
+    def parts(self, amplitude: float) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return each record's directions (N, K) and variances (K,) under a drift."""
+        if self._pink is None:
+            return [(u, amplitude * unit) for u, unit in self._units]
+        return [
+            self._parts(basis, amplitude + pink)
+            for basis, pink in zip(self._bases, self._pink, strict=True)
+        ]
+
+    def drift(self, amplitude: float) -> Drift | None:
+        """Return the noise under a drift; None where it is white."""
+        return Drift(self, amplitude) if amplitude or self._pink is not None else None
 
     def most_probable(self, residuals: np.ndarray) -> float:
         """Return the variance of the drift under which ``residuals`` (N,) are most probable.
 
         Maximum of the evidence -r'(I + B L B')^-1 r - log det(I + B L B') over a grid of half
-        decades; 0 where white noise alone is as probable as any. ``residuals`` are in noises.
+        decades; 0 where the noise without drift is as probable as any. ``residuals`` are in noises.
         """
-        inside = [
-            (residuals[a:b] @ u) ** 2
-            for (u, _), a, b in zip(self.parts, self.edges[:-1], self.edges[1:], strict=True)
-        ]
 
         def score(amplitude: float) -> float:
             total = 0.0
-            for power, (_, unit) in zip(inside, self.parts, strict=True):
-                variance = amplitude * unit
+            for (u, variance), (a, b) in zip(
+                self.parts(amplitude), pairwise(self.edges), strict=True
+            ):
+                power = (residuals[a:b] @ u) ** 2
                 total += float(np.sum(np.log1p(variance) - power * variance / (1.0 + variance)))
             return total
 
         best = min(map(float, _AMPLITUDES), key=score)
-        return best if score(best) < 0.0 else 0.0
+        return best if score(best) < score(0.0) else 0.0
 
 
 class Drift:
-    """The covariance of several records' noise with a drift of variance ``amplitude``."""
+    """The covariance of several records' noise with a drift of variance ``amplitude``, or 0."""
 
     def __init__(self, space: DriftSpace, amplitude: float) -> None:
         self.amplitude = amplitude
         self.space = space
-        variances = [amplitude * unit for _, unit in space.parts]
+        parts = space.parts(amplitude)
+        self._directions = [u for u, _ in parts]
+        variances = [v for _, v in parts]
         self.log_det = float(sum(np.sum(np.log1p(v)) for v in variances))
         self._taken = [1.0 - 1.0 / np.sqrt(1.0 + v) for v in variances]
         self._kept = [v / (1.0 + v) for v in variances]
@@ -101,8 +156,8 @@ class Drift:
         return np.asarray(residuals - left)
 
     def _subtract(self, rows: np.ndarray, parts: Sequence[np.ndarray]) -> None:
-        edges = self.space.edges
-        for (u, _), part, a, b in zip(self.space.parts, parts, edges[:-1], edges[1:], strict=True):
+        edges = pairwise(self.space.edges)
+        for u, part, (a, b) in zip(self._directions, parts, edges, strict=True):
             rows[..., a:b] -= ((rows[..., a:b] @ u) * part) @ u.T
 
 

@@ -20,9 +20,9 @@ SETTINGS = DiagnosisSettings()
 DRAG, CURVED = (replace(PLAIN, effects=(typical(n),)) for n in ("linear drag", "sensor curvature"))
 
 
-def fit(model: Actuator, cost: float, seed: int = 0, drift: float = 0.0) -> Fit:
+def fit(model: Actuator, cost: float, seed: int = 0, drift: float = 0.0, lead_in: int = 0) -> Fit:
     """A fit of ``model`` that leaves white noise of this mean square."""
-    record = record_of(PLAIN)
+    record = replace(record_of(PLAIN), lead_in=lead_in)
     noise = Drift(DriftSpace([drift_modes(record, 4)]), drift) if drift else None
     problem = WhitenedProblem([record], Layout(model), noise, workers=1)
     r = np.random.default_rng(seed).standard_normal(problem.samples)
@@ -70,17 +70,17 @@ def test_correlated_residuals_count_as_fewer_samples_until_a_fit_is_white() -> N
 
 def test_a_residual_as_coloured_as_the_reading_at_rest_is_noise() -> None:
     # a laser that averages over four samples, and a slow wave of half its noise
-    white = np.random.default_rng(3).standard_normal(fit(PLAIN, 1.0).residuals.size + 4)
-    walk = np.cumsum(white)
+    white = fit(PLAIN, 1.0, lead_in=400)
+    walk = np.cumsum(np.random.default_rng(3).standard_normal(white.residuals.size + 4))
     averaged = (walk[4:] - walk[:-4]) / 2.0
-    plain = replace(fit(PLAIN, 1.0), residuals=averaged)
-    wave = np.sin(2.0 * math.pi * 0.4 * plain.problem.records[0].time)
-    wave[: plain.problem.records[0].lead_in] = 0.0
-    judge = Judge(SETTINGS, plain)
-    assert judge.is_settled(plain)
-    assert not judge.is_settled(replace(plain, residuals=averaged + 0.7 * wave))
-    # beside a white reading at rest it is not
-    assert not Judge(SETTINGS, fit(PLAIN, 1.0)).is_settled(plain)
+    coloured = replace(white, residuals=averaged)
+    wave = 0.7 * np.sin(2.0 * math.pi * 0.4 * white.problem.records[0].time)
+    wave[:400] = 0.0
+    judge = Judge(SETTINGS, coloured)
+    assert judge.is_settled(coloured)
+    assert not judge.is_settled(replace(coloured, residuals=averaged + wave))
+    # where the reading at rest is white, it is not noise
+    assert not Judge(SETTINGS, white).is_settled(coloured)
 
 
 def test_probabilities_add_up_to_one_and_follow_the_evidence() -> None:

@@ -7,8 +7,16 @@ import pytest
 from scipy.linalg import sqrtm
 from scipy.stats import multivariate_normal
 
-from dearig.model.diagnosis.noise import Drift, DriftSpace, WhitenedProblem, drift_modes
+from dearig.model.actuator import Drive
+from dearig.model.diagnosis.noise import (
+    Drift,
+    DriftSpace,
+    WhitenedProblem,
+    drift_modes,
+    pink_density,
+)
 from dearig.model.fitting.parameters import Layout
+from dearig.model.records import ActuatorRecord
 from tests.tools.engine import PLAIN, masked, record_of, thesis_drive
 
 MODES = 6
@@ -81,3 +89,45 @@ def test_a_whitened_problem_has_whitened_residuals() -> None:
     drift = Drift(DriftSpace([drift_modes(record, 8)]), 50.0)
     problem = WhitenedProblem([record], layout, drift, workers=1)
     assert problem.residuals(x) == pytest.approx(drift.whitened(plain), abs=1e-6)
+
+
+def test_whitening_takes_out_1_over_f_noise_beside_a_drift() -> None:
+    some, pink = bases(30, 20), [np.arange(1.0, 7.0), np.arange(2.0, 8.0)]
+    drift = DriftSpace(some, pink).drift(1.5)
+    assert drift is not None
+    wide = [b * np.sqrt(1.5 + p) for b, p in zip(some, pink, strict=True)]
+    rows = np.random.default_rng(2).standard_normal((3, 50))
+    expected = rows @ np.linalg.inv(sqrtm(dense(wide, 1.0)).real)
+    assert drift.whitened(rows) == pytest.approx(expected, abs=1e-9)
+    assert DriftSpace(some).drift(0.0) is None
+
+
+def at_rest(noise: np.ndarray) -> ActuatorRecord:
+    """A record of a film that hangs still for all of it but its last sample."""
+    time = 0.01 * np.arange(noise.size)
+    voltage = np.zeros(noise.size)
+    voltage[-1] = 1.0
+    return ActuatorRecord("rest", Drive(time, voltage), noise, 1e-6, lead_in=noise.size - 1)
+
+
+def pink_noise(rng: np.random.Generator, n: int, density: float) -> np.ndarray:
+    """Noise (n,) at 100 Hz of density p/f in m^2/Hz between a period and half the rate."""
+    f = np.fft.rfftfreq(8 * n, 0.01)
+    size = np.zeros(f.size)
+    size[1:] = np.sqrt(density / f[1:] * 8 * n / 0.02)
+    turned = np.exp(2j * np.pi * rng.random(f.size))
+    return np.fft.irfft(size * turned, 8 * n)[:n]
+
+
+def test_the_density_of_1_over_f_noise_is_read_at_rest() -> None:
+    rng = np.random.default_rng(6)
+    found = []
+    for _ in range(40):
+        white = 1e-6 * rng.standard_normal(400)
+        assert pink_density([at_rest(white)], 12.0) == 0.0
+        found.append(pink_density([at_rest(0.3 * white + pink_noise(rng, 400, 2e-13))], 12.0))
+    assert np.median(found) == pytest.approx(2e-13, rel=0.15)
+    assert np.mean([p > 0.0 for p in found]) > 0.95
+    # of several records at once it is known better
+    both = pink_density([at_rest(pink_noise(rng, 400, 2e-13)) for _ in range(10)], 12.0)
+    assert both == pytest.approx(2e-13, rel=0.2)
