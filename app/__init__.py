@@ -8,10 +8,10 @@
     fit = dearig.identify(run)
     fit.save("model.toml")
 
-``open``, ``record``, ``identify``, ``validate``, ``simulate``, ``diagnose``, ``invert`` and
-``track`` take objects or paths and return values that a notebook displays and that have ``plot``,
-``to_html`` and ``save``. Nothing is printed; errors are ``DearigError``, each a sentence that says
-what to do.
+``open``, ``record``, ``identify``, ``validate``, ``simulate``, ``diagnose``, ``invert``,
+``track`` and ``hold`` take objects or paths and return values that a notebook displays and that
+have ``plot``, ``to_html`` and ``save``. Nothing is printed; errors are ``DearigError``, each a
+sentence that says what to do.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from dearig.api.analysis import diagnose, identify, simulate, validate
+    from dearig.api.holding import HoldOptions, HoldResult, hold
     from dearig.api.models import Model
     from dearig.api.predictions import Prediction
     from dearig.api.recordings import Recording, open, record  # noqa: A004
@@ -42,6 +43,8 @@ __all__ = [
     "DearigError",
     "DiagnoseResult",
     "DiskFault",
+    "HoldOptions",
+    "HoldResult",
     "IdentifyResult",
     "InputError",
     "InstrumentFault",
@@ -57,6 +60,7 @@ __all__ = [
     "ValidateResult",
     "__version__",
     "diagnose",
+    "hold",
     "identify",
     "invert",
     "open",
@@ -69,6 +73,7 @@ __all__ = [
 # each name is imported when it is first used: ``import dearig`` takes no time
 _MODULES = {
     "dearig.api.analysis": ("diagnose", "identify", "simulate", "validate"),
+    "dearig.api.holding": ("HoldOptions", "HoldResult", "hold"),
     "dearig.api.models": ("Model",),
     "dearig.api.predictions": ("Prediction",),
     "dearig.api.recordings": ("Recording", "open", "record"),

@@ -51,13 +51,13 @@ class Feedback:
         gate enforces both.
     response : float
         Response time in s of the loop, beside its delay.
-    block : float
-        Time in s of the readings that are answered together.
     ahead : float
         Time in s of the output that waits when an answer is admitted.
     laser_loss : float
         Time in s without usable readings, during which the correction stays as it is. Then the
         voltage is ramped down.
+    block : float
+        Time in s of the readings that are answered together.
     """
 
     setpoint: float
@@ -65,12 +65,12 @@ class Feedback:
     lead_in: float
     start: float
     stop: float
-    authority: float = 0.1
-    rate_limit: float = 0.01
-    response: float = 2.0
+    authority: float
+    rate_limit: float
+    response: float
+    ahead: float
+    laser_loss: float
     block: float = 0.1
-    ahead: float = 0.5
-    laser_loss: float = 2.0
 
     def __post_init__(self) -> None:
         for name in ("block", "ahead", "laser_loss"):

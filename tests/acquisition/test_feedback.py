@@ -43,8 +43,8 @@ duration_s = 1.0
 LOADED = parse_sequence(SEQUENCE, "4 kV", Path())
 #: Under 4 kV the film stands at 0.515 mm and creeps to 0.526 mm: it is asked for less.
 HOLD = Feedback(
-    setpoint=0.5e-3, sensitivity=1.07e-3, lead_in=0.4, start=2.4, stop=7.4, rate_limit=0.02,
-    response=0.5, laser_loss=1.0,
+    setpoint=0.5e-3, sensitivity=1.07e-3, lead_in=0.4, start=2.4, stop=7.4, authority=0.1,
+    rate_limit=0.02, response=0.5, ahead=0.5, laser_loss=1.0,
 )  # fmt: skip
 BLOCK, WAITING = 20, 6  # samples; blocks that are output before an answer
 
