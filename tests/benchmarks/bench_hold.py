@@ -2,13 +2,14 @@
 
 Run as ``python -m tests.benchmarks.bench_hold``. Each rig hides the effect of its seed, and two
 more: creep over the whole hour (branches of 2 s to 5000 s, 10 % to 30 % of the equilibrium modulus
-together), and a room that warms by 3 K with a time constant of 20 min, which changes all moduli by
-0.6 % per K. The thesis's model is fitted to one recording of the thesis's excitation, and its
-voltage for a displacement of 60 % of that under three quarters of the highest voltage is played
-twice: alone, and with the feedback of ``dearig hold``.
+together), and a room that warms by 1.5 K with a time constant of 20 min, which changes all moduli
+by 0.6 % per K: the load then hangs some 0.2 mm lower. The thesis's model is fitted to one recording
+of the thesis's excitation. Its voltage for a displacement of 60 % of that under three quarters of
+the highest voltage is played twice: alone, and with the feedback of ``dearig hold``.
 
 Errors are setpoint minus reading, RMS, over the hour and from the time on at which the loop has
-settled; the noise of a reading is in both.
+settled; the noise of a reading is in both. Blocks of 0.3 s are read, because an hour is simulated
+faster so; the delay of an answer does not depend on it.
 """
 
 from __future__ import annotations
@@ -40,10 +41,11 @@ FAMILIES = (
     "electrode_resistance",
 )  # fmt: skip
 RATE = 200.0  # Hz
-OPTIONS = HoldOptions(authority=0.2)
+READ = 60  # samples: three blocks of the feedback
+OPTIONS = HoldOptions(authority=0.4)
 CREEP_SHARE = (0.1, 0.3)
 CREEP_TIMES = np.geomspace(2.0, 5000.0, 8)
-ROOM, ROOM_TIME, PER_KELVIN = 3.0, 1200.0, -0.006
+ROOM, ROOM_TIME, PER_KELVIN = 1.5, 1200.0, -0.006
 
 
 def main() -> None:
@@ -53,7 +55,7 @@ def main() -> None:
     given = parser.parse_args()
     heads = (
         "hidden (seed)", "creep of mu_0", "setpoint", "noise", "feedforward alone", "with feedback",
-        "settled", "settled / noise", "correction", "least output waiting", "run time",
+        "settled", "all / noise", "settled / noise", "correction", "at limit", "run time",
     )  # fmt: skip
     print("| " + " | ".join(heads) + " |\n|" + "---|" * len(heads))
     within = 0
@@ -100,8 +102,9 @@ def _row(seed: int, seconds: float, folder: Path) -> bool:
     print(
         f"| {name} | {share:.0%} | {setpoint * 1e6:.0f} | {after.noise * 1e6:.2f} "
         f"| {alone.rms * 1e6:.1f} | {after.rms * 1e6:.2f} | {after.settled_rms * 1e6:.2f} "
-        f"| {after.settled_rms / after.noise:.2f} | {report.lowest:+.1%} to {report.highest:+.1%} "
-        f"| {report.waiting:.2f} s | {took:.0f} s |",
+        f"| {after.rms / after.noise:.2f} | {after.settled_rms / after.noise:.2f} "
+        f"| {report.lowest:+.1%} to {report.highest:+.1%} | {report.limited:.0f} s "
+        f"| {took:.0f} s |",
         flush=True,
     )
     return after.rms <= 2.0 * after.noise
@@ -111,7 +114,9 @@ def _playing(case: TruthCase, rig: RigFile, run):
     """Return what ``run`` returns, with the film of ``case`` on the simulated rig."""
 
     def opened(*_: object) -> SimulatedRig:
-        return SimulatedRig(rig, case.plant(), ManualClock(), noise_seed=(case.seed,))
+        return SimulatedRig(
+            rig, case.plant(), ManualClock(), noise_seed=(case.seed,), block_samples=READ
+        )
 
     with patch("dearig.acquisition.run.open_rig", opened):
         return run()
