@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from datetime import datetime
 
-from dearig.recording.importers.text_layout import GROUPED, Column, moment_of
+from dearig.recording.importers.text_layout import Column, moment_of
+from dearig.recording.importers.text_numbers import GROUPED, MINUS
 
 __all__ = ["complaint_about", "number_in"]
 
@@ -13,11 +15,15 @@ __all__ = ["complaint_about", "number_in"]
 SHOWN = 30
 
 
+#: Sign before the exponent of a number of double precision in Fortran.
+_FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d+$)")
+
+
 def number_in(cell: str, column: Column) -> float | None:
     """Return the number in ``cell``; of a date and time, seconds. None if it is neither."""
     if column.since is not None:
         return _seconds(cell, column.since)
-    text = cell
+    text = cell.replace(MINUS, "-")
     if column.thousands and column.thousands in text:
         if not GROUPED.fullmatch(text):
             return None
@@ -30,7 +36,7 @@ def number_in(cell: str, column: Column) -> float | None:
     if "_" in text or not text.isascii():
         return None
     try:
-        return float(text)
+        return float(_FORTRAN.sub("e", text))
     except ValueError:
         return None
 

@@ -47,13 +47,15 @@ class Chosen:
     """Columns of a source by quantity, and what was not sure.
 
     ``unsure`` are sentences: while there is one, nothing may be imported. ``notes`` say what was
-    found without being asked for. ``table_choices`` are the tables of which one must be chosen.
+    found without being asked for. ``optional`` are quantities that a recording can do without, and
+    that nobody asked for. ``table_choices`` are the tables of which one must be chosen.
     """
 
     source: Source
     picked: dict[str, Pick] = field(default_factory=dict)
     table: str | None = None
     table_choices: tuple[str, ...] = ()
+    optional: set[str] = field(default_factory=set)
     unsure: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 

@@ -82,10 +82,12 @@ class ExcelFile(StoredColumns):
             for column in sheet.layout.columns:
                 table = "/".join(filter(None, (before.rstrip("/"), column.group)))
                 columns[before + printable(column.name)] = Stored(
-                    _load(sheet, column), None, column.own, column.unit, table=table,
+                    _load(sheet, column), None, column.own, column.unit,
+                    "time" if column.since is not None else "", table,
                     cell=_cell(sheet, column), row=sheet.row,
                 )  # fmt: skip
-        super().__init__(path, "an Excel workbook", columns)
+        notes = [note for sheet in sheets for note in sheet.layout.notes]
+        super().__init__(path, "an Excel workbook", columns, notes=notes)
         for sheet in sheets:
             sheet.report = lambda part: self.progress(part)
         self.block = [row for sheet in sheets for row in sheet.layout.block]

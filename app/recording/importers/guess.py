@@ -138,7 +138,11 @@ class Guess:
     def _take_if_sure(self, quantity: str) -> None:
         """Pick the column of a quantity that a recording can do without, if it is sure."""
         chosen, before = self._chosen, len(self._chosen.unsure)
+        if quantity in chosen.picked:
+            return
         self._take(quantity)
+        if quantity in chosen.picked:
+            chosen.optional.add(quantity)
         if len(chosen.unsure) > before:
             why = "; ".join(chosen.unsure[before:])
             del chosen.unsure[before:]

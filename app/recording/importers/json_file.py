@@ -242,18 +242,28 @@ def _at(place: int) -> Callable[[Json], Json]:
 def _stored_rows(
     rows: Sequence[Json], get: Callable[[Json], Json], own: str, table: str, lines: bool
 ) -> Stored:
+    unit, label = _dated([get(row) for row in rows[:LOOKED_AT]])
     return Stored(
-        lambda: _numbers([get(row) for row in rows]), len(rows), own, table=table,
+        lambda: _numbers([get(row) for row in rows]), len(rows), own, unit, label, table,
         cell=lambda index: _complaint(get(rows[index])),
         row=(lambda index: f"line {index + 1}") if lines else None,
     )  # fmt: skip
 
 
 def _stored(values: list[Json], own: str, table: str, unit: str = "", label: str = "") -> Stored:
+    dated = _dated(values[:LOOKED_AT])
+    unit, label = unit or dated[0], label or dated[1]
     return Stored(
         lambda: _numbers(values), len(values), own, unit, label, table,
         cell=lambda index: _complaint(values[index]),
     )  # fmt: skip
+
+
+def _dated(values: Sequence[Json]) -> tuple[str, str]:
+    """Return the unit and the label of dates and times of day; both "" for numbers."""
+    first = next((value for value in values if value is not None), None)
+    column = None if first is None else _column_of(first)
+    return ("s", "time") if column is not None and column.since is not None else ("", "")
 
 
 def _is_column(values: Sequence[Json]) -> bool:

@@ -45,12 +45,13 @@ class ParquetFile(StoredColumns):
         if not 0 <= claimed <= UNPACKED_MAX + PACKED_MAX * size:
             raise InputError(f"{path} is not read: its {size} bytes claim {rows} rows")
         columns = {}
-        for place, unit in found:
+        for place, unit, is_date in found:
             name = ".".join(place)
             if printable(name) in columns:
                 raise InputError(f"{path}: two columns are called {name!r}; rename one")
             columns[printable(name)] = Stored(
-                self._loader(place), rows, place[-1], unit, table=".".join(place[:-1]),
+                self._loader(place), rows, place[-1], unit, "time" if is_date else "",
+                ".".join(place[:-1]),
                 cell=self._cell(name),
             )  # fmt: skip
         super().__init__(
@@ -104,19 +105,19 @@ def _as_array(pyarrow: Any, values: Any) -> np.ndarray:
 
 def _fields(
     types: Any, fields: Any, path: tuple[str, ...], depth: int
-) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Yield the path of every column of numbers, and its unit."""
+) -> Iterator[tuple[tuple[str, ...], str, bool]]:
+    """Yield the path of every column of numbers, its unit, and True if it has dates or times."""
     for field in fields:
         kind, inside = field.type, (*path, field.name)
         if types.is_struct(kind) and depth < DEEPEST:
             yield from _fields(types, [kind.field(i) for i in range(kind.num_fields)], inside,
                                depth + 1)  # fmt: skip
         elif types.is_temporal(kind) and not types.is_interval(kind):
-            yield inside, "s"
+            yield inside, "s", not types.is_duration(kind)
         elif types.is_floating(kind) or types.is_integer(kind) or types.is_decimal(kind):
             told = field.metadata or {}
             unit = next((told[name] for name in _UNITS if name in told), b"")
-            yield inside, unit.decode("utf-8", "replace")
+            yield inside, unit.decode("utf-8", "replace"), False
 
 
 def _library() -> tuple[Any, Any]:

@@ -15,6 +15,7 @@ from dearig.recording.importers.labels import suggestion
 
 __all__ = [
     "PARSER_FAILURES",
+    "GapError",
     "NeedsOptionError",
     "Source",
     "listing",
@@ -53,6 +54,14 @@ class NeedsOptionError(InputError):
         self.words = words
 
 
+class GapError(InputError):
+    """``column``, which a recording can do without, has no number in some place."""
+
+    def __init__(self, message: str, column: str) -> None:
+        super().__init__(message)
+        self.column = column
+
+
 #: Names listed in a message, at most.
 LISTED = 12
 
@@ -70,7 +79,8 @@ class Source(Protocol):
     ``skipped``, the rows before each one that was left out, and its place in words;
     ``cut_short``, True if columns may end early; ``notes``, sentences on what was found;
     ``progress``, a callable that can be set, which gets the part of ``read`` that is done;
-    ``overview(names, count)``, first values and number of values of columns in one reading.
+    ``optional``, columns that can be set, for which ``read`` raises ``GapError`` where a cell is no
+    number; ``overview(names, count)``, first values and number of values of columns in one reading.
     """
 
     @property

@@ -71,9 +71,11 @@ class TdmsChannels(StoredColumns):
         start, started = _number(told.get("wf_start_offset")), _started(channel)
         if started is not None and first is not None:
             start += float((started - first) / np.timedelta64(1, "us")) / 1e6
+        dates = channel.dtype.kind == "M"
         return Stored(
             _loader(self.path, channel.group_name, channel.name), len(channel), channel.name,
-            str(told.get("unit_string", "")), str(told.get("description", "")),
+            "s" if dates else str(told.get("unit_string", "")),
+            "time" if dates else str(told.get("description", "")),
             printable(channel.group_name), step if step > 0.0 else None, start,
         )  # fmt: skip
 

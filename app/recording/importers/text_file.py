@@ -24,7 +24,7 @@ from dearig.recording.files import in_words
 from dearig.recording.importers.cells import complaint_about, number_in
 from dearig.recording.importers.columns import NamedColumns, Overview
 from dearig.recording.importers.importer import Importer
-from dearig.recording.importers.source import NeedsOptionError, no_such_column
+from dearig.recording.importers.source import GapError, NeedsOptionError, no_such_column
 from dearig.recording.importers.text_blocks import BytesReader, blocks_of, halves_of
 from dearig.recording.importers.text_layout import (
     HEAD_CHARACTERS,
@@ -89,6 +89,8 @@ class TextFile(NamedColumns[Column]):
                     columns[name] = replace(column, name=name, group=group)
                     self._section_of[name] = section
         super().__init__(columns)
+        #: columns that are given up, with ``GapError``, where a cell is no number
+        self.optional: frozenset[str] = frozenset()
         self._skip = skip_bad_rows
         # it costs a third of the parsing
         self._is_spaced = f"{self.layout.delimiter} " in head
@@ -119,6 +121,11 @@ class TextFile(NamedColumns[Column]):
             if column.group:
                 found.setdefault(column.group, []).append(name)
         return found
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """Sentences on what could be read in another way."""
+        return self.layout.notes
 
     @property
     def block(self) -> Sequence[Sequence[str]]:
@@ -316,9 +323,11 @@ class TextFile(NamedColumns[Column]):
         for number, content in enumerate(block.decode("utf-8", "replace").split("\n"), line):
             if not self._holds_data(content):
                 continue
-            fault, values = self._row(content, self._wanted)
+            fault, values, column = self._row(content, self._wanted)
             if not fault:
                 rows.append(values)
+            elif column in self.optional:
+                raise GapError(f"line {number}{fault}", column)
             elif self._skip:
                 self.skipped.append((before + len(rows), f"line {number}"))
             else:
@@ -338,22 +347,26 @@ class TextFile(NamedColumns[Column]):
         cells = cells_of(content, self.layout.delimiter)
         return any(c.place < len(cells) and cells[c.place] for c in self._wanted)
 
-    def _row(self, content: str, wanted: Sequence[Column]) -> tuple[str, list[float]]:
-        """Return what is wrong with a line, empty if nothing is, and its values."""
+    def _row(self, content: str, wanted: Sequence[Column]) -> tuple[str, list[float], str]:
+        """Return what is wrong with a line, empty if nothing is, its values, and in which column.
+
+        The column is "" where the whole line is wrong.
+        """
         try:
             cells = cells_of(content, self.layout.delimiter)
         except csv.Error as error:
-            return f": it cannot be split: {error}", []
+            return f": it cannot be split: {error}", [], ""
         if len(cells) != self.layout.cells:
-            return f": {len(cells)} values, and the table has {self.layout.cells} columns", []
+            said = f": {len(cells)} values, and the table has {self.layout.cells} columns"
+            return said, [], ""
         values = []
         for column in wanted:
             value = number_in(cells[column.place], column)
             if value is None or not math.isfinite(value):
                 wrong = complaint_about(cells[column.place], value)
-                return f", column {column.name!r}: {wrong}", []
+                return f", column {column.name!r}: {wrong}", [], column.name
             values.append(value)
-        return "", values
+        return "", values, ""
 
 
 @dataclass(frozen=True)

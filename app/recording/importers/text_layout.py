@@ -18,10 +18,10 @@ from datetime import datetime
 from pathlib import Path
 
 from dearig.errors import InputError
+from dearig.recording.importers.text_numbers import Signs, is_number, signs_of
 from dearig.recording.importers.units import unit_of
 
 __all__ = [
-    "GROUPED",
     "HEAD_CHARACTERS",
     "Column",
     "Layout",
@@ -46,10 +46,6 @@ _MARKS = {
     codecs.BOM_UTF16_BE: "utf-16",
 }
 _DELIMITERS = ("\t", ";", ",", "|", None)  # None: any white space
-_POINT = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf|infinity)", re.I)
-_COMMA = re.compile(r"[+-]?(?:\d+,?\d*|,\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf|infinity)", re.I)
-#: A number whose digits stand in groups of three.
-GROUPED = re.compile(r"[+-]?\d{1,3}(?:([.,' ])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")
 _SAMPLE = 400  # lines of data that are looked at
 _LEAST = 2  # lines of data in a row that begin a table
 
@@ -80,7 +76,8 @@ class Layout:
 
     ``first`` is the number, from 0, of the first line of data; ``names_line`` that of the names,
     -1 if there is none. ``cells`` are the cells of a line of data, ``block`` those of the lines
-    above the names, ``step_s`` the time from row to row where the file says it.
+    above the names, ``step_s`` the time from row to row where the file says it. ``notes`` are
+    sentences on what could be read in another way.
     """
 
     encoding: str
@@ -91,6 +88,7 @@ class Layout:
     columns: tuple[Column, ...]
     block: tuple[tuple[str, ...], ...] = ()
     step_s: float | None = None
+    notes: tuple[str, ...] = ()
 
 
 def encoding_of(raw: bytes, path: Path) -> str:
@@ -175,7 +173,7 @@ def layout_of(
     found = [t for d in options if (t := _Table.find(lines, start, d, labview))]
     if not found:
         raise _no_table(lines, start, path)
-    table = max(found, key=lambda t: (t.rows > 0, t.cells > 1, t.rows * t.cells, t.cells))
+    table = max(found, key=lambda t: (t.rows > 0, t.cells > 1, t.strict, t.rows * t.cells, t.cells))
     return table.layout(encoding, path, None if names_line is None else names_line - 1)
 
 
@@ -219,6 +217,7 @@ class _Table:
     cells: int
     rows: int
     sample: tuple[tuple[str, ...], ...]
+    strict: bool  # all cells of its first lines are numbers
 
     @classmethod
     def find(
@@ -229,16 +228,23 @@ class _Table:
         rows = [cells_of(lines[i], delimiter) for i in places]
         # numbers only, then mostly numbers, then one row of numbers below a line of names
         for strict, least in ((True, _LEAST), (False, _LEAST), (True, 1)):
-            good = functools.partial(_is_data, delimiter=delimiter, strict=strict)
+            good = functools.partial(_is_data, strict=strict)
             for at in range(len(rows) - least + 1):
                 run = rows[at : at + least]
                 same = len({len(row) for row in (run if least > 1 else rows[at - 1 : at + 1])}) == 1
                 if not (same and all(map(good, run))):
                     continue
                 width = len(run[0])
+                # rows with a cell that is no number may stand first
+                while strict and least > 1 and at > 0 and places[at - 1] == places[at] - 1:
+                    if len(rows[at - 1]) != width or not _is_data(rows[at - 1], strict=False):
+                        break
+                    at -= 1
                 below = (row for row in rows[at:] if len(row) == width and good(row))
                 like = tuple(tuple(row) for row in itertools.islice(below, _SAMPLE))
-                return cls(lines, start, delimiter, labview, places[at], width, len(like), like)
+                return cls(
+                    lines, start, delimiter, labview, places[at], width, len(like), like, strict
+                )
         return None
 
     def layout(self, encoding: str, path: Path, names_line: int | None) -> Layout:
@@ -249,11 +255,7 @@ class _Table:
         if self.labview:
             units = units or self._labview_units()
         groups = self._groups(line, names)
-        columns = tuple(
-            replace(column, group=groups[place])
-            for place in range(self.cells)
-            if (column := self._column(place, names, units)) is not None
-        )
+        columns, notes = self._columns(names, units, groups)
         used = self.first if line < 0 else line
         block = tuple(
             tuple(c for c in cells_of(_bare(text), self.delimiter) if c)
@@ -262,7 +264,7 @@ class _Table:
         )
         return Layout(
             encoding, self.delimiter, self.first, line, self.cells, _unique(columns), block,
-            self._step(names, units, block),
+            self._step(names, units, block), (*notes, *self._passed_over(line)),
         )  # fmt: skip
 
     def _names(self, path: Path, given: int | None) -> tuple[int, list[str], list[str]]:
@@ -284,7 +286,11 @@ class _Table:
             names = self._split(above[1])
             if self._are_names(names) or (len(names) == len(cells) and _are_all_units(cells)):
                 return above[1], names, cells
-        return (above[0], cells, []) if self._are_names(cells) else (-1, [], [])
+        if not self._are_names(cells):
+            return -1, [], []
+        units = self._split(above[1]) if len(above) > 1 else []
+        # some programs write the units above the names
+        return above[0], cells, units if len(units) == len(cells) and _are_all_units(units) else []
 
     def _labview_units(self) -> list[str]:
         """Return the units that the head of a LabVIEW file gives, by the place of the column."""
@@ -304,7 +310,7 @@ class _Table:
     def _are_names(self, cells: list[str]) -> bool:
         used = max(i for row in self.sample for i, cell in enumerate(row) if cell) + 1
         named = [cell for cell in cells if cell]
-        numbers = sum(_is_number(cell, ",") for cell in named)
+        numbers = sum(is_number(cell) for cell in named)
         return len(cells) >= used and len(named) > 0 and numbers == 0
 
     def _groups(self, line: int, names: list[str]) -> list[str]:
@@ -322,7 +328,7 @@ class _Table:
             blocks = [
                 set(filter(None, names[a:b])) for a, b in itertools.pairwise([*starts, self.cells])
             ]
-            words = not any(_is_number(titles[i], ",") for i in starts)
+            words = not any(is_number(titles[i]) for i in starts)
             if len(starts) > 1 and words and all(blocks) and blocks[0] & blocks[1]:
                 found = list(none)
                 for a, b in itertools.pairwise([*starts, self.cells]):
@@ -338,23 +344,53 @@ class _Table:
                 seen += 1
         return found
 
-    def _column(self, place: int, names: list[str], units: list[str]) -> Column | None:
-        cells = [row[place] for row in self.sample if row[place]]
-        if not cells:
-            return None
-        name = names[place] if place < len(names) and names[place] else f"#{place + 1}"
-        unit = units[place] if place < len(units) else ""
-        if moments := [m for cell in cells if (m := moment_of(cell))]:
-            return Column(name, place, "s", since=moments[0])
-        decimal, thousands = ".", ""
-        if self.delimiter != ",":
-            both = [c for c in cells if "," in c and "." in c and GROUPED.fullmatch(c)]
-            if both:
-                decimal = max(",.", key=both[0].rfind)
-                thousands = "." if decimal == "," else ","
-            elif any("," in cell for cell in cells):
-                decimal = ","
-        return Column(name, place, unit, decimal, thousands)
+    def _columns(
+        self, names: list[str], units: list[str], groups: list[str]
+    ) -> tuple[list[Column], list[str]]:
+        """Return the columns with values in the sample, and notes on their numbers."""
+        cells = {
+            place: there
+            for place in range(self.cells)
+            if (there := [row[place] for row in self.sample if row[place]])
+        }
+        moments = {p: next(filter(None, map(moment_of, column)), None) for p, column in
+                   cells.items()}  # fmt: skip
+        timed = {place: moment for place, moment in moments.items() if moment is not None}
+        numbers = {place: column for place, column in cells.items() if place not in timed}
+        signs = dict(zip(numbers, signs_of([*numbers.values()]), strict=True))
+        found: list[Column] = []
+        notes: list[str] = []
+        for place, column in cells.items():
+            name = names[place] if place < len(names) and names[place] else f"#{place + 1}"
+            unit = units[place] if place < len(units) else ""
+            group, of = groups[place], signs.get(place, Signs())
+            if place in timed:
+                found.append(Column(name, place, "s", since=timed[place], group=group))
+                continue
+            if of.open and of.decimal == ",":
+                cell = next(cell for cell in column if "," in cell)
+                notes.append(
+                    f"{cell!r} in column {name!r} is read as {cell.replace(',', '.')}: nothing in "
+                    f"the file says whether the comma is of decimals"
+                )
+            found.append(Column(name, place, unit, of.decimal, of.thousands, group=group))
+        return found, notes
+
+    def _passed_over(self, line: int) -> list[str]:
+        """Return a note on rows of numbers between the names and the first row that is read."""
+        begin = self.start if line < 0 else line + 1
+        rows = [
+            number for number in range(begin, self.first)
+            if holds_data(self.lines[number]) and any(map(is_number, self._split(number)))
+            and len(self._split(number)) == self.cells
+        ]  # fmt: skip
+        if not rows:
+            return []
+        return [
+            f"the table begins in line {self.first + 1}: line {rows[0] + 1}"
+            + (f" and {len(rows) - 1} more" if len(rows) > 1 else "")
+            + " above it were not taken for rows"
+        ]
 
     def _step(
         self, names: list[str], units: list[str], block: tuple[tuple[str, ...], ...]
@@ -382,17 +418,17 @@ def _bare(line: str) -> str:
 
 def _are_units(cells: Sequence[str]) -> bool:
     """Return True if ``cells`` are a line of units; an oscilloscope has numbers beside them."""
-    named = [c for c in cells if c and not _is_number(c, ",")]
+    named = [c for c in cells if c and not is_number(c)]
     known = [c for c in named if unit_of(c) is not None]
     return len(known) > 0 and len(known) >= len(named) - 1
 
 
 def _are_all_units(cells: Sequence[str]) -> bool:
     """Return True if ``cells`` are units and nothing else; numbers above them name channels."""
-    return all(not c or (not _is_number(c, ",") and unit_of(c) is not None) for c in cells)
+    return all(not c or (not is_number(c) and unit_of(c) is not None) for c in cells)
 
 
-def _unique(columns: tuple[Column, ...]) -> tuple[Column, ...]:
+def _unique(columns: Sequence[Column]) -> tuple[Column, ...]:
     """Return ``columns`` with the group before their names, and the place behind repeated ones."""
     seen: Counter[str] = Counter()
     found = []
@@ -405,13 +441,6 @@ def _unique(columns: tuple[Column, ...]) -> tuple[Column, ...]:
     return tuple(found)
 
 
-def _is_number(cell: str, delimiter: str | None) -> bool:
-    return bool(
-        _POINT.fullmatch(cell)
-        or (delimiter != "," and (_COMMA.fullmatch(cell) or GROUPED.fullmatch(cell)))
-    )
-
-
 def is_row(line: str, layout: Layout) -> bool:
     """Return True if ``line`` is one of the table's rows, most of whose cells are numbers."""
     if not holds_data(line):
@@ -420,11 +449,11 @@ def is_row(line: str, layout: Layout) -> bool:
         cells = cells_of(line, layout.delimiter)
     except csv.Error:
         return False
-    return len(cells) == layout.cells and _is_data(cells, layout.delimiter, strict=False)
+    return len(cells) == layout.cells and _is_data(cells, strict=False)
 
 
-def _is_data(cells: Sequence[str], delimiter: str | None, strict: bool) -> bool:
+def _is_data(cells: Sequence[str], strict: bool) -> bool:
     """Return True if ``cells`` are a row of numbers; if not ``strict``, mostly numbers."""
-    numbers = sum(_is_number(cell, delimiter) or moment_of(cell) is not None for cell in cells)
+    numbers = sum(is_number(cell) or moment_of(cell) is not None for cell in cells)
     words = sum(bool(cell) for cell in cells) - numbers
     return numbers > words if not strict else numbers > 0 and words == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -9,9 +10,9 @@ from types import MappingProxyType
 import numpy as np
 
 from dearig.errors import InputError
-from dearig.recording.importers.chosen import Chosen
+from dearig.recording.importers.chosen import Chosen, Pick
 from dearig.recording.importers.labels import names_of, suggestion
-from dearig.recording.importers.source import NeedsOptionError, listing
+from dearig.recording.importers.source import GapError, NeedsOptionError, listing
 from dearig.recording.importers.specimen import Specimen, specimen_told
 from dearig.recording.timestamps import not_forward
 
@@ -181,7 +182,8 @@ def _read(
     picked = {q: chosen.picked[q] for q in quantities if q in chosen.picked}
     columns = [pick.column for pick in picked.values()]
     step = _step(chosen, columns, rate_Hz)
-    raw = source.read(columns)
+    raw = _read_columns(chosen, picked, values)
+    columns = [pick.column for pick in picked.values()]
     sizes = {column: raw[column].size for column in columns}
     size = min(sizes.values())
     if getattr(source, "cut_short", False):
@@ -202,6 +204,7 @@ def _read(
             f"time is counted from the first row, {step:.9g} s from row to row"
             f"{said and f', as {said} says'}"
         )
+    _leave_gaps(chosen, picked, table, values)
     names = (
         {q: pick.column for q, pick in picked.items()}
         | {"time": "time"}
@@ -221,6 +224,56 @@ def _read(
         values.notes.append(f"time is counted from the first time stamp, {first:.3f} s")
     _note_left_out(chosen, values, good)
     return found
+
+
+def _read_columns(chosen: Chosen, picked: dict[str, Pick], values: Values) -> dict[str, np.ndarray]:
+    """Return the columns ``picked``, without optional ones that have gaps.
+
+    Changes ``picked`` and the notes.
+    """
+    source = chosen.source
+    while True:
+        optional = {picked[q].column: q for q in chosen.optional if q in picked}
+        if hasattr(source, "optional"):
+            source.optional = frozenset(optional)
+        try:
+            return source.read([pick.column for pick in picked.values()])
+        except GapError as error:
+            _leave_out(chosen, picked, optional[error.column], str(error), values)
+
+
+def _leave_gaps(
+    chosen: Chosen, picked: dict[str, Pick], table: dict[str, np.ndarray], values: Values
+) -> None:
+    """Leave out optional columns that have no number where all others have one.
+
+    Changes ``picked``, ``table`` and the notes.
+    """
+    optional = [q for q in chosen.optional if q in table]
+    if not optional:
+        return
+    good = np.ones(table["time"].size, dtype=bool)
+    for quantity in table.keys() - set(optional):
+        good &= np.isfinite(table[quantity])
+    for quantity in optional:
+        gaps = good & ~np.isfinite(table[quantity])
+        if gaps.any():
+            at = int(np.argmax(gaps))
+            where = f"{chosen.source.row(at)}: there is no value"
+            _leave_out(chosen, picked, quantity, where, values)
+            del table[quantity]
+
+
+def _leave_out(
+    chosen: Chosen, picked: dict[str, Pick], quantity: str, where: str, values: Values
+) -> None:
+    pick = picked.pop(quantity)
+    chosen.picked.pop(quantity, None)
+    values.notes.append(
+        f"the {quantity.replace('_', ' ')} was not imported: {pick.column!r} has gaps ({where}); "
+        f"it is with --column {shlex.quote(f'{pick.target.name}={pick.column}')} and "
+        f"--skip-bad-rows"
+    )
 
 
 def _step(chosen: Chosen, columns: Sequence[str], rate_Hz: float | None) -> float | None:
