@@ -114,7 +114,7 @@ def problems(
         guess = guesses.get(number)
         if not choice.unit:
             scaled = guess is not None and guess.doubt == "scale"
-            more = f", the output of an instrument in {column.unit}, and enter its scale"
+            more = f", which is in {column.unit}, and enter its scale"
             found.append(f"Choose the unit of {column.name!r}{more if scaled else ''}.")
             continue
         if (said := _contradiction(choice, column, guess)) is not None:
@@ -132,10 +132,8 @@ def _contradiction(
         return None
     chosen, named = unit_label(choice.unit), unit_label(column.unit)
     if guess is not None and guess.doubt == "scale" and guess.quantity == choice.quantity:
-        return (
-            f"{column.name!r} is the output of an instrument in {named}: enter its scale in "
-            f"{chosen} per {named}, or choose V at the card with a rig file."
-        )
+        card = ", or choose V at the card with a rig file" if column.unit == "V" else ""
+        return f"{column.name!r} is in {named}: enter its scale in {chosen} per {named}{card}."
     known = any(column.unit in units for units in UNITS.values())
     if known and column.unit != choice.unit:
         right = (

@@ -145,7 +145,7 @@ def test_what_is_not_sure_is_left_open_and_nothing_can_be_imported(opened, qtbot
     monitor, laser = dialog.columns.boxes(2), dialog.columns.boxes(3)
     assert not dialog.start.isEnabled()
     assert monitor.unit.currentData() == laser.unit.currentData() == ""
-    assert "output of an instrument in V" in dialog.to_do.text()
+    assert "'Laser out (V)', which is in V, and enter its scale" in dialog.to_do.text()
     choose(monitor.unit, "kV")
     choose(laser.unit, "mm")
     # a unit alone is not enough: volts are not kilovolts, and not mm

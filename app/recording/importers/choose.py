@@ -183,6 +183,12 @@ def _asked(
     if own is not None:
         return Pick(target, column, _both(own, scale), _behind(own))
     label = labels[column]
+    if label.unknown:
+        raise InputError(
+            f"{source.path}: {column!r} is in {label.unknown!r} by its name, which is no unit that "
+            f"is known here, and {target.name} asks for {target.unit}; give its scale, such as "
+            f"{shlex.quote(f'{target.name}={column}*4')}, or *1 if it is in {target.unit}"
+        )
     if not label.unit:
         return Pick(target, column, scale)
     wanted = "voltage" if target.raw else DIMENSIONS[target.quantity]

@@ -70,6 +70,7 @@ class Guess:
             self._propose()
             return
         self._take_one(("stretch", "strain", "displacement"))
+        self._take_one(("displacement",), by_unit=True)
         self._take_one(("nominal_stress", "force"))
         self._take_one(("nominal_stress", "force"), by_unit=True)
         self._take_if_sure("temperature")
@@ -174,6 +175,13 @@ class Guess:
             self._pick(target, column, target.scale, doubt)
         elif label.raw == quantity:
             self._pick_raw(quantity, column, label)
+        elif label.unknown:
+            likely = target_name(quantity, LIKELY[DIMENSIONS[quantity]])
+            self._chosen.unsure.append(
+                f"the unit {label.unknown!r} of {column!r} is not known: its scale is needed, as "
+                f"{shlex.quote(f'{likely}={column}*FACTOR')}"
+            )
+            self._propose_scaled(target_of(likely), column)
         elif not label.unit and DIMENSIONS[quantity] not in ("strain", "stretch"):
             likely = LIKELY[DIMENSIONS[quantity]]
             target = target_of(target_name(quantity, likely))
@@ -250,9 +258,13 @@ class Guess:
             f"{column!r} is the output of an instrument in {label.unit}, up to {largest:.3g}: its "
             f"scale is needed, in --rig-file or as {shlex.quote(f'{likely}={column}*FACTOR')}"
         )
+        self._propose_scaled(target_of(likely), column)
+
+    def _propose_scaled(self, target: Target, column: str) -> None:
+        """Propose ``column`` for ``target``, with a scale that only the user knows."""
         self._chosen.source.check(column)
-        proposed = Pick(target_of(likely), column, Scale(), behind="*FACTOR", doubt="scale")
-        self._chosen.picked[quantity] = proposed
+        proposed = Pick(target, column, Scale(), behind="*FACTOR", doubt="scale")
+        self._chosen.picked[target.quantity] = proposed
         self._free.remove(column)
 
     def _pick(self, target: Target, column: str, scale: Scale, doubt: str = "") -> None:

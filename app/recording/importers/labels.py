@@ -49,16 +49,17 @@ _WORDS = MappingProxyType(
     {
         "time": "time zeit temps timestamp zeitstempel datetime elapsed t",
         "voltage_monitor": "monitor moniteur vmon",
-        "voltage": "voltage spannung tension hv highvoltage hochspannung u v potential potentiel",
-        "current": "current strom courant i imon leakage",
+        "voltage": "voltage volt volts spannung tension hv highvoltage hochspannung u v potential "
+        "potentiel",
+        "current": "current curr strom courant i imon leakage",
         "temperature": "temperature temperatur temp",
         "stretch": "stretch lambda λ streckung streckgrad",
         "strain": "strain dehnung deformation verformung",
         "nominal_stress": "stress contrainte spannung zugspannung nennspannung",
-        "force": "force load kraft last charge effort",
-        "displacement": "displacement travel extension weg verschiebung deplacement stroke hub "
-        "position elongation auslenkung allongement verlangerung laser crosshead traverse course "
-        "dehnung",
+        "force": "force load kraft last charge effort f",
+        "displacement": "displacement disp displ deflection lvdt travel extension weg verschiebung "
+        "deplacement stroke hub position elongation auslenkung allongement verlangerung laser "
+        "crosshead traverse course dehnung",
     }
 )
 _QUANTITIES_OF: dict[str, list[str]] = {}
@@ -83,7 +84,8 @@ class Label:
     """What a column's name says: quantities that it may be, and its unit, empty if it has none.
 
     ``unit`` is a symbol of ``UNITS``, ``dimensions`` are those that the symbol belongs to. ``raw``
-    is the quantity of an instrument's output in volts, such as a laser's.
+    is the quantity of an instrument's output in volts, such as a laser's. ``unknown`` is what
+    seems to be a unit and is none of ``UNITS``.
     """
 
     name: str
@@ -91,6 +93,7 @@ class Label:
     unit: str = ""
     dimensions: tuple[str, ...] = ()
     raw: str = ""
+    unknown: str = ""
 
 
 @dataclass(frozen=True)
@@ -163,6 +166,7 @@ def label_of(name: str, unit: str = "") -> Label:
             words, found = match["name"], inside
             break
     symbol, dimensions = found or ("", ())
+    unknown = "" if found else unit or _unknown_unit(name)
     quantities = _quantities(words)
     raw = ""
     if found:
@@ -171,9 +175,18 @@ def label_of(name: str, unit: str = "") -> Label:
         if raw and raw != "voltage_monitor":
             quantities = []
         quantities = [q for q in quantities if DIMENSIONS[q] in dimensions]
-    return Label(name, tuple(quantities), symbol, dimensions, raw)
+    return Label(name, tuple(quantities), symbol, dimensions, raw, unknown)
 
 
+def _unknown_unit(name: str) -> str:
+    """Return a short text in brackets at the end of ``name``, which may be a unit, or ""."""
+    match = _UNIT_IN_NAME[0].fullmatch(name.strip().translate(_BRACKETS))
+    inside = match["unit"].strip() if match else ""
+    return inside if len(inside) <= UNIT_MAX and re.match(r"[^\W\d]|°|%", inside) else ""
+
+
+#: Characters of a unit, at most: (measured) is none.
+UNIT_MAX = 7
 _RAW = ("displacement", "current", "voltage_monitor")
 _BRACKETS = str.maketrans("()", "[]")
 _UNIT_IN_NAME = (

@@ -200,7 +200,7 @@ def _columns(source: Source, shown: int) -> list[ColumnPreview]:
                 number,
                 printable(name),
                 label.quantities or raw,
-                label.unit or units.get(name, ""),
+                label.unit or label.unknown or units.get(name, ""),
                 tuple(float(v) for v in seen.first),
                 seen.count,
                 owners[name][0] if len(owners.get(name, ())) == 1 else "",

@@ -14,7 +14,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 
 from dearig.errors import InputError
@@ -96,6 +96,7 @@ def encoding_of(raw: bytes, path: Path) -> str:
     for mark, encoding in _MARKS.items():
         if raw.startswith(mark):
             return encoding
+    raw = raw.rstrip(b"\0") or raw  # a logger that was cut off leaves zeros at the end
     if b"\0" in raw:
         # text of ASCII characters as UTF-16 has a zero in every other byte
         even, odd = raw[::2].count(0), raw[1::2].count(0)
@@ -131,6 +132,13 @@ def moment_of(cell: str) -> datetime | None:
     if ":" not in cell or not cell[:1].isdigit():
         return None
     text = cell.replace(",", ".")
+    if match := _CLOCK.fullmatch(text):
+        hours, minutes, seconds = match.groups()
+        if hours is None and "." not in seconds:
+            return None  # it may be hours and minutes
+        return _MIDNIGHT + timedelta(
+            hours=int(hours or 0), minutes=int(minutes), seconds=float(seconds)
+        )
     try:
         return datetime.fromisoformat(text.replace("/", "-"))
     except ValueError:
@@ -143,9 +151,12 @@ def moment_of(cell: str) -> datetime | None:
     return None
 
 
+#: A time of day, or a time since the start, which may have many hours or none.
+_CLOCK = re.compile(r"(?:(\d{1,5}):)?([0-5]?\d):([0-5]\d(?:\.\d+)?)")
+_MIDNIGHT = datetime(1900, 1, 1)  # as strptime has it
 _MOMENTS = (
     "%m/%d/%Y %I:%M:%S.%f %p", "%m/%d/%Y %I:%M:%S %p",
-    "%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%H:%M:%S.%f", "%H:%M:%S",
+    "%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p",
     "%Y-%m-%d %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S",
 )  # fmt: skip
 

@@ -1,0 +1,184 @@
+"""Ways of writing numbers, times and units, and what of them is not sure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dearig.errors import InputError
+from dearig.recording import Recording, import_file, open_recording
+from dearig.recording.importers import Imported, ImportOptions
+from dearig.recording.importers.labels import label_of
+from dearig.recording.importers.text_numbers import Signs, signs_of
+from tests.tools.imports import MOVED, TIME, VOLTAGE, same
+from tests.tools.recordings import Clock
+
+
+def imported(folder: Path, text: str | bytes, **options: object) -> tuple[Imported, Recording]:
+    path = folder / "in.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    done = import_file(
+        path, folder / "out.h5", ImportOptions(**options), overwrite=True, now=Clock()
+    )
+    return done, open_recording(folder / "out.h5")
+
+
+def table(names: str, row: str, **how: float) -> str:
+    """Rows of ``row``, a format of t (s), v (V) and m (mm), below ``names``."""
+    lines = (
+        row.format(t=t, v=v, m=m * 1e3, T=how.get("late", 0.0) + t)
+        for t, v, m in zip(TIME, VOLTAGE, MOVED, strict=True)
+    )
+    return f"{names}\n" + "\n".join(lines) + "\n"
+
+
+GERMAN = str.maketrans(".,", ",.")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param(
+            table("Zeit (s);Spannung (V);Weg (mm)", "{t:.2f};{v:,.6f};{m:.9f}").translate(GERMAN),
+            id="points between thousands, decimal commas",
+        ),
+        pytest.param(
+            table("Zeit (s);Spannung (V);Weg (mm)", "{t:.2f};{v:,.6f};{m:.9f}").replace(",", "'"),
+            id="Swiss",
+        ),
+        pytest.param(
+            table("Time (s);Voltage (V);Travel (mm)", "{t:.2f};{v:,.0f};{m:.9f}")
+            .translate(GERMAN).replace("\n", ";\n"),
+            id="whole thousands beside decimal commas, and a separator at the end",
+        ),
+        pytest.param(
+            table("Time (s),Voltage (V),Travel (mm)", '{t:.2f},"{v:,.6f}",{m:.9f}'),
+            id="quoted thousands between commas",
+        ),
+        pytest.param(
+            table("Time (s)X Voltage (V)X Travel (mm)", '"{t:.2f}"X"{v:.6f}"X"{m:.9f}"')
+            .replace(".", ",").replace("X", ","),
+            id="quoted decimal commas between commas",
+        ),
+        pytest.param(
+            table("Time (s);Voltage (V);Travel (mm)", "{t:.2f};{v:,.6f};{m:.9f}")
+            .replace(",", "\u202f").replace(".", ","),
+            id="narrow blanks between thousands",
+        ),
+        pytest.param(
+            table(" TIME_S  VOLTAGE_V  DISPLACEMENT_MM", "{t:.6E} {v:.9E} {m:.9E}")
+            .replace("E+", "D+").replace("E-", "D-"),
+            id="Fortran",
+        ),
+        pytest.param(
+            table("Time [s] ; Voltage [V] ; Travel [mm]", "{t:.2f} ; {v:.6f} ; {m:.9f}"),
+            id="blanks around separators",
+        ),
+        pytest.param(
+            table("s,V,mm\nTime,Voltage,Travel", "{t:.2f},{v:.6f},{m:.9f}"), id="units above names"
+        ),
+        pytest.param(
+            table("Time,Voltage (V),Travel (mm)", "00:{t:05.2f},{v:.6f},{m:.9f}"), id="minutes"
+        ),
+        pytest.param(
+            table("Elapsed,Voltage (V),Travel (mm)", "99:59:{T:05.2f},{v:.6f},{m:.9f}", late=58.0),
+            id="hundred hours",
+        ),
+        pytest.param(table("Time_s,Volts_V,Disp_mm", "{t:.2f},{v:.6f},{m:.9f}"), id="short names"),
+        pytest.param(
+            table("Time (s);Voltage (V);Travel (mm)", "{t:.2f};{v:.6f};{m:.9f}").encode("utf-16"),
+            id="UTF-16",
+        ),
+    ],
+)  # fmt: skip
+def test_numbers_are_read_as_people_write_them(tmp_path: Path, text: str | bytes) -> None:
+    _, run = imported(tmp_path, text)
+    same(run)
+
+
+@pytest.mark.parametrize(
+    ("columns", "signs"),
+    [
+        ([["0,5", "1,25"], ["1.012"]], [Signs(","), Signs(",", ".")]),
+        ([["0.5"], ["1,012"], ["812"]], [Signs("."), Signs(".", ","), Signs(".")]),
+        ([["0,5"], ["812", "77"]], [Signs(","), Signs(",")]),  # so that 1.012 further on is refused
+        ([["1,012"]], [Signs(",", open=True)]),
+        ([["1,234,567"], ["5,123"]], [Signs(".", ","), Signs(".", ",")]),
+        ([["1.234,5"], ["7"]], [Signs(",", "."), Signs(",")]),
+        ([["0.5"], ["0,5"], ["1.012"]], [Signs("."), Signs(","), Signs(".", open=True)]),
+    ],
+)
+def test_what_a_column_leaves_open_the_others_decide(
+    columns: list[list[str]], signs: list[Signs]
+) -> None:
+    assert signs_of(columns) == signs
+
+
+def test_a_comma_that_nothing_explains_is_said(tmp_path: Path) -> None:
+    rows = "\n".join(f"{i};{i},000;{1 + i},500" for i in range(1, 30))
+    done, run = imported(tmp_path, f"time_s;voltage_kV;displacement_mm\n{rows}\n")
+    assert any("'1,000' in column 'voltage_kV' is read as 1.000" in note for note in done.notes)
+    assert run.voltage_command.max() == 29e3
+
+
+def test_thousands_behind_the_sample_are_refused_not_taken_for_decimals(tmp_path: Path) -> None:
+    rows = "\n".join(f"{i},5;{i * 2 if i < 500 else f'{i * 2:,}'.replace(',', '.')};{i},25"
+                     for i in range(510))  # fmt: skip
+    with pytest.raises(InputError, match=r"line 502, column 'voltage_V': '1.000' is not a number"):
+        imported(tmp_path, f"time_s;voltage_V;displacement_mm\n{rows}\n")
+
+
+def test_a_typographic_minus_is_a_minus(tmp_path: Path) -> None:
+    text = table("time_s,voltage_V,displacement_mm", "{t:.2f},{v:.6f},-{m:.9f}")
+    _, run = imported(tmp_path, text.replace("-", "\N{MINUS SIGN}"))
+    np.testing.assert_allclose(run.displacement, -MOVED, rtol=1e-8, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("unit", "pascal"), [("psi", 6894.757), ("ksi", 6894757.0), ("bar", 1e5), ("mbar", 100.0)]
+)
+def test_other_units_of_stress(tmp_path: Path, unit: str, pascal: float) -> None:
+    rows = "\n".join(f"{i},{i / 100},{i}" for i in range(30))
+    _, run = imported(tmp_path, f"time_s,strain,Stress ({unit})\n{rows}\n")
+    np.testing.assert_allclose(run.nominal_stress, np.arange(30) * pascal, rtol=1e-6)
+
+
+def test_a_unit_that_is_not_known_needs_a_scale(tmp_path: Path) -> None:
+    text = table("Time (s),Voltage (V),Travel (px)", "{t:.2f},{v:.6f},{m:.9f}")
+    with pytest.raises(InputError, match=r"unit 'px' .* not known.*mm=Travel \(px\)\*FACTOR'"):
+        imported(tmp_path, text)
+    given = {"displacement_mm": "Travel (px)"}
+    with pytest.raises(InputError, match=r"in 'px' by its name.*or \*1 if it is in mm"):
+        imported(tmp_path, text, columns=given)
+    done, run = imported(tmp_path, text, columns={"displacement_mm": "Travel (px)*1"})
+    same(run)
+    assert "displacement in mm from 'Travel (px)', scaled *1" in done.took
+    assert label_of("Travel (measured)").unknown == ""
+
+
+def test_an_optional_column_with_gaps_costs_no_rows(tmp_path: Path) -> None:
+    lines = table("time_s,voltage_V,displacement_mm", "{t:.2f},{v:.6f},{m:.9f}").splitlines()
+    gaps = [f"{line},{'23' if i % 9 == 0 else ''}" for i, line in enumerate(lines[1:])]
+    text = "\n".join([f"{lines[0]},temperature_C", *gaps])
+    for skip in (False, True):
+        done, run = imported(tmp_path, text, skip_bad_rows=skip)
+        same(run)
+        assert run.temperature is None
+        assert any("temperature was not imported" in n and "line 3" in n for n in done.notes)
+    asked = {"temperature_C": "temperature_C"}
+    with pytest.raises(InputError, match="line 3, column 'temperature_C': there is no value"):
+        imported(tmp_path, text, columns=asked)
+    assert imported(tmp_path, text, columns=asked, skip_bad_rows=True)[1].samples == 7
+
+
+def test_the_first_rows_count_even_if_they_cannot_be_read(tmp_path: Path) -> None:
+    lines = table("time_s,voltage_V,displacement_mm", "{t:.2f},{v:.6f},{m:.9f}").splitlines()
+    for number in (1, 2):
+        lines[number] = lines[number].rpartition(",")[0] + ",OVER"
+    with pytest.raises(InputError, match="line 2, column 'displacement_mm': 'OVER' is not a num"):
+        imported(tmp_path, "\n".join(lines))
+    done, run = imported(tmp_path, "\n".join(lines), skip_bad_rows=True)
+    assert run.samples == TIME.size - 2
+    assert "2 rows were left out because they could not be used" in done.doubts
