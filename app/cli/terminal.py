@@ -44,12 +44,14 @@ if TYPE_CHECKING:
     )
     from dearig.analysis.tracking import TrackOutcome
     from dearig.batch.campaign import CampaignOutcome
+    from dearig.batch.studies import StudyTable
 
 __all__ = [
     "branch_table",
     "campaign_runs",
     "diagnosis_tables",
     "identify_table",
+    "study_rows",
     "track_table",
     "validate_tables",
 ]
@@ -107,6 +109,13 @@ def campaign_runs(outcome: CampaignOutcome, most: int = 40) -> RenderableType:
 
     warnings = (outcome.queue.halted,) if outcome.queue.halted else ()
     return _Fitted([*campaign_summary(outcome), campaign_table(outcome, most)], warnings)
+
+
+def study_rows(table: StudyTable, most: int) -> RenderableType:
+    """Return the table of a study of many recordings, at most ``most`` rows of it."""
+    from dearig.report.study_table import study_table_rows, study_table_sentences
+
+    return _Fitted([*study_table_sentences(table), study_table_rows(table, most)], ())
 
 
 _RANKED = 6  # candidates of a round that a terminal shows

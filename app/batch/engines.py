@@ -1,0 +1,216 @@
+"""Where the tasks of a study are computed: processes of this computer, or a Dask cluster.
+
+An engine yields a row for each task, in the order in which they end. A worker that dies costs time,
+not rows.
+"""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import os
+import signal
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
+from concurrent.futures.process import BrokenProcessPool
+from typing import TYPE_CHECKING, Any, Protocol
+
+from dearig.errors import InputError
+from dearig.extras import import_extra
+from dearig.recording.files import in_words, journal_of
+
+# a worker process imports this module before it knows its task
+if TYPE_CHECKING:
+    from dearig.batch.fits import Row, Task
+
+__all__ = ["ClusterLost", "DaskEngine", "Engine", "LocalEngine", "engine_at"]
+
+log = logging.getLogger(__name__)
+
+#: Times that a task is tried alone whose worker died, before it counts as the cause.
+_TRIES_ALONE = 2
+_DASK_TIMEOUT = "10 s"  # to find the scheduler
+_RETRIES = 3
+
+
+class ClusterLost(Exception):  # noqa: N818  (what happened)
+    """The cluster does not answer any more; the rows so far are there."""
+
+
+class Engine(Protocol):
+    """A place where tasks are computed."""
+
+    def run(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Row]]:
+        """Yield each task with its row, in the order in which they end."""
+
+
+def engine_at(where: str, workers: int | None = None) -> Engine:
+    """Return the engine that ``--on`` names: local, or dask:ADDRESS. Raises ``InputError``."""
+    if where == "local":
+        return LocalEngine(workers)
+    scheme, colon, address = where.partition(":")
+    if scheme == "dask" and colon and address:
+        return DaskEngine(address)
+    raise InputError(
+        f"--on {where!r} is not known: write local, or dask:ADDRESS with the address of a Dask "
+        f"scheduler, such as dask:tcp://10.0.0.5:8786"
+    )
+
+
+class LocalEngine:
+    """So many processes of this computer, by default one for each core.
+
+    With one worker the tasks are computed in this process.
+    """
+
+    def __init__(
+        self, workers: int | None = None, work: Callable[[Task], Row] | None = None
+    ) -> None:
+        from dearig.batch.fits import fit_task
+
+        self.workers = workers or os.cpu_count() or 1
+        self._work = work or fit_task
+
+    def run(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Row]]:
+        """Yield each task with its row, in the order in which they end."""
+        if self.workers == 1 or len(tasks) == 1:
+            for task in tasks:
+                yield task, self._work(task)
+            return
+        waiting = deque(tasks)
+        while waiting:
+            suspects = yield from self._pool(waiting, self.workers)
+            for task in suspects:
+                yield task, self._alone(task)
+
+    def _alone(self, task: Task) -> Row:
+        """Compute a task that was under way when a worker died: it may be the cause."""
+        found: list[tuple[Task, Row]] = []
+        for _ in range(_TRIES_ALONE):
+            found += self._pool(deque([task]), 1)
+            if found:
+                return found[0][1]
+        return _lost(task)
+
+    def _pool(
+        self, waiting: deque[Task], workers: int
+    ) -> Generator[tuple[Task, Row], None, list[Task]]:
+        """Compute tasks of ``waiting`` until there are none, or a worker dies.
+
+        Returns the tasks that were under way then. A task is handed over when a worker is free for
+        it, so that these are few.
+        """
+        before = set(multiprocessing.active_children())
+        pool = ProcessPoolExecutor(
+            workers, multiprocessing.get_context("spawn"), initializer=_ignore_ctrl_c
+        )
+        running: dict[Future[Row], Task] = {}
+        try:
+            while waiting or running:
+                while waiting and len(running) < workers:
+                    future = pool.submit(self._work, waiting[0])
+                    running[future] = waiting.popleft()
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    row = future.result()
+                    yield running.pop(future), row
+        except BrokenProcessPool:
+            log.warning("a worker process has died; its recording is computed again")
+            return list(running.values())
+        except BaseException:
+            # the operator has ended the study, or its reader has: nobody waits for these
+            for child in set(multiprocessing.active_children()) - before:
+                child.terminate()
+            raise
+        finally:
+            pool.shutdown(cancel_futures=True)
+        return []
+
+
+def _ignore_ctrl_c() -> None:
+    """Leave ctrl-C to the process that reads the rows."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _lost(task: Task) -> Row:
+    return {
+        "recording": task.name,
+        "state": "failed",
+        "reason": f"{task.name}: the process that computed it ended without a word, "
+        f"{_TRIES_ALONE + 1} times; it may need more memory than there is",
+    }
+
+
+class DaskEngine:
+    """The workers of the Dask scheduler at ``address``, each with this version of the program.
+
+    A recording is sent to the worker that computes it, so that the workers need no common disk.
+    Raises ``InputError`` where Dask is not installed, or no scheduler answers.
+    """
+
+    def __init__(self, address: str) -> None:
+        self._dask = import_extra("distributed", "cluster", "--on dask:ADDRESS")
+        self._address = address
+        self._client = self._connect()
+
+    def _connect(self) -> Any:
+        try:
+            return self._dask.Client(self._address, timeout=_DASK_TIMEOUT, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise InputError(
+                f"no Dask scheduler answers at {self._address}: {in_words(error)}"
+            ) from error
+
+    def run(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Row]]:
+        """Yield each task with its row, in the order in which they end.
+
+        Raises ``ClusterLost`` where the scheduler, all workers or the network are lost.
+        """
+        with self._client as client:
+            threads = sum(client.nthreads().values())
+            if not threads:
+                raise InputError(f"the Dask scheduler at {self._address} has no workers")
+            # two for each thread: one is computed while the next one is on its way
+            yield from self._run(client, deque(tasks), 2 * threads)
+
+    def _run(self, client: Any, waiting: deque[Task], most: int) -> Iterator[tuple[Task, Row]]:
+        from dearig.batch.fits import OtherVersion
+
+        done = self._dask.as_completed(loop=client.loop)
+        running: dict[Any, Task] = {}
+        while waiting or running:
+            while waiting and len(running) < most:
+                task = waiting.popleft()
+                future = self._submit(client, task)
+                running[future.key] = task
+                done.add(future)
+            future = next(done)
+            task = running.pop(future.key)
+            try:
+                row = future.result()
+            except OtherVersion as error:
+                raise InputError(f"{error}: install the same ones") from error
+            except self._dask.KilledWorker:
+                row = _lost(task)
+            except (OSError, RuntimeError, TimeoutError, CancelledError) as error:
+                raise ClusterLost(str(error) or type(error).__name__) from error
+            yield task, row
+
+    def _submit(self, client: Any, task: Task) -> Any:
+        from dearig.batch.fits import code_digest, fit_sent
+
+        contents = [
+            (path.name, path.read_bytes())
+            for path in (task.path, journal_of(task.path))
+            if path.is_file()
+        ]
+        return client.submit(
+            fit_sent, task.name, contents, task.options, code_digest(), key=f"dearig-{task.key}",
+            pure=False, retries=_RETRIES,
+        )  # fmt: skip

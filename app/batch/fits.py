@@ -1,0 +1,235 @@
+"""One task of a study: one recording fitted, diagnosed or validated, as a row of plain values.
+
+A row depends on the content of the recording, the options and this version of the program alone. It
+has no computing times and no paths, so that it is the same wherever it is computed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import math
+import tempfile
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib import import_module, metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import dearig
+from dearig.analysis.diagnose import diagnose_recordings
+from dearig.analysis.identify import identify_recordings
+from dearig.analysis.validate import validate_model
+from dearig.batch.numbers import errors_of, parameters_of
+from dearig.config.modelfile import load_model
+from dearig.errors import InputError
+from dearig.progress import Progress, quiet
+from dearig.recording.files import file_sha256, journal_of, one_line
+from dearig.recording.index import glance
+from dearig.recording.reader import open_recording
+from dearig.recording.recording import Recording
+
+__all__ = [
+    "KINDS",
+    "OtherVersion",
+    "Row",
+    "StudyOptions",
+    "Task",
+    "code_digest",
+    "fit_sent",
+    "fit_task",
+]
+
+log = logging.getLogger(__name__)
+
+#: What a study does with each recording.
+KINDS = ("identify", "diagnose", "validate")
+#: Row of the table of a study: plain values by the names of its columns.
+Row = dict[str, Any]
+#: Packages of this distribution on which the numbers depend, beside its foundations.
+_SOURCES = ("analysis", "batch", "config", "drivers", "model", "recording")
+_LIBRARIES = ("numpy", "scipy", "numba", "h5py")
+# linear algebra is limited to one thread for the whole process: fits in it go one after the other
+_ONE_AT_A_TIME = threading.Lock()
+
+
+class OtherVersion(Exception):  # noqa: N818  (what was found)
+    """A worker has another version of this program."""
+
+
+@dataclass(frozen=True)
+class StudyOptions:
+    """What is done with each recording.
+
+    ``do`` is one of ``KINDS``, with Maxwell ``branches``, a ``spring`` (for identify) and ``drive``
+    command or monitor. ``ended_early`` is keep, cut or leave-out. ``intervals``: 95 % intervals
+    are computed. ``model`` is the text of the model file of a validation.
+    """
+
+    do: str
+    branches: int = 3
+    spring: str = "gent"
+    drive: str = "command"
+    ended_early: str = "keep"
+    intervals: bool = True
+    model: str = ""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One recording of a study: its ``name`` in the table, its file, and the key of its row."""
+
+    name: str
+    path: Path
+    key: str
+    options: StudyOptions
+
+
+@cache
+def code_digest() -> str:
+    """Return what tells this program from another version: of its sources and its libraries."""
+    found = hashlib.sha256()
+    for library in _LIBRARIES:
+        found.update(f"{library} {metadata.version(library)}\n".encode())
+    sources = [p for folder in dearig.__path__ for p in sorted(Path(folder).glob("*.py"))]
+    for name in _SOURCES:
+        for folder in import_module(f"dearig.{name}").__path__:
+            sources += sorted(Path(folder).rglob("*.py"))
+    for path in sources:
+        found.update(path.name.encode() + path.read_bytes())
+    return found.hexdigest()
+
+
+def key_of(path: Path, name: str, options: StudyOptions) -> str:
+    """Return the key of a row: of recording, journal, name, options and version.
+
+    Raises ``OSError`` for a file that cannot be read.
+    """
+    found = hashlib.sha256(code_digest().encode())
+    found.update(json.dumps([name, asdict(options)], sort_keys=True).encode())
+    for part in (path, journal_of(path)):
+        found.update(file_sha256(part).encode() if part.is_file() else b"none")
+    return found.hexdigest()
+
+
+def fit_task(task: Task, progress: Progress = quiet) -> Row:
+    """Return the row of ``task``; what is wrong with its recording is in the row."""
+    return _row(task.path, task.name, task.options, progress)
+
+
+def fit_sent(
+    name: str, contents: Sequence[tuple[str, bytes]], options: StudyOptions, digest: str
+) -> Row:
+    """Return the row of a recording that was sent with its journal, as names and contents.
+
+    ``digest`` is the sender's ``code_digest``; raises ``OtherVersion`` where it differs.
+    """
+    if digest != code_digest():
+        raise OtherVersion("a worker has another version of dearig or of its libraries")
+    with tempfile.TemporaryDirectory(prefix="dearig-study-") as folder:
+        for file, content in contents:
+            Path(folder, file).write_bytes(content)
+        return _row(Path(folder, contents[0][0]), name, options, quiet)
+
+
+def _row(path: Path, name: str, options: StudyOptions, progress: Progress) -> Row:
+    row: Row = {"recording": name, "state": "failed", "reason": ""}
+    with _ONE_AT_A_TIME:
+        try:
+            row |= _about(path)
+            row |= _computed(path, options, progress)
+            row["state"] = "ok"
+        except InputError as error:
+            row["reason"] = str(error).replace(str(path), name)
+        except Exception as error:  # one recording must not cost the rows of the others
+            log.exception("unexpected error with %s", path)
+            reason = f"unexpected error ({type(error).__name__}: {one_line(error)})"
+            # without a checksum: such a row is not kept
+            return {"recording": name, "state": "failed", "reason": f"{name}: {reason}"}
+    return row
+
+
+def _about(path: Path) -> Row:
+    """Return what the columns before the results are of."""
+    entry = glance(path, path.name, path.stat().st_size)
+    if entry.trouble:
+        raise InputError(entry.trouble)
+    recording = open_recording(path)
+    return {
+        "sha256": file_sha256(path),
+        "started": entry.start_time,
+        "film": entry.film_id,
+        "rig": entry.rig,
+        "operator": entry.operator,
+        "title": entry.title,
+        "temperature_celsius": _mean(recording.temperature),
+        "duration_s": entry.duration_s,
+        "samples": entry.samples,
+        "complete": entry.complete,
+        **_peaks(recording, entry.peaks),
+    }
+
+
+def _peaks(recording: Recording, peaks: Mapping[str, float]) -> Row:
+    if recording.kind != "actuator":
+        return {}
+    volts, metres = peaks.get("voltage_command"), peaks.get("displacement")
+    return {
+        "peak_voltage_kV": None if volts is None else volts * 1e-3,
+        "peak_displacement_mm": None if metres is None else metres * 1e3,
+    }
+
+
+def _mean(values: np.ndarray | None) -> float | None:
+    good = None if values is None else values[np.isfinite(values)]
+    return None if good is None or not good.size else float(good.mean())
+
+
+def _computed(path: Path, options: StudyOptions, progress: Progress) -> Row:
+    if options.do == "validate":
+        with tempfile.TemporaryDirectory(prefix="dearig-study-") as folder:
+            model = Path(folder, "model.toml")
+            model.write_text(options.model, "utf-8", newline="\n")
+            loaded = load_model(model)
+        validated = validate_model(loaded, [path], drive=options.drive, progress=progress)
+        return errors_of(validated.comparisons[0])
+    if options.do == "identify":
+        fitted = identify_recordings(
+            [path], branches=(options.branches,), spring=options.spring, drive=options.drive,
+            intervals=options.intervals, ended_early=options.ended_early, progress=progress,
+        )  # fmt: skip
+        return {
+            **_parameters(parameters_of(fitted)),
+            **errors_of(fitted.train[0]),
+            "converged": bool(fitted.fit.converged),
+        }
+    found = diagnose_recordings(
+        [path], branches=options.branches, drive=options.drive, ended_early=options.ended_early,
+        progress=progress,
+    )  # fmt: skip
+    if found.finding.interrupted:
+        # a person's ctrl-C is not a result that could be kept
+        raise KeyboardInterrupt
+    return {
+        "verdict": found.verdict,
+        "effects": ", ".join(step.effect for step in found.finding.steps),
+        **_parameters(parameters_of(found)),
+        **errors_of(found.after.train[0]),
+        **{f"{name}_before": value for name, value in errors_of(found.before.train[0]).items()},
+    }
+
+
+def _parameters(found: list[dict[str, Any]]) -> Row:
+    row: Row = {}
+    for parameter in found:
+        name = parameter["name"]
+        row[name] = parameter["value"]
+        for end in ("low95", "high95"):
+            row[f"{name}_{end}"] = parameter[end]
+        row[f"{name}_determined"] = parameter["determined"]
+    return {n: None if isinstance(v, float) and not math.isfinite(v) else v for n, v in row.items()}

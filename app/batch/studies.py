@@ -1,0 +1,284 @@
+"""Many recordings fitted, diagnosed or validated: a table with a row for each of them."""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+import io
+import json
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from dearig.batch.engines import ClusterLost, Engine, LocalEngine
+from dearig.batch.fits import KINDS, Row, StudyOptions, Task, key_of
+from dearig.batch.journal import JOURNAL, read_lines
+from dearig.batch.queue import Queue
+from dearig.config.modelfile import load_model
+from dearig.config.toml_input import read_text
+from dearig.errors import InputError
+from dearig.extras import import_extra
+from dearig.input_file import read_input
+from dearig.progress import Progress, quiet
+from dearig.recording.files import in_words, replaced_when_done, write_whole
+from dearig.recording.index import ENDINGS, list_folder
+from dearig.recording.json_file import write_json
+
+__all__ = ["StudyTable", "Subject", "columns_of", "study_recordings", "subjects_of", "with_model"]
+
+log = logging.getLogger(__name__)
+
+#: Version of the rows in the cache; another one is not read.
+CACHED = "dearig-study-row/1"
+#: Recordings of a study, at most, and bytes of a list of them.
+_MOST, _LIST_BYTES = 100_000, 2**24
+_LISTS = (".txt", ".csv", ".list")
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A recording of a study: its name in the table, its file, and what is known beside it.
+
+    ``beside`` are columns of the run of a campaign: its name and its settings.
+    """
+
+    name: str
+    path: Path
+    beside: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class StudyTable:
+    """Rows of a study in the order of their starts, and the files that they were written to.
+
+    ``cached`` rows were computed by an earlier study. ``moved`` says why the rest was computed on
+    this computer, "" if it was computed where it should be. ``parquet`` is None where pyarrow is
+    not installed.
+    """
+
+    options: StudyOptions
+    rows: tuple[Row, ...]
+    cached: int
+    table: Path
+    parquet: Path | None
+    moved: str = ""
+
+    @property
+    def failed(self) -> tuple[Row, ...]:
+        """Rows without a result."""
+        return tuple(row for row in self.rows if row["state"] != "ok")
+
+
+def subjects_of(sources: Sequence[Path], out: Path) -> list[Subject]:
+    """Return the recordings in ``sources``: folders, lists (text, a path a line), recordings.
+
+    Of the folder of a campaign the runs to warm up are left out. What lies in ``out`` is no source.
+    Raises ``InputError`` where there is none, and for a name that occurs twice.
+    """
+    found: list[Subject] = []
+    for source in sources:
+        before = f"{source.as_posix().rstrip('/')}/" if len(sources) > 1 else ""
+        if source.is_dir():
+            found += _in_folder(source, before, out)
+        elif source.suffix.lower() in ENDINGS:
+            found.append(Subject(source.as_posix(), source))
+        elif source.suffix.lower() in _LISTS:
+            found += _listed(source)
+        else:
+            what = "is not there" if not source.exists() else "is not one of them"
+            raise InputError(
+                f"{source} {what}: give folders, recordings, or a list of recordings ({_LISTS[0]}) "
+                f"with a path on each line"
+            )
+    if not found:
+        raise InputError(f"there is no recording in {', '.join(map(str, sources))}")
+    if len(found) > _MOST:
+        raise InputError(f"{len(found):,} recordings are more than {_MOST:,}; study them in parts")
+    names: set[str] = set()
+    for subject in found:
+        if subject.name in names:
+            raise InputError(f"{subject.name} is given twice; give each recording once")
+        names.add(subject.name)
+    return found
+
+
+def _in_folder(folder: Path, before: str, out: Path) -> Iterator[Subject]:
+    inside = out.resolve()
+    runs: dict[str, dict[Path, Any]] = {}
+    for name in sorted(list_folder(folder).files):
+        path = folder / name
+        if path.resolve().is_relative_to(inside):
+            continue
+        beside: dict[str, Any] = {}
+        parent = path.parent
+        if (parent / JOURNAL).exists():
+            key = str(parent)
+            if key not in runs:
+                queue = Queue.of(read_lines(parent / JOURNAL))
+                runs[key] = {parent / run.recording: run for run in queue.listed if run.recording}
+            run = runs[key].get(path)
+            if run is not None and run.warm_up:
+                continue
+            if run is not None:
+                beside = {"run": run.name, **{f"set {n}": v for n, v in run.settings.items()}}
+        yield Subject(f"{before}{name}", path, beside)
+
+
+def _listed(path: Path) -> Iterator[Subject]:
+    try:
+        lines = read_input(path, "list", _LIST_BYTES).decode("utf-8").splitlines()
+    except UnicodeDecodeError as error:
+        raise InputError(f"list {path}: not UTF-8 text; save the file in UTF-8") from error
+    for line in lines:
+        name = line.strip().strip('"')
+        if name and not name.startswith("#"):
+            yield Subject(name, path.parent / name)
+
+
+def with_model(options: StudyOptions, model: Path | None) -> StudyOptions:
+    """Return ``options`` with the text of the model file that a validation needs."""
+    if options.do not in KINDS:
+        raise InputError(f"--do {options.do} is not one of {', '.join(KINDS)}")
+    if (options.do == "validate") != (model is not None):
+        raise InputError(
+            "--do validate needs --model MODEL.toml"
+            if model is None
+            else f"--model is of --do validate; --do {options.do} fits a model"
+        )
+    if model is None:
+        return options
+    load_model(model)  # refuses what is none
+    return replace(options, model=read_text(model, "model file"))
+
+
+def study_recordings(
+    subjects: Sequence[Subject],
+    options: StudyOptions,
+    out: Path,
+    engine: Engine,
+    *,
+    progress: Progress = quiet,
+) -> StudyTable:
+    """Compute a row for each of ``subjects`` with ``engine``, and write the table to ``out``.
+
+    A row that an earlier study with the same recording, options and version has computed is taken
+    from the cache in ``out``. A study that is ended keeps its rows there. Where a cluster is lost,
+    the rest is computed on this computer.
+    """
+    cache = out / "cache"
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{cache} cannot be created: {in_words(error)}") from error
+    rows: dict[str, Row] = {}
+    tasks: list[Task] = []
+    unreadable = 0
+    for i, subject in enumerate(subjects):
+        progress("reading", i / len(subjects))
+        try:
+            task = Task(
+                subject.name, subject.path, key_of(subject.path, subject.name, options), options
+            )
+        except OSError as error:
+            reason = f"{subject.name} cannot be read: {in_words(error)}"
+            rows[subject.name] = {"recording": subject.name, "state": "failed", "reason": reason}
+            unreadable += 1
+            continue
+        known = _kept(cache / f"{task.key}.json")
+        if known is not None:
+            rows[task.name] = known
+        else:
+            tasks.append(task)
+    cached = len(subjects) - len(tasks) - unreadable
+    moved = ""
+    try:
+        _compute(tasks, engine, rows, cache, len(subjects), progress)
+    except ClusterLost as error:
+        moved = f"the cluster was lost ({error}); the rest was computed on this computer"
+        log.warning("%s", moved)
+        rest = [task for task in tasks if task.name not in rows]
+        _compute(rest, LocalEngine(), rows, cache, len(subjects), progress)
+    made = [{**rows[s.name], **s.beside} for s in subjects]
+    made.sort(key=lambda row: (str(row.get("started", "")), row["recording"]))
+    table = out / "study.csv"
+    _write_csv(made, table)
+    return StudyTable(options, tuple(made), cached, table, _write_parquet(made, out), moved)
+
+
+def _compute(
+    tasks: Sequence[Task],
+    engine: Engine,
+    rows: dict[str, Row],
+    cache: Path,
+    total: int,
+    progress: Progress,
+) -> None:
+    progress("fitting", len(rows) / total)
+    for task, row in engine.run(tasks):
+        rows[task.name] = row
+        # one that could not be read, or whose worker was lost, may have a result the next time
+        if "sha256" in row:
+            _keep(cache / f"{task.key}.json", row)
+        progress("fitting", len(rows) / total)
+
+
+def _keep(path: Path, row: Row) -> None:
+    write_json({"format": CACHED, "row": row}, path)
+
+
+def _kept(path: Path) -> Row | None:
+    """Return the row in the cache; None where there is none, or a damaged one."""
+    try:
+        found = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return None
+    if not isinstance(found, dict) or found.get("format") != CACHED:
+        return None
+    row = found.get("row")
+    return row if isinstance(row, dict) and {"recording", "state"} <= set(row) else None
+
+
+def columns_of(rows: Sequence[Row]) -> list[str]:
+    """Return the names of all columns, in the order in which they occur."""
+    return list(dict.fromkeys(name for row in rows for name in row))
+
+
+def _write_csv(rows: Sequence[Row], path: Path) -> None:
+    text = io.StringIO()
+    columns = columns_of(rows)
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(columns)
+    # the shortest text of a number that is read as the same number
+    table.writerows([_cell(row.get(name)) for name in columns] for row in rows)
+    write_whole(path, text.getvalue().encode())
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, list | dict):
+        return json.dumps(value)
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def _write_parquet(rows: Sequence[Row], out: Path) -> Path | None:
+    """Write the rows as Parquet; None where pyarrow is not installed."""
+    if importlib.util.find_spec("pyarrow") is None:
+        return None
+    pyarrow = import_extra("pyarrow", "parquet", "a table in Parquet")
+    parquet = import_extra("pyarrow.parquet", "parquet", "a table in Parquet")
+    columns = {}
+    for name in columns_of(rows):
+        values = [row.get(name) for row in rows]
+        kinds = {type(value) for value in values if value is not None}
+        if kinds <= {int, float} and float in kinds:
+            values = [None if value is None else float(value) for value in values]
+        elif len(kinds) > 1 or kinds & {list, dict}:
+            values = [None if value is None else _cell(value) for value in values]
+        columns[name] = pyarrow.array(values, type=pyarrow.string() if not kinds else None)
+    path = out / "study.parquet"
+    with replaced_when_done(path, overwrite=True) as partial:
+        parquet.write_table(pyarrow.table(columns), partial)
+    return path

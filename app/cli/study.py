@@ -1,0 +1,103 @@
+"""The command for many recordings: each fitted, diagnosed or validated, in one table."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dearig.cli.options import (
+    Drive,
+    DriveChannel,
+    EndedEarly,
+    EndedEarlyOption,
+    Force,
+    Json,
+    SpringKind,
+)
+from dearig.cli.output import check_files, print_line, working, write_result
+
+__all__ = ["commands"]
+
+commands = typer.Typer()
+_ROWS = 40  # rows of the table that a terminal shows
+
+
+class Do(StrEnum):
+    """What a study does with each recording."""
+
+    identify = "identify"
+    diagnose = "diagnose"
+    validate = "validate"
+
+
+@commands.command(rich_help_panel="Models")
+def study(
+    sources: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FOLDER|LIST|FILE.h5...",
+            help="Folders of recordings, lists of recordings (.txt, a path on each line), or "
+            "recordings.",
+            show_default=False,
+        ),
+    ],
+    do: Annotated[Do, typer.Option(help="What is done with each recording.")],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for the table and the cache.")
+    ] = Path("study"),
+    on: Annotated[
+        str,
+        typer.Option(
+            metavar="local|dask:ADDRESS",
+            help="Where the fits are computed: in processes of this computer, or by the workers of "
+            "a Dask scheduler.",
+        ),
+    ] = "local",
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=1024, help="Processes of --on local.", show_default="one for each core"
+        ),
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(metavar="MODEL.toml", help="The model of --do validate."),
+    ] = None,
+    branches: Annotated[int, typer.Option(min=1, max=10, help="Number of Maxwell branches.")] = 3,
+    spring: Annotated[
+        SpringKind, typer.Option(help="Strain energy of --do identify.")
+    ] = SpringKind.gent,
+    drive: Drive = DriveChannel.command,
+    intervals: Annotated[bool, typer.Option(help="Compute 95 % confidence intervals.")] = True,
+    ended_early: EndedEarlyOption = EndedEarly.keep,
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Fit, diagnose or validate many recordings, each by itself, into one table.
+
+    A broken recording costs its row. What was computed is kept in the cache, so that a study that
+    was ended goes on where it stood. Ctrl-C ends it.
+    """  # fmt: skip
+    from dearig.batch.engines import engine_at
+    from dearig.batch.fits import StudyOptions
+    from dearig.batch.studies import study_recordings, subjects_of, with_model
+    from dearig.cli.terminal import study_rows
+    from dearig.report.study_table import study_table_json
+
+    check_files(force, (model, *(s for s in sources if s.is_file())), json=json)
+    options = with_model(
+        StudyOptions(do.value, branches, spring.value, drive.value, ended_early.value, intervals),
+        model,
+    )
+    subjects = subjects_of(sources, out)
+    engine = engine_at(on, workers)
+    with working(json) as (console, progress):
+        table = study_recordings(subjects, options, out, engine, progress=progress)
+    console.print(study_rows(table, _ROWS))
+    print_line(console, f"Table: {table.table}")
+    if table.parquet is not None:
+        print_line(console, f"Parquet: {table.parquet}")
+    write_result(study_table_json(table), json)
