@@ -58,6 +58,7 @@ def own_of(
     recording, so of two events of one kind the larger is found.
     """
     fitter = Fitter([record], replace(model, effects=()), settings or DiagnosisSettings(), 1)
+    fitter.read_colour()
     plain = _as_it_is(fitter.problem(model))
     judge = Judge(fitter.settings, plain)
     if judge.is_noise(plain):

@@ -182,6 +182,7 @@ class Fitter:
         self.times = (settings.branch_time_min_s, settings.branch_time_max * longest)
         self._coarse: dict[tuple[str, ...], np.ndarray] = {}
         self._space: dict[bool, DriftSpace] = {}
+        self._pink_density = 0.0
         self._limits = np.zeros(0, dtype=bool)
 
     # -- problems
@@ -206,9 +207,17 @@ class Fitter:
             )
         return self._space[full]
 
+    def read_colour(self) -> None:
+        """Read the 1/f noise of the records at rest; the noise of later problems has it.
+
+        Springs are sought in white noise: in slow noise their likelihood has more valleys.
+        """
+        self._pink_density = pink_density(self.records, self.settings.odds)
+        self._space.clear()
+
     def _pink(self, records: Sequence[ActuatorRecord], modes: int) -> list[np.ndarray] | None:
         """Return the variances (K,) of each record's 1/f noise in its modes; None without any."""
-        density = pink_density(records, self.settings.odds)
+        density = self._pink_density
         number = np.arange(1.0, modes + 1.0)
         # of a cosine of amplitude 1: the density at its frequency over the record's duration; the
         # modes are lower by j^-2
@@ -369,7 +378,7 @@ class Fitter:
             else r
             for r in self._prepared(model)
         )
-        self._space.clear()
+        self.read_colour()
         self._coarse.clear()
 
     def _strip_baseline(
