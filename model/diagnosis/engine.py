@@ -316,7 +316,7 @@ class Search:
         drift = parent.problem.noise_drift
         if drift is not None and parent.drift:
             noise = np.concatenate([np.full(r.measured.size, r.noise) for r in records])
-            went = drift.mean(parent.plain_residuals()) * noise
+            went = parent.mean_drift() * noise
         times = fitter.times if fitter.of_actuator else _film_times(records)
         plain = fitter.problem(parent.model)
         residuals = -parent.plain_residuals()

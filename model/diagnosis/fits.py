@@ -15,7 +15,7 @@ from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.noise import (
     DriftSpace,
     WhitenedProblem,
-    drift_modes,
+    drift_basis,
     pink_density,
 )
 from dearig.model.diagnosis.preparation import prepared, with_model_error
@@ -31,7 +31,7 @@ from dearig.model.fitting.levenberg import LocalFit, descend
 from dearig.model.fitting.parallel import Job, Result, parallel_map
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.search import voltage_starts
-from dearig.model.records import ActuatorRecord, Record
+from dearig.model.records import ActuatorRecord, Record, counted
 
 __all__ = ["DRIFT", "Fit", "Fitter", "Work", "with_effect"]
 
@@ -135,6 +135,17 @@ class Fit:
         )  # fmt: skip
         return -bare.residuals(self.x)
 
+    def mean_drift(self) -> np.ndarray:
+        """Return the most probable drift (N,) in noises, as the records count displacement."""
+        problem = self.problem
+        if problem.noise_drift is None:
+            return np.zeros(self.residuals.size)
+        mean = problem.noise_drift.mean(self.plain_residuals())
+        for record, (a, b) in zip(problem.records, pairwise(problem.edges), strict=True):
+            if isinstance(record, ActuatorRecord):
+                mean[a:b] = counted(mean[a:b], max(record.lead_in, 1))
+        return mean
+
 
 class Work:
     """Simulations of a search, and their cost in integration steps."""
@@ -203,7 +214,7 @@ class Fitter:
             modes = self.settings.drift_modes
             rigs = [r for r in records if isinstance(r, ActuatorRecord)]
             self._space[full] = DriftSpace(
-                [drift_modes(r, modes) for r in rigs], self._pink(rigs, modes)
+                [drift_basis(r, modes) for r in rigs], self._pink(rigs, modes)
             )
         return self._space[full]
 

@@ -16,11 +16,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from dearig.model.fitting.offsets import centred
 from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.problem import Problem
 from dearig.model.records import ActuatorRecord, Record
 
-__all__ = ["Drift", "DriftSpace", "WhitenedProblem", "drift_modes", "pink_density"]
+__all__ = ["Drift", "DriftSpace", "WhitenedProblem", "drift_basis", "drift_modes", "pink_density"]
 
 _POWER = 2.0  # of 1/j in a mode's standard deviation: an integrated random walk
 #: Variances of the slowest mode, in units of the noise, among which the evidence chooses.
@@ -47,6 +48,12 @@ def drift_modes(record: ActuatorRecord, modes: int, every: int = 1) -> np.ndarra
         whole = basis.shape[0] // every
         basis = basis[: whole * every].reshape(whole, every, modes).mean(axis=1)
     return basis
+
+
+def drift_basis(record: ActuatorRecord, modes: int) -> np.ndarray:
+    """Return the modes (N, K) of ``drift_modes`` less what the offset of ``record`` absorbs."""
+    basis = centred(record, drift_modes(record, modes))
+    return basis if record.valid is None else np.where(record.valid[:, None], basis, 0.0)
 
 
 def pink_density(records: Sequence[Record], odds: float) -> float:
@@ -176,9 +183,8 @@ class WhitenedProblem(Problem):
     ) -> None:
         super().__init__(records, layout, **options)  # type: ignore[arg-type]
         self.noise_drift = drift
-        self.readings = self.measured
         if drift is not None:
-            self.measured = drift.whitened(self.measured)
+            self.measured = drift.whitened(self.readings)
 
     def predict(
         self, values: np.ndarray, coarse: np.ndarray | None = None

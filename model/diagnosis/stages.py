@@ -111,7 +111,7 @@ def drift_values(fit: Fit) -> list[np.ndarray]:
     basis_of = EFFECTS[DRIFT_LAW].drift_basis
     if drift is None or basis_of is None or not fit.drift:
         return []
-    mean = drift.mean(fit.plain_residuals())
+    mean = fit.mean_drift()
     found = []
     for record, (a, b) in zip(fit.problem.records, pairwise(fit.problem.edges), strict=True):
         if isinstance(record, ActuatorRecord):
@@ -141,7 +141,7 @@ def _drift_estimates(fit: Fit) -> Iterator[Estimate]:
     drift = fit.problem.noise_drift
     if drift is None or not fit.drift:
         return
-    mean = drift.mean(fit.plain_residuals())
+    mean = fit.mean_drift()
     for record, (a, b) in zip(fit.problem.records, pairwise(fit.problem.edges), strict=True):
         part = mean[a:b]
         rms = float(np.sqrt(np.mean(part**2))) * record.noise

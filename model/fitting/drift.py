@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dearig.model.effects import EFFECTS, EffectValues
+from dearig.model.fitting.offsets import centred
 from dearig.model.records import ActuatorRecord, Record
 
 __all__ = ["DriftFit", "RecordDrift", "record_drift"]
@@ -110,7 +111,10 @@ def record_drift(records: Sequence[Record], effects: EffectValues) -> RecordDrif
 
 
 def _basis_of(record: ActuatorRecord, effects: Sequence[str]) -> np.ndarray:
-    """Derivative of the readings of ``record`` with respect to each amplitude: (N, n) in m."""
+    """Derivative of the readings of ``record`` with respect to each amplitude: (N, n) in m.
+
+    Less what the offset of the record absorbs.
+    """
     basis = [EFFECTS[name].drift_basis for name in effects]
     columns = np.concatenate([way(record.time) for way in basis if way is not None], axis=1)
-    return record.seen(columns.T).T
+    return centred(record, record.seen(columns.T).T)

@@ -95,7 +95,8 @@ def identify(
     if method not in METHODS:
         raise ModelError(f"method {method!r} is not one of {', '.join(METHODS)}")
     layout = Layout(base)
-    problem = Problem(records, layout, workers)
+    # the algorithm as printed takes the zero of displacement for exact
+    problem = Problem(records, layout, workers, exact_zero=method == "de")
     require_free(layout, problem.samples)
     if method == "de":
         found = algorithm_1(problem, seed, progress)
@@ -158,9 +159,8 @@ def _result(
     warnings = []
     if fit.cost > 1.5 and method == "hybrid":
         warnings.append(
-            f"the residual is {math.sqrt(fit.cost):.3g} times the noise: the model lacks "
-            f"something, and the intervals (widened by the residual's size and correlation) "
-            f"are a rough guide"
+            "the residual is above the noise: the model lacks something, and the intervals "
+            "(widened by the residual's size and correlation) are a rough guide"
         )
     if method == "hybrid" and not fit.converged:
         warnings.append("the fit stopped before it converged")

@@ -13,6 +13,7 @@ from dearig.model.effects import EFFECTS, SENSOR_COLUMNS
 from dearig.model.errors import ModelError
 from dearig.model.film import Strip, stress_of
 from dearig.model.fitting.drift import DriftFit, record_drift
+from dearig.model.fitting.offsets import Offsets
 from dearig.model.fitting.parallel import parallel_map
 from dearig.model.fitting.parameters import Layout
 from dearig.model.records import ActuatorRecord, FilmRecord, Record
@@ -44,7 +45,8 @@ class Problem:
     each population. ``coarse_columns`` (d,) bool are the parameters whose derivatives the records'
     coarse drives give; None where none are.
 
-    Drift that each of several records has by itself is eliminated in every prediction
+    The offset of each record is eliminated in every prediction (``dearig.model.fitting.offsets``)
+    unless ``exact_zero``, and so is drift that each of several records has by itself
     (``dearig.model.fitting.drift``); the layout's amplitudes of it then have no influence.
     """
 
@@ -55,6 +57,7 @@ class Problem:
         workers: int = 2,
         fidelity: int = kernel.CAREFUL,
         on_simulations: Callable[[int, float], None] | None = None,
+        exact_zero: bool = False,
     ) -> None:
         if not records:
             raise ModelError("a fit needs at least one record")
@@ -72,7 +75,9 @@ class Problem:
         # difference of full and coarse readings (N,) in m, while the coarse drives are used
         self._correction: np.ndarray | None = None
         self.simulations = 0
-        self.measured = np.concatenate([r.measured for r in records])
+        #: (N,) as they were taken; ``measured`` are those that are compared
+        self.readings = np.concatenate([r.measured for r in records])
+        self.measured = self.readings
         # a masked reading has no weight
         self.sigma = np.concatenate(
             [
@@ -83,6 +88,7 @@ class Problem:
             ]
         )
         self._edges = np.cumsum([0, *(r.measured.size for r in records)])
+        self._offsets = Offsets(() if exact_zero else records)
         self.drift = record_drift(self.records, layout.base.effects)
         own = () if self.drift is None else self.drift.names
         #: (d,) bool: parameters of the layout that each record has for itself
@@ -124,7 +130,9 @@ class Problem:
         self.simulations += steps.size
         if self.on_simulations is not None:
             self.on_simulations(steps.size, self._effort(float(steps.sum())))
+        out += self._offsets.nearest(self.readings - out)
         if self._correction is not None:
+            # the difference of two predictions with their offsets
             out += self._correction
         if self.drift is not None:
             out += self.drift.nearest(self.measured - out)

@@ -168,5 +168,6 @@ def test_a_record_too_short_for_its_drift_is_fitted_without_error():
     problem, x, held = problem_of([TWO[0], short])
     fit = descend(problem, x, held)
     assert np.all(np.isfinite(problem.fit_drift(fit.x).amplitudes))
-    assert np.max(np.abs(fit.residuals[-3:])) < 1e-6  # every drift starts at 0
+    # drift and offset take everything but a constant
+    assert np.ptp(fit.residuals[-3:]) < 1e-6
     assert fit.cost == pytest.approx(1.0, abs=0.06)

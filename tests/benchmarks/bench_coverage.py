@@ -1,0 +1,159 @@
+"""How often the 95 % intervals of `identify` and `diagnose` hold the truth, on simulated rigs.
+
+Run as ``python -m tests.benchmarks.bench_coverage --rigs 100``, with ``--diagnose`` for the other.
+Each rig has a film of three branches and one noise, drawn by its seed; ``--diagnose`` gives it one
+effect of a list beside that, in turn. It makes the thesis's identification record, with a lead-in
+of 2 s, white noise, and the steps of a 16-bit converter; displacement is counted from the mean of
+the lead-in, as in a recording. The truth is inside the model's class: what is counted is whether
+the intervals are honest, not whether the model is right. With each share stands its own 95 %
+interval (Clopper and Pearson), and the RMS of the errors in units of what the interval says.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.stats import beta
+
+from dearig.model.actuator import Actuator, Drive
+from dearig.model.diagnosis import diagnose
+from dearig.model.effects import EffectValues
+from dearig.model.excitation import Sequence
+from dearig.model.fitting import Estimate, identify
+from dearig.model.material import THESIS_FILM, THESIS_LOAD, Network
+from dearig.model.records import ActuatorRecord, counted
+
+EFFECTS_DRAWN: tuple[EffectValues, ...] = (
+    (("load inertia", (("moving_mass", 0.15),)),),
+    (("sensor lag", (("time_constant", 8e-3),)),),
+    (("electrode resistance", (("resistance", 2e7),)),),
+    (("linear drag", (("drag", 400.0),)),),
+)
+CONVERTER_STEP = 80e-3 / 2**16  # m: +-40 mm over 16 bits
+_NORMAL_95 = 1.96
+
+
+@dataclass
+class Count:
+    """How often the interval of one parameter held the truth; errors in standard deviations."""
+
+    held: int = 0
+    of: int = 0
+    errors: list[float] = field(default_factory=list)
+
+    def add(self, estimate: Estimate, truth: float) -> None:
+        """Count one estimate."""
+        self.of += 1
+        self.held += estimate.low <= truth <= estimate.high
+        half = 0.5 * (estimate.high - estimate.low)
+        if math.isfinite(half) and half > 0.0:
+            self.errors.append(_NORMAL_95 * (truth - estimate.value) / half)
+
+    def row(self, name: str) -> str:
+        """Return the row of the table."""
+        low = beta.ppf(0.025, self.held, self.of - self.held + 1) if self.held else 0.0
+        high = 1.0 if self.held == self.of else beta.ppf(0.975, self.held + 1, self.of - self.held)
+        rms = math.sqrt(float(np.mean(np.square(self.errors)))) if self.errors else math.nan
+        return (
+            f"| {name} | {self.held} of {self.of} | {100.0 * self.held / self.of:.0f} | "
+            f"{100.0 * low:.0f} to {100.0 * high:.0f} | {rms:.2f} |"
+        )
+
+
+def rig_of(seed: int, effects: EffectValues = ()) -> tuple[Actuator, float]:
+    """Return the rig of ``seed`` and its noise in m."""
+    rng = np.random.default_rng(seed)
+    moduli = rng.uniform((35e3, 20e3, 10e3, 5e3), (60e3, 60e3, 40e3, 20e3))
+    times = np.exp(rng.uniform(np.log((0.15, 0.8, 4.0)), np.log((0.5, 2.5, 12.0))))
+    noise = math.exp(rng.uniform(math.log(0.7e-6), math.log(3e-6)))
+    network = Network.gent(tuple(moduli), (1e4,) * 4, tuple(times))
+    return Actuator(THESIS_FILM, THESIS_LOAD, network, effects), noise
+
+
+def record_of(model: Actuator, noise: float, rate: float, seed: int) -> ActuatorRecord:
+    """Return the thesis's record of ``model`` as a recording gives it to a fit."""
+    drive = Drive(*Sequence.thesis().sample(rate))
+    answer = model.simulate(drive)
+    if not answer.ok:
+        raise RuntimeError(f"rig {seed}: {answer.in_words}")
+    rng = np.random.default_rng((seed, 1))
+    read = answer.displacement + noise * rng.standard_normal(drive.time.size)
+    read = CONVERTER_STEP * np.round(read / CONVERTER_STEP)
+    lead_in = int(np.flatnonzero(drive.voltage)[0])
+    floor = float(np.std(read[:lead_in], ddof=2))
+    return ActuatorRecord(f"rig {seed}", drive, counted(read, lead_in), floor, lead_in=lead_in)
+
+
+def truths(model: Actuator) -> dict[str, float]:
+    """Return the true values by the names of a fit."""
+    network = model.network
+    found = {f"mu_{i}": s.modulus for i, s in enumerate(network.springs)}
+    found |= {f"T_{i}": t for i, t in enumerate(network.times, 1)}
+    for name, values in model.effects:
+        found |= {f"{name}: {key}": value for key, value in values}
+    return found
+
+
+def count(
+    counts: dict[str, Count], estimates: Iterable[Estimate], truth: dict[str, float]
+) -> list[str]:
+    """Count the estimates of parameters whose truth is known; return those that missed."""
+    missed = []
+    for e in estimates:
+        if e.name in truth:
+            counts.setdefault(e.name, Count()).add(e, truth[e.name])
+            if not e.low <= truth[e.name] <= e.high:
+                missed.append(e.name)
+    return missed
+
+
+def main() -> None:
+    """Count, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rigs", type=int, default=100, help="rigs [100]")
+    parser.add_argument("--first", type=int, default=0, help="first seed [0]")
+    parser.add_argument("--rate", type=float, default=1000.0, help="Hz [1000]")
+    parser.add_argument("--diagnose", action="store_true", help="diagnose rigs with one effect")
+    parser.add_argument("--workers", type=int, default=2, help="threads of a fit [2]")
+    given = parser.parse_args()
+    counts: dict[str, Count] = {}
+    others = 0
+    for seed in range(given.first, given.first + given.rigs):
+        started = time.perf_counter()
+        effects = EFFECTS_DRAWN[seed % len(EFFECTS_DRAWN)] if given.diagnose else ()
+        model, noise = rig_of(seed, effects)
+        record = record_of(model, noise, given.rate, seed)
+        base = replace(model, effects=())
+        if given.diagnose:
+            finding = diagnose([record], base, workers=given.workers)
+            names = tuple(name for name, _ in finding.final.model.effects)
+            said = f"{' + '.join(names) or 'nothing'} for {effects[0][0]}"
+            if names == (effects[0][0],):
+                missed = count(counts, finding.final.estimates, truths(model))
+            else:
+                # another law's parameters have no truth
+                others, missed = others + 1, []
+        else:
+            fit = identify([record], base, workers=given.workers)
+            said = f"cost {fit.cost:.3f}, correlation {fit.correlation:.2f}"
+            missed = count(counts, fit.estimates, truths(model))
+        spent = time.perf_counter() - started
+        print(f"{seed}: {said}, missed {missed or 'none'}, {spent:.1f} s", flush=True)
+    print("\n| parameter | held | % | 95 % of that | RMS of errors |\n|---|---|---|---|---|")
+    total = Count()
+    for name, one in counts.items():
+        print(one.row(name))
+        total.held, total.of = total.held + one.held, total.of + one.of
+        total.errors += one.errors
+    print(total.row("all"))
+    if others:
+        print(f"\n{others} rigs were explained by another law and are not counted.")
+
+
+if __name__ == "__main__":
+    main()
