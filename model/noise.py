@@ -12,23 +12,29 @@ import numpy as np
 
 from dearig.model.errors import ModelError
 
-__all__ = ["noise_at_rest", "noise_of"]
+__all__ = ["DIFFERENCES", "LEAD_IN", "READINGS_MIN", "noise_at_rest", "noise_of"]
 
-_READINGS_MIN = 4  # fewer have no second difference to average
+#: Sources of a noise: readings at rest, or second differences of all of them.
+LEAD_IN, DIFFERENCES = "lead-in", "second differences"
+#: Fewer readings have no second difference to average.
+READINGS_MIN = 4
 _READINGS_A_LINE = 4  # samples for each of the three numbers of a periodic line
 _SLOWEST_LINE = 15.0  # Hz; slower ones may be drift, or noise that a sensor has averaged
 _STANDS_OUT = 30.0  # times the spectrum's median about it: by chance once in a million readings
 _LINE_FOUND = 1e-5  # of a frequency bin: moves the sine's end by some 1e-5 of a period
 
 
-def noise_of(values: np.ndarray) -> float:
+def noise_of(values: np.ndarray, valid: np.ndarray | None = None) -> float:
     """Standard deviation of the noise on a slowly changing quantity ``values`` (N,), N >= 4.
 
     From second differences, which no drift or slope disturbs: their variance is six times that of
-    white noise.
+    white noise. Readings that are not ``valid`` (N,) take no part; with too few others it is 0.
     """
     _require_readings(values)
-    return float(np.sqrt(np.mean(np.diff(values, 2) ** 2) / 6.0))
+    bends = np.diff(values, 2)
+    if valid is not None:
+        bends = bends[valid[:-2] & valid[1:-1] & valid[2:]]
+    return float(np.sqrt(np.mean(bends**2) / 6.0)) if bends.size else 0.0
 
 
 def noise_at_rest(time: np.ndarray, values: np.ndarray) -> float:
@@ -54,9 +60,9 @@ def noise_at_rest(time: np.ndarray, values: np.ndarray) -> float:
 
 
 def _require_readings(values: np.ndarray) -> None:
-    if values.size < _READINGS_MIN:
+    if values.size < READINGS_MIN:
         raise ModelError(
-            f"{values.size} samples are too few to read a noise from; {_READINGS_MIN} are needed"
+            f"{values.size} samples are too few to read a noise from; {READINGS_MIN} are needed"
         )
 
 

@@ -29,7 +29,14 @@ from dearig.analysis.outcomes import (
     pooled_rms,
 )
 from dearig.analysis.quality import check_enough, extrapolated, few_data, inspect
-from dearig.analysis.records import Source, as_record, check_named_once, compare, open_all
+from dearig.analysis.records import (
+    Source,
+    as_record,
+    check_named_once,
+    compare,
+    noise_sentences,
+    open_all,
+)
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence, parse_sequence
@@ -289,6 +296,7 @@ def _prepared(
         for r in (*recordings, *others)
         for sentence in inspect(r, settings.drive, to_fit=r in recordings).findings
     ]
+    said += noise_sentences((*recordings, *others))
     said += extrapolated(recordings, others, settings.drive)
     films = sorted({r.film_id for r in (*recordings, *others) if r.film_id})
     if len(films) > 1:
@@ -425,9 +433,10 @@ def _without_own(stand: Stand, own: dict[str, Own | None]) -> Stand:
 
 
 def _noise(recordings: Sequence[Recording], drive: str) -> float:
-    """Return the pooled noise floor of the training recordings, m or Pa."""
-    floors = [as_record(r, drive).noise for r in recordings]
-    return math.sqrt(sum(n * n for n in floors) / len(floors))
+    """Return the noise of the training recordings, RMS over all samples, m or Pa."""
+    records = [as_record(r, drive) for r in recordings]
+    samples = sum(r.measured.size for r in records)
+    return math.sqrt(sum(r.noise**2 * r.measured.size for r in records) / samples)
 
 
 def _experiment(

@@ -17,7 +17,12 @@ from dearig.analysis.compatibility import (
 )
 from dearig.analysis.cores import for_simulations
 from dearig.analysis.early_ends import choose
-from dearig.analysis.outcomes import BranchTrial, Comparison, IdentifyOutcome
+from dearig.analysis.outcomes import (
+    BranchTrial,
+    Comparison,
+    IdentifyOutcome,
+    pooled_over_noise,
+)
 from dearig.analysis.quality import few_data
 from dearig.analysis.records import (
     PUBLISHED_FIT,
@@ -25,6 +30,7 @@ from dearig.analysis.records import (
     as_record,
     check_named_once,
     compare,
+    noise_sentences,
     open_all,
 )
 from dearig.config.modelfile import ModelFile
@@ -112,7 +118,7 @@ def identify_recordings(
         validation=tuple(validated),
         trials=tuple(trials),
         seconds=seconds,
-        quality=(*left_out, *also_left_out),
+        quality=(*left_out, *also_left_out, *noise_sentences((*recordings, *others))),
         few_data=few_data(recordings, drive),
         assumed=assumed_by(recordings, rig_file),
         published_fit=PUBLISHED_FIT if is_thesis_run else None,
@@ -200,6 +206,7 @@ def _history(
     seconds: float,
 ) -> dict[str, Any]:
     """Return the origin of the model, for its file."""
+    over_noise = pooled_over_noise(train)
     unit, scale = ("um", 1e6) if train[0].kind == "actuator" else ("kPa", 1e-3)
 
     def figures(comparison: Comparison) -> dict[str, Any]:
@@ -215,7 +222,7 @@ def _history(
         "drive": drive,
         "seconds": seconds,
         "simulations": fit.simulations,
-        "mean_square_over_noise": fit.cost,
+        "mean_square_over_noise": None if over_noise is None else over_noise**2,
         "residual_correlation_samples": fit.correlation,
         "warnings": list(fit.warnings),
         "train": [

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from dearig.errors import DearigError
+from dearig.model.noise import LEAD_IN
 from dearig.model.verdict import STOPPED, Judgement, judge
 
 if TYPE_CHECKING:
@@ -32,7 +33,9 @@ __all__ = [
     "SeparatingExperiment",
     "Stand",
     "ValidateOutcome",
+    "noise_from",
     "pooled_noise",
+    "pooled_over_noise",
     "pooled_rms",
     "pooled_steady_rms",
     "save_fitted_model",
@@ -56,9 +59,11 @@ class Comparison:
     reading must not be used. ``noise`` is the noise floor in
     the measured unit, None where it could not be read. ``role`` is train or validation. ``table``
     is A, B, or "" for a run that is in neither of the thesis's validation tables, ``row`` its label
-    there (f = 0.2 Hz). ``rms_without_events`` is the error in the measured unit without the
-    recording's own drift and ``events``, None where it has none of these. ``ended`` says how the
-    run ended if it ended early. ``quiet_count`` are the readings at rest that ``noise`` is from.
+    there (f = 0.2 Hz). ``noise_source`` is where the noise is from, as in
+    ``dearig.model.noise``. ``rms_without_events`` is the error in the measured unit
+    without the recording's own drift and ``events``, None where it has none of these. ``ended``
+    says how the run ended if it ended early. ``quiet_count`` are the readings at rest that
+    ``noise`` is from.
     """
 
     name: str
@@ -70,6 +75,7 @@ class Comparison:
     model: np.ndarray
     errors: Errors
     noise: float | None
+    noise_source: str = LEAD_IN
     table: str = ""
     row: str = ""
     published: Published | None = None
@@ -97,9 +103,9 @@ class Comparison:
         """Return the error, without events where they are known, over the recording's noise.
 
         ``noise`` is that of the training recordings. It counts where the recording's own is not
-        known or smaller. The upper bound of the noise is taken (two standard deviations of a
-        standard deviation from ``quiet_count`` readings): 200 readings give it within 10 % only. A
-        film's noise includes the error that its model is allowed.
+        known, from no lead-in, or smaller. The upper bound of the noise is taken (two standard
+        deviations of a standard deviation from ``quiet_count`` readings): 200 readings give it
+        within 10 % only. A film's noise includes the error that its model is allowed.
         """
         error = self.steady_rms
         allowed = 0.0
@@ -108,7 +114,9 @@ class Comparison:
 
             allowed = FILM_MODEL_ERROR * float(np.nanmax(np.abs(self.measured)))
         bound = 1.0 + 2.0 / math.sqrt(2.0 * self.quiet_count) if self.quiet_count else 1.0
-        return error / math.hypot(bound * max(self.noise or 0.0, noise), allowed)
+        # second differences count fast motion as noise
+        own = self.noise if self.noise_source == LEAD_IN or self.kind == "film" else None
+        return error / math.hypot(bound * max(own or 0.0, noise), allowed)
 
 
 @dataclass(frozen=True)
@@ -303,6 +311,21 @@ def _pooled(comparisons: Sequence[Comparison], errors: Sequence[float]) -> float
 
 
 def pooled_noise(comparisons: Sequence[Comparison]) -> float | None:
-    """RMS of the noise floors that are known, in m or Pa; None where none is."""
-    floors = [c.noise for c in comparisons if c.noise is not None]
-    return math.sqrt(sum(n * n for n in floors) / len(floors)) if floors else None
+    """RMS of the noise floors that are known, over all samples, in m or Pa; None where none is."""
+    known = [c for c in comparisons if c.noise is not None]
+    return _pooled(known, [c.noise or 0.0 for c in known]) if known else None
+
+
+def pooled_over_noise(comparisons: Sequence[Comparison]) -> float | None:
+    """Return ``pooled_rms`` over ``pooled_noise``: the error in every text, table and file.
+
+    None where the noise is not known.
+    """
+    noise = pooled_noise(comparisons)
+    return pooled_rms(comparisons) / noise if noise else None
+
+
+def noise_from(comparisons: Sequence[Comparison]) -> str | None:
+    """Return where the noise is from: lead-in, second differences, or both; None if not known."""
+    sources = {c.noise_source for c in comparisons if c.noise is not None}
+    return ", ".join(sorted(sources)) or None

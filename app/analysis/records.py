@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -22,12 +22,12 @@ from dearig.model.errors import ModelError
 from dearig.model.excitation import Lobes
 from dearig.model.film import Strip
 from dearig.model.measures import errors
-from dearig.model.noise import noise_of
+from dearig.model.noise import LEAD_IN
 from dearig.model.records import ActuatorRecord, FilmRecord, Record, counted
 from dearig.recording.early_end import early_end
 from dearig.recording.reader import open_recording
 from dearig.recording.recording import Recording
-from dearig.recording.rest_noise import MIN_QUIET, noise_floor
+from dearig.recording.rest_noise import MIN_QUIET, ReadingNoise
 
 __all__ = [
     "PUBLISHED_FIT",
@@ -35,7 +35,9 @@ __all__ = [
     "as_record",
     "check_named_once",
     "compare",
+    "noise_sentences",
     "open_all",
+    "reading_noise_of",
     "recording_drive",
 ]
 
@@ -113,32 +115,27 @@ _KIND_WORDS = {"actuator": "an actuator (voltage)", "film": "a film (stretch)"}
 def as_record(recording: Recording, drive: str = "command") -> Record:
     """Return the record that a fit takes; ``drive`` is command or monitor, for actuators.
 
-    The noise comes from the quiet lead-in, or from second differences where there is none. Readings
-    that must not be used (see ``dearig.analysis.quality``) are masked, and replaced by a line
-    across them.
+    The noise is that of ``reading_noise_of``. Readings that must not be used (see
+    ``dearig.analysis.quality``) are masked, and replaced by a line across them.
     """
     try:
         if recording.kind == "film":
             stretch, stress = _present(recording.stretch), _present(recording.nominal_stress)
-            _noise(stress)  # refuses one that never changes
+            reading_noise_of(recording, None)  # refuses one that never changes
             valid = inspect(recording, drive).valid
+            noise = reading_noise_of(recording, valid)
             stress = _bridged(recording.time, stress, valid)
-            return FilmRecord(
-                recording.name, recording.time, stretch, stress, _noise(stress), valid
-            )
+            return FilmRecord(recording.name, recording.time, stretch, stress, noise.value, valid)
         displacement = _present(recording.displacement)
-        noise = recording.noise_floor or _noise(displacement)
+        reading_noise_of(recording, None)
         driven = recording_drive(recording, drive)
         valid = inspect(recording, drive).valid
-        if valid is not None:
-            displacement = _bridged(recording.time, displacement, valid)
-            quiet = recording.quiet & valid
-            noise = noise_floor(recording.time[quiet], displacement[quiet]) or _noise(displacement)
+        displacement = _bridged(recording.time, displacement, valid)
         return ActuatorRecord(
             recording.name,
             driven,
             displacement,
-            noise,
+            reading_noise_of(recording, valid).value,
             recording.displacement_delay - recording.displacement_skew,
             valid,
             _lead_in(recording),
@@ -146,6 +143,33 @@ def as_record(recording: Recording, drive: str = "command") -> Record:
         )
     except ModelError as error:
         raise InputError(f"{recording.path}: {error}") from error
+
+
+def reading_noise_of(recording: Recording, valid: np.ndarray | None) -> ReadingNoise:
+    """Return the noise of the ``valid`` (N,) readings, from the lead-in where there is one.
+
+    Raises ``ModelError`` where no reading differs from its neighbours.
+    """
+    noise = recording.noise if valid is None else recording.noise_of_valid(valid)
+    if noise is None:
+        raise ModelError(
+            "the signal never changes, or on a straight line only: check that "
+            "the sensor was connected and that the right column was imported"
+        )
+    return noise
+
+
+def noise_sentences(recordings: Iterable[Recording]) -> list[str]:
+    """Return a sentence on each recording of an actuator whose noise is from no lead-in."""
+    said = []
+    for recording in recordings:
+        noise = recording.noise
+        if recording.kind == "actuator" and noise is not None and noise.source != LEAD_IN:
+            said.append(
+                f"{recording.name}: the noise, {noise.value * 1e6:.3g} um, is {noise.words}; fast "
+                f"motion counts in it, and the zero of displacement is known to one reading only"
+            )
+    return said
 
 
 def _lead_in(recording: Recording) -> int:
@@ -189,16 +213,6 @@ def _present(values: np.ndarray | None) -> np.ndarray:
     return values
 
 
-def _noise(values: np.ndarray) -> float:
-    noise = noise_of(values)
-    if noise > 0.0:
-        return noise
-    raise ModelError(
-        "the signal never changes, or on a straight line only: check that "
-        "the sensor was connected and that the right column was imported"
-    )
-
-
 def compare(
     recording: Recording,
     model: Actuator | Strip,
@@ -228,12 +242,12 @@ def compare(
         answer = replace(model, kinematics=recording.kinematics).simulate(recording.time, stretch)
         if not answer.ok:
             raise InputError(f"{recording.path}: the model cannot follow it: {answer.in_words}")
-        predicted, driven = answer.stress, stretch
         try:
-            noise: float | None = _noise(signal[usable])
+            reading_noise_of(recording, look.valid)
         except ModelError as error:
             raise InputError(f"{recording.path}: {error}") from error
-        table, row, published, count = "", "", None, 0
+        predicted, driven = answer.stress, stretch
+        table, row, published = "", "", None
     else:
         if not isinstance(model, Actuator):
             raise InputError(
@@ -248,10 +262,9 @@ def compare(
         if not response.ok:
             raise InputError(f"{recording.path}: the model cannot follow it: {response.in_words}")
         predicted = counted(response.displacement, _lead_in(recording))
-        quiet = recording.quiet & usable
-        driven, noise = drive_of.voltage, noise_floor(recording.time[quiet], signal[quiet])
-        count = int(quiet.sum())
+        driven = drive_of.voltage
         table, row, published = _place(recording)
+    noise = recording.noise if look.valid is None else recording.noise_of_valid(look.valid)
     ended = early_end(recording)
     if ended is not None:
         warnings.append(ended.sentence)
@@ -264,13 +277,14 @@ def compare(
         measured=np.where(usable, signal, np.nan),
         model=predicted,
         errors=errors(signal[usable], predicted[usable]),
-        noise=noise,
+        noise=noise.value if noise else None,
+        noise_source=noise.source if noise else LEAD_IN,
         table=table,
         row=row,
         published=published,
         warnings=tuple(warnings),
         ended=ended,
-        quiet_count=count,
+        quiet_count=noise.count if noise and noise.source == LEAD_IN else 0,
     )
 
 

@@ -295,7 +295,7 @@ def assess(
     """
     try:
         recording = open_recording(path)
-        noise = recording.noise_floor
+        noise = recording.noise.value if recording.noise is not None else None
     except DearigError as error:
         return Assessment(path, unfit=str(error))
     errors, fitted, unfit = None, False, ""

@@ -12,11 +12,12 @@ import numpy as np
 from dearig.drivers.channels import Channel
 from dearig.drivers.rig import Instrument
 from dearig.extras import import_extra
+from dearig.model.noise import LEAD_IN
 from dearig.model.specimen import Film, Load
 from dearig.recording.arrays import Arrays, Overview
 from dearig.recording.files import file_sha256
 from dearig.recording.layout import SIGNALS, UNITS, variable_attributes
-from dearig.recording.rest_noise import noise_floor
+from dearig.recording.rest_noise import MIN_QUIET, ReadingNoise, noise_of_readings
 
 if TYPE_CHECKING:
     import pandas
@@ -221,16 +222,36 @@ class Recording:
         return mask
 
     @cached_property
+    def noise(self) -> ReadingNoise | None:
+        """Noise of a reading, in m or Pa, and where it is from; None where it is not known.
+
+        From the first samples only, where there are very many.
+        """
+        return self.noise_of_valid(None)
+
+    def noise_of_valid(self, valid: np.ndarray | None) -> ReadingNoise | None:
+        """Return ``noise`` without the readings that are not ``valid`` (N,)."""
+        name = "displacement" if self.kind == "actuator" else "nominal_stress"
+        if name not in self.arrays.names:
+            return None
+        quiet, end = min(self.quiet_samples, NOISE_MAX), min(self.samples, NOISE_MAX)
+        # only the lead-in is read where it is enough
+        for last in (quiet, end) if quiet >= MIN_QUIET else (end,):
+            time, readings = (self.arrays.window(n, 0, last) for n in ("time", name))
+            usable = None if valid is None else valid[:last]
+            found = noise_of_readings(time, readings, quiet, usable)
+            if found is not None:
+                return found
+        return None
+
+    @property
     def noise_floor(self) -> float | None:
         """Standard deviation in m of the displacement about a line through the lead-in.
 
         None for a film, and for a lead-in of fewer than 20 samples.
         """
-        if "displacement" not in self.arrays.names:
-            return None
-        quiet = min(self.quiet_samples, NOISE_MAX)
-        time, readings = (self.arrays.window(n, 0, quiet) for n in ("time", "displacement"))
-        return noise_floor(time, readings)
+        noise = self.noise if self.kind == "actuator" else None
+        return noise.value if noise is not None and noise.source == LEAD_IN else None
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the values as an xarray ``Dataset`` over ``time``, in SI units.

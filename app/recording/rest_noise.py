@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-from dearig.model.noise import noise_at_rest
+from dearig.model.noise import DIFFERENCES, LEAD_IN, READINGS_MIN, noise_at_rest, noise_of
 
-__all__ = ["MIN_QUIET", "NEGLIGIBLE", "lead_in", "mean_beyond_noise", "noise_floor"]
+__all__ = [
+    "MIN_QUIET",
+    "NEGLIGIBLE",
+    "ReadingNoise",
+    "lead_in",
+    "mean_beyond_noise",
+    "noise_floor",
+    "noise_of_readings",
+]
 
 #: Least number of samples for an estimate of the noise.
 MIN_QUIET = 20
@@ -51,6 +60,50 @@ def _steady(voltage: np.ndarray, largest: float) -> int:
         return 0
     away = np.abs(voltage - first.mean()) > max(LEAVES * spread, NEGLIGIBLE * largest)
     return int(np.argmax(away)) if away.any() else int(voltage.size)
+
+
+@dataclass(frozen=True)
+class ReadingNoise:
+    """Standard deviation ``value`` of one reading, in its unit, and where it is from.
+
+    ``source`` is ``LEAD_IN`` or ``DIFFERENCES``; ``count`` are the readings at rest.
+    """
+
+    value: float
+    source: str
+    count: int
+
+    @property
+    def words(self) -> str:
+        """Where it is from."""
+        if self.source == LEAD_IN:
+            return f"over {self.count} samples at 0 V"
+        if self.count >= MIN_QUIET:
+            return "from second differences: the readings at 0 V at the start do not change"
+        if self.count:
+            return f"from second differences: only {self.count} samples at 0 V at the start"
+        return "from second differences: no rest at 0 V at the start"
+
+
+def noise_of_readings(
+    time: np.ndarray, values: np.ndarray, quiet: int, valid: np.ndarray | None = None
+) -> ReadingNoise | None:
+    """Return the noise of ``values`` (N,) whose first ``quiet`` are at rest.
+
+    Readings that are not ``valid`` (N,) take no part. Where fewer than 20 are at rest, it is that
+    of all second differences, which counts fast motion as noise. None where nothing changes.
+    """
+    at_rest = slice(0, quiet) if valid is None else np.flatnonzero(valid[:quiet])
+    time_at_rest, at_rest_values = time[at_rest], values[at_rest]
+    count = int(at_rest_values.size)
+    if count >= MIN_QUIET:
+        value = noise_at_rest(time_at_rest, at_rest_values)
+        if value > 0.0:
+            return ReadingNoise(value, LEAD_IN, count)
+    if values.size < READINGS_MIN:
+        return None
+    value = noise_of(values, valid)
+    return ReadingNoise(value, DIFFERENCES, count) if value > 0.0 else None
 
 
 def noise_floor(time: np.ndarray, values: np.ndarray) -> float | None:

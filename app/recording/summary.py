@@ -42,7 +42,7 @@ def describe(recording: Recording, checksum: bool = True) -> dict[str, Any]:
             "step_min_s": low,
             "step_max_s": high,
         }
-    film, load = recording.film, recording.load
+    film, load, noise = recording.film, recording.load, recording.noise
     return {
         "format": FORMAT,
         "path": str(recording.path),
@@ -62,7 +62,9 @@ def describe(recording: Recording, checksum: bool = True) -> dict[str, Any]:
             _channel(recording, name) for name in recording.arrays.names if name != "time"
         ],
         "quiet_samples": recording.quiet_samples,
-        "noise_floor_m": recording.noise_floor,
+        "noise_floor_m": noise.value if noise and recording.kind == "actuator" else None,
+        "noise_floor_Pa": noise.value if noise and recording.kind == "film" else None,
+        "noise_from": noise.source if noise else None,
         "rest_reading_m": recording.rest_reading,
         "displacement_skew_s": recording.displacement_skew,
         "displacement_delay_s": recording.displacement_delay,
@@ -137,11 +139,13 @@ def describe_rows(recording: Recording) -> list[tuple[str, str]]:
             span = f"{channel['min'] * scale:.6g} to {channel['max'] * scale:.6g} {unit}"
             shown = channel.get("label", channel["name"].replace("_", " "))
             rows.append((shown, span.rstrip()))
-    if d["noise_floor_m"] is not None:
-        floor = f"{d['noise_floor_m'] * 1e6:.3g} um, over {d['quiet_samples']} samples at 0 V"
-        rows.append(("noise floor", floor))
-    elif d["kind"] == "actuator":
-        rows.append(("noise floor", f"unknown: {d['quiet_samples']} samples at 0 V at the start"))
+    noise = recording.noise
+    if noise is not None and d["kind"] == "actuator":
+        rows.append(("noise floor", f"{noise.value * 1e6:.3g} um, {noise.words}"))
+    elif noise is not None:
+        rows.append(("noise floor", f"{noise.value * 1e-3:.3g} kPa, from second differences"))
+    else:
+        rows.append(("noise floor", "unknown: the readings do not change"))
     if d["kind"] == "actuator":
         between = "zero-order hold" if recording.hold else "linear"
         rows.append(("voltage interpolation", between))

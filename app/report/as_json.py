@@ -5,7 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from dearig.analysis.outcomes import pooled_noise, pooled_steady_rms
+from dearig.analysis.outcomes import (
+    noise_from,
+    pooled_noise,
+    pooled_over_noise,
+    pooled_steady_rms,
+)
 from dearig.report.sentences import warnings_of
 from dearig.units import SHOWN
 
@@ -54,7 +59,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "converged": bool(fit.converged),
         "model_path": outcome.model_path,
         **_noise_json(outcome.kind, outcome.train),
-        "residual_over_noise": _number(math.sqrt(fit.cost)) if fit.cost >= 0.0 else None,
+        "residual_over_noise": _number(pooled_over_noise(outcome.train)),
         "parameters": [_parameter_json(e, known) for e in fit.estimates],
         "train": [_comparison_json(c) for c in outcome.train],
         "validation": [_comparison_json(c) for c in outcome.validation],
@@ -76,7 +81,7 @@ def _noise_json(kind: str, comparisons: tuple[Comparison, ...]) -> dict[str, Any
     shown = SHOWN[kind]
     noise = pooled_noise(comparisons)
     value = None if noise is None else noise * shown.error_factor
-    return {f"noise_floor_{shown.suffix}": _number(value)}
+    return {f"noise_floor_{shown.suffix}": _number(value), "noise_from": noise_from(comparisons)}
 
 
 def _parameter_json(estimate: Estimate, known: bool) -> dict[str, Any]:
@@ -172,6 +177,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
             "validation": _names(before.validation, after.validation),
         },
         f"noise_floor_{shown.suffix}": _number(outcome.noise * shown.error_factor),
+        "noise_from": noise_from(outcome.before.train),
         "baseline": {"model": "thesis", **_stand_json(before)},
         "steps": [
             {

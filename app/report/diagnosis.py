@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dearig.analysis.outcomes import pooled_rms
+from dearig.analysis.outcomes import pooled_noise, pooled_rms
 from dearig.model.verdict import TOLERANCE
 from dearig.report.numbers import NO_VALUE, interval, quoted, seconds, significant, symbol
 from dearig.report.sentences import few_data_sentence, listed
@@ -262,18 +262,18 @@ def _error_change(
 ) -> str:
     shown = SHOWN[outcome.kind]
     first, last = pooled_rms(before), pooled_rms(after)
-    floor = (
-        f"the noise floor of {significant(outcome.noise * shown.error_factor)} {shown.error_unit}"
-    )
+    # of the same recordings, as in the table
+    noise = pooled_noise(after) or outcome.noise
+    floor = f"the noise floor of {significant(noise * shown.error_factor)} {shown.error_unit}"
     if not changed:
         return (
             f"On {role} the error is {significant(last * shown.error_factor)} "
-            f"{shown.error_unit} RMS, {significant(last / outcome.noise)} times {floor}."
+            f"{shown.error_unit} RMS, {significant(last / noise)} times {floor}."
         )
     return (
         f"On {role} the error {'falls' if last < first else 'changes'} from "
         f"{significant(first * shown.error_factor)} to {significant(last * shown.error_factor)} "
-        f"{shown.error_unit} RMS, which is {significant(last / outcome.noise)} times {floor}."
+        f"{shown.error_unit} RMS, which is {significant(last / noise)} times {floor}."
     )
 
 
@@ -338,8 +338,7 @@ def _pairs(
     ]
     if len(rows) > 1:
         one, two = pooled_errors(before), pooled_errors(after)
-        floors = [c.noise for c in after if c.noise]
-        noise = math.sqrt(sum(n * n for n in floors) / len(floors)) if floors else None
+        noise = pooled_noise([c for c in after if c.name in first])
         if one is not None and two is not None:
             rows.append(("all", one, two, noise))
     return rows
@@ -402,6 +401,7 @@ def step_table(outcome: DiagnoseOutcome) -> Table:
         if i == 0:
             stand = outcome.before
         errors = pooled_errors(stand.validation)
+        noise = pooled_noise(stand.validation) or outcome.noise
         rows.append(
             Row(
                 (
@@ -409,7 +409,7 @@ def step_table(outcome: DiagnoseOutcome) -> Table:
                     significant(stage.train_rms * shown.error_factor),
                     significant(stage.selection_rms * shown.error_factor),
                     NO_VALUE if errors is None else significant(errors.rms * shown.error_factor),
-                    NO_VALUE if errors is None else significant(errors.rms / outcome.noise),
+                    NO_VALUE if errors is None else significant(errors.rms / noise),
                 ),
                 mark=i == len(stages) - 1 and i > 0,
             )

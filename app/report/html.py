@@ -9,9 +9,10 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dearig.analysis.outcomes import pooled_over_noise
 from dearig.report.figure_export import svg
 from dearig.report.figures import comparison_figure, loop_figure
-from dearig.report.numbers import seconds, significant
+from dearig.report.numbers import NO_VALUE, seconds, significant
 from dearig.report.parameter_figures import branches_figure, parameters_figure
 from dearig.report.residual_figures import residual_panels
 from dearig.report.sentences import (
@@ -181,6 +182,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
             ),
         )
     every = (*outcome.train, *outcome.validation)
+    over = pooled_over_noise(outcome.train)
     return Part(
         title=outcome.title,
         lead="Identification",
@@ -211,7 +213,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
             ("Method", (outcome.method,)),
             ("Converged", ("yes" if fit.converged else "no",)),
             ("Simulations", (f"{fit.simulations:,}",)),
-            ("Residual over noise", (significant(fit.cost**0.5),)),
+            ("Residual over noise", (NO_VALUE if over is None else significant(over),)),
             ("Residual correlation", (f"{significant(fit.correlation)} samples",)),
             ("Computing time", (seconds(outcome.seconds),)),
         ),

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from dearig.analysis.outcomes import pooled_noise, pooled_rms
+from dearig.analysis.outcomes import noise_from, pooled_noise, pooled_over_noise, pooled_rms
+from dearig.model.noise import LEAD_IN
 from dearig.report.numbers import seconds, significant, symbol
 from dearig.units import SHOWN
 
@@ -198,7 +199,9 @@ def _error(comparisons: Sequence[Comparison]) -> str:
     if not noise:
         return f"{words} The noise floor is not known, so the error cannot be compared with it."
     floor = f"{significant(noise * shown.error_factor)} {shown.error_unit}"
-    ratio = rms / noise
+    if kind == "actuator" and noise_from(comparisons) != LEAD_IN:
+        floor += " (from second differences, not from a lead-in at rest)"
+    ratio = pooled_over_noise(comparisons) or 0.0
     if ratio <= _AT_NOISE:
         return f"{words} The noise floor is {floor}: the residual is almost only noise."
     if ratio <= _NEAR_NOISE:

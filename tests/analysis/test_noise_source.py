@@ -1,0 +1,78 @@
+"""One noise for a recording, wherever it is shown, and where it is from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dearig.analysis.outcomes import noise_from, pooled_noise, pooled_over_noise
+from dearig.analysis.records import as_record, compare, noise_sentences
+from dearig.model.actuator import Actuator
+from dearig.model.material import THESIS_FILM, THESIS_LOAD, Network
+from dearig.recording import RunMetadata, import_file, open_recording
+from dearig.recording.recording import Recording
+from dearig.recording.summary import describe, describe_rows
+from dearig.report.as_json import outcome_json
+from dearig.report.sentences import identify_summary
+from dearig.report.tables import error_table
+from tests.tools.recordings import Clock
+from tests.tools.reports import actuator_comparison, identify_outcome
+
+NOISE = 2e-6
+MODEL = Actuator(THESIS_FILM, THESIS_LOAD, Network.gent((60e3,), (1e4,), ()))
+
+
+def recorded(folder: Path, rest: float, dropout: bool = False) -> Recording:
+    """A slow rise of the voltage after ``rest`` s at 0 V, read at 100 Hz."""
+    time = np.arange(400) / 100.0
+    volts = np.where(time < rest, 0.0, 2000.0 * (time - rest) + 1.0)
+    read = 1e-4 * (volts / 1e4) ** 2 + NOISE * np.random.default_rng(3).standard_normal(time.size)
+    if dropout:
+        read[20:22] += 3e-3
+    path, out = folder / "in.csv", folder / "run.h5"
+    rows = (f"{t},{v},{1e3 * d}" for t, v, d in zip(time, volts, read, strict=True))
+    path.write_text("\n".join(["time_s,voltage_V,displacement_mm", *rows]), "utf-8")
+    import_file(path, out, metadata=RunMetadata(), overwrite=True, now=Clock())
+    return open_recording(out)
+
+
+@pytest.mark.parametrize(
+    ("rest", "source"),
+    [(1.0, "lead-in"), (0.05, "second differences"), (0.0, "second differences")],
+)
+def test_info_fits_and_comparisons_agree(tmp_path: Path, rest: float, source: str) -> None:
+    run = recorded(tmp_path, rest)
+    told, compared = describe(run), compare(run, MODEL, "train")
+    assert told["noise_floor_m"] == as_record(run).noise == compared.noise
+    assert told["noise_floor_m"] == pytest.approx(NOISE, rel=0.2)
+    assert told["noise_from"] == compared.noise_source == noise_from([compared]) == source
+    row, sentences = dict(describe_rows(run))["noise floor"], noise_sentences([run])
+    if source == "lead-in":
+        assert "over 101 samples at 0 V" in row
+        assert sentences == []
+    else:
+        assert "from second differences" in row
+        assert row.partition(", ")[2] in sentences[0]
+
+
+def test_readings_that_are_not_used_are_not_in_the_noise(tmp_path: Path) -> None:
+    run = recorded(tmp_path, 1.0, dropout=True)
+    assert as_record(run).noise == compare(run, MODEL, "train").noise
+    assert as_record(run).noise == pytest.approx(NOISE, rel=0.2)
+
+
+def test_prose_table_and_json_give_one_noise_and_one_error() -> None:
+    loud = actuator_comparison(name="loud.h5", noise=3e-6)
+    outcome = identify_outcome(train=(actuator_comparison(noise=1e-6), loud), validation=())
+    noise, over = pooled_noise(outcome.train), pooled_over_noise(outcome.train)
+    found = outcome_json(outcome)
+    assert found["noise_floor_um"] == pytest.approx(noise * 1e6)
+    assert found["residual_over_noise"] == pytest.approx(over)
+    assert noise == pytest.approx(5**0.5 * 1e-6)
+    alone = identify_outcome(train=(loud,), validation=())
+    cell = error_table("x", (loud,)).rows[0].cells[-1]
+    assert float(cell) == pytest.approx(outcome_json(alone)["residual_over_noise"], rel=0.01)
+    said = " ".join(identify_summary(alone))
+    assert "noise floor is 3.00" in said
