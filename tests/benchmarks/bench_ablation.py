@@ -1,0 +1,200 @@
+"""What each stage and each rule of the diagnosis earns: switched off in turn, on the same rigs.
+
+Run as ``python -m tests.benchmarks.bench_ablation [--first SEED] [--rigs N] [--hand second]
+[--noise KIND] [--only NAME,...]``. Every rig is recorded once, as in the blind test, and diagnosed
+by the whole method and by each method with one thing less. A row says for how many rigs the first
+effect was of a hidden family (or nothing was named where nothing is hidden), for how many the error
+on untouched recordings came within 15 % of what the truth itself would leave, for how many it got
+worse than the baseline's, and the processor time of a rig.
+
+A rule earns its place if its row is worse than the first by more than chance: the last column is
+the probability of so large a difference in the number within the noise, either way, if the rule did
+nothing (the sign test on the rigs that differ). Rigs that were looked at are no evidence.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import numpy as np
+from scipy.stats import binomtest
+
+from dearig.analysis.records import as_record
+from dearig.config.rigfile import RigFile
+from dearig.model.actuator import Actuator
+from dearig.model.diagnosis import diagnose
+from dearig.model.diagnosis import race as racing
+from dearig.model.diagnosis.engine import Search
+from dearig.model.diagnosis.evidence import Judge
+from dearig.model.diagnosis.regression import Regression
+from dearig.model.diagnosis.settings import DiagnosisSettings
+from dearig.model.material import TABLE_3
+from dearig.model.records import ActuatorRecord
+from dearig.recording import open_recording
+from dearig.sim_backend.laser_noise import NOISES, WHITE
+from dearig.sim_backend.truth.cases import HANDS
+from tests.blind.play import Bench, Case
+from tests.blind.score import WITHIN
+
+Switch = Callable[[], AbstractContextManager[Any]]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """The method with one thing less: other settings, or a step that does nothing."""
+
+    name: str
+    settings: Mapping[str, Any]
+    switch: Switch = nullcontext
+
+
+def _without(owner: Any, name: str, instead: Callable[..., Any]) -> Switch:
+    return lambda: mock.patch.object(owner, name, instead)
+
+
+VARIANTS = (
+    Variant("whole", {}),
+    # stages
+    Variant("no pairs in the race", {"pairs": 0}),
+    Variant(
+        "no general laws",
+        {},
+        _without(Search, "_with_general", lambda *given: given[-1]),
+    ),
+    Variant("no drift in the noise", {}, _without(Search, "_drifting", lambda *_: None)),
+    Variant("no exchange", {}, _without(Search, "_exchanged", lambda *given: given[-1])),
+    Variant("no pruning", {}, _without(Search, "_pruned", lambda *given: given[-1])),
+    Variant(
+        "shapes not sharpened", {}, _without(Regression, "_sharpened", lambda *given: given[1])
+    ),
+    Variant(
+        "no start from other laws",
+        {},
+        _without(racing, "_transplanted", lambda *given: given[1].x),
+    ),
+    Variant("one effect at most", {"effects_max": 1}),
+    # rules
+    Variant("one start of each effect", {"starts": 1}),
+    Variant("all effects race", {"contenders": math.inf}),
+    Variant("no model of the form's error", {"form_error": 0.0, "form_share": 0.0}),
+    Variant("a further effect need not explain half", {"share": 0.0}),
+    Variant("mu_0 free in the regression", {"modulus_freedom": 1.0}),
+    Variant("unnamed causes as probable", {"unnamed_odds": 0.0}),
+    Variant("noise is noise, white or not", {}, _without(Judge, "_is_like_rest", lambda *_: True)),
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One rig under one variant; errors on untouched recordings over what the truth leaves."""
+
+    right: bool
+    before: float
+    after: float
+    seconds: float
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--first", type=int, default=90000, help="first seed [90000]")
+    parser.add_argument("--rigs", type=int, default=100, help="how many rigs [100]")
+    parser.add_argument("--hand", choices=tuple(HANDS), default="first", help="[first]")
+    parser.add_argument("--noise", choices=NOISES, default=WHITE, help="[white]")
+    parser.add_argument("--rate", type=float, default=200.0, help="Hz [200]")
+    parser.add_argument("--only", help="names of variants beside the whole, with commas between")
+    given = parser.parse_args()
+    variants = list(VARIANTS)
+    if given.only:
+        names = ["whole", *(name.strip() for name in given.only.split(","))]
+        if unknown := set(names) - {v.name for v in VARIANTS}:
+            parser.error(f"no variant {', '.join(sorted(unknown))}")
+        variants = [v for v in VARIANTS if v.name in names]
+    found: dict[str, list[Outcome]] = {v.name: [] for v in variants}
+    with tempfile.TemporaryDirectory() as folder:
+        bench = Bench(Path(folder), given.rate)
+        for seed in range(given.first, given.first + given.rigs):
+            case = Case(seed, "thesis", given.hand, given.noise)
+            for name, outcome in _played(bench, case, Path(folder) / str(seed), variants):
+                found[name].append(outcome)
+            print(f"{seed}: {_told(found)}", flush=True)
+    print(_table(found))
+
+
+def _played(
+    bench: Bench, case: Case, folder: Path, variants: list[Variant]
+) -> Iterator[tuple[str, Outcome]]:
+    """Record the rig of ``case``, and diagnose it by every variant."""
+    folder.mkdir()
+    train, others = (_records(paths) for paths in bench.record(case, folder))
+    least = math.hypot(bench.floor_um(case.noise), bench.own_um(case)) * 1e-6
+    rig = RigFile()
+    base = Actuator(rig.as_film(), rig.as_load(), TABLE_3)
+    families = set(case.truth.families)
+    for variant in variants:
+        settings = replace(DiagnosisSettings(), **variant.settings)
+        began = time.process_time()
+        with variant.switch():
+            diagnosis = diagnose(train, base, workers=1, settings=settings)
+        seconds = time.process_time() - began
+        named = [step.family for step in diagnosis.steps]
+        right = named[0] in families if named else not families
+        models = (diagnosis.baseline.model, diagnosis.final.predicting)
+        before, after = (
+            _error(model, others) / least for model in models if isinstance(model, Actuator)
+        )
+        yield variant.name, Outcome(right, before, after, seconds)
+
+
+def _records(paths: list[Path]) -> list[ActuatorRecord]:
+    records = [as_record(open_recording(path)) for path in paths]
+    return [r for r in records if isinstance(r, ActuatorRecord)]
+
+
+def _error(model: Actuator, records: list[ActuatorRecord]) -> float:
+    """RMS in m of all ``records`` together; infinite where the model cannot follow one."""
+    left = []
+    for record in records:
+        response = model.simulate(record.drive, record.lag)
+        if not response.ok:
+            return math.inf
+        good = slice(None) if record.valid is None else record.valid
+        left.append((record.displacement - record.seen(response.displacement))[good])
+    return float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
+
+
+def _told(found: Mapping[str, list[Outcome]]) -> str:
+    return ", ".join(f"{name} {rows[-1].after:.2f}" for name, rows in found.items())
+
+
+def _table(found: Mapping[str, list[Outcome]]) -> str:
+    heads = ("variant", "named right", "within 15 %", "worse", "CPU s", "by chance")
+    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    whole = [o.after <= WITHIN for o in found["whole"]]
+    for name, rows in found.items():
+        within = [o.after <= WITHIN for o in rows]
+        gained = sum(a and not b for a, b in zip(within, whole, strict=True))
+        lost = sum(b and not a for a, b in zip(within, whole, strict=True))
+        chance = binomtest(lost, lost + gained).pvalue if lost + gained else 1.0
+        cells = (
+            name,
+            f"{sum(o.right for o in rows)}/{len(rows)}",
+            f"{sum(within)}/{len(rows)} (+{gained} -{lost})",
+            str(sum(o.after > 1.001 * o.before for o in rows)),
+            f"{np.median([o.seconds for o in rows]):.1f}",
+            f"{chance:.2f}",
+        )
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    main()
