@@ -33,6 +33,7 @@ from dearig.sim_backend.keyence import SimulatedController
 from dearig.sim_backend.serial_port import serve_on_socket
 from tests.campaign.link import Link
 from tests.campaign.trouble import ACTS, Load, Run, hostile_files, planted_code_ran, stalling_disk
+from tests.tools.command import thesis_model
 
 __all__ = ["KINDS", "Outcome", "run_case"]
 
@@ -72,6 +73,10 @@ NO_WATCHDOG = "i_have_no_watchdog = true"
 
 ZERO = 50.0  # V at the film that count as 0
 LEAD_IN = 0.3  # s
+#: A kind with this before its name happens to a hold, while the voltage answers the readings.
+HOLD = "hold-"
+HOLD_LEAD_IN, HOLD_RISE = 2.0, 0.5  # s
+HOLD_FOR = 12  # s
 SAMPLE_RATE = 1000.0  # Hz, as a rig file has it by default
 EARLIEST, LATEST = 0.7, 2.7  # s after the start: when trouble sets in
 STARTS_WITHIN = 120.0  # s, on a machine that is busy
@@ -169,6 +174,11 @@ KINDS: dict[str, Expected] = {
     "file-replaced": Expected((4,), _LOOK, ramp=True),
     "folder-renamed": Expected((4,), _LOOK, ramp=True),
     "operator-stops": Expected((130,), ramp=True, event="interrupted by the signal SIGTERM"),
+    "hold-client-killed": Expected(_KILLED),
+    "hold-client-frozen": Expected((4,), _FROZEN, event="fault"),
+    "hold-guardian-frozen": Expected((4,), _UNANSWERED, ramp=True, event="guardian"),
+    "hold-both-killed": Expected(_KILLED, _ENABLE_LOW, faults=2),
+    "hold-operator-stops": Expected((130,), ramp=True, event="interrupted by the signal SIGTERM"),
 }
 
 
@@ -196,7 +206,9 @@ def run_case(kind: str, seed: int, folder: Path, patience: float = 0.0) -> Outco
     (folder / "recordings").mkdir(parents=True)
     out, stalled = folder / "recordings" / "run.h5", folder / "stalled"
     garbled = kind == FaultKind.SERIAL_GARBAGE
-    moment = float(np.random.default_rng((seed, *kind.encode())).uniform(EARLIEST, LATEST))
+    moment = _begins(kind) + float(
+        np.random.default_rng((seed, *kind.encode())).uniform(EARLIEST, LATEST)
+    )
     rig_file, sequence = folder / "rig.toml", folder / "sequence.toml"
     with ExitStack() as stack:
         port = stack.enter_context(_laser_port(garbled))
@@ -223,7 +235,7 @@ def run_case(kind: str, seed: int, folder: Path, patience: float = 0.0) -> Outco
         process = subprocess.Popen(
             [
                 # -P: the console script that an operator starts has no working folder on its path
-                sys.executable, "-P", "-m", "dearig", "record", str(sequence),
+                sys.executable, "-P", "-m", "dearig", *_asked(kind, folder, sequence),
                 "--rig", f"daqmx:Dev1@127.0.0.1:{link.port}",
                 "--rig-file", str(rig_file), "--out", str(out),
             ],
@@ -237,6 +249,19 @@ def run_case(kind: str, seed: int, folder: Path, patience: float = 0.0) -> Outco
             return Outcome(kind, seed, moment, None, process.poll(), "", [str(error)])
         finally:
             _end(process)
+
+
+def _asked(kind: str, folder: Path, sequence: Path) -> list[str]:
+    """Return the command with its own arguments: a hold, or the run of ``sequence``."""
+    if not kind.startswith(HOLD):
+        return ["record", str(sequence)]
+    model = str(thesis_model(folder / "model.toml"))
+    return ["hold", "0.6", "--model", model, "--for", f"{HOLD_FOR}s", "--rise-s", f"{HOLD_RISE}"]
+
+
+def _begins(kind: str) -> float:
+    """Return the time in s of the run at which the first trouble may set in, less ``EARLIEST``."""
+    return HOLD_LEAD_IN + HOLD_RISE if kind.startswith(HOLD) else 0.0
 
 
 @contextmanager
@@ -264,13 +289,14 @@ def _observe(
     bound = expected.bound + patience
     struck = None
     if expected.recorded:
-        start = _started(run.process, device)
+        start = _started(run.process, device) - (HOLD_LEAD_IN if kind.startswith(HOLD) else LEAD_IN)
         run.children = psutil.Process(run.process.pid).children(recursive=True)
         struck = start + moment
-        if kind in ACTS:
-            _wait(lambda: clock.now() >= struck, LATEST + 1.0)
+        act = ACTS.get(kind.removeprefix(HOLD))
+        if act is not None:
+            _wait(lambda: clock.now() >= struck, _begins(kind) + LATEST + 1.0)
             struck = clock.now()
-            ACTS[kind](run)
+            act(run)
         if _FREEZES in kind:
             end = struck + bound
             _wait(lambda: device.wire_voltage() == 0.0 or clock.now() > end, bound + 5.0)
@@ -362,7 +388,7 @@ def _recording_faults(kind: str, expected: Expected, moment: float, run: Run) ->
 
 
 def _started(run: subprocess.Popen[str], device: Device) -> float:
-    """When the sample clock started, on the card's clock."""
+    """When the voltage rose first, on the card's clock."""
 
     def up() -> bool:
         if run.poll() is not None:
@@ -372,7 +398,7 @@ def _started(run: subprocess.Popen[str], device: Device) -> float:
 
     _wait(up, STARTS_WITHIN)
     # the wire leaves 0 V with the first sample of the ramp
-    return next(c.time for c in device.history() if c.wire != 0.0) - LEAD_IN
+    return next(c.time for c in device.history() if c.wire != 0.0)
 
 
 def _wait(until: Callable[[], bool], seconds: float) -> None:

@@ -13,7 +13,7 @@ PATIENCE = 20.0
 @pytest.mark.skipif(sys.platform == "win32", reason="stops and kills processes by signals")
 @pytest.mark.parametrize(
     "kind",
-    ["client-killed", "client-frozen", "guardian-killed", "amplifier-trip", "disk-full",
+    ["hold-client-killed", "client-frozen", "guardian-killed", "amplifier-trip", "disk-full",
      "server-gone", "operator-stops", "serial-garbage"],
 )  # fmt: skip
 def test_it_ends_at_zero_volts_with_what_was_recorded(kind, tmp_path):
