@@ -129,7 +129,7 @@ def correctable(
 
     def predicted() -> PredictedFilm:
         return PredictedFilm(
-            actuator, waveform.samples, waveform.rate, waveform.limits, film, observe=None
+            actuator, waveform.samples, waveform.rate, waveform.limits, film, keeps=False
         )
 
     try:

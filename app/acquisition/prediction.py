@@ -44,7 +44,7 @@ class PredictedFilm:
 
     The prediction ends where the voltage leaves ``limits``, because such a waveform is refused, and
     where the model fails. ``observe`` is called with the first sample of each piece and its samples
-    (n,) V.
+    (n,) V. With ``keeps`` False, ``displacement`` and ``field`` are not kept.
 
     Raises ``ModelError`` for a film without a rest state.
     """
@@ -57,6 +57,8 @@ class PredictedFilm:
         limits: Limits,
         film: str,
         observe: Callable[[int, np.ndarray], None] | None = None,
+        *,
+        keeps: bool = True,
     ) -> None:
         self.film = film
         self.stride = stride_at(rate)
@@ -79,7 +81,7 @@ class PredictedFilm:
         self._ended = False
         self._next = 0  # sample
         # single precision: 8 bytes for each step of a run of hours
-        count = -(-samples // self.stride)
+        count = -(-samples // self.stride) if keeps else 0
         self._displacement = np.full(count, np.nan, dtype=np.float32)
         self._field = np.full(count, np.nan, dtype=np.float32)
 

@@ -109,6 +109,10 @@ MEASUREMENTS = {
         "Following a path beside a PI loop and learning without a model",
         ("tests.benchmarks.bench_track --rigs 12",),
     ),
+    "hold": Measurement(
+        "Holding a displacement for an hour, beside the feedforward alone",
+        ("tests.benchmarks.bench_hold",),
+    ),
     "ni-examples": Measurement(
         "Example programs of nidaqmx-python on the simulated card",
         ("tests.benchmarks.bench_ni_examples --source FOLDER",),
