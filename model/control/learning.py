@@ -22,6 +22,12 @@ prediction, over two octaves. After a run that has learned, it is the part of th
 in the band that was learned. Beyond what was seen W grows with the square of the frequency, as the
 error of a mass does. The filter Q of no phase passes what keeps |Q| W below ``CONTRACTION``. Where
 nothing does, nothing is learned.
+
+What a run had alone, noise and a drift of the sensor, is learned as well as what repeats, and makes
+the next run worse by its own power. So a step counts only if the mean square error falls by more
+than two standard errors, those of white noise. The first one that does not ends the learning, and
+the voltage before it is kept. Where the error grows by more than all that was learned, the film
+responds otherwise than the model says: that run is stepped back from, and less is learned.
 """
 
 from __future__ import annotations
@@ -44,26 +50,38 @@ __all__ = ["CONTRACTION", "Learner", "Lesson"]
 #: Largest |Q| W that is learned with: the error of a run is at most this part of the last one's.
 CONTRACTION = 0.8
 
+_IS_NOISE = "the error is noise: nothing more is learned, and its voltage is kept"
+_NO_BETTER = (
+    "what was learned last has not made the error significantly smaller: nothing more is learned, "
+    "and the voltage before it is kept"
+)
 _USABLE = 0.5  # of the path's samples: with fewer a run teaches nothing
-_WORSE = 1.1  # times the smallest error: a run so much worse is stepped back from
-_NEAR_NOISE = 1.1  # times the noise: an error so small is not learned from
-_SPIKE = 8.0  # noises: a single reading so far from its neighbours is a spike
+_SIGNIFICANT = 2.0  # standard errors: one in 44 differences is so large by chance, either way
+#: Noises: a single reading so far from its neighbours is a spike. Gaussian noise reaches 5 once in
+#: a million readings; the rest is for noise with heavier tails.
+_SPIKE = 8.0
 _SPIKE_WINDOW = 11  # samples
 _STUCK = 0.05  # s of one and the same reading while the film is predicted to move
 _MOVED = 6.0  # noises that the prediction moves meanwhile
 _RELEASED = 0.1  # s without a voltage, after which a film that is above its target is let go
 _WEAK = 0.05  # of the highest voltage: its square pulls 1/400 as much
 _JUMP_WINDOW = 0.02  # s on either side of a jump
-_JUMP = 8.0  # standard deviations of such differences elsewhere in the run
-_SUDDEN = 0.6  # of the change over four times as long: what moves steadily has a quarter
-_WIDENED = 2.0  # times the band of the last run, at most
+_JUMP = _SPIKE  # standard deviations of such differences elsewhere in the run
+_APART = 4  # times as long: over that a jump is no larger, and what moves steadily four times
+_SUDDEN = 0.5 * (1.0 + 1.0 / _APART)  # of the change over so much longer: half way between these
+_WIDENED = 2.0  # times the band of the last run, at most: Q passes something up to there
 _LOWEST = 3  # lines of a spectrum in which an error of the zero shows
 _COUNTS = 0.02  # of the power of an error: a band with less decides nothing
 _TOLD = 4.0  # times the power of the noise: what is less tells nothing
-_GAIN = (0.5, 2.0)  # of the film over the model's, that learning corrects for
-_PHASE = 1.0  # rad, of the film against the model, that learning corrects for
-_CLEAR = 30.0  # times the power of the noise: a path tells the response of the film there
-_NARROWED = 0.5  # of Q's band, where a run was stepped back from
+# With a film of g exp(i phi) times the model's response, learning with the model alone would
+# converge where |1 - g exp(i phi)| < 1: up to g = 2, or to phi = 60 degrees. Beyond, the model is
+# wrong in another way than a ratio corrects for.
+_GAIN = (0.5, 2.0)
+_PHASE = np.pi / 3.0  # rad
+#: Power over that of the noise from which a path tells the response of the film: the error of their
+#: ratio is the root of its inverse, and less than what a contraction leaves.
+_CLEAR = (1.0 - CONTRACTION) ** -2
+_NARROWED = 1.0 / _WIDENED  # of Q's band, where a run was stepped back from
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +113,42 @@ class _Run:
     known: np.ndarray  # (N,) m: Q d before it
     lacking: np.ndarray  # (N,) m: d of it
     rms: float
+    error: np.ndarray  # (N,) m: reference minus measured
+    counted: np.ndarray  # (N,): where that is known and can be reached
     left: np.ndarray  # (M,) m: amplitudes of its error
     edge: float  # Hz: of what its voltage was learned with, 0 for the first
+
+    def mean_square(self, noise: float) -> tuple[float, float]:
+        """Return the mean square of the error in m^2, and its standard error.
+
+        With white ``noise`` n (standard deviation in m) on a repeatable error r, the variance of
+        the mean of (r + n)^2 over N samples is (4 r^2 noise^2 + 2 noise^4)/N.
+        """
+        squares = np.square(self.error[self.counted])
+        if squares.size == 0:
+            return np.inf, 0.0
+        mean, power = float(np.mean(squares)), noise * noise
+        repeatable = max(mean - power, 0.0)
+        return mean, float(np.sqrt((4.0 * repeatable + 2.0 * power) * power / squares.size))
+
+    def is_noise(self, noise: float, readings: int) -> bool:
+        """Return whether its error is not significantly above the ``noise`` in m.
+
+        The noise was measured from so many ``readings`` at rest: its power is known to a part
+        sqrt(2/readings).
+        """
+        power = noise * noise
+        alone = power * np.sqrt(2.0 / max(np.count_nonzero(self.counted), 1) + 2.0 / readings)
+        return bool(self.mean_square(noise)[0] - power <= _SIGNIFICANT * alone)
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """What was learned from a run."""
+
+    before: np.ndarray  # (M,) m: amplitudes of the error of that run
+    edge: float  # Hz: of Q
+    power: float  # m^2: mean square of the change of what is known
 
 
 class Learner:
@@ -125,7 +177,8 @@ class Learner:
         self._told_up_to = 1  # line
         self._best: _Run | None = None
         self._lacking: list[np.ndarray] = []  # raw, of the last runs
-        self._learned: tuple[np.ndarray, float] | None = None  # amplitudes (M,) of an error, edge
+        self._learned: _Step | None = None  # the last step
+        self._settled = ""  # why nothing more is learned
 
     @property
     def voltage(self) -> np.ndarray:
@@ -163,16 +216,27 @@ class Learner:
         if np.count_nonzero(usable & self._inside) < _USABLE * np.count_nonzero(self._inside):
             notes.append("too few readings can be used: nothing is learned from this run")
             return self._lesson(rms, largest, samples, learned=False, notes=notes)
+        if self._settled:
+            notes.append(self._settled)
+            return self._lesson(rms, largest, samples, learned=False, notes=notes)
         lacking = self._bridged(reading - self._now.reading, usable)
         best = self._best
-        if best is not None and rms > _WORSE * best.rms + 0.1 * self._noise:
-            return self._step_back(best, rms, largest, samples, notes)
         if best is None:
             self._ratio, self._told_up_to = self._film_over_model(lacking)
-        lacking = self._repeated(lacking, notes)
-        left = np.abs(np.fft.rfft(np.where(counted, error, 0.0)))
-        edge = 0.0 if self._learned is None else self._learned[1]
-        self._best = _Run(self._now, self._known, lacking, rms, left, edge)
+        left = np.abs(np.fft.rfft(error))
+        edge = 0.0 if self._learned is None else self._learned.edge
+        run = _Run(self._now, self._known, lacking, rms, error, counted, left, edge)
+        if best is not None:
+            (now, within), (before, before_within) = (one.mean_square(noise) for one in (run, best))
+            scatter = _SIGNIFICANT * np.hypot(within, before_within)
+            # what did not repeat and was learned adds its power to the error, and no more
+            added = 0.0 if self._learned is None else self._learned.power
+            if now > before + added + scatter:
+                return self._step_back(best, rms, largest, samples, notes)
+            if now > before - scatter:
+                self._settle(best, _NO_BETTER, notes)
+                return self._lesson(rms, largest, samples, learned=False, notes=notes)
+        self._best = replace(run, lacking=self._repeated(lacking, notes))
         return self._follow(self._best, rms, largest, samples, notes)
 
     # ------------------------------------------------------------ next voltage
@@ -181,10 +245,8 @@ class Learner:
         self, run: _Run, rms: float, largest: float, samples: int, notes: list[str]
     ) -> Lesson:
         """Take the next voltage from what ``run`` has shown."""
-        if run.rms <= _NEAR_NOISE * self._noise:
-            notes.append("the smallest error is noise: its voltage is played again")
-            self._known = run.known
-            self._now = run.played
+        if run.is_noise(self._noise, self._task.lead_in or self._task.samples):
+            self._settle(run, _IS_NOISE, notes)
             return self._lesson(rms, largest, samples, learned=False, notes=notes)
         edge, contraction = self._pass(run)
         if edge <= 0.0:
@@ -192,21 +254,29 @@ class Learner:
                 "the measured displacement has too little to do with the prediction: nothing is "
                 "learned; check the sign of the laser, the film and the model"
             )
+            self._known, self._now = run.known, run.played
+            self._best = None  # the next run is as the first
             return self._lesson(rms, largest, samples, learned=False, notes=notes)
         change = np.where(self._inside, run.lacking - run.known, 0.0)
         weight = self._beyond_noise(change)
-        self._known = run.known + self._over_ratio(low_pass(change, self._rate, edge), weight)
-        self._learned = (run.left, edge)
+        step = self._over_ratio(low_pass(change, self._rate, edge), weight)
+        self._known = run.known + step
+        self._learned = _Step(run.left, edge, _mean_square(step[run.counted]))
         wanted = replace(self._task, target=self.first.reference - self._known)
         self._now = invert(self._model, wanted, start=run.played.voltage)
         return self._lesson(rms, largest, samples, learned=True, notes=notes, edge=edge,
                             contraction=contraction)  # fmt: skip
 
+    def _settle(self, run: _Run, why: str, notes: list[str]) -> None:
+        """Keep the voltage of ``run`` from now on."""
+        self._best, self._known, self._now, self._settled = run, run.known, run.played, why
+        notes.append(why)
+
     def _step_back(
         self, best: _Run, rms: float, largest: float, samples: int, notes: list[str]
     ) -> Lesson:
         """Go back to the run of the smallest error, and learn less of it."""
-        failed = self._edge if self._learned is None else self._learned[1]
+        failed = self._edge if self._learned is None else self._learned.edge
         # the band that made the best run is known to be safe
         self._edge = best.edge if 0.0 < best.edge < failed else _NARROWED * failed
         self._learned = None
@@ -259,8 +329,8 @@ class Learner:
         """Return the edge in Hz of Q, and the largest |Q| W with it; 0 where nothing passes."""
         highest, least = self._edge, self._rate / self.first.time.size
         off = self._off_by_prediction(run.lacking)
-        if self._learned is not None and self._learned[0] is not run.left:
-            before, learned = self._learned
+        if self._learned is not None and self._learned.before is not run.left:
+            before, learned = self._learned.before, self._learned.edge
             left = self._left(before, run.left)
             band = self._frequency <= learned
             if np.isnan(left[band]).all():
@@ -474,11 +544,15 @@ class Learner:
     def _jumps(self, change: np.ndarray) -> bool:
         """Return whether ``change`` (N,) m has a jump: as large at once as over a longer time."""
         width = max(round(_JUMP_WINDOW * self._rate), 3)
-        near, far = (_differences(change, width, k * width) for k in (1, 4))
+        near, far = (_differences(change, width, k * width) for k in (1, _APART))
         usual = float(np.median(np.abs(near[self._inside]))) / 0.67
         least = _JUMP * max(self._noise * np.sqrt(2.0 / width), usual)
         sudden = (np.abs(near) > least) & (np.abs(near) > _SUDDEN * np.abs(far))
         return bool(np.any(sudden[self._inside]))
+
+
+def _mean_square(values: np.ndarray) -> float:
+    return float(np.mean(np.square(values))) if values.size else 0.0
 
 
 def _differences(values: np.ndarray, width: int, apart: int) -> np.ndarray:

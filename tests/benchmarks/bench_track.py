@@ -89,6 +89,7 @@ class Row:
     from_thesis: tuple[float, ...]
     pi: float
     model_free: tuple[float, ...]
+    quiet: tuple[float, float]  # of the first and the last voltage, without noise and drift
     found: str
 
 
@@ -140,6 +141,12 @@ def _summary(rows: list[Row]) -> None:
         f"{sum(min(r.learned) > 1.05 * r.diagnosed for r in rows)}; the last worse than the first: "
         f"{sum(r.learned[-1] > 1.05 * r.diagnosed for r in rows)}."
     )
+    print(
+        f"Without noise and drift of the sensor, the voltages of the first and the last run miss "
+        f"the target by {', '.join(f'{r.quiet[0]:.2f} and {r.quiet[1]:.2f}' for r in rows)} um; "
+        f"the last by more, and by more than a fifth of the noise: "
+        f"{sum(r.quiet[1] > max(r.quiet[0], 0.2 * r.noise) for r in rows)}."
+    )
     for r in rows:
         print(
             f"{r.seed}: learned from the model with the effect "
@@ -179,6 +186,7 @@ def _row(seed: int, training: tuple[str, ...], fit: Fit, folder: Path) -> Row:
         seed, ours.noise * 1e6, linear, fitted, first, tuple(learned),
         tuple(of(run.measured) for run in theirs.runs[1:]), of(peers.pi()),
         tuple(of(row) for row in peers.learning()),
+        (of(peers.quiet(ours.runs[2].voltage)), of(peers.quiet(ours.runs[-1].voltage))),
         ", ".join(name for name, _ in model.model.effects) or "nothing",
     )  # fmt: skip
 
@@ -288,6 +296,11 @@ class _Peers:
         plant = self.plant.renewed(np.random.default_rng(self.rng.integers(2**31)))
         motion, _ = plant.advance(self.found.time, voltage, True)
         return motion.displacement + NOISE * self.rng.standard_normal(voltage.size)
+
+    def quiet(self, voltage: np.ndarray) -> np.ndarray:
+        """Displacement (N,) m under ``voltage`` (N,) V, without noise and drift of a sensor."""
+        motion, _ = self.plant.advance(self.found.time, voltage, True)
+        return motion.displacement
 
     def learning(self) -> list[np.ndarray]:
         """Readings (N,) m of the iterations after the linear map."""

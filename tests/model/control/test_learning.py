@@ -147,6 +147,20 @@ def test_a_voltage_whose_error_is_noise_is_kept():
     np.testing.assert_array_equal(spoilt.voltage, found)
 
 
+def test_a_drift_that_does_not_repeat_ends_the_learning():
+    rig, teacher = Rig(THESIS), learner()
+    first = teacher.voltage.copy()
+    drift = 2e-6 * np.sin(np.linspace(0.0, np.pi, first.size))
+    assert teacher.learn(rig.play(teacher) + drift, NOISE).learned
+    assert not np.array_equal(teacher.voltage, first)
+    kept = teacher.learn(rig.play(teacher), NOISE)  # the learned drift is an error now
+    assert not kept.learned
+    assert "not made the error significantly smaller" in kept.notes[-1]
+    np.testing.assert_array_equal(kept.voltage, first)
+    teacher.learn(rig.play(teacher) + drift, NOISE)
+    np.testing.assert_array_equal(teacher.voltage, first)
+
+
 def test_an_uncertain_model_learns_less():
     rig = hiding("linear drag")
     heavier = with_effect(THESIS, "load inertia", numbers("load inertia", 4.0))
