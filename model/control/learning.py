@@ -138,7 +138,7 @@ class _Run:
         sqrt(2/readings).
         """
         power = noise * noise
-        alone = power * np.sqrt(2.0 / max(np.count_nonzero(self.counted), 1) + 2.0 / readings)
+        alone = power * np.sqrt(2.0 / max(int(np.count_nonzero(self.counted)), 1) + 2.0 / readings)
         return bool(self.mean_square(noise)[0] - power <= _SIGNIFICANT * alone)
 
 
