@@ -290,6 +290,29 @@ def test_a_jump_trips_at_once_whatever_the_rate(rate):
         assert found.get("jump") == (at if tripped and allowed < 0.03 else None)
 
 
+@pytest.mark.parametrize(
+    ("lost", "beyond", "trips"),
+    [
+        (250, 0.0, {}),
+        (350, 0.0, {"laser": PEAK + 299}),
+        # it comes back elsewhere: the film has moved, or it is another target
+        (250, 5e-3, {"jump": PEAK + 250}),
+    ],
+)
+def test_a_laser_out_of_range_is_tolerated_for_its_grace_time_only(lost, beyond, trips):
+    signals = Signals()
+    signals.displacement[PEAK + lost :] += beyond
+    signals.displacement[PEAK : PEAK + lost] = 0.040
+    assert {"laser", "jump", "displacement"} <= signals.tripped().keys()
+    for cuts in ((), range(7, signals.planned.size, 113)):
+        graced = Interlocks(
+            signals.settings, signals.channels, RATE, signals.predicted, signals.planned,
+            laser_grace=0.3,
+        )  # fmt: skip
+        found = watch(graced, signals.counts(), cuts)
+        assert {trip.interlock: trip.sample for trip in found} == trips
+
+
 def test_differences_from_one_end_of_a_converter_to_the_other_are_seen():
     signals = Signals(laser_stuck_swing_kV=15.0, displacement_min_mm=-100.0)
     signals.displacement[:] = -0.0399
