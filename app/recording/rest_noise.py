@@ -33,6 +33,8 @@ LEAVES = 6.0
 #: Least von Neumann ratio (mean square of successive differences over the variance) of readings
 #: that do not drift. It is 2 for white noise, with a standard deviation of 2/sqrt(n), 0.45 for 20.
 STEADY = 1.0
+#: Samples that are looked at in one step.
+PIECE = 2**16
 
 
 def lead_in(voltage: np.ndarray, step: float = 0.0) -> int:
@@ -41,13 +43,23 @@ def lead_in(voltage: np.ndarray, step: float = 0.0) -> int:
     ``step`` V is the resolution of the converter. A voltage is at rest within a thousandth of its
     largest value around 0 V, or where it is steady in its own noise around the offset of a monitor.
     """
-    size = np.abs(voltage)
-    if size.size == 0:
+    if voltage.size == 0:
         return 0
-    largest = float(size.max())
-    loud = size > max(step, NEGLIGIBLE * largest)
-    quiet = int(np.argmax(loud)) if loud.any() else int(size.size)
+    largest = max(float(voltage.max()), -float(voltage.min()))
+    quiet = _within(voltage, 0.0, max(step, NEGLIGIBLE * largest))
     return max(quiet, _steady(voltage, largest))
+
+
+def _within(values: np.ndarray, middle: float, most: float) -> int:
+    """Count the first ``values`` (N,) that differ from ``middle`` by ``most`` or less.
+
+    They are read piece by piece: a lead-in is short, and a recording may be long.
+    """
+    for begin in range(0, values.size, PIECE):
+        away = np.abs(values[begin : begin + PIECE] - middle) > most
+        if away.any():
+            return begin + int(np.argmax(away))
+    return int(values.size)
 
 
 def _steady(voltage: np.ndarray, largest: float) -> int:
@@ -58,8 +70,7 @@ def _steady(voltage: np.ndarray, largest: float) -> int:
     spread = float(first.std(ddof=1))
     if spread > 0.0 and float(np.mean(np.diff(first) ** 2)) < STEADY * spread**2:
         return 0
-    away = np.abs(voltage - first.mean()) > max(LEAVES * spread, NEGLIGIBLE * largest)
-    return int(np.argmax(away)) if away.any() else int(voltage.size)
+    return _within(voltage, float(first.mean()), max(LEAVES * spread, NEGLIGIBLE * largest))
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ def not_forward(time: np.ndarray) -> tuple[int, str] | None:
 
     The second value is ``goes back`` or ``stands still``, for a sentence that begins with time.
     """
-    back = np.flatnonzero(np.diff(time) <= 0.0)
+    back = np.flatnonzero(time[1:] <= time[:-1])
     if not back.size:
         return None
     at = int(back[0]) + 1

@@ -77,10 +77,11 @@ class Source(Protocol):
     the file for a value that is no number; ``block``, the cells of the lines above a table;
     ``rows(indices)``, the places of several samples at once;
     ``skipped``, the rows before each one that was left out, and its place in words;
-    ``cut_short``, True if columns may end early; ``notes``, sentences on what was found;
-    ``progress``, a callable that can be set, which gets the part of ``read`` that is done;
-    ``optional``, columns that can be set, for which ``read`` raises ``GapError`` where a cell is no
-    number; ``overview(names, count)``, first values and number of values of columns in one reading.
+    ``is_finite``, True if ``read`` returns finite numbers only; ``cut_short``, True if columns may
+    end early; ``notes``, sentences on what was found; ``progress``, a callable that can be set,
+    which gets the part of ``read`` that is done; ``optional``, columns that can be set, for which
+    ``read`` raises ``GapError`` where a cell is no number; ``overview(names, count)``, the
+    ``Overview`` of columns, in one reading.
     """
 
     @property

@@ -57,6 +57,8 @@ class TextFile(NamedColumns[Column]):
     ``skip_bad_rows`` rows that cannot be read are left out; ``skipped`` has their lines afterwards.
     """
 
+    is_finite = True  # other cells are refused, or their rows left out
+
     def __init__(
         self, path: Path, names_line: int | None = None, skip_bad_rows: bool = False
     ) -> None:

@@ -179,7 +179,8 @@ def layout_of(
     forced = re.fullmatch(r'"?sep=(.)"?\s*', lines[0])
     start = 1 if forced else 0
     labview = lines[0].startswith("LabVIEW Measurement")
-    there = [d for d in delimiters if d is None or d in head]
+    blank = re.search(r"\S[ \t]+\S", head) is not None
+    there = [d for d in delimiters if (blank if d is None else d in head)]
     options = (forced[1],) if forced else there or delimiters
     found = [t for d in options if (t := _Table.find(lines, start, d, labview))]
     if not found:
@@ -236,23 +237,28 @@ class _Table:
     ) -> _Table | None:
         """Return the table that ``delimiter`` splits ``lines`` into; None if there is none."""
         places = [i for i in range(start, len(lines)) if holds_data(lines[i])]
-        rows = [cells_of(lines[i], delimiter) for i in places]
+
+        @functools.cache  # most lines are never split
+        def row(number: int) -> list[str]:
+            return cells_of(lines[places[number]], delimiter)
+
         # numbers only, then mostly numbers, then one row of numbers below a line of names
         for strict, least in ((True, _LEAST), (False, _LEAST), (True, 1)):
             good = functools.partial(_is_data, strict=strict)
-            for at in range(len(rows) - least + 1):
-                run = rows[at : at + least]
-                same = len({len(row) for row in (run if least > 1 else rows[at - 1 : at + 1])}) == 1
-                if not (same and all(map(good, run))):
+            for at in range(0 if least > 1 else 1, len(places) - least + 1):
+                run = [row(i) for i in range(at, at + least)]
+                beside = run if least > 1 else [row(at - 1), *run]
+                if len({len(cells) for cells in beside}) > 1 or not all(map(good, run)):
                     continue
                 width = len(run[0])
                 # rows with a cell that is no number may stand first
                 while strict and least > 1 and at > 0 and places[at - 1] == places[at] - 1:
-                    if len(rows[at - 1]) != width or not _is_data(rows[at - 1], strict=False):
+                    if len(row(at - 1)) != width or not _is_data(row(at - 1), strict=False):
                         break
                     at -= 1
-                below = (row for row in rows[at:] if len(row) == width and good(row))
-                like = tuple(tuple(row) for row in itertools.islice(below, _SAMPLE))
+                every = map(row, range(at, len(places)))
+                below = (cells for cells in every if len(cells) == width and good(cells))
+                like = tuple(tuple(cells) for cells in itertools.islice(below, _SAMPLE))
                 return cls(
                     lines, start, delimiter, labview, places[at], width, len(like), like, strict
                 )

@@ -307,8 +307,10 @@ def _good_rows(
     Raises ``InputError`` for the first other one unless ``skip``.
     """
     source = chosen.source
-    finite = {quantity: np.isfinite(column) for quantity, column in table.items()}
     good = np.ones(table["time"].size, dtype=bool)
+    finite = {}
+    if not getattr(source, "is_finite", False):
+        finite = {quantity: np.isfinite(column) for quantity, column in table.items()}
     for column in finite.values():
         good &= column
     if not skip and not good.all():
