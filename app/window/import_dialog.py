@@ -11,7 +11,6 @@ from typing import Any
 from PySide6.QtCore import Qt, QTimer, Signal, Slot
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import (
-    QComboBox,
     QDialog,
     QHBoxLayout,
     QLabel,
@@ -44,7 +43,7 @@ from dearig.window.import_plot import ImportPlot
 from dearig.window.import_table import COLUMNS_MAX, ImportTable
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
-from dearig.window.widgets import ElidedLabel, Message, button, label
+from dearig.window.widgets import ElidedLabel, Message, button, label, name_list
 from dearig.window.worker import Job, Worker
 
 __all__ = ["ImportDialog"]
@@ -93,7 +92,7 @@ class ImportDialog(QDialog):
     def _build(self) -> None:
         self.file = ElidedLabel()
         self.file.show_text(str(self.path))
-        self.table_box = QComboBox()
+        self.table_box = name_list()
         self.table_box.setToolTip("Table of the file: a sheet, a specimen or a group")
         self.table_label = QLabel("&Table")
         self.table_label.setBuddy(self.table_box)
@@ -300,7 +299,8 @@ class ImportDialog(QDialog):
         if self._writing:
             return
         self._tried = None
-        self.fields.show_kind(kind_of(self.columns.choices()[0]))
+        choices, _ = self.columns.choices()
+        self.fields.show_kind(kind_of(choices), {choice.quantity for choice in choices.values()})
         self._show_state()
         self._later.start()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from PySide6.QtCore import Signal, Slot
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -48,6 +50,7 @@ class ImportFields(QWidget):
         self._session = session
         self._told = Specimen()
         self._kind = ""
+        self._there: frozenset[str] = frozenset()
         self._lines: dict[str, QLineEdit] = {}
         self.names_line = QSpinBox(minimum=0, maximum=100_000)
         self.names_line.setSpecialValueText("found by itself")
@@ -107,14 +110,19 @@ class ImportFields(QWidget):
         """Return the field of ``key``."""
         return self._lines[key]
 
-    def show_kind(self, kind: str) -> None:
-        """Show the fields that an import of ``kind`` (actuator, film, or "") has."""
-        self._kind = kind
+    def show_kind(self, kind: str, there: Collection[str] = ()) -> None:
+        """Show the fields that an import of ``kind`` (actuator, film, or "") has.
+
+        ``there`` are the quantities that are chosen; a film's stretch needs no gauge length.
+        """
+        self._kind, self._there = kind, frozenset(there)
         given = kind == "actuator" and self.film.currentData() == _GIVEN
-        told = self._told != Specimen()
-        for key, _, _ in _SPECIMEN:
-            self.form.setRowVisible(self._lines[key], kind == "film")
-        self.form.setRowVisible(self.take_told, kind == "film" and told)
+        length = kind == "film" and not self._there & {"stretch", "strain"}
+        area = kind == "film" and "nominal_stress" not in self._there
+        for key, needed in (("gauge_length_mm", length), ("area_mm2", area)):
+            self.form.setRowVisible(self._lines[key], needed)
+        told = (length and self._told.gauge_length_mm, area and self._told.area_mm2)
+        self.form.setRowVisible(self.take_told, any(told))
         self.form.setRowVisible(self.film, kind == "actuator")
         for key, _, _ in _FILM:
             self.form.setRowVisible(self._lines[key], given)
@@ -133,7 +141,7 @@ class ImportFields(QWidget):
             parts.append(f"cross-section {told.area_mm2:g} mm²")
         self.take_told.setText(f"Use what the file says: {', '.join(parts)}")
         self.form.setRowVisible(self.names_line, text)
-        self.show_kind(self._kind)
+        self.show_kind(self._kind, self._there)
 
     @property
     def raw(self) -> bool:
@@ -183,7 +191,7 @@ class ImportFields(QWidget):
 
     @Slot()
     def _film_changed(self) -> None:
-        self.show_kind(self._kind)
+        self.show_kind(self._kind, self._there)
         self.changed.emit()
 
     @Slot()

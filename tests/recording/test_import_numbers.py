@@ -182,3 +182,11 @@ def test_the_first_rows_count_even_if_they_cannot_be_read(tmp_path: Path) -> Non
     done, run = imported(tmp_path, "\n".join(lines), skip_bad_rows=True)
     assert run.samples == TIME.size - 2
     assert "2 rows were left out because they could not be used" in done.doubts
+
+
+def test_true_strain_beside_engineering_strain_is_no_displacement(tmp_path: Path) -> None:
+    names = "Time (s),True Strain,True Stress (MPa),Engineering Strain,Engineering Stress (MPa)"
+    rows = "\n".join(f"{i},{i / 9},{i / 8},{i / 10},{i / 20}" for i in range(30))
+    done, run = imported(tmp_path, f"{names}\n{rows}\n")
+    np.testing.assert_allclose(run.stretch, 1.0 + np.arange(30) / 10)
+    assert any("taken as a part of the length, not as %" in note for note in done.notes)

@@ -37,9 +37,10 @@ class Pick:
     def said(self) -> str:
         """What was taken for what, for a message."""
         target = self.target
-        unit = "V at the card" if target.raw else "no unit" if target.unit == "1" else target.unit
+        unit = "in V at the card" if target.raw else f"in {target.unit}"
+        unit = "without unit" if target.unit == "1" else unit
         scaled = f", scaled {self.behind}" if self.behind else ""
-        return f"{target.quantity.replace('_', ' ')} in {unit} from {self.column!r}{scaled}"
+        return f"{target.quantity.replace('_', ' ')} {unit} from {self.column!r}{scaled}"
 
 
 @dataclass

@@ -70,7 +70,8 @@ class Guess:
             self._propose()
             return
         self._take_one(("stretch", "strain", "displacement"))
-        self._take_one(("displacement",), by_unit=True)
+        if not {"stretch", "strain"} & there.keys():
+            self._take("displacement", by_unit=True)
         self._take_one(("nominal_stress", "force"))
         self._take_one(("nominal_stress", "force"), by_unit=True)
         self._take_if_sure("temperature")
@@ -193,7 +194,8 @@ class Guess:
                 self._chosen.notes.append(
                     f"{column!r} names no unit: it is taken as a part of the length, not as %"
                 )
-            self._pick(target, column, target.scale, doubt)
+            open_unit = quantity == "strain" and not label.unit
+            self._pick(target, column, target.scale, doubt or ("unit" if open_unit else ""))
 
     def _of_unit(self, quantity: str) -> list[str]:
         """Return the one free column with a unit of ``quantity``, or the only one that is left.
