@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Sequence
 from pathlib import Path
 
-from dearig.batch.journal import JOURNAL, REQUESTS, append_line, read_lines
+from dearig.batch.journal import JOURNAL, REQUESTS, append_line
 from dearig.batch.queue import WAITING, Queue
 from dearig.errors import InputError
 
@@ -19,7 +19,7 @@ def ask(folder: Path, wishes: Sequence[tuple[str, str]], by: str = "") -> None:
     Each is one of ``REQUEST_KINDS`` and the name of a run, "" where it needs none. Raises
     ``InputError`` for a folder without a campaign, and for a run that does not wait.
     """
-    queue = Queue.of(read_lines(folder / JOURNAL)) if folder.is_dir() else Queue()
+    queue = Queue.of(folder / JOURNAL) if folder.is_dir() else Queue()
     if not queue.runs:
         raise InputError(f"{folder} has no campaign: there is no journal {JOURNAL}")
     for _, name in wishes:

@@ -150,7 +150,7 @@ def play_campaign(
 def _check_folder(folder: Path, resume: bool) -> None:
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file; give a folder for the campaign")
-    entries = Queue.of(read_lines(folder / JOURNAL)) if folder.is_dir() else Queue()
+    entries = Queue.of(folder / JOURNAL) if folder.is_dir() else Queue()
     if resume and not entries.runs:
         raise InputError(f"{folder} has no campaign to continue; leave --resume out to begin one")
     if entries.runs and not resume:
@@ -203,7 +203,7 @@ class _Session:
         self._observer, self._progress, self._now, self._wait = observer, progress, now, wait
         self._simulated = is_simulated(address)
         self._planned = {run.name: run for run in campaign.runs}
-        self.queue = Queue.of(journal.entries)
+        self.queue = Queue.after(journal.entries, journal.path)
         # a session that continues another one does not know how long the film has rested
         self._rested = not any(run.attempts for run in self.queue.runs.values())
 
@@ -367,6 +367,11 @@ class _Session:
     def _left(self, why: str) -> str:
         return f"{why}; {len(self.queue.waiting)} runs are left: arm them with --resume"
 
+    def _of_run(self, state: RunState) -> Progress:
+        """Return a progress that says which run of how many it is."""
+        number, count = self.queue.order.index(state.name) + 1, len(self.queue.order)
+        return lambda stage, part: self._progress(f"run {number} of {count}, {stage}", part)
+
     def _part(self) -> float:
         return 1.0 - len(self.queue.waiting) / max(len(self.queue.runs), 1)
 
@@ -404,7 +409,7 @@ class _Session:
         try:
             result = record(
                 loaded, self._address, self._rig_file, path, self._run_options(run),
-                observer=self._observer, progress=self._progress,
+                observer=self._observer, progress=self._of_run(state),
             )  # fmt: skip
         except DearigError as error:
             return self._failed(state, path, error)
@@ -487,7 +492,7 @@ class _Session:
             return
         found = compute(
             self._campaign, recording, self._folder, self.queue.model, self._rig_file,
-            self._progress,
+            self._of_run(state),
         )  # fmt: skip
         extremes = "" if self._campaign.is_kept(run) else self._reduce(state, recording)
         band = left_band(self._campaign.stop_when, found.numbers)

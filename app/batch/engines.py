@@ -6,6 +6,7 @@ not rows.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import multiprocessing
 import os
@@ -24,7 +25,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from dearig.errors import InputError
 from dearig.extras import import_extra
-from dearig.recording.files import in_words, journal_of
+from dearig.recording.files import in_words, journal_of, one_line
 
 # a worker process imports this module before it knows its task
 if TYPE_CHECKING:
@@ -38,6 +39,11 @@ log = logging.getLogger(__name__)
 _TRIES_ALONE = 2
 _DASK_TIMEOUT = "10 s"  # to find the scheduler
 _RETRIES = 3
+_LOOK_S = 5.0  # between two looks at whether there are workers
+_NO_WORKER_S = 30.0  # without a worker after which nobody waits for one
+_ANSWER_S = 30.0  # for a row that is computed to come from its worker
+#: Errors by which Dask reports that scheduler, workers or network are lost.
+_LOST_BY = (OSError, RuntimeError, TimeoutError, CancelledError, asyncio.CancelledError)
 
 
 class ClusterLost(Exception):  # noqa: N818  (what happened)
@@ -133,6 +139,10 @@ class LocalEngine:
         return []
 
 
+def _words(error: BaseException) -> str:
+    return one_line(error) if isinstance(error, Exception) and str(error) else type(error).__name__
+
+
 def _ignore_ctrl_c() -> None:
     """Leave ctrl-C to the process that reads the rows."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -182,25 +192,42 @@ class DaskEngine:
     def _run(self, client: Any, waiting: deque[Task], most: int) -> Iterator[tuple[Task, Row]]:
         from dearig.batch.fits import OtherVersion
 
-        done = self._dask.as_completed(loop=client.loop)
         running: dict[Any, Task] = {}
         while waiting or running:
             while waiting and len(running) < most:
                 task = waiting.popleft()
-                future = self._submit(client, task)
-                running[future.key] = task
-                done.add(future)
-            future = next(done)
-            task = running.pop(future.key)
+                running[self._submit(client, task)] = task
+            for future in self._next(client, list(running)):
+                task = running.pop(future)
+                try:
+                    row = future.result(timeout=_ANSWER_S)
+                except OtherVersion as error:
+                    raise InputError(f"{error}: install the same ones") from error
+                except self._dask.KilledWorker:
+                    row = _lost(task)
+                except _LOST_BY as error:
+                    raise ClusterLost(_words(error)) from error
+                yield task, row
+
+    def _next(self, client: Any, running: list[Any]) -> set[Any]:
+        """Return futures that have ended. Raises ``ClusterLost`` if no worker is left."""
+        alone = 0.0
+        while alone < _NO_WORKER_S:
             try:
-                row = future.result()
-            except OtherVersion as error:
-                raise InputError(f"{error}: install the same ones") from error
-            except self._dask.KilledWorker:
-                row = _lost(task)
-            except (OSError, RuntimeError, TimeoutError, CancelledError) as error:
-                raise ClusterLost(str(error) or type(error).__name__) from error
-            yield task, row
+                with client.as_current():
+                    ended: set[Any] = self._dask.wait(
+                        running, timeout=_LOOK_S, return_when="FIRST_COMPLETED"
+                    ).done
+            except TimeoutError:
+                try:
+                    alone = 0.0 if client.nthreads() else alone + _LOOK_S
+                except _LOST_BY as error:
+                    raise ClusterLost(_words(error)) from error
+            except _LOST_BY as error:
+                raise ClusterLost(_words(error)) from error
+            else:
+                return ended
+        raise ClusterLost(f"it has had no worker for {_NO_WORKER_S:g} s")
 
     def _submit(self, client: Any, task: Task) -> Any:
         from dearig.batch.fits import code_digest, fit_sent

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import time
 from collections.abc import Callable
@@ -47,7 +48,7 @@ def read_lines(path: Path, tolerant: bool = False) -> list[dict[str, Any]]:
     for i, line in enumerate(whole.splitlines()):
         entry: Any = None
         with contextlib.suppress(ValueError, RecursionError):
-            entry = json.loads(line)
+            entry = json.loads(line, parse_constant=_finite, parse_float=_finite)
         if not isinstance(entry, dict) or not isinstance(entry.get("event"), str):
             if not tolerant:
                 raise InputError(
@@ -57,6 +58,14 @@ def read_lines(path: Path, tolerant: bool = False) -> list[dict[str, Any]]:
             entry = {"event": ""}
         found.append(entry)
     return found
+
+
+def _finite(text: str) -> float:
+    """Return a number of a journal. Raises ``ValueError`` for one that is not finite."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
 
 
 class Journal:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from dearig.batch.journal import FORMAT
+from dearig.batch.journal import FORMAT, read_lines
+from dearig.config.toml_input import shown
 from dearig.errors import InputError
 
 __all__ = ["LOST", "PLAYED", "REQUEST_KINDS", "Queue", "RunState"]
@@ -76,15 +78,25 @@ class Queue:
     started: str = ""
 
     @classmethod
-    def of(cls, entries: Iterable[Mapping[str, Any]]) -> Queue:
-        """Return the state that the ``entries`` of a journal lead to."""
+    def of(cls, path: Path) -> Queue:
+        """Return the state that the journal at ``path`` leads to; an empty one without a file.
+
+        Raises ``InputError`` for a file that is not a journal.
+        """
+        return cls.after(read_lines(path), path)
+
+    @classmethod
+    def after(cls, entries: Iterable[Mapping[str, Any]], path: Path) -> Queue:
+        """Return the state that the ``entries`` of the journal at ``path`` lead to."""
         queue = cls()
         for i, entry in enumerate(entries):
             try:
                 queue.take(entry)
-            except (KeyError, TypeError, AttributeError, ValueError) as error:
+            except InputError as error:
+                raise InputError(f"{path}: {error}") from error
+            except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
                 raise InputError(
-                    f"entry {i + 1} of the journal is not complete: the file was changed by hand"
+                    f"{path}, entry {i + 1} is not complete or wrong: the file was changed by hand"
                 ) from error
         return queue
 
@@ -96,26 +108,28 @@ class Queue:
             case "armed":
                 self.armed, self.status, self.reason = True, "", ""
                 self.ending = False
-                self.armed_until, self.armed_runs = entry["until"], entry["runs"]
+                until, runs = entry["until"], entry["runs"]
+                self.armed_until = None if until is None else float(until)
+                self.armed_runs = None if runs is None else int(runs)
             case "request":
                 self._request(entry)
             case "started":
                 run = self.runs[entry["run"]]
-                run.state, run.recording, run.reason = RUNNING, entry["recording"], ""
+                run.state, run.recording, run.reason = RUNNING, _name(entry["recording"]), ""
                 run.attempts = int(entry["attempt"])
                 if self.armed_runs is not None:
                     self.armed_runs -= 1
             case "not-started":
                 run = self.runs[entry["run"]]
-                run.state, run.recording, run.reason = WAITING, "", entry["reason"]
+                run.state, run.recording, run.reason = WAITING, "", str(entry["reason"])
                 run.attempts -= 1
                 if self.armed_runs is not None:
                     self.armed_runs += 1
             case "recorded":
                 run = self.runs[entry["run"]]
-                run.recorded, run.recording = True, entry["recording"]
+                run.recorded, run.recording = True, _name(entry["recording"])
             case "reduced":
-                self.runs[entry["run"]].extremes = entry["extremes"]
+                self.runs[entry["run"]].extremes = _name(entry["extremes"])
             case "ended":
                 self._end(entry)
             case "halted":
@@ -128,15 +142,16 @@ class Queue:
     def _plan(self, entry: Mapping[str, Any]) -> None:
         if entry["format"] != FORMAT:
             raise InputError(
-                f"the journal has the format {entry['format']}, and this version reads {FORMAT}"
+                f"it has the format {shown(entry['format'])}, and this version reads {FORMAT}"
             )
-        self.name, self.rig, self.plan = entry["name"], entry["rig"], entry["plan_sha256"]
-        self.rig_file = entry["rig_file_sha256"]
+        self.name, self.rig = str(entry["name"]), str(entry["rig"])
+        self.plan, self.rig_file = str(entry["plan_sha256"]), str(entry["rig_file_sha256"])
         self.repeat_lost, self.rest = int(entry["repeat_lost"]), float(entry["rest_s"])
-        self.started = entry["at"]
+        self.started = str(entry["at"])
         for run in entry["runs"]:
-            self.runs[run["name"]] = RunState(
-                run["name"], run["sequence_sha256"], float(run["duration_s"]),
+            name = str(run["name"])
+            self.runs[name] = RunState(
+                name, str(run["sequence_sha256"]), float(run["duration_s"]),
                 dict(run["settings"]), bool(run["warm_up"]),
             )  # fmt: skip
         self.order = list(self.runs)
@@ -164,10 +179,12 @@ class Queue:
 
     def _end(self, entry: Mapping[str, Any]) -> None:
         run = self.runs[entry["run"]]
-        run.state, run.reason, run.recorded = entry["state"], entry["reason"], False
-        run.recording = entry["recording"]
-        run.numbers = dict(entry.get("numbers") or {})
-        run.model = entry.get("model", "")
+        if entry["state"] not in PLAYED:
+            raise ValueError(entry["state"])
+        run.state, run.reason, run.recorded = entry["state"], str(entry["reason"]), False
+        run.recording = _name(entry["recording"])
+        run.numbers = {str(n): float(v) for n, v in dict(entry.get("numbers") or {}).items()}
+        run.model = _name(entry.get("model", ""))
         if run.state == LOST and run.attempts <= self.repeat_lost:
             run.state = WAITING
 
@@ -200,3 +217,10 @@ class Queue:
     def model(self) -> str:
         """File of the last fitted model, relative to the folder, "" for none."""
         return next((run.model for run in reversed(self.listed) if run.model), "")
+
+
+def _name(value: Any) -> str:
+    """Return the name of a file of a campaign. Raises ``ValueError`` for what is none."""
+    if not isinstance(value, str) or "\0" in value:
+        raise ValueError(value)
+    return value

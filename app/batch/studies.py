@@ -14,7 +14,7 @@ from typing import Any
 
 from dearig.batch.engines import ClusterLost, Engine, LocalEngine
 from dearig.batch.fits import KINDS, Row, StudyOptions, Task, key_of
-from dearig.batch.journal import JOURNAL, read_lines
+from dearig.batch.journal import JOURNAL
 from dearig.batch.queue import Queue
 from dearig.config.modelfile import load_model
 from dearig.config.toml_input import read_text
@@ -116,7 +116,7 @@ def _in_folder(folder: Path, before: str, out: Path) -> Iterator[Subject]:
         if (parent / JOURNAL).exists():
             key = str(parent)
             if key not in runs:
-                queue = Queue.of(read_lines(parent / JOURNAL))
+                queue = Queue.of(parent / JOURNAL)
                 runs[key] = {parent / run.recording: run for run in queue.listed if run.recording}
             run = runs[key].get(path)
             if run is not None and run.warm_up:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from dearig.batch.campaign import CampaignOutcome
-from dearig.batch.journal import JOURNAL, read_lines
+from dearig.batch.journal import JOURNAL
 from dearig.batch.queue import Queue
 from dearig.errors import InputError
 from dearig.recording.follow import Follower
@@ -42,7 +42,7 @@ def seen(folder: Path) -> CampaignOutcome:
     no end. Raises ``InputError`` for a folder without a campaign.
     """
     running = folder.is_dir() and is_running(folder)
-    queue = Queue.of(read_lines(folder / JOURNAL)) if folder.is_dir() else Queue()
+    queue = Queue.of(folder / JOURNAL) if folder.is_dir() else Queue()
     if not queue.runs:
         raise InputError(f"{folder} has no campaign: there is no journal {JOURNAL}")
     status, reason = queue.status, queue.reason

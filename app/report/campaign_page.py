@@ -162,23 +162,30 @@ def campaign_table(outcome: CampaignOutcome, most: int | None = None) -> Table:
         start = min(max(played - most * 3 // 4, 0), len(runs) - most)
         left_out = len(runs) - most
         runs = runs[start : start + most]
+    # a file is named only where it is not the run's name with .h5
+    files = [_other_file(run) for run in runs]
+    filed = any(files)
     rows = [
         Row(
-            (
-                run.name,
-                run.state,
-                run.extremes or (run.recording if _recording(outcome.folder, run) else NO_VALUE),
-                *(_shown(run, name) for name in names),
-            ),
+            (run.name, run.state, *([file] if filed else []), *(_shown(run, n) for n in names)),
             detail=run.reason,
             muted=run.state in (WAITING, SKIPPED),
             mark=run.state in (LOST, STOPPED),
         )
-        for run in runs
+        for run, file in zip(runs, files, strict=True)
     ]
-    head = (("", ""), ("State", ""), ("Recording", ""), *((name, "") for name in names))
+    columns = ["State", *(["File"] if filed else []), *names]
+    head = (("", ""), *((name, "") for name in columns))
     note = f"{left_out} more runs are not listed." if left_out else ""
     return Table("Runs", head, tuple(rows), note)
+
+
+def _other_file(run: RunState) -> str:
+    """Return the file of a run whose name is not that of the run, "" for one that is."""
+    if run.state in (WAITING, SKIPPED):
+        return ""
+    file = run.extremes or run.recording
+    return "" if file == f"{run.name}.h5" else file
 
 
 def _shown(run: RunState, name: str) -> str:
@@ -204,12 +211,7 @@ def _contents(outcome: CampaignOutcome) -> Callable[[], dict[str, Any]]:
             "summary": campaign_summary(outcome),
             "warnings": [queue.halted] if queue.halted else [],
             "runs": campaign_table(outcome),
-            "pictures": [
-                picture(
-                    f, prefixes(), "Numbers of the runs, in the order in which they were played."
-                )
-                for f in figures
-            ],
+            "pictures": [picture(f, prefixes(), "Numbers of the runs.") for f in figures],
             "provenance": (
                 ("Folder", (str(outcome.folder),)),
                 ("Rig", (queue.rig,)),
@@ -223,19 +225,21 @@ def _contents(outcome: CampaignOutcome) -> Callable[[], dict[str, Any]]:
 
 def numbers_figure(queue: Queue, names: Sequence[str]) -> Figure:
     """Draw each number of the runs against the order of the runs, one below the other."""
+    from matplotlib.ticker import MaxNLocator
+
     from dearig.report.figure_style import WIDTH, blank, few_ticks, style
 
-    runs = [run for run in queue.listed if run.numbers]
+    runs = list(enumerate(queue.listed, start=1))
     with style():
         figure = blank(WIDTH, 0.8 + 1.1 * len(names))
         axes = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
         for ax, name in zip(axes, names, strict=True):
-            places = [i + 1 for i, run in enumerate(runs) if name in run.numbers]
-            ax.plot(
-                places, [r.numbers[name] for r in runs if name in r.numbers], ".-", linewidth=0.8
-            )
+            points = [(place, run.numbers[name]) for place, run in runs if name in run.numbers]
+            ax.plot(*zip(*points, strict=True), ".-", linewidth=0.8)
             ax.set_ylabel(name, fontsize="x-small")
             few_ticks(ax, y=3)
-        axes[-1].set_xlabel("Run with numbers")
+            ax.ticklabel_format(axis="y", useOffset=False)
+        axes[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes[-1].set_xlabel("Run, in the order in which they are played")
         figure.align_ylabels(list(axes))
     return figure

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
+from dearig.batch import campaign as module
+from dearig.batch.after import Computed
 from dearig.batch.ask import ask
 from dearig.batch.campaign import Arming
 from dearig.batch.journal import JOURNAL, REQUESTS
 from dearig.batch.watching import seen
+from dearig.config.modelfile import save_model
 from dearig.errors import DiskFault, InputError, InstrumentFault, Interrupted, SafetyStop
+from dearig.model.actuator import Actuator
+from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
 from tests.tools.played import PLAN, UNKNOWN, Bench, Killed
 
 NAMES = ["three-0001", "three-0002", "three-0003"]
@@ -326,3 +332,43 @@ def test_no_kill_loses_the_extremes_of_a_run(bench: Bench, place: int) -> None:
     assert {p.name for p in bench.out.glob("three*")} == {
         "three-0001.h5", "three-0002.csv", "three-0003.h5"
     }  # fmt: skip
+
+
+# ---------------------------------------------------------------- computations
+
+
+def computed(monkeypatch: pytest.MonkeyPatch, **facts) -> None:
+    """Let each run have these results."""
+    monkeypatch.setattr(module, "compute", lambda *_: Computed(**facts))
+
+
+def test_a_number_that_leaves_its_band_halts_it_and_no_kill_hides_that(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = PLAN + '[after]\nidentify = true\nstop_when = "mu_0_kPa < 40"\n'
+    computed(monkeypatch, numbers={"mu_0_kPa": 39.0})
+    bench.kill_at = 2 * 5  # after the halt, before the end of the run is noted
+    with pytest.raises(Killed):
+        bench.play(plan)
+    bench.kill_at = -1
+    with pytest.raises(InputError, match="mu_0_kPa is 39, and the plan stops when mu_0_kPa < 40"):
+        bench.continued(plan)
+    assert bench.played.total() == 1
+    computed(monkeypatch, numbers={"mu_0_kPa": 41.0})
+    assert bench.continued(plan, LOOKED).status == "complete"
+    assert seen(bench.out).queue.runs["three-0002"].numbers == {"mu_0_kPa": 41.0}
+
+
+def test_the_gate_checks_a_run_with_the_film_s_present_model(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    soft = replace(TABLE_3, equilibrium=replace(TABLE_3.equilibrium, modulus=3e3), branches=())
+    save_model(
+        bench.folder / "soft.toml", "soft", Actuator(THESIS_FILM, THESIS_LOAD, soft), {}, True
+    )
+    computed(monkeypatch, model="../soft.toml")
+    plan = PLAN + "[after]\nidentify = true\n"
+    with pytest.raises(InputError, match=r"with the film's present model .*--skip three-0002"):
+        bench.play(plan)
+    assert bench.played.total() == 1
+    assert states(bench) == ["done", "waiting", "waiting"]

@@ -73,7 +73,7 @@ def growth(runs: int) -> None:
 
         def progress(stage: str, fraction: float) -> None:
             nonlocal played
-            if stage == "recording" and fraction == 0.0:
+            if stage.endswith("recording") and fraction == 0.0:
                 played += 1
                 if played in {10, runs // 4, runs // 2, 3 * runs // 4, runs}:
                     handles = process.num_fds() if hasattr(process, "num_fds") else 0

@@ -17,6 +17,8 @@ from nptdms import ChannelObject, TdmsWriter
 from openpyxl import Workbook
 from scipy.io import savemat
 
+from dearig.batch.campaign import CampaignOutcome
+from dearig.batch.queue import Queue
 from dearig.config.campaignfile import EXAMPLE as CAMPAIGN
 from dearig.config.campaignfile import load_campaign
 from dearig.config.modelfile import load_model
@@ -30,6 +32,7 @@ from dearig.recording.importers.choose import choose
 from dearig.recording.importers.registry import source_at
 from dearig.recording.importers.specimen import Specimen
 from dearig.recording.importers.values import values_of
+from dearig.report.campaign_page import campaign_json, campaign_summary, campaign_table
 from tests.fuzz.mutate import mutated_bytes, mutated_hdf5, mutated_text
 from tests.tools.command import LOBE, film_model, thesis_model
 from tests.tools.recordings import Clock, run_counts, write_run, writer
@@ -182,6 +185,34 @@ def read_plan(path: Path) -> None:
     plan.load(plan.runs[-1])
 
 
+def journals(folder: Path) -> list[bytes]:
+    at = {"at": "2026-11-27T10:00:00.000+00:00"}
+    run = {"name": "a", "sequence_sha256": "0", "duration_s": 1.5, "settings": {}, "warm_up": False}
+    entries = [
+        {"event": "planned", "format": "dearig-campaign-journal/1", "name": "n", "rig": "sim",
+         "plan_sha256": "1", "rig_file_sha256": "2", "rest_s": 0.5, "repeat_lost": 1,
+         "runs": [run, run | {"name": "b"}]},
+        {"event": "armed", "by": "Ada", "rig": "sim", "runs": 2, "until": 1.8e9},
+        {"event": "request", "number": 1, "what": "first", "run": "b", "by": ""},
+        {"event": "started", "run": "b", "attempt": 1, "recording": "b.h5"},
+        {"event": "recorded", "run": "b", "recording": "b.h5", "output": "confirmed"},
+        {"event": "ended", "run": "b", "state": "done", "reason": "", "recording": "b.h5",
+         "numbers": {"mu_0_kPa": 45.0}, "model": "models/b.toml"},
+        {"event": "halted", "reason": "arc"},
+        {"event": "session-ended", "status": "halted", "reason": "arc"},
+    ]  # fmt: skip
+    return [b"".join(json.dumps(at | entry).encode() + b"\n" for entry in entries)]
+
+
+def read_journal(path: Path) -> None:
+    queue = Queue.of(path)
+    if queue.runs:
+        outcome = CampaignOutcome(queue.name, path.parent, queue, queue.status, queue.reason)
+        json.dumps(campaign_json(outcome), allow_nan=False)
+        campaign_table(outcome)
+        campaign_summary(outcome)
+
+
 def rig_files(folder: Path) -> list[bytes]:
     write_default(folder / "rig.toml")
     return [(folder / "rig.toml").read_bytes(), b"[card]\nsample_rate_Hz = 200.0\n"]
@@ -198,6 +229,7 @@ TARGETS: dict[str, Target] = {
     "sequences": Target(".toml", sequences, mutated_text, load_sequence, 0.2),
     "paths": Target(".toml", paths, mutated_text, load_target, 0.01),
     "plans": Target(".toml", plans, mutated_text, read_plan, 0.05),
+    "journals": Target(".jsonl", journals, mutated_text, read_journal, 0.05),
     "rig files": Target(".toml", rig_files, mutated_text, load_rig_file, 0.12),
     "model files": Target(".toml", models, mutated_text, load_model, 0.2),
     "CSV": Target(".csv", exported("csv"), mutated_text, read_table, 0.2),
