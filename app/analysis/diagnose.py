@@ -26,6 +26,7 @@ from dearig.analysis.outcomes import (
     DiagnoseOutcome,
     SeparatingExperiment,
     Stand,
+    covariance_table,
     pooled_rms,
 )
 from dearig.analysis.quality import check_enough, extrapolated, few_data, inspect
@@ -504,8 +505,10 @@ def _history(outcome: DiagnoseOutcome, recordings: Sequence[Recording]) -> dict[
                 "low95": e.low if math.isfinite(e.low) else None,
                 "high95": e.high if math.isfinite(e.high) else None,
                 "determined": e.determined,
+                "at_bound": e.at_bound,
                 "note": e.note,
             }
             for e in finding.final.estimates
         ],
+        "covariance": covariance_table(finding.final.covariance_names, finding.final.covariance),
     }

@@ -21,6 +21,7 @@ from dearig.analysis.outcomes import (
     BranchTrial,
     Comparison,
     IdentifyOutcome,
+    covariance_table,
     pooled_over_noise,
 )
 from dearig.analysis.quality import few_data
@@ -237,8 +238,10 @@ def _history(
                 "low95": e.low if e.low > 0.0 else None,
                 "high95": e.high if math.isfinite(e.high) else None,
                 "determined": e.determined,
+                "at_bound": e.at_bound,
                 "note": e.note,
             }
             for e in fit.estimates
         ],
+        "covariance": covariance_table(fit.covariance_names, fit.covariance),
     }

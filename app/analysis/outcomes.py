@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -33,6 +33,7 @@ __all__ = [
     "SeparatingExperiment",
     "Stand",
     "ValidateOutcome",
+    "covariance_table",
     "noise_from",
     "pooled_noise",
     "pooled_over_noise",
@@ -323,6 +324,16 @@ def pooled_over_noise(comparisons: Sequence[Comparison]) -> float | None:
     """
     noise = pooled_noise(comparisons)
     return pooled_rms(comparisons) / noise if noise else None
+
+
+def covariance_table(names: Sequence[str], covariance: np.ndarray) -> dict[str, Any] | None:
+    """Return ``covariance`` (f, f) of parameters ``names`` in SI units as plain values.
+
+    None where there is none. It comes from the curvature of the likelihood at the optimum.
+    """
+    if covariance.size == 0 or not np.isfinite(covariance).all():
+        return None
+    return {"names": list(names), "matrix": covariance.tolist()}
 
 
 def noise_from(comparisons: Sequence[Comparison]) -> str | None:

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from dearig.analysis.outcomes import (
+    covariance_table,
     noise_from,
     pooled_noise,
     pooled_over_noise,
@@ -61,6 +62,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         **_noise_json(outcome.kind, outcome.train),
         "residual_over_noise": _number(pooled_over_noise(outcome.train)),
         "parameters": [_parameter_json(e, known) for e in fit.estimates],
+        "covariance": covariance_table(fit.covariance_names, fit.covariance),
         "train": [_comparison_json(c) for c in outcome.train],
         "validation": [_comparison_json(c) for c in outcome.validation],
         "trials": [_trial_json(t, outcome.kind) for t in outcome.trials],
@@ -94,6 +96,7 @@ def _parameter_json(estimate: Estimate, known: bool) -> dict[str, Any]:
         "ci95": [low, high] if known or not estimate.free else [None, None],
         "determined": bool(estimate.determined),
         "free": bool(estimate.free),
+        "at_bound": bool(estimate.at_bound),
         "note": estimate.note,
     }
 
@@ -250,6 +253,7 @@ def diagnosis_json(outcome: DiagnoseOutcome) -> dict[str, Any]:
         "assumed": outcome.assumed,
         "performed": list(outcome.performed),
         "parameters": [_effect_number_json(e) for e in finding.final.estimates],
+        "covariance": covariance_table(finding.final.covariance_names, finding.final.covariance),
         "quality": list(outcome.quality),
         "notes": list(finding.notes),
         "interrupted": finding.interrupted,
@@ -322,6 +326,7 @@ def _effect_number_json(estimate: Estimate) -> dict[str, Any]:
         "unit": estimate.unit,
         "ci95": [_number(estimate.low), _number(estimate.high)],
         "determined": bool(estimate.determined),
+        "at_bound": bool(estimate.at_bound),
         "note": estimate.note,
     }
 

@@ -12,7 +12,7 @@ from dearig.analysis.outcomes import pooled_noise, pooled_rms
 from dearig.model.verdict import TOLERANCE
 from dearig.report.numbers import NO_VALUE, interval, quoted, seconds, significant, symbol
 from dearig.report.sentences import few_data_sentence, listed
-from dearig.report.tables import Row, Table
+from dearig.report.tables import BOUND_MARK, Row, Table
 from dearig.units import SHOWN, parameter_unit, readable
 
 if TYPE_CHECKING:
@@ -526,6 +526,8 @@ def _estimate(e: Estimate, name: str, detail: str) -> Row:
     within = interval(low, high) if e.free else "derived"
     if e.free and e.low == e.high == e.value:
         within = NO_VALUE
+    if e.at_bound:
+        within += BOUND_MARK
     return Row(
         (name, value if e.determined else f"({value})", unit, within),
         detail,

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from dearig.model.fitting import Identification
 
 __all__ = [
+    "BOUND_MARK",
     "Row",
     "Table",
     "branch_trials",
@@ -56,6 +57,9 @@ class Table:
         notes = " ".join(n for n in (self.note, other.note) if n)
         return Table(self.title, self.head + other.head[1:], rows, notes)
 
+
+#: After the interval of a parameter at an end of its search range.
+BOUND_MARK = ", at bound"
 
 _TITLES = {
     "A": "Table A: amplitudes 6 to 8 kV at one frequency (the thesis's Table 4)",
@@ -158,8 +162,10 @@ def parameter_table(fit: Identification) -> Table:
         if known:
             value = quoted(e.value * factor, e.low * factor, e.high * factor)
             within = interval(e.low * factor, e.high * factor) if e.free else "derived"
+            within = f"{within}{BOUND_MARK}" if e.at_bound else within
         else:
-            value, within = significant(e.value * factor, 4), NO_VALUE
+            value = significant(e.value * factor, 4)
+            within = BOUND_MARK.lstrip(", ") if e.at_bound else NO_VALUE
         cells = [symbol(e.name), value if e.determined or not known else f"({value})", unit, within]
         if published:
             theirs = published.get(e.name, math.nan)
@@ -170,6 +176,8 @@ def parameter_table(fit: Identification) -> Table:
     if published:
         head.append(("Thesis", "Table 3"))
     notes = []
+    if any(e.at_bound for e in fit.estimates):
+        notes.append("At bound: at an end of the search range; the data may ask for more.")
     if known and fit.undetermined:
         notes.append("Values in brackets are not determined by these data.")
     if published:

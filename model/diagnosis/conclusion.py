@@ -207,8 +207,14 @@ def conclude(
     judge, full = found.judge, fitter.full
     doubtful = not end.is_small and end.explained < _TRUSTED_SHARE
     others = end.first.model if doubtful else end.predicting(found.best, end.last)
-    first = stage_of(end.first, judge, full, estimated=True)
-    final = stage_of(end.last, judge, full, estimated=True, for_others=others)
+    first = stage_of(end.first, judge, full)
+    final = stage_of(
+        end.last,
+        judge,
+        full,
+        profiled=fitter.means_about(end.last, found.best.drift),
+        for_others=others,
+    )
     steps, rivals = end.steps(final)
     before, after = signatures(full, end.first), signatures(full, end.last)
     models = final.of_each(len(full))

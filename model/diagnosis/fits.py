@@ -25,6 +25,7 @@ from dearig.model.effects import EFFECTS
 from dearig.model.film import Strip
 from dearig.model.fitting.broyden import descend_broyden
 from dearig.model.fitting.coarse_drive import coarse_drive_of
+from dearig.model.fitting.estimates import recentre
 from dearig.model.fitting.identify import fit_globally, is_worth_freeing
 from dearig.model.fitting.intervals import correlation_time, is_flat
 from dearig.model.fitting.levenberg import LocalFit, descend
@@ -345,6 +346,15 @@ class Fitter:
         ratios = [(t.noise / f.noise) ** 2 for t, f in zip(self.records, self.full, strict=True)]
         scaled = drift * sum(ratios) / len(ratios)
         return self.problem(model, scaled, kernel.CAREFUL, full=True)
+
+    def means_about(self, careful: Fit, drift: float) -> WhitenedProblem:
+        """Return the thinned records, moved so that their optimum is that of a ``careful`` fit.
+
+        ``drift`` is that of the thinned records.
+        """
+        problem = self.problem(careful.model, drift)
+        recentre(problem, careful.problem, careful.problem.layout.values(careful.x))
+        return problem
 
     def start_of(self, problem: WhitenedProblem, parent: np.ndarray, effects: Values) -> np.ndarray:
         """Return coordinates (d,) of ``problem``: a ``parent``'s, then its new ``effects``."""

@@ -183,8 +183,13 @@ class WhitenedProblem(Problem):
     ) -> None:
         super().__init__(records, layout, **options)  # type: ignore[arg-type]
         self.noise_drift = drift
-        if drift is not None:
-            self.measured = drift.whitened(self.readings)
+        self.set_readings(self.readings)
+
+    def set_readings(self, readings: np.ndarray) -> None:
+        """Fit other ``readings`` (N,) in place of those of the records."""
+        super().set_readings(readings)
+        if self.noise_drift is not None:
+            self.measured = self.noise_drift.whitened(readings)
 
     def predict(
         self, values: np.ndarray, coarse: np.ndarray | None = None

@@ -110,7 +110,8 @@ class Stage:
     differences have a meaning. ``estimates`` are the model's parameters with their intervals.
     ``for_others`` is the model that predicts other recordings, refitted without the effects that
     are specific to these recordings. ``models`` are those of the training records, each with its
-    own drift.
+    own drift. ``covariance`` (f, f) is that of the fitted parameters ``covariance_names``, in SI
+    units.
     """
 
     model: Actuator | Strip
@@ -122,6 +123,8 @@ class Stage:
     estimates: tuple[Estimate, ...] = ()
     for_others: Actuator | Strip | None = None
     models: tuple[Actuator | Strip, ...] = ()
+    covariance_names: tuple[str, ...] = ()
+    covariance: np.ndarray = field(default_factory=lambda: np.empty((0, 0)), compare=False)
 
     def of_each(self, records: int) -> tuple[Actuator | Strip, ...]:
         """Return the models of so many training ``records``."""

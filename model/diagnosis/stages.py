@@ -12,12 +12,12 @@ import numpy as np
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis.evidence import Judge
 from dearig.model.diagnosis.fits import Fit
+from dearig.model.diagnosis.noise import WhitenedProblem
 from dearig.model.diagnosis.results import Stage
 from dearig.model.effects import EFFECTS
 from dearig.model.film import Strip
 from dearig.model.fitting import Estimate
-from dearig.model.fitting.identify import is_determined
-from dearig.model.fitting.intervals import covariance
+from dearig.model.fitting.estimates import estimates_with_intervals
 from dearig.model.fitting.left_out import left_out
 from dearig.model.records import ActuatorRecord, Record
 
@@ -27,7 +27,6 @@ __all__ = ["DRIFT_LAW", "drift_values", "stage_of", "with_drift"]
 DRIFT_LAW = "fitful drift"
 
 _NORMAL_95 = 1.96
-_AT_BOUND = 1e-9  # of a coordinate
 _FLAT = 1e-4  # relative singular value: polynomials that nearly cancel are left out
 
 
@@ -36,22 +35,32 @@ def stage_of(
     judge: Judge,
     full: Sequence[Record],
     *,
-    estimated: bool = False,
+    profiled: WhitenedProblem | None = None,
     for_others: Actuator | Strip | None = None,
 ) -> Stage:
-    """Return the errors of ``fit``; with ``estimated`` the intervals of its parameters too.
+    """Return the errors of ``fit``; with ``profiled`` the intervals of its parameters too.
 
+    That is a problem with the same optimum, on which their likelihood is profiled.
     ``for_others`` is the model that predicts other recordings, where it is another one. Errors are
     of readings of the ``full`` records.
     """
     problem = fit.problem
-    jacobian = problem.jacobian(fit.x, ~fit.fixed, None if estimated else fit.residuals)
+    jacobian = problem.jacobian(fit.x, ~fit.fixed, None if profiled else fit.residuals)
     good = np.isfinite(problem.sigma)
     scale = problem.sigma[good]
     # thinning took noise away: put back, so that errors compare with those of every sample
     lost = _noise_lost(problem.records, full)
     reach = problem.layout.reach(fit.x)[~fit.fixed]
     predicted = left_out(fit.residuals, jacobian, reach)[good] * scale
+    estimates: tuple[Estimate, ...] = ()
+    names: tuple[str, ...] = ()
+    covariance = np.empty((0, 0))
+    if profiled is not None:
+        values = problem.layout.values(fit.x)
+        found, names, covariance = estimates_with_intervals(
+            profiled, values, fit.fixed, lambda: None, lower_ends=False
+        )
+        estimates = (*found, *_drift_estimates(fit))
     return Stage(
         model=fit.model,
         cost=fit.cost,
@@ -59,7 +68,9 @@ def stage_of(
         selection_rms=math.sqrt(float(np.mean(predicted**2)) + lost),
         selection_max=float(np.max(np.abs(predicted))),
         criterion=judge.criterion(fit),
-        estimates=_estimates(fit, jacobian) if estimated else (),
+        estimates=estimates,
+        covariance_names=names,
+        covariance=covariance,
         for_others=for_others or fit.model,
         models=with_drift(fit),
     )
@@ -70,36 +81,6 @@ def _noise_lost(thin: Sequence[Record], full: Sequence[Record]) -> float:
     sizes = np.array([r.measured.size for r in thin], dtype=float)
     lost = np.array([f.noise**2 - t.noise**2 for f, t in zip(full, thin, strict=True)])
     return max(float(np.sum(sizes * lost) / np.sum(sizes)), 0.0)
-
-
-def _estimates(fit: Fit, jacobian: np.ndarray) -> tuple[Estimate, ...]:
-    """Return all parameters with 95 % intervals from the curvature of the likelihood.
-
-    Widened by what the residual is above the noise, and by its correlation.
-    """
-    layout = fit.problem.layout
-    inflation = max(1.0, fit.cost) * max(1.0, fit.correlation)
-    spread = np.full(fit.x.size, math.inf)
-    spread[~fit.fixed] = np.sqrt(np.diag(covariance(jacobian.T @ jacobian, inflation)))
-    room = np.minimum(fit.x - layout.lower, layout.upper - fit.x)
-    values = layout.values(fit.x)
-    found = []
-    for q, x, value, sigma, free in zip(
-        layout.quantities, fit.x, values, spread, room, strict=True
-    ):
-        if not math.isfinite(sigma):
-            found.append(Estimate(q.name, q.unit, float(value), 0.0, math.inf, False, "held"))
-            continue
-        low, high = x - _NORMAL_95 * sigma, x + _NORMAL_95 * sigma
-        if q.logarithmic:
-            low, high = math.exp(max(low, -700.0)), math.exp(min(high, 700.0))
-        low, high = max(float(low), q.bounds[0]), min(float(high), q.bounds[1])
-        sure = is_determined(low, high)
-        note = "" if sure else "poorly determined by these data"
-        if free < _AT_BOUND:
-            note = "at the end of its search range"
-        found.append(Estimate(q.name, q.unit, float(value), low, high, sure, note))
-    return (*found, *_drift_estimates(fit))
 
 
 # ---------------------------------------------------------------- drift

@@ -11,14 +11,20 @@ import numpy as np
 from dearig.model.actuator import Actuator
 from dearig.model.errors import ModelError
 from dearig.model.film import Strip
-from dearig.model.fitting.intervals import CHI2_95, correlation_time, covariance, profile
+from dearig.model.fitting.estimates import (
+    AT_BOUND,
+    at_bound,
+    estimates_with_intervals,
+    recentre,
+)
+from dearig.model.fitting.intervals import CHI2_95, correlation_time
 from dearig.model.fitting.levenberg import LocalFit, descend
 from dearig.model.fitting.parameters import Estimate, Layout, require_free
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import Progress, algorithm_1, film_starts, voltage_starts
 from dearig.model.fitting.thinning import thinned
 from dearig.model.material import Network
-from dearig.model.records import ActuatorRecord, FilmRecord, Record
+from dearig.model.records import FilmRecord, Record
 
 __all__ = [
     "METHODS",
@@ -26,7 +32,6 @@ __all__ = [
     "add_intervals",
     "fit_globally",
     "identify",
-    "is_determined",
     "is_worth_freeing",
 ]
 
@@ -35,8 +40,6 @@ METHODS = ("hybrid", "de")
 _COARSE_RATE = 125.0  # Hz: resolves relaxation times of tens of milliseconds
 _COARSE_SAMPLES = 1500  # of a film record
 _SCOUT_ITERATIONS = 10  # of each start, before the worse ones are dropped
-_DETERMINED_RATIO = 5.0  # ratio of the ends of an interval, above which a value is not quoted
-_J_WORDS = "no spring stiffens measurably at these stretches: only a lower bound"
 
 
 @dataclass(frozen=True)
@@ -143,9 +146,14 @@ def _result(
     model = layout.model(values)
     base = layout.base
     estimates = [
-        Estimate(q.name, q.unit, float(v), 0.0, math.inf, False, words)
-        for q, v in zip(layout.quantities, values, strict=True)
-    ]
+        Estimate(
+            q.name, q.unit, float(v), 0.0, math.inf, False, AT_BOUND if end else words,
+            at_bound=bool(end),
+        )
+        for q, v, end in zip(
+            layout.quantities, values, at_bound(layout, layout.coordinates(values)), strict=True
+        )
+    ]  # fmt: skip
     if isinstance(base, Actuator) and base.load.rest_length is not None:
         modulus = layout.build(values).equilibrium.modulus
         estimates.insert(
@@ -162,6 +170,11 @@ def _result(
             "the residual is above the noise: the model lacks something, and the intervals "
             "(widened by the residual's size and correlation) are a rough guide"
         )
+    warnings += [
+        f"{e.name} is {AT_BOUND}: the data may ask for a value beyond it"
+        for e in estimates
+        if e.at_bound
+    ]
     if method == "hybrid" and not fit.converged:
         warnings.append("the fit stopped before it converged")
     return Identification(
@@ -189,31 +202,6 @@ def _coarse(problem: Problem) -> Problem:
         for r in problem.records
     ]
     return Problem(records, problem.layout, problem.workers)
-
-
-def _coarse_about(problem: Problem, values: np.ndarray) -> Problem:
-    """Return the coarse problem with its optimum at that of the full one.
-
-    Averaging shifts a curve, and intervals can be narrower than the shift. So the coarse
-    measurement is the coarse model at the optimum plus the averaged residual of the full problem.
-    """
-    coarse = _coarse(problem)
-    full, _ = problem.predict(values)
-    thin, _ = coarse.predict(values)
-    edges_full = np.cumsum([0, *(r.measured.size for r in problem.records)])
-    edges_thin = np.cumsum([0, *(r.measured.size for r in coarse.records)])
-    for i, record in enumerate(problem.records):
-        model = full[0, edges_full[i] : edges_full[i + 1]]
-        part = slice(edges_thin[i], edges_thin[i + 1])
-        thinner = coarse.records[i]
-        if isinstance(record, ActuatorRecord) and isinstance(thinner, ActuatorRecord):
-            moved = replace(record, displacement=record.displacement - model)
-            left = moved.in_means(thinner.means_of // record.means_of).measured
-        elif isinstance(record, FilmRecord):
-            pulled = replace(record, stress=record.stress - model)
-            left = pulled.coarse(_COARSE_SAMPLES).measured
-        coarse.measured[part] = thin[0, part] + left
-    return coarse
 
 
 def fit_globally(
@@ -272,58 +260,16 @@ def _intervals(
     problem: Problem, values: np.ndarray, held: np.ndarray, progress: Progress
 ) -> tuple[list[Estimate], tuple[str, ...], np.ndarray]:
     """Return estimates with profile-likelihood intervals; ``held`` (d,) limits are undetermined."""
-    layout = problem.layout
-    coarse = _coarse_about(problem, values)
-    centre = descend(coarse, layout.coordinates(values), held, iterations=10)
-    free = ~held
-    residuals = centre.residuals
-    inflation = max(1.0, centre.cost) * max(1.0, correlation_time(residuals))
-    jac = coarse.jacobian(centre.x, free)
-    cov = covariance(jac.T @ jac, inflation)
-    # a held limit is freed alone for its own profile; the others stay practically neo-Hookean
-    estimates = []
+    coarse = _coarse(problem)
+    recentre(coarse, problem, values)
     done = 0
 
     def tick() -> None:
         nonlocal done
         done += 1
-        progress("intervals", 1.0 - 0.5 ** (done / (3.0 * layout.size)))
+        progress("intervals", 1.0 - 0.5 ** (done / (3.0 * problem.layout.size)))
 
-    chi2 = centre.cost * coarse.samples
-    for j, q in enumerate(layout.quantities):
-        sides = (-1.0,) if held[j] else (-1.0, 1.0)  # a held limit is already at its upper end
-        low, high = profile(coarse, centre.x, chi2, j, jac, inflation, held, tick, sides)
-        value = float(values[j])
-        if q.logarithmic:
-            low, high = math.exp(low), math.exp(high)
-        if q.kind != "effect":
-            low = max(low, 0.0)
-        low, high = float(min(low, value)), float(max(high, value))
-        determined = is_determined(low, high)
-        note = "" if determined else _open_words(low, high)
-        if held[j]:
-            note = _J_WORDS if low > 0.0 else "not determined by these data"
-        estimates.append(Estimate(q.name, q.unit, value, low, high, determined, note))
+    found = estimates_with_intervals(coarse, values, held, tick)
     progress("intervals", 1.0)
     problem.simulations += coarse.simulations
-    names = tuple(n for n, f in zip(layout.names, free, strict=True) if f)
-    natural = np.where([q.logarithmic for q in layout.quantities], values, 1.0)[free]
-    return estimates, names, cov * np.outer(natural, natural)
-
-
-def is_determined(low: float, high: float) -> bool:
-    """Whether an interval is narrow enough for its value to be quoted, and excludes 0."""
-    near, far = sorted((abs(low), abs(high)))
-    return low * high > 0.0 and far < math.inf and far / near <= _DETERMINED_RATIO
-
-
-def _open_words(low: float, high: float) -> str:
-    if low < 0.0 < high:
-        return "not distinguishable from 0 with these data"
-    if low == 0.0 and math.isinf(high):
-        return "not determined by these data"
-    if math.isinf(high):
-        return "only a lower bound"
-    if low == 0.0:
-        return "only an upper bound"
-    return f"known only within a factor of {high / low:.3g}"
+    return found

@@ -83,6 +83,7 @@ class Estimate:
     An end of the interval that the data leave open is 0 or infinite. ``determined`` is False when
     the interval is so wide that the value should not be quoted; ``note`` then says so in words.
     ``free`` is False for a parameter that follows from others (mu_0 of a measured rest length).
+    ``at_bound`` is True for a value at an end of its search range: the data may ask for more.
     """
 
     name: str
@@ -93,6 +94,7 @@ class Estimate:
     determined: bool
     note: str = ""
     free: bool = True
+    at_bound: bool = False
 
 
 class Layout:

@@ -94,6 +94,10 @@ class Problem:
         #: (d,) bool: parameters of the layout that each record has for itself
         self.own = np.array([name in own for name in layout.names], dtype=bool)
 
+    def set_readings(self, readings: np.ndarray) -> None:
+        """Fit other ``readings`` (N,) in place of those of the records."""
+        self.readings = self.measured = readings
+
     @property
     def samples(self) -> int:
         """Number of readings that are fitted."""

@@ -1,0 +1,57 @@
+"""Estimates with intervals: bounds are marked, and means of readings keep the optimum."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dearig.model.fitting.estimates import estimates_with_intervals, recentre
+from dearig.model.fitting.levenberg import descend
+from dearig.model.fitting.parameters import Estimate
+from dearig.model.fitting.problem import Problem
+from dearig.report.diagnosis import estimate_table
+from dearig.report.tables import parameter_table
+from tests.tools.engine import PLAIN, effect, posed, record_of, thesis_drive
+from tests.tools.reports import fit as paper_fit
+
+
+def test_a_parameter_at_an_end_of_its_search_range_is_marked() -> None:
+    record = record_of(PLAIN)
+    early = np.interp(record.time + 5e-3, record.time, record.displacement)
+    lagged = replace(PLAIN, effects=effect("sensor lag", time_constant=2e-3))
+    problem, x, free = posed(lagged, replace(record, displacement=early))
+    found = descend(problem, x, ~free)
+    values = problem.layout.values(found.x)
+    estimates, _, _ = estimates_with_intervals(
+        problem, values, ~free, lambda: None, lower_ends=False
+    )
+    lag = estimates[-1]
+    assert (lag.value, lag.at_bound, lag.determined) == (0.0, True, False)
+    assert lag.note == "at the end of its search range"
+    assert [e.name for e in estimates if e.at_bound] == [lag.name]
+
+
+def test_tables_mark_a_parameter_at_a_bound() -> None:
+    ended = Estimate("mu_1", "Pa", 0.01, 0.0, 20.0, False, "at the end", at_bound=True)
+    for fit in (
+        paper_fit(estimates=(ended,)),
+        paper_fit(estimates=(ended,), covariance=np.empty(0)),
+    ):
+        assert "at bound" in parameter_table(fit).rows[0].cells[3]
+        assert "the data may ask for more" in parameter_table(fit).note
+    assert "at bound" in estimate_table((ended,)).rows[0].cells[3]
+
+
+@pytest.mark.parametrize("lead_in", [0, 800])
+def test_means_of_readings_have_the_optimum_of_all_readings(lead_in: int) -> None:
+    record = replace(record_of(PLAIN, thesis_drive(rate=400.0)), lead_in=lead_in)
+    problem, x, free = posed(PLAIN, record)
+    best = descend(problem, x, ~free)
+    means = Problem([record.in_means(8)], problem.layout, workers=1)
+    recentre(means, problem, problem.layout.values(best.x))
+    gradient = means.jacobian(best.x, free).T @ means.residuals(best.x)
+    scale = np.linalg.norm(means.jacobian(best.x, free), axis=0)
+    # in standard deviations
+    assert np.abs(gradient / scale).max() < 0.1
