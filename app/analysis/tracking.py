@@ -302,6 +302,11 @@ class Tracking:
         self.proposed = self._next()
         return run
 
+    @property
+    def settled(self) -> str:
+        """Why nothing more is learned: further runs play the same voltage; "" while it goes on."""
+        return self._learner.settled
+
     def outcome(self, rig: str, status: str = "complete", reason: str = "") -> TrackOutcome:
         """Return what was done on the rig at the address ``rig``."""
         return TrackOutcome(

@@ -25,15 +25,15 @@ __all__ = ["FollowRequest", "Followed", "Played", "begin_following", "learn_from
 class FollowRequest:
     """What is to be followed: the target as ``toml``, whose tables are in ``folder``.
 
-    ``model`` is a model file, None for the thesis model. ``film`` is the name of the film on the
-    rig, ``within`` in m the distance from the target that is accepted.
+    ``model`` is a model file, None for the thesis model. The rig is at ``address``. ``within`` in m
+    is the distance from the target that is accepted.
     """
 
     toml: str
     folder: Path
     model: Path | None
+    address: str
     rig_file: RigFile
-    film: str
     within: float
 
 
@@ -58,8 +58,11 @@ class Played:
     sequence: str
 
 
-def begin_following(request: FollowRequest, progress: Progress = quiet) -> Followed:
-    """Compute the voltage of the first run, and check it with the gate. Raises ``InputError``."""
+def begin_following(request: FollowRequest, film: str = "", progress: Progress = quiet) -> Followed:
+    """Compute the voltage of the first run, and check it with the gate for the ``film`` by name.
+
+    Raises ``InputError``.
+    """
     target = parse_target(request.toml, "the target", request.folder)
     progress("computing the voltage", 0.0)
     if request.model is None:
@@ -69,10 +72,12 @@ def begin_following(request: FollowRequest, progress: Progress = quiet) -> Follo
     else:
         model = load_model(request.model)
     tracking = Tracking(target, model, request.rig_file, iterations=None, within=request.within)
-    return _checked(Followed(request, tracking), progress)
+    return _checked(Followed(request, tracking), film, progress)
 
 
-def learn_from(followed: Followed, played: Played, progress: Progress = quiet) -> Followed | None:
+def learn_from(
+    followed: Followed, played: Played, film: str = "", progress: Progress = quiet
+) -> Followed | None:
     """Learn from a run, and return what is proposed next; None if it played something else.
 
     Raises ``InputError`` for a run from which nothing can be learned.
@@ -82,20 +87,20 @@ def learn_from(followed: Followed, played: Played, progress: Progress = quiet) -
         return None
     progress("learning from the run", 0.0)
     followed.tracking.add(recording, followed.margins)
-    return _checked(followed, progress)
+    return _checked(followed, film, progress)
 
 
-def write_report(followed: Followed, rig: str, path: Path, progress: Progress = quiet) -> Path:
-    """Write the report of all runs on the rig at the address ``rig`` to ``path``."""
+def write_report(followed: Followed, path: Path, progress: Progress = quiet) -> Path:
+    """Write the report of all runs to ``path``."""
     progress("writing the report", 0.0)
-    return write_track_report(followed.tracking.outcome(rig), path)
+    return write_track_report(followed.tracking.outcome(followed.request.address), path)
 
 
-def _checked(followed: Followed, progress: Progress) -> Followed:
+def _checked(followed: Followed, film: str, progress: Progress) -> Followed:
     """Return ``followed`` with what the gate says of the proposed run."""
     request, proposed = followed.request, followed.tracking.proposed
     if proposed is None:
         raise InputError("all runs are made")
-    planned = plan(proposed.sequence(), request.rig_file, film=request.film, progress=progress)
+    planned = plan(proposed.sequence(), request.rig_file, film=film, progress=progress)
     margins = () if planned.waveform is None else planned.waveform.margins
     return replace(followed, margins=margins, reasons=planned.reasons)

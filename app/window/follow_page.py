@@ -85,7 +85,6 @@ class FollowPage(QWidget):
         self._followed: Followed | None = None
         self._folder: Path | None = None  # of the sequences that were shown
         self._awaited = ""  # TOML of the sequence that was shown on the page Run
-        self._addresses: list[str] = []  # rigs of the runs
         self._recorded_meanwhile: Path | None = None  # while a job went on
 
         self.split = QSplitter(Qt.Orientation.Horizontal)
@@ -105,7 +104,6 @@ class FollowPage(QWidget):
         self.within.valueChanged.connect(self._refresh)
         self.nearest.toggled.connect(self._refresh)
         session.rig_changed.connect(self._refresh)
-        session.notes_changed.connect(self._refresh)
         session.running_changed.connect(self._refresh)
         session.recorded.connect(self._recorded)
         self._refresh()
@@ -121,15 +119,16 @@ class FollowPage(QWidget):
         """Return what the inputs ask for."""
         session = self._session
         return FollowRequest(
-            self.target.toml, self.target.folder, self.model.path, session.rig_file, session.film,
-            self.within.value() * 1e-6,
+            self.target.toml, self.target.folder, self.model.path, session.address,
+            session.rig_file, self.within.value() * 1e-6,
         )  # fmt: skip
 
     @Slot()
     def compute(self) -> None:
         """Compute the voltage of the first run; earlier runs are no longer shown."""
         if self._job is None:
-            self._submit(self._worker.submit(begin_following, self.request()), self._begun)
+            job = self._worker.submit(begin_following, self.request(), self._session.film)
+            self._submit(job, self._begun)
 
     @Slot()
     def show_on_run(self) -> None:
@@ -161,10 +160,7 @@ class FollowPage(QWidget):
     def open_report(self) -> None:
         """Write the report of the runs and open it in the browser."""
         if self._followed is not None and self._folder is not None and self._job is None:
-            job = self._worker.submit(
-                write_report, self._followed, ", ".join(dict.fromkeys(self._addresses)),
-                self._folder / "report.html",
-            )  # fmt: skip
+            job = self._worker.submit(write_report, self._followed, self._folder / "report.html")
             self._submit(job, self._report_written)
 
     @Slot()
@@ -211,7 +207,7 @@ class FollowPage(QWidget):
 
     @Slot(object)
     def _begun(self, followed: Followed) -> None:
-        self._folder, self._addresses = None, []
+        self._folder = None
         self._await("")
         self._show(followed)
 
@@ -220,7 +216,6 @@ class FollowPage(QWidget):
         if followed is None:  # another sequence was played
             return
         self._await("")
-        self._addresses.append(self._session.address)
         self._show(followed)
         self.tabs.setCurrentWidget(self.runs)
 
@@ -261,7 +256,9 @@ class FollowPage(QWidget):
                 "warn",
             )
             return
-        job = self._worker.submit(learn_from, self._followed, Played(path, self._awaited))
+        job = self._worker.submit(
+            learn_from, self._followed, Played(path, self._awaited), self._session.film
+        )
         self._submit(job, self._learned)
 
     def _await(self, sequence: str) -> None:
@@ -288,7 +285,7 @@ class FollowPage(QWidget):
     def _show(self, followed: Followed) -> None:
         self._followed = followed
         tracking = followed.tracking
-        outcome = tracking.outcome(self._session.address)
+        outcome = tracking.outcome(followed.request.address)
         self.headline.setText(track_headline(outcome))
         notes = () if not tracking.runs else tracking.runs[-1].notes
         self.next_run.show_pieces(
@@ -359,7 +356,7 @@ class FollowPage(QWidget):
     def _state(self, followed: Followed, changed: bool) -> tuple[str, str]:
         """Return what keeps the next run from being shown on the page Run, and its role."""
         if changed:
-            return "Target, model, film or rig have changed: compute the voltage again.", "warn"
+            return "Target, model or rig have changed: compute the voltage again.", "warn"
         if followed.reasons:
             return f"Refused by the limits of the rig file: {'; '.join(followed.reasons)}.", "bad"
         if not followed.tracking.outcome("").feasible and not self.nearest.isChecked():
@@ -368,7 +365,8 @@ class FollowPage(QWidget):
                 "follow the nearest one that is feasible.",
                 "bad",
             )
-        return "", ""
+        settled = followed.tracking.settled
+        return (f"{settled[:1].upper()}{settled[1:]}." if settled else ""), "good"
 
     # layout
 

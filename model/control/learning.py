@@ -178,7 +178,7 @@ class Learner:
         self._best: _Run | None = None
         self._lacking: list[np.ndarray] = []  # raw, of the last runs
         self._learned: _Step | None = None  # the last step
-        self._settled = ""  # why nothing more is learned
+        self.settled = ""  #: why nothing more is learned
 
     @property
     def voltage(self) -> np.ndarray:
@@ -216,8 +216,8 @@ class Learner:
         if np.count_nonzero(usable & self._inside) < _USABLE * np.count_nonzero(self._inside):
             notes.append("too few readings can be used: nothing is learned from this run")
             return self._lesson(rms, largest, samples, learned=False, notes=notes)
-        if self._settled:
-            notes.append(self._settled)
+        if self.settled:
+            notes.append(self.settled)
             return self._lesson(rms, largest, samples, learned=False, notes=notes)
         lacking = self._bridged(reading - self._now.reading, usable)
         best = self._best
@@ -269,7 +269,7 @@ class Learner:
 
     def _settle(self, run: _Run, why: str, notes: list[str]) -> None:
         """Keep the voltage of ``run`` from now on."""
-        self._best, self._known, self._now, self._settled = run, run.known, run.played, why
+        self._best, self._known, self._now, self.settled = run, run.known, run.played, why
         notes.append(why)
 
     def _step_back(

@@ -208,11 +208,13 @@ def test_a_changed_target_or_rig_is_computed_again(qtbot: QtBot, page: FollowPag
     assert page.run_button.isEnabled()
     # nothing is learned from a run on another rig
     click(qtbot, page.run_button)
-    session.set_rig_file(None, "", RigFile())
+    session.set_address("sim:8")
     session.recorded.emit(made(session.folder, "other"))
     assert "Nothing is learned from the last run" in page.message.text()
+    assert "compute the voltage again" in page.state.text()
     # and nothing from another sequence
-    session.set_rig_file(None, "", RIG)
+    session.set_address("sim")
+    session.set_notes("Ada", "film 3", "")  # what the operator writes changes no voltage
     session.recorded.emit(session.folder / "other.h5")
     idle(qtbot, page)
     assert page.followed is not None
