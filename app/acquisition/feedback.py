@@ -191,23 +191,22 @@ class FeedbackLoop:
     def toml(self) -> str:
         """Return the settings as TOML, as a recording keeps them."""
         f, s = self.feedback, self.settings
-        return tomli_w.dumps(
-            {
-                "setpoint_mm": f.setpoint * 1e3,
-                "from_s": f.start,
-                "to_s": f.stop,
-                "authority_pct": f.authority * 100.0,
-                "rate_limit_pct_per_s": f.rate_limit * 100.0,
-                "response_s": f.response,
-                "block_s": s.period,
-                "delay_s": s.delay,
-                "laser_loss_s": f.laser_loss,
-                "sensitivity_mm": s.sensitivity * 1e3,
-                "gain_per_mm_s": s.gain * 1e-3,
-                "gain_margin": s.gain_margin,
-                "phase_margin_deg": s.phase_margin,
-            }
-        )
+        values = {
+            "setpoint_mm": f.setpoint * 1e3,
+            "from_s": f.start,
+            "to_s": f.stop,
+            "authority_pct": f.authority * 100.0,
+            "rate_limit_pct_per_s": f.rate_limit * 100.0,
+            "response_s": f.response,
+            "block_s": s.period,
+            "delay_s": s.delay,
+            "laser_loss_s": f.laser_loss,
+            "sensitivity_mm": s.sensitivity * 1e3,
+            "gain_per_mm_s": s.gain * 1e-3,
+            "gain_margin": s.gain_margin,
+            "phase_margin_deg": s.phase_margin,
+        }
+        return tomli_w.dumps({key: float(f"{value:.6g}") for key, value in values.items()})
 
     def take(
         self, block: Block, waiting: float
@@ -291,7 +290,9 @@ class FeedbackLoop:
         self._told[answer.state] = start
         level, words = _STATES[answer.state]
         correction = f"{answer.correction:+.2%}"
-        return [Event(start, level, f"feedback: {words.format(correction=correction)}")]
+        held = f"{self.feedback.setpoint * 1e3:.6g} mm"
+        said = words.format(correction=correction, held=held)
+        return [Event(start, level, f"feedback: {said}")]
 
     def _blind(self, start: int) -> Trip:
         sample = start + self._block
@@ -311,7 +312,7 @@ def _reading_step(rig_file: RigFile) -> float:
 
 
 _STATES = {
-    "holding": ("info", "the displacement is held, correction {correction}"),
+    "holding": ("info", "{held} are held, correction {correction}"),
     "limited": (
         "warning",
         "the correction stands at its limit, {correction}: the displacement is not held; a model "

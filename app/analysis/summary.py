@@ -460,7 +460,12 @@ def _conditions(recording: Recording) -> dict[tuple[str, str], str]:
     instruments = {instrument.role for instrument in recording.instruments}
     found: dict[tuple[str, str], str] = {}
     for what, value in describe_rows(recording):
-        if what in _RESULTS or " at " in what or what in recording.declared.values():
+        if (
+            what in _RESULTS
+            or what == "feedback"
+            or " at " in what
+            or what in recording.declared.values()
+        ):
             continue
         group = "Instruments" if what in instruments else "Sample" if what in _SAMPLE else "Run"
         # without the offset from UTC, which is the same for all
@@ -470,6 +475,7 @@ def _conditions(recording: Recording) -> dict[tuple[str, str], str]:
     for group, text in (
         ("Rig file", str(recording.provenance.get("configuration", ""))),
         ("Sequence", recording.sequence_toml),
+        ("Feedback", str(recording.provenance.get("feedback", ""))),
     ):
         for key, value in _flat(text).items():
             found.setdefault((group, key), value)

@@ -166,6 +166,9 @@ def describe_rows(recording: Recording) -> list[tuple[str, str]]:
         rows.append(("load", f"{load.mass * 1e3:.6g} g{rest}"))
     if recording.notes:
         rows.append(("notes", recording.notes))
+    feedback = str(recording.provenance.get("feedback", ""))
+    if feedback:
+        rows.append(("feedback", feedback.strip().replace(" = ", " ").replace("\n", "; ")))
     for instrument in recording.instruments:
         parts = [f"{instrument.model}, serial {instrument.serial or 'unknown'}"]
         parts += [f"{name} {value}" for name, value in instrument.settings]

@@ -19,6 +19,7 @@ from dearig.config.sequencefile import parse_sequence
 from dearig.errors import InputError, InstrumentFault, SafetyStop
 from dearig.model.control import HoldAnswer, HoldController
 from dearig.recording import open_recording
+from dearig.recording.summary import describe_rows
 from dearig.sim_backend.faults import FaultPlan
 from dearig.sim_backend.rig import SimulatedRig
 
@@ -107,10 +108,13 @@ def test_the_recording_says_what_was_held_and_how(run) -> None:
     noted = tomllib.loads(str(recording.provenance["feedback"]))
     assert noted["setpoint_mm"] == pytest.approx(0.5)
     assert noted["delay_s"] == pytest.approx(0.6)
-    assert noted["gain_margin"] == pytest.approx(0.5 * math.pi * 1.1 / 0.6)
+    assert noted["gain_margin"] == pytest.approx(0.5 * math.pi * 1.1 / 0.6, rel=1e-5)
     assert result.feedback is not None
+    shown = dict(describe_rows(recording))["feedback"]
+    assert shown.startswith("setpoint_mm 0.5; from_s 2.4; ")
     said = [event.message for event in recording.events]
     assert result.feedback.sentence in said
+    assert said[0].startswith("feedback: 0.5 mm are held, correction ")
     assert f"{len(seen.answers)} answers, each 0.6 s after its readings" in said[-1]
     with pytest.raises(InputError, match="use dearig hold again"):
         original_of(result.path)
