@@ -18,6 +18,7 @@
 /entry/checksums        CRC-32 of the counts (runs only)
 /entry/overview         NXdata: minima and maxima of the physical values of a long run
 /entry/provenance       versions, configuration and its hash, seed, host, operator
+                        of a hold also feedback (TOML)
 """
 
 from __future__ import annotations
