@@ -100,6 +100,7 @@ def save_recording(
         entry.attrs["samples"] = size
         entry.attrs["outcome"] = fixed("finished")
         entry.attrs["complete"] = True
+        progress("writing", 1.0)
     return path
 
 

@@ -57,7 +57,8 @@ class Response:
 def serve(connection: Connection) -> None:
     """Do the jobs that come through ``connection`` until its other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    sys.unraisablehook = _unraisable
+    lost = threading.Event()  # an interrupt that a callback could not raise
+    sys.unraisablehook = lambda found: _unraisable(found, lost)
     work: queue.SimpleQueue[Request] = queue.SimpleQueue()
     current: list[int] = []
     listener = threading.Thread(target=_listen, args=(connection, work, current), daemon=True)
@@ -65,7 +66,7 @@ def serve(connection: Connection) -> None:
     while True:
         request = work.get()
         current[:] = [request.number]
-        answer = _done(connection, request)
+        answer = _done(connection, request, lost)
         current.clear()
         try:
             connection.send(answer)
@@ -102,19 +103,26 @@ def _interrupt() -> None:
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
 
 
-def _unraisable(found: Any) -> None:
-    """Interrupt again where an interrupt was lost in a callback, which cannot raise it."""
+def _unraisable(found: Any, lost: threading.Event) -> None:
+    """Report an error of a callback, which cannot raise it.
+
+    An interrupt is raised by the next report of progress: here it would be lost again.
+    """
     if isinstance(found.exc_value, KeyboardInterrupt):
-        _interrupt()
+        lost.set()
     else:
         sys.__unraisablehook__(found)
 
 
-def _done(connection: Connection, request: Request) -> Response:
+def _done(connection: Connection, request: Request, lost: threading.Event) -> Response:
     last = ("", -1.0)
+    lost.clear()
 
     def report(stage: str, fraction: float) -> None:
         nonlocal last
+        if lost.is_set():
+            lost.clear()
+            raise KeyboardInterrupt
         if stage != last[0] or fraction - last[1] >= _STEP:
             last = (stage, fraction)
             connection.send(Response(request.number, "progress", last))

@@ -58,6 +58,20 @@ def stubborn(progress: Progress) -> None:
             progress("heard, and going on", 0.5)
 
 
+class _Deaf:
+    """What is deleted loses an interrupt: ``__del__`` cannot raise it."""
+
+    def __del__(self) -> None:
+        threading.Event().wait()
+
+
+def deaf(progress: Progress) -> str:
+    progress("waiting", 0.0)
+    _Deaf()
+    progress("going on", 0.5)
+    return "never"
+
+
 def keeping(progress: Progress) -> str:
     try:
         progress("waiting", 0.0)
@@ -139,6 +153,16 @@ def test_cancel_ends_the_work_and_the_next_job_runs(qtbot, worker, tmp_path):
     assert sign.exists()
     job.cancel()
     qtbot.waitUntil(lambda: after != [], timeout=_PATIENCE)
+    assert seen == [("cancelled", None)]
+
+
+def test_an_interrupt_that_a_callback_loses_ends_the_work_at_its_next_progress(qtbot, worker):
+    job = worker.submit(deaf)
+    seen = ended(job)
+    with qtbot.waitSignal(job.progressed, timeout=_PATIENCE):
+        pass
+    job.cancel()
+    qtbot.waitUntil(lambda: seen != [], timeout=_PATIENCE)
     assert seen == [("cancelled", None)]
 
 
