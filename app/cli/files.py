@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -28,6 +28,9 @@ from dearig.cli.output import (
 )
 from dearig.errors import InputError
 from dearig.printable import MESSAGE_MAX, printable
+
+if TYPE_CHECKING:
+    from dearig.config.rigfile import RigFile
 
 __all__ = ["commands"]
 
@@ -117,8 +120,6 @@ def import_(
 ) -> None:
     """Convert measured data (text, Excel, MAT, TDMS, HDF5, JSON, Parquet) to a recording."""
     from dearig.config.imports import imported_metadata, raw_scales
-    from dearig.config.rigfile import load_rig_file
-    from dearig.config.toml_input import read_text
     from dearig.recording.importers import ImportOptions, import_file
     from dearig.recording.reader import open_recording
     from dearig.recording.summary import describe
@@ -129,7 +130,7 @@ def import_(
     if out is None:
         raise InputError("name the recording with --out FILE.h5, or list the columns: --columns")
     check_files(force, (source, rig_file), out, json=json, recording=out)
-    settings = None if rig_file is None else load_rig_file(rig_file)
+    settings, configuration = _rig_file(rig_file)
     options = ImportOptions(
         _columns(column or []), gauge_length_mm, area_mm2,
         None if kinematics is None else kinematics.value, rate, names_line, skip_bad_rows,
@@ -141,7 +142,7 @@ def import_(
         ),
     )  # fmt: skip
     metadata = imported_metadata(
-        "" if rig_file is None else read_text(rig_file, "rig file"), settings, film, notes,
+        configuration, settings, film, notes,
         length_mm=film_length_mm, width_mm=film_width_mm, thickness_um=film_thickness_um,
         permittivity=permittivity, load_g=load_g, kinematics=options.kinematics,
     )  # fmt: skip
@@ -162,6 +163,16 @@ def import_(
         print_line(console, f"Check this: {doubt}", style="yellow")
     told = {"took": list(done.took), "notes": list(done.notes), "doubts": list(done.doubts)}
     write_result({**describe(recording), **told}, json)
+
+
+def _rig_file(path: Path | None) -> tuple[RigFile | None, str]:
+    """Return the settings and the text of a rig file; None and "" without one."""
+    if path is None:
+        return None, ""
+    from dearig.config.rigfile import load_rig_file
+    from dearig.config.toml_input import read_text
+
+    return load_rig_file(path), read_text(path, "rig file")
 
 
 def _typed(**given: object) -> tuple[str, ...]:

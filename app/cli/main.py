@@ -19,7 +19,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, TextIO, cast
+from typing import Annotated, Any, TextIO, cast
 
 import typer
 from typer.exceptions import TyperException
@@ -27,6 +27,7 @@ from typer.exceptions import TyperException
 from dearig import log_file
 from dearig.cli import campaign, files, fit, hold, run, study, tools, track, watch
 from dearig.cli.last_words import LastingStream, leave, silence_libraries
+from dearig.cli.lost_interrupt import note_lost
 from dearig.cli.output import version
 from dearig.errors import DearigError, DiskFault, InputError, Interrupted
 from dearig.printable import MESSAGE_MAX, PrintableStream, printable
@@ -320,10 +321,15 @@ def _unexpected_errors_told(written: log_file.LogFile) -> Iterator[None]:
 
     sys.excepthook = lambda _, error, __: _tell_unexpected(error, written)
     threading.excepthook = thread_ended
-    # such as a library's object that cannot let go of an instrument whose link is lost
-    sys.unraisablehook = lambda args: log.error(
-        "error while an object was deleted: %r", args.object, exc_info=args.exc_value
-    )
+
+    def unraisable(args: Any) -> None:
+        if isinstance(args.exc_value, KeyboardInterrupt):
+            note_lost()
+            return
+        # such as a library's object that cannot let go of an instrument whose link is lost
+        log.error("error while an object was deleted: %r", args.object, exc_info=args.exc_value)
+
+    sys.unraisablehook = unraisable
     try:
         yield
     finally:

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from dearig.cli.console import PrintableConsole
+from dearig.cli.lost_interrupt import raise_lost
 from dearig.printable import printable
 
 __all__ = ["progress"]
@@ -49,6 +50,7 @@ def progress(
 
     def report(stage: str, fraction: float) -> None:
         nonlocal current
+        raise_lost()
         stage = printable(stage)
         done = min(max(fraction, 0.0), 1.0) if math.isfinite(fraction) else 0.0
         if stage != current and whole:
@@ -66,5 +68,6 @@ def progress(
         yield report
 
 
-def _unseen(stage: str, fraction: float) -> None:
+def _unseen(stage: str, fraction: float) -> None:  # noqa: ARG001
     """Show nothing."""
+    raise_lost()

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
-from dearig.model.material import THESIS_FILM, THESIS_LOAD
 from dearig.model.specimen import Film, Load
 from dearig.recording.assumed import ASSUMED, FILM_VALUES
 from dearig.recording.importers.units import Scale
 from dearig.recording.metadata import RunMetadata
+
+if TYPE_CHECKING:
+    from dearig.config.rigfile import RigFile
 
 __all__ = ["imported_metadata", "raw_scales"]
 
@@ -57,6 +59,9 @@ def imported_metadata(
     changed: dict[str, object] = {n: value for n, value in given.items() if value is not None}
     film: Film | None = None if settings is None else settings.as_film()
     load: Load | None = None if settings is None else settings.as_load()
+    if changed or load_g is not None:
+        # imports the effects and their compiler, which most imports begin without
+        from dearig.model.material import THESIS_FILM, THESIS_LOAD
     try:
         if changed and kinematics is not None:
             changed["kinematics"] = kinematics

@@ -7,6 +7,7 @@ import math
 import pytest
 from rich.console import Console
 
+from dearig.cli.lost_interrupt import note_lost
 from dearig.cli.progress_bar import progress
 from dearig.cli.terminal import branch_table, identify_table, validate_tables
 from dearig.errors import InputError
@@ -245,3 +246,13 @@ class TestJson:
         monkeypatch.setattr("sys.stdout", Closed())
         with pytest.raises(InputError, match="standard output"):
             write_json({}, "-")
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_an_interrupt_that_a_callback_lost_is_raised_by_the_next_progress(terminal: bool) -> None:
+    with progress("dearig", console=Console(file=io.StringIO(), force_terminal=terminal)) as report:
+        report("reading", 0.1)
+        note_lost()
+        with pytest.raises(KeyboardInterrupt):
+            report("reading", 0.2)
+        report("reading", 0.3)  # once
