@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from dearig.analysis.budget import given_values
 from dearig.analysis.compatibility import (
     assumed_by,
     base_model,
@@ -21,6 +22,7 @@ from dearig.analysis.outcomes import (
     BranchTrial,
     Comparison,
     IdentifyOutcome,
+    budget_table,
     covariance_table,
     pooled_over_noise,
 )
@@ -38,7 +40,7 @@ from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
 from dearig.model.errors import ModelError
-from dearig.model.fitting import Identification, add_intervals, identify
+from dearig.model.fitting import Identification, add_intervals, identify, with_budget
 from dearig.model.material import Network
 from dearig.model.records import Record
 from dearig.progress import Progress, quiet
@@ -101,6 +103,7 @@ def identify_recordings(
         ]
         if intervals and method == "hybrid":
             fit = add_intervals(records, fit, progress=progress)
+    fit = with_budget(records, fit, given_values(rig_file, drive), progress=progress)
     compared = [compare(r, fit.model, "train", drive) for r in recordings]
     validated = [compare(r, fit.model, "validation", drive) for r in others]
     seconds = clock() - started
@@ -239,9 +242,11 @@ def _history(
                 "high95": e.high if math.isfinite(e.high) else None,
                 "determined": e.determined,
                 "at_bound": e.at_bound,
+                "systematic": e.systematic,
                 "note": e.note,
             }
             for e in fit.estimates
         ],
         "covariance": covariance_table(fit.covariance_names, fit.covariance),
+        "uncertainty_budget": budget_table(fit.budget),
     }

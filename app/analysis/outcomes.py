@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dearig.config.modelfile import ModelFile
     from dearig.model.diagnosis.events import Event
     from dearig.model.diagnosis.results import Diagnosis
-    from dearig.model.fitting import Identification
+    from dearig.model.fitting import Contribution, Identification
     from dearig.model.measures import Errors
     from dearig.recording.early_end import EarlyEnd
 
@@ -33,6 +33,7 @@ __all__ = [
     "SeparatingExperiment",
     "Stand",
     "ValidateOutcome",
+    "budget_table",
     "covariance_table",
     "noise_from",
     "pooled_noise",
@@ -334,6 +335,18 @@ def covariance_table(names: Sequence[str], covariance: np.ndarray) -> dict[str, 
     if covariance.size == 0 or not np.isfinite(covariance).all():
         return None
     return {"names": list(names), "matrix": covariance.tolist()}
+
+
+def budget_table(budget: Sequence[Contribution]) -> list[dict[str, Any]]:
+    """Return the contributions to an uncertainty budget as plain values, in SI units."""
+    return [
+        {
+            "given": c.given.name,
+            "relative_uncertainty": c.given.relative,
+            "shifts": dict(zip(c.names, c.shifts, strict=True)),
+        }
+        for c in budget
+    ]
 
 
 def noise_from(comparisons: Sequence[Comparison]) -> str | None:

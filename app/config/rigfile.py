@@ -45,14 +45,38 @@ class FilmSection(Section):
     length_mm: float = Field(
         default=75.0, gt=0.0, le=1e4, description="free length L1 of the film, along the motion"
     )
+    length_mm_uncertainty: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=1e4,
+        description="standard uncertainty of length_mm; 0 if not known",
+    )
     width_mm: float = Field(
         default=72.0, gt=0.0, le=1e4, description="width L2 of the film, across the motion"
+    )
+    width_mm_uncertainty: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=1e4,
+        description="standard uncertainty of width_mm; 0 if not known",
     )
     thickness_mm: float = Field(
         default=1.0, ge=1e-4, le=100.0, description="thickness Z of the film"
     )
+    thickness_mm_uncertainty: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=100.0,
+        description="standard uncertainty of thickness_mm; 0 if not known",
+    )
     relative_permittivity: float = Field(
         default=4.7, ge=1.0, le=1000.0, description="relative permittivity of the film"
+    )
+    relative_permittivity_uncertainty: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=1000.0,
+        description="standard uncertainty of relative_permittivity; 0 if not known",
     )
     density_kg_m3: float = Field(default=1000.0, ge=1.0, le=3e4, description="density of the film")
     kinematics: Literal["constrained-width", "uniaxial", "equibiaxial"] = Field(
@@ -65,6 +89,12 @@ class LoadSection(Section):
 
     mass_g: float = Field(
         default=200.0, ge=0.0, le=1e5, description="mass that hangs from the film"
+    )
+    mass_g_uncertainty: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=1e5,
+        description="standard uncertainty of mass_g; 0 if not known",
     )
     rest_length_mm: float | None = Field(
         default=None,

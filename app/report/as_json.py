@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from dearig.analysis.outcomes import (
+    budget_table,
     covariance_table,
     noise_from,
     pooled_noise,
@@ -63,6 +64,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "residual_over_noise": _number(pooled_over_noise(outcome.train)),
         "parameters": [_parameter_json(e, known) for e in fit.estimates],
         "covariance": covariance_table(fit.covariance_names, fit.covariance),
+        "uncertainty_budget": budget_table(fit.budget),
         "train": [_comparison_json(c) for c in outcome.train],
         "validation": [_comparison_json(c) for c in outcome.validation],
         "trials": [_trial_json(t, outcome.kind) for t in outcome.trials],
@@ -87,6 +89,7 @@ def _noise_json(kind: str, comparisons: tuple[Comparison, ...]) -> dict[str, Any
 
 
 def _parameter_json(estimate: Estimate, known: bool) -> dict[str, Any]:
+    combined = [_number(end) if end != 0.0 else None for end in estimate.combined]
     low = None if estimate.low == 0.0 else _number(estimate.low)
     high = _number(estimate.high)
     return {
@@ -96,6 +99,8 @@ def _parameter_json(estimate: Estimate, known: bool) -> dict[str, Any]:
         "ci95": [low, high] if known or not estimate.free else [None, None],
         "determined": bool(estimate.determined),
         "free": bool(estimate.free),
+        "systematic": _number(estimate.systematic),
+        "ci95_combined": combined if known else [None, None],
         "at_bound": bool(estimate.at_bound),
         "note": estimate.note,
     }

@@ -160,22 +160,40 @@ def parameter_table(fit: Identification) -> Table:
     for e in fit.estimates:
         factor, unit = parameter_unit(e.unit)
         if known:
-            value = quoted(e.value * factor, e.low * factor, e.high * factor)
+            # only the digits that all uncertainties support
+            low, high = e.combined
+            value = quoted(e.value * factor, low * factor, high * factor)
             within = interval(e.low * factor, e.high * factor) if e.free else "derived"
             within = f"{within}{BOUND_MARK}" if e.at_bound else within
         else:
             value = significant(e.value * factor, 4)
             within = BOUND_MARK.lstrip(", ") if e.at_bound else NO_VALUE
         cells = [symbol(e.name), value if e.determined or not known else f"({value})", unit, within]
+        if fit.budget:
+            shifted = e.systematic * factor
+            cells.append(significant(shifted, 2) if shifted else NO_VALUE)
+            both = interval(e.combined[0] * factor, e.combined[1] * factor)
+            cells.append(both if known else NO_VALUE)
         if published:
             theirs = published.get(e.name, math.nan)
             cells.append(significant(theirs * factor, 4))
         # without intervals all notes are the same, and the page shows it once
         rows.append(Row(tuple(cells), e.note if known else "", known and not e.determined))
     head = [("", ""), ("Value", ""), ("Unit", ""), ("95 % interval", "")]
+    if fit.budget:
+        head += [("Given values", "\N{PLUS-MINUS SIGN}1 sigma"), ("Combined", "95 %")]
     if published:
         head.append(("Thesis", "Table 3"))
     notes = []
+    if fit.budget:
+        values = ", ".join(
+            f"{c.given.name} {significant(100.0 * c.given.relative, 2)} %" for c in fit.budget
+        )
+        notes.append(
+            f"The 95 % interval is of the noise alone. Given values, with standard uncertainties "
+            f"by the rig file ({values}), move a parameter by the next column; the last interval "
+            f"has both."
+        )
     if any(e.at_bound for e in fit.estimates):
         notes.append("At bound: at an end of the search range; the data may ask for more.")
     if known and fit.undetermined:

@@ -27,6 +27,12 @@ class AmplifierSettings(Section):
         le=1e5,
         description="gain: volts at the film per volt at the amplifier's input",
     )
+    gain_V_per_V_uncertainty: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=1e5,
+        description="standard uncertainty of gain_V_per_V; 0 if not known",
+    )
     offset_V: float = Field(
         default=0.0,
         ge=-100.0,
@@ -44,6 +50,12 @@ class AmplifierSettings(Section):
         gt=0.0,
         le=100.0,
         description="scaling of the voltage monitor: volts per kilovolt at the film",
+    )
+    monitor_V_per_kV_uncertainty: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=100.0,
+        description="standard uncertainty of monitor_V_per_kV; 0 if not known",
     )
     current_monitor_V_per_mA: float = Field(
         default=0.25,

@@ -42,6 +42,12 @@ class LaserSettings(Section):
         le=1000.0,
         description="scaling of the analog output, as set in the controller",
     )
+    mm_per_V_uncertainty: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=1000.0,
+        description="standard uncertainty of mm_per_V; 0 if not known",
+    )
     direction: Literal[1, -1] = Field(
         default=1,
         description="sign of the analog output: 1 when it rises as the film gets longer, -1 when "

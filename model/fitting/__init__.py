@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
+from dearig.model.fitting.budget import with_budget
 from dearig.model.fitting.identify import Identification, add_intervals, identify
-from dearig.model.fitting.parameters import Estimate
+from dearig.model.fitting.parameters import Contribution, Estimate, GivenValue
 
-__all__ = ["Estimate", "Identification", "add_intervals", "identify"]
+__all__ = [
+    "Contribution",
+    "Estimate",
+    "GivenValue",
+    "Identification",
+    "add_intervals",
+    "identify",
+    "with_budget",
+]

@@ -19,7 +19,7 @@ from dearig.model.fitting.estimates import (
 )
 from dearig.model.fitting.intervals import CHI2_95, correlation_time
 from dearig.model.fitting.levenberg import LocalFit, descend
-from dearig.model.fitting.parameters import Estimate, Layout, require_free
+from dearig.model.fitting.parameters import Contribution, Estimate, Layout, require_free
 from dearig.model.fitting.problem import Problem
 from dearig.model.fitting.search import Progress, algorithm_1, film_starts, voltage_starts
 from dearig.model.fitting.thinning import thinned
@@ -30,6 +30,7 @@ __all__ = [
     "METHODS",
     "Identification",
     "add_intervals",
+    "coarse_problem",
     "fit_globally",
     "identify",
     "is_worth_freeing",
@@ -51,7 +52,8 @@ class Identification:
     the residuals over the noise (1 when only noise is left); ``correlation`` the correlation
     time of the residuals in samples, by which the intervals are widened. ``held_limits`` names the
     locking limits that were held because the data do not determine them. ``warnings``
-    are sentences for the operator.
+    are sentences for the operator. ``budget`` are the contributions of given values to the
+    uncertainty (``dearig.model.fitting.budget``).
     """
 
     method: str
@@ -65,6 +67,7 @@ class Identification:
     converged: bool
     warnings: tuple[str, ...]
     held_limits: tuple[str, ...] = ()
+    budget: tuple[Contribution, ...] = ()
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -192,7 +195,7 @@ def _result(
     )
 
 
-def _coarse(problem: Problem) -> Problem:
+def coarse_problem(problem: Problem) -> Problem:
     """Return the problem on means of neighbouring samples where records are denser than needed."""
     base = problem.layout.base
     records = [
@@ -219,7 +222,7 @@ def fit_globally(
     limits[layout.column("J")] = True
     driven_by_voltage = isinstance(layout.base, Actuator)
     first = limits if driven_by_voltage or not stiffening else np.zeros_like(limits)
-    coarse = _coarse(problem)
+    coarse = coarse_problem(problem)
     starts = (
         voltage_starts(coarse, progress)
         if driven_by_voltage
@@ -260,7 +263,7 @@ def _intervals(
     problem: Problem, values: np.ndarray, held: np.ndarray, progress: Progress
 ) -> tuple[list[Estimate], tuple[str, ...], np.ndarray]:
     """Return estimates with profile-likelihood intervals; ``held`` (d,) limits are undetermined."""
-    coarse = _coarse(problem)
+    coarse = coarse_problem(problem)
     recentre(coarse, problem, values)
     done = 0
 

@@ -16,10 +16,21 @@ from dearig.model.material import Branch, Network, Spring
 from dearig.model.network import HEAD, nominal_pull
 from dearig.model.springs import SPRINGS, locking_strain
 
-__all__ = ["THESIS_RANGES", "Estimate", "Layout", "Quantity"]
+__all__ = [
+    "NORMAL_95",
+    "THESIS_RANGES",
+    "Contribution",
+    "Estimate",
+    "GivenValue",
+    "Layout",
+    "Quantity",
+]
 
 #: Search ranges of the thesis's Algorithm 1: moduli Pa, limits J, relaxation times s.
 THESIS_RANGES = {"mu": (0.0, 8e6), "J": (0.0, 9e8), "T": (0.0, 3e6)}
+
+#: Standard deviations of a normal distribution within which 95 % lie.
+NORMAL_95 = 1.959963984540054
 
 # Lower ends for logarithmic coordinates; below, a spring or branch has no measurable influence.
 _FLOOR = {"mu": 1e-2, "J": 1e-3, "T": 1e-6}
@@ -84,6 +95,8 @@ class Estimate:
     the interval is so wide that the value should not be quoted; ``note`` then says so in words.
     ``free`` is False for a parameter that follows from others (mu_0 of a measured rest length).
     ``at_bound`` is True for a value at an end of its search range: the data may ask for more.
+    ``systematic`` is its standard uncertainty by those of the film, the load and the scalings, 0
+    where none are known; ``low`` and ``high`` do not contain it.
     """
 
     name: str
@@ -95,6 +108,40 @@ class Estimate:
     note: str = ""
     free: bool = True
     at_bound: bool = False
+    systematic: float = 0.0
+
+    @property
+    def combined(self) -> tuple[float, float]:
+        """The 95 % interval with the uncertainty of what was given; open ends stay open."""
+        ends = []
+        for end, sign in ((self.low, -1.0), (self.high, 1.0)):
+            is_open = not math.isfinite(end) or (end == 0.0 and self.value > 0.0)
+            width = math.hypot(end - self.value, NORMAL_95 * self.systematic)
+            moved = self.value + sign * width
+            # what noise cannot make negative, a given value cannot either
+            ends.append(end if is_open else max(moved, 0.0) if self.low >= 0.0 else moved)
+        return ends[0], ends[1]
+
+
+@dataclass(frozen=True)
+class GivenValue:
+    """A value that is given, not fitted, and its relative standard uncertainty.
+
+    ``name`` is a field of the film, ``mass``, or ``voltage`` or ``displacement`` for the scaling
+    of these channels.
+    """
+
+    name: str
+    relative: float
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """Shifts in SI units of the fitted parameters ``names``, by one standard uncertainty."""
+
+    given: GivenValue
+    names: tuple[str, ...]
+    shifts: tuple[float, ...]
 
 
 class Layout:

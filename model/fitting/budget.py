@@ -1,0 +1,98 @@
+"""Uncertainty budget of a fit: what the uncertainty of each given value does to the parameters.
+
+Film, load and scalings are given, not fitted, and an error of theirs changes the parameters by
+more than noise does: 1 % of thickness moves mu_0 by 1.6 %. Each is moved by one standard
+uncertainty up and down, and the parameters are fitted again from where they are. Half the
+difference is the shift. Shifts of independent values add up as squares.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from dearig.model.actuator import Actuator
+from dearig.model.errors import ModelError
+from dearig.model.fitting.identify import Identification, coarse_problem
+from dearig.model.fitting.levenberg import descend
+from dearig.model.fitting.parameters import Contribution, GivenValue, Layout
+from dearig.model.fitting.problem import Problem
+from dearig.model.fitting.search import Progress
+from dearig.model.records import ActuatorRecord, Record
+
+__all__ = ["with_budget"]
+
+_GAIN = 1e-3  # of chi-square: both refits end at a hundredth of a standard deviation
+_ITERATIONS = 40
+
+
+def with_budget(
+    records: Sequence[Record],
+    fitted: Identification,
+    given: Sequence[GivenValue],
+    workers: int = 2,
+    progress: Progress = lambda *_: None,
+) -> Identification:
+    """Return ``fitted`` with the ``systematic`` uncertainty of each estimate; of actuators only.
+
+    ``records`` are its training records.
+    """
+    model = fitted.model
+    if not isinstance(model, Actuator) or not given:
+        return fitted
+    problem = coarse_problem(Problem(records, Layout(model), workers))
+    layout = problem.layout
+    held = np.array([name in fitted.held_limits for name in layout.names])
+    start = descend(problem, layout.coordinates(layout.initial()), held, gain=_GAIN).x
+    done, found = 0, []
+    for one in given:
+        ends = []
+        for sign in (-1.0, 1.0):
+            moved, changed = _moved(problem.records, model, one.name, sign * one.relative)
+            other = Problem(moved, Layout(changed), workers)
+            x = descend(other, start, held, _ITERATIONS, _GAIN, damping=1e-4).x
+            ends.append(layout.values(x))
+            done += 1
+            progress("uncertainty budget", done / (2 * len(given)))
+        shifts = np.where(held, 0.0, 0.5 * (ends[1] - ends[0]))
+        found.append(Contribution(one, layout.names, tuple(map(float, shifts))))
+    total = dict(
+        zip(
+            layout.names, np.sqrt(np.sum([np.square(c.shifts) for c in found], axis=0)), strict=True
+        )
+    )
+    return replace(
+        fitted,
+        estimates=tuple(
+            replace(e, systematic=float(total.get(e.name, 0.0))) for e in fitted.estimates
+        ),
+        budget=tuple(found),
+    )
+
+
+def _moved(
+    records: Sequence[Record], model: Actuator, name: str, by: float
+) -> tuple[list[Record], Actuator]:
+    """Return records and model with the value ``name`` larger by the part ``by``."""
+    factor = 1.0 + by
+    if not math.isfinite(factor) or factor <= 0.0:
+        raise ModelError(f"an uncertainty of {by:.3g} of the {name} leaves no value above 0")
+    if name == "mass":
+        return [*records], replace(model, load=replace(model.load, mass=model.load.mass * factor))
+    if name not in ("voltage", "displacement"):
+        value = getattr(model.film, name) * factor
+        return [*records], replace(model, film=replace(model.film, **{name: value}))
+    moved: list[Record] = []
+    for record in records:
+        if not isinstance(record, ActuatorRecord):
+            raise ModelError("an uncertainty budget is made of records driven by voltage")
+        if name == "voltage":
+            drive = replace(record.drive, voltage=record.drive.voltage * factor)
+            moved.append(replace(record, drive=drive))
+        else:
+            # the weights stay, so that only the readings move
+            moved.append(replace(record, displacement=record.displacement * factor))
+    return moved, model
