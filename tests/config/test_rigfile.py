@@ -82,7 +82,7 @@ MISTAKES = [
     ("[film]\nlenght_mm = 75", r"film\.lenght_mm is not a key; did you mean film\.length_mm\?"),
     ("[lazer]\nnoise_um = 1", r"lazer is not a table; did you mean laser\?"),
     ("[zzz]\na = 1", r"zzz is not a table; a rig file takes amplifier, laser"),
-    ("[load]\nqqq = 1", r"load\.qqq is not a key; \[load\] takes mass_g, mass_g_uncertainty, rest_length_mm"),
+    ("[load]\nqqq = 1", r"load\.qqq is not a key; \[load\] takes mass_g, mass_g_uncertainty, "),
     ("length_mm = 75", r"length_mm is not a key here: it belongs in \[film\]"),
     ("[load]\nlength_mm = 75", r"load\.length_mm is not a key here: it belongs in \[film\]"),
     (
