@@ -11,6 +11,7 @@ import logging
 import multiprocessing
 import os
 import signal
+import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import (
@@ -79,10 +80,8 @@ class LocalEngine:
     def __init__(
         self, workers: int | None = None, work: Callable[[Task], Row] | None = None
     ) -> None:
-        from dearig.batch.fits import fit_task
-
         self.workers = workers or os.cpu_count() or 1
-        self._work = work or fit_task
+        self._work = work or _fit_task()
 
     def run(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Row]]:
         """Yield each task with its row, in the order in which they end."""
@@ -115,7 +114,7 @@ class LocalEngine:
         """
         before = set(multiprocessing.active_children())
         pool = ProcessPoolExecutor(
-            workers, multiprocessing.get_context("spawn"), initializer=_ignore_ctrl_c
+            workers, multiprocessing.get_context("spawn"), initializer=_begin_worker
         )
         running: dict[Future[Row], Task] = {}
         try:
@@ -143,9 +142,24 @@ def _words(error: BaseException) -> str:
     return one_line(error) if isinstance(error, Exception) and str(error) else type(error).__name__
 
 
-def _ignore_ctrl_c() -> None:
-    """Leave ctrl-C to the process that reads the rows."""
+def _fit_task() -> Callable[[Task], Row]:
+    from dearig.batch.fits import fit_task
+
+    return fit_task
+
+
+def _begin_worker() -> None:
+    """Leave ctrl-C to the process that reads the rows, and end with it, also when it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # without this, workers whose parent was killed wait for a task for ever
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _lost(task: Task) -> Row:

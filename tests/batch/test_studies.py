@@ -5,9 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
+import psutil
 import pytest
 
 from dearig.batch.engines import ClusterLost, DaskEngine, LocalEngine, engine_at
@@ -107,6 +110,19 @@ def test_a_worker_that_dies_costs_the_row_of_its_recording() -> None:
         "a": "ok", "poison": "failed"
     }  # fmt: skip
     assert "ended without a word" in found["poison"]["reason"]
+
+
+def test_workers_end_with_the_process_that_began_them_also_when_it_is_killed() -> None:
+    began = subprocess.Popen(
+        [sys.executable, "-m", "tests.tools.study_work"], stdout=subprocess.PIPE, text=True
+    )
+    assert began.stdout is not None
+    with began.stdout:
+        workers = [psutil.Process(int(began.stdout.readline())) for _ in range(2)]
+        began.kill()
+        began.wait()
+    _, alive = psutil.wait_procs(workers, timeout=60)
+    assert not alive
 
 
 def test_a_lost_cluster_leaves_the_rest_to_this_computer(
