@@ -11,6 +11,20 @@ from tests.tools.command import dearig, names, refused
 
 # {s} is the shelf of good and bad files
 COMMANDS: dict[str, tuple[str, list[str]]] = {
+    # campaigns, studies, watchers
+    "no plan there": ("campaign no.toml --out o", ["no.toml", "is not there"]),
+    "a sequence for a plan": (
+        "campaign {s}/lobe.toml --out o",
+        ["lobe.toml: lead_in_s is not a key"],
+    ),
+    "a recording for a plan": ("campaign {s}/run.h5 --out o", ["is a recording (HDF5)"]),
+    "a folder for a plan": ("campaign {s} --out o", ["is a folder"]),
+    "no runs to arm": ("campaign {s}/lobe.toml --out o --runs 0", ["--runs", "it must be"]),
+    "no campaign to ask": ("campaign-queue no --pause", ["no has no campaign"]),
+    "nothing to watch": ("watch no.h5", ["no.h5 is not there"]),
+    "nothing to study": ("study {s}/lobe.toml --do identify --out o", ["lobe.toml is not one"]),
+    "a study without its model": ("study {s} --do validate --out o", ["needs --model MODEL.toml"]),
+    "a study on nothing": ("study {s}/run.h5 --do identify --on x --out o", ["write local, or"]),
     # rigs and outputs
     "unknown rig": (
         "record {s}/lobe.toml --out o.h5 --rig foo",

@@ -69,6 +69,10 @@ MEASUREMENTS = {
     "plan": Measurement(
         "Processor time and memory of long runs", ("tests.benchmarks.bench_plan --full",)
     ),
+    "batch": Measurement(
+        "Campaigns that are killed, many runs in one process, and studies that lose their cluster",
+        ("tests.benchmarks.bench_campaign", "tests.benchmarks.bench_study"),
+    ),
     "soak": Measurement(
         "What a server and a program that runs for long keep", ("tests.benchmarks.bench_soak",)
     ),
