@@ -1,9 +1,10 @@
 """Time and memory of importing a CSV file of three million rows, beside pandas and pyarrow.
 
 Run as ``python -m tests.benchmarks.bench_import [--rows N]``. Each reading is a process of its own.
-The least of some runs counts, because other programs use the machine too; the time of all
-processors is told beside the time on the clock. Memory is the largest resident size less that of
-the same process before it reads, in multiples of the columns as float64.
+Other programs use the machine too: the least of some runs is printed, and medians of ratios to
+pandas and pyarrow within a round, of the time on the clock and of the time of all processors.
+Memory is the largest resident size less that of the same process before it reads, in multiples of
+the columns as float64.
 """
 
 from __future__ import annotations
@@ -75,6 +76,9 @@ READERS = {
 }
 
 
+REFERENCES = ("pandas.read_csv", "pyarrow, one thread")
+
+
 def _resident(line: str) -> int:
     """Return a memory size of this process in bytes, VmRSS or VmHWM."""
     text = Path("/proc/self/status").read_text("utf-8")
@@ -107,24 +111,40 @@ def main() -> None:
         write(warm, 5000)
         spoil(whole, spoilt)
         columns = 8 * len(COLUMNS) * asked.rows
-        print(f"{asked.rows:,} rows, {whole.stat().st_size / 1e6:.0f} MB")
-        for name, path in [(n, whole) for n in READERS] + [("import to a recording", spoilt)]:
-            command = [sys.executable, "-m", "tests.benchmarks.bench_import", "--measure"]
-            runs = [
-                subprocess.run(
-                    [*command, name, str(path), str(warm)],
+        print(f"{asked.rows:,} rows, {whole.stat().st_size / 1e6:.0f} MB, {asked.repeats} rounds")
+        readings = [(name, name, whole) for name in READERS]
+        readings.append(("import, last cell wrong", "import to a recording", spoilt))
+        found: dict[str, list[list[float]]] = {label: [] for label, _, _ in readings}
+        wrong = ""
+        for _ in range(asked.repeats):
+            for label, name, path in readings:
+                run = subprocess.run(
+                    [sys.executable, "-m", "tests.benchmarks.bench_import", "--measure", name,
+                     str(path), str(warm)],
                     capture_output=True, text=True, check=True,
-                )
-                for _ in range(asked.repeats)
-            ]  # fmt: skip
-            found = np.array([run.stdout.split() for run in runs], dtype=float)
-            took, cpu, memory = found.min(axis=0)
-            wrong = runs[0].stderr.strip().rpartition("/")[2].partition(";")[0]
-            print(
-                f"{name:22} {took:5.2f} s, {cpu:5.2f} s of processors, "
-                f"{memory / columns:4.2f} x the columns  {wrong}",
-                flush=True,
-            )
+                )  # fmt: skip
+                found[label].append([float(word) for word in run.stdout.split()])
+                wrong = run.stderr.strip().partition(";")[0].rpartition("/")[2] or wrong
+        for label, runs in found.items():
+            report(label, np.array(runs), {n: np.array(found[n]) for n in REFERENCES}, columns)
+        print(wrong)
+
+
+def report(label: str, runs: np.ndarray, references: dict[str, np.ndarray], columns: int) -> None:
+    """Print the least time and memory of ``runs``, and medians of their ratios to ``references``.
+
+    A ratio is between two readings of one round, which met the same load of the machine.
+    """
+    took, cpu, memory = runs.min(axis=0)
+    ratios = []
+    for name, other in references.items():
+        clock, processors = np.median(runs[:, :2] / other[:, :2], axis=0)
+        ratios.append(f"{clock:4.2f} and {processors:4.2f} of {name}")
+    print(
+        f"{label:24} {took:5.2f} s, {cpu:5.2f} s of processors, {memory / columns:4.2f} x the "
+        f"columns; {'; '.join(ratios)}",
+        flush=True,
+    )
 
 
 if __name__ == "__main__":
