@@ -34,6 +34,7 @@ _UNIT_LABELS = MappingProxyType(
 _LABELS = MappingProxyType(
     {
         ", or replace it with --force": "",
+        "give it to the commands as it is": "copy it into the folder of recordings",
         "--skip-bad-rows leaves such rows out": "“Leave out bad rows” leaves them out",
         "--gauge-length-mm": "“Gauge length”",
         "--area-mm2": "“Cross-section”",

@@ -40,7 +40,7 @@ from dearig.window.import_choice import (
 from dearig.window.import_memory import ImportMemory, Remembered
 from dearig.window.import_options import ImportFields
 from dearig.window.import_plot import ImportPlot
-from dearig.window.import_table import COLUMNS_MAX, ImportTable
+from dearig.window.import_table import ImportTable
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
 from dearig.window.widgets import ElidedLabel, Message, button, label, name_list
@@ -492,23 +492,16 @@ class ImportDialog(QDialog):
                 self.out_path()
             except InputError as error:
                 found = [in_window_words(str(error))]
-        if self.content is not None and len(self._proposal().numbers) > COLUMNS_MAX:
-            found.append(f"The first {COLUMNS_MAX} of {len(self._proposal().numbers)} columns are "
-                         f"shown, those with a known name before others.")  # fmt: skip
-        self.to_do.show_text("\n".join(found), "warn")
+        self.start.setEnabled(not found and self._tried is not None and not self._writing)
         for widget in (self.columns, self.fields, self.table_box, self.out):
             widget.setEnabled(self.content is not None and not self._writing)
-        blocked = self._writing or self._tried is None or self._blocked()
-        self.start.setEnabled(not blocked)
-
-    def _blocked(self) -> bool:
-        if self._problems():
-            return True
-        try:
-            self.out_path()
-        except InputError:
-            return True
-        return False
+        shown, there = len(self.columns.columns), len(self._proposal().numbers)
+        if 0 < shown < there:
+            found.append(
+                f"The first {shown} of {there} columns are shown, those with a known name before "
+                f"others."
+            )
+        self.to_do.show_text("\n".join(found), "warn")
 
 
 def _free_name(folder: Path, stem: str) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.progress import Progress, part, quiet
-from dearig.recording.importers.choose import TABLES_TRIED, choose
+from dearig.recording.importers.choose import choose
 from dearig.recording.importers.chosen import Chosen, label_in, own_name
 from dearig.recording.importers.columns import Overview
 from dearig.recording.importers.importing import OPENED
@@ -25,6 +25,8 @@ from dearig.recording.importers.units import Scale
 __all__ = ["ColumnPreview", "Content", "Guessed", "Proposal", "content_of", "preview"]
 
 _SHOWN = 5  # values of each column
+#: Tables of a file for which columns are proposed.
+PROPOSED_MAX = 500
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,7 @@ def content_of(
     scales = raw or {}
     # without tables, and where several columns of several make up a recording
     proposals = {"": _proposal(source, None, scales, numbers)}
-    for name in list(tables)[:TABLES_TRIED]:
+    for name in list(tables)[:PROPOSED_MAX]:
         proposals[printable(name)] = _proposal(source, name, scales, numbers)
     block: Sequence[Sequence[str]] = getattr(source, "block", ())
     return Content(
