@@ -141,9 +141,16 @@ class Search:
     def _searched(self, baseline: Fit) -> Fit:
         """Laws are sought in white noise and in drift, the more promising first."""
         judge = self.judge
-        if judge.is_settled(baseline):
+        settled = judge.is_settled(baseline)
+        if settled and baseline.problem.noise_drift is None:
             return baseline
         drifting = self._drifting(baseline)
+        if settled:
+            # a reading that drifts looks at rest like one with 1/f noise: the rest of it decides
+            judge.see([drifting] if drifting else [])
+            if drifting is not None and judge.gain(baseline, drifting) > self.settings.odds:
+                return drifting
+            return baseline
         first = self._raced(baseline, pairs=True)
         judge.see([baseline, *first, *([drifting] if drifting else [])])
         if drifting is None or judge.gain(baseline, drifting) < self.settings.odds:

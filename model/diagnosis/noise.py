@@ -60,7 +60,8 @@ def pink_density(records: Sequence[Record], odds: float) -> float:
     """Return p in m^2 of a density p/f of the readings at rest, 0 where they are white.
 
     Whittle's likelihood of the lead-ins' periodograms below 15 Hz, of a density w + p/f over one of
-    w; p is believed where twice the logarithm of their ratio is above ``odds``.
+    w; p is believed where twice the logarithm of their ratio is above ``odds``, and where a walk or
+    a drift, of density w + p/f^2, is less probable.
     """
     frequency: list[np.ndarray] = [np.zeros(0)]
     power: list[np.ndarray] = [np.zeros(0)]
@@ -76,12 +77,18 @@ def pink_density(records: Sequence[Record], odds: float) -> float:
     f, density = np.concatenate(frequency), np.concatenate(power)
     if f.size < _PINK_LINES or not density.any():
         return 0.0
-    shapes = 1.0 + _CORNERS[:, None] / f
-    white = np.mean(density / shapes, axis=1)
-    scores = f.size * np.log(white) + np.sum(np.log(shapes), axis=1)
-    best = int(np.argmin(scores))
-    gain = 2.0 * (f.size * math.log(float(np.mean(density))) - float(scores[best]))
-    return float(white[best] * _CORNERS[best]) if gain > odds else 0.0
+
+    def fitted(power: float) -> tuple[float, float]:
+        """Return minus the logarithm of the largest likelihood, and p there."""
+        shapes = 1.0 + (_CORNERS[:, None] / f) ** power
+        white = np.mean(density / shapes, axis=1)
+        scores = f.size * np.log(white) + np.sum(np.log(shapes), axis=1)
+        best = int(np.argmin(scores))
+        return float(scores[best]), float(white[best] * _CORNERS[best])
+
+    score, found = fitted(1.0)
+    gain = 2.0 * (f.size * math.log(float(np.mean(density))) - score)
+    return found if gain > odds and score < fitted(2.0)[0] else 0.0
 
 
 class DriftSpace:

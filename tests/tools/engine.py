@@ -50,6 +50,15 @@ def record_of(
     return ActuatorRecord("made", drive, noisy, noise)
 
 
+def pink_noise(rng: np.random.Generator, n: int, density: float) -> np.ndarray:
+    """Noise (n,) at 100 Hz of density p/f in m^2/Hz between a period and half the rate."""
+    f = np.fft.rfftfreq(8 * n, 0.01)
+    size = np.zeros(f.size)
+    size[1:] = np.sqrt(density / f[1:] * 8 * n / 0.02)
+    turned = np.exp(2j * np.pi * rng.random(f.size))
+    return np.fft.irfft(size * turned, 8 * n)[:n]
+
+
 def film_record_of(model: Strip, seed: int = 0, noise: float = FILM_NOISE) -> FilmRecord:
     """A strip pulled, let go fast, pulled further, held, and let go."""
     time = np.linspace(0.0, 40.0, 801)

@@ -7,11 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dearig.model.actuator import Drive
 from dearig.model.diagnosis import diagnose
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
+from dearig.model.noise import noise_at_rest
+from dearig.model.records import ActuatorRecord
 from tests.tools.diagnoses import HIDDEN, of_hidden, plant
-from tests.tools.engine import PLAIN, STRIP, effect, film_record_of, record_of, thesis_drive
+from tests.tools.engine import (
+    PLAIN,
+    STRIP,
+    effect,
+    film_record_of,
+    pink_noise,
+    record_of,
+    thesis_drive,
+)
 
 
 def test_a_hidden_effect_is_named_with_its_parameters() -> None:
@@ -83,3 +94,24 @@ def test_a_search_without_work_left_ends_with_what_it_has() -> None:
     found = diagnose([record_of(plant("sensor curvature"))], PLAIN, workers=1, settings=settings)
     assert found.status == "budget"
     assert any("computing budget" in note for note in found.notes)
+
+
+def after_rest(way: np.ndarray) -> ActuatorRecord:
+    """The plain film after 4 s at 0 V, its reading off by ``way`` (N,) m."""
+    drive = thesis_drive()
+    time = np.arange(way.size) / 100.0
+    voltage = np.concatenate((np.zeros(way.size - drive.time.size), drive.voltage))
+    plain = record_of(PLAIN, Drive(time, voltage, hold=True))
+    reading = plain.displacement + way - way[:400].mean()
+    noise = noise_at_rest(time[:400], reading[:400])
+    return replace(plain, displacement=reading, noise=noise, lead_in=400)
+
+
+def test_slow_noise_of_a_sensor_is_noise_and_a_drift_is_a_drift() -> None:
+    count = 400 + thesis_drive().time.size
+    pink = pink_noise(np.random.default_rng(8), count, 1.5e-13)
+    assert diagnose([after_rest(pink)], PLAIN, workers=1).verdict == "nothing_missing"
+    # at rest, a reading that drifts is not white either
+    time = np.arange(count) / 100.0
+    drifting = diagnose([after_rest(8e-6 * np.log1p(time / 0.8))], PLAIN, workers=1)
+    assert [step.family for step in drifting.steps] == ["drift"]
