@@ -197,9 +197,14 @@ class DaskEngine:
         Raises ``ClusterLost`` where the scheduler, all workers or the network are lost.
         """
         with self._client as client:
+            try:
+                client.wait_for_workers(1, timeout=_NO_WORKER_S)
+            except TimeoutError as error:
+                raise InputError(
+                    f"the Dask scheduler at {self._address} has no workers: start some with dask "
+                    f"worker {self._address}"
+                ) from error
             threads = sum(client.nthreads().values())
-            if not threads:
-                raise InputError(f"the Dask scheduler at {self._address} has no workers")
             # two for each thread: one is computed while the next one is on its way
             yield from self._run(client, deque(tasks), 2 * threads)
 
