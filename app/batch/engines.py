@@ -139,7 +139,11 @@ class LocalEngine:
 
 
 def _words(error: BaseException) -> str:
-    return one_line(error) if isinstance(error, Exception) and str(error) else type(error).__name__
+    return (
+        one_line(error, 120)
+        if isinstance(error, Exception) and str(error)
+        else type(error).__name__
+    )
 
 
 def _fit_task() -> Callable[[Task], Row]:

@@ -152,6 +152,12 @@ def test_a_large_sequence_is_not_written_for_every_run(tmp_path: Path) -> None:
         parsed('name = "a"\nsequence = "long.toml"\nrepeat = 9000\n', tmp_path)
 
 
+def test_a_band_can_be_of_a_parameter_that_a_diagnosis_may_find() -> None:
+    band = "power-law_drag.drag_kPa > 2"
+    plan = parsed(HEAD + f'[after]\ndiagnose = true\nstop_when = "{band}"\n')
+    assert str(plan.stop_when[0]) == band
+
+
 def test_a_band_is_left_where_its_condition_holds() -> None:
     text = '[after]\nidentify = true\nstop_when = ["mu_0_kPa < 40", "T_1_s >= 2e1"]\n'
     low, late = parsed(HEAD + text).stop_when
