@@ -58,7 +58,7 @@ def stage_of(
     if profiled is not None:
         values = problem.layout.values(fit.x)
         found, names, covariance = estimates_with_intervals(
-            profiled, values, fit.fixed, lambda: None, lower_ends=False
+            profiled, values, fit.fixed, lambda _: None, lower_ends=False
         )
         estimates = (*found, *_drift_estimates(fit))
     return Stage(

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 
@@ -54,15 +55,15 @@ def estimates_with_intervals(
     problem: Problem,
     values: np.ndarray,
     held: np.ndarray,
-    tick: Callable[[], None],
+    report: Callable[[float], None],
     lower_ends: bool = True,
 ) -> tuple[list[Estimate], tuple[str, ...], np.ndarray]:
     """Return estimates at ``values`` (d,) with 95 % intervals, and names and covariance (f, f).
 
     ``held`` (d,) bool are parameters that were not fitted; with ``lower_ends`` each locking limit
     among them is freed alone for its own lower end. ``problem`` has its optimum near ``values``.
-    ``tick`` is called at each point of a profile. The covariance, in SI units, is that of the
-    parameters that were fitted.
+    ``report`` receives the fraction that is done, at each point of a profile. The covariance, in SI
+    units, is that of the parameters that were fitted.
     """
     layout = problem.layout
     centre = descend(problem, layout.coordinates(values), held, iterations=10)
@@ -78,6 +79,13 @@ def estimates_with_intervals(
         if held[j] and not (lower_ends and q.kind == "J"):
             estimates.append(Estimate(q.name, q.unit, value, 0.0, math.inf, False, "held"))
             continue
+        points = count(1)
+
+        def tick(before: int = j, points: Iterator[int] = points) -> None:
+            # how many points a profile takes is not known: four are the rule
+            part = 1.0 - 0.5 ** (next(points) / 2.0)
+            report((before + part) / layout.size)
+
         sides = (-1.0,) if held[j] else (-1.0, 1.0)  # a held limit is already at its upper end
         low, high = profile(problem, centre.x, chi2, j, jac, inflation, held, tick, sides)
         if q.logarithmic:

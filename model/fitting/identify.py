@@ -38,7 +38,9 @@ __all__ = [
 
 METHODS = ("hybrid", "de")
 
-_COARSE_RATE = 125.0  # Hz: resolves relaxation times of tens of milliseconds
+# Hz: resolves relaxation times of tens of milliseconds; thinning raises it where means would not do
+_COARSE_RATE = 50.0
+_POPULATIONS = 20.0  # simulated until a descent counts as half done
 _COARSE_SAMPLES = 1500  # of a film record
 _SCOUT_ITERATIONS = 10  # of each start, before the worse ones are dropped
 
@@ -207,6 +209,25 @@ def coarse_problem(problem: Problem) -> Problem:
     return Problem(records, problem.layout, problem.workers)
 
 
+class _Descents:
+    """Progress of so many descents, shown at each population that one of them simulates."""
+
+    def __init__(self, progress: Progress, total: int) -> None:
+        self._progress, self._total = progress, total
+        self._ended = self._populations = 0
+
+    def simulated(self, _count: int, _cost: float) -> None:
+        """Count a population; how many a descent takes is not known."""
+        self._populations += 1
+        part = 1.0 - 0.5 ** (self._populations / _POPULATIONS)
+        self._progress("descents", min((self._ended + part) / self._total, 1.0))
+
+    def ended(self) -> None:
+        """Count the end of a descent."""
+        self._ended, self._populations = self._ended + 1, 0
+        self._progress("descents", min(self._ended / self._total, 1.0))
+
+
 def fit_globally(
     problem: Problem, nested: Network | None, progress: Progress, stiffening: bool = True
 ) -> tuple[LocalFit, np.ndarray]:
@@ -222,6 +243,7 @@ def fit_globally(
     limits[layout.column("J")] = True
     driven_by_voltage = isinstance(layout.base, Actuator)
     first = limits if driven_by_voltage or not stiffening else np.zeros_like(limits)
+    progress("global search", 0.0)
     coarse = coarse_problem(problem)
     starts = (
         voltage_starts(coarse, progress)
@@ -230,20 +252,24 @@ def fit_globally(
     )
     if nested is not None:
         starts = np.vstack([starts, layout.padded(nested)])
-    steps = len(starts) + 4
+    descents = _Descents(progress, len(starts) + 4)
+    coarse.on_simulations = descents.simulated
     fits = []
-    for n, start in enumerate(starts):
+    for start in starts:
         fits.append(descend(coarse, start, first, iterations=_SCOUT_ITERATIONS))
-        progress("descents", (n + 1) / steps)
+        descents.ended()
     # two, because the best after a few steps is not always the best at the end
     leaders = sorted(fits, key=lambda f: f.cost)[:2]
-    best = min((descend(coarse, f.x, first) for f in leaders), key=lambda f: f.cost)
-    progress("descents", (len(starts) + 2) / steps)
+    ends = []
+    for leader in leaders:
+        ends.append(descend(coarse, leader.x, first))
+        descents.ended()
+    best = min(ends, key=lambda f: f.cost)
     if driven_by_voltage and limits.any():
         freed = descend(coarse, best.x, iterations=20)
         if is_worth_freeing(coarse, best.cost, freed, int(limits.sum())):
             best, first = freed, np.zeros_like(limits)
-    progress("descents", (len(starts) + 3) / steps)
+    descents.ended()
     fit = descend(problem, best.x, first, damping=1e-4)
     progress("descents", 1.0)
     problem.simulations += coarse.simulations
@@ -265,14 +291,7 @@ def _intervals(
     """Return estimates with profile-likelihood intervals; ``held`` (d,) limits are undetermined."""
     coarse = coarse_problem(problem)
     recentre(coarse, problem, values)
-    done = 0
-
-    def tick() -> None:
-        nonlocal done
-        done += 1
-        progress("intervals", 1.0 - 0.5 ** (done / (3.0 * problem.layout.size)))
-
-    found = estimates_with_intervals(coarse, values, held, tick)
+    found = estimates_with_intervals(coarse, values, held, lambda part: progress("intervals", part))
     progress("intervals", 1.0)
     problem.simulations += coarse.simulations
     return found

@@ -25,7 +25,7 @@ def test_a_parameter_at_an_end_of_its_search_range_is_marked() -> None:
     found = descend(problem, x, ~free)
     values = problem.layout.values(found.x)
     estimates, _, _ = estimates_with_intervals(
-        problem, values, ~free, lambda: None, lower_ends=False
+        problem, values, ~free, lambda _: None, lower_ends=False
     )
     lag = estimates[-1]
     assert (lag.value, lag.at_bound, lag.determined) == (0.0, True, False)

@@ -237,6 +237,12 @@ def test_progress_is_told():
     assert {stage for stage, _ in told} == {"global search", "descents", "intervals"}
     assert all(0.0 <= part <= 1.0 for _, part in told)
     assert told[-1] == ("intervals", 1.0)
+    assert told[0] == ("global search", 0.0)
+    for stage in ("global search", "descents", "intervals"):
+        parts = [part for name, part in told if name == stage]
+        # the time that is left is estimated from these
+        assert parts == sorted(parts)
+        assert max(np.diff(parts)) < 0.3
 
 
 @pytest.mark.parametrize(
