@@ -190,3 +190,28 @@ def test_true_strain_beside_engineering_strain_is_no_displacement(tmp_path: Path
     done, run = imported(tmp_path, f"{names}\n{rows}\n")
     np.testing.assert_allclose(run.stretch, 1.0 + np.arange(30) / 10)
     assert any("taken as a part of the length, not as %" in note for note in done.notes)
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "Time (s)   Voltage (V)   Travel (mm)\n--------   -----------   -----------",
+        "Time (s) Voltage (V) Travel (mm)",
+        "Time.s Voltage..V. Disp__mm",
+        "Time[s] Voltage[V](measured) Travel(laser)[mm]",
+    ],
+)
+def test_names_between_blanks_stand_above_their_columns(tmp_path: Path, head: str) -> None:
+    text = table(head, "{t:.2f} {v:.6f} {m:.9f}")
+    same(imported(tmp_path, text.replace("Voltage..V.", "Voltage..V"))[1])
+
+
+def test_names_that_cannot_be_told_apart_are_not_guessed(tmp_path: Path) -> None:
+    text = table("Time in s Voltage in V Travel in mm", "{t:.2f} {v:.6f} {m:.9f}")
+    with pytest.raises(InputError, match="the names #1, #2, #3 do not say what the columns are"):
+        imported(tmp_path, text)
+
+
+def test_rows_of_empty_cells_are_blank(tmp_path: Path) -> None:
+    text = table("Time (s);Voltage (V);Travel (mm)", "{t:.2f};{v:.6f};{m:.9f}")
+    same(imported(tmp_path, f"{text};;\n;;\n")[1])

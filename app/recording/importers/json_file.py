@@ -105,7 +105,9 @@ def _in_object(
 ) -> Iterator[tuple[str, Stored]]:
     names, rows = value.get("columns"), value.get("data")
     if isinstance(names, list) and isinstance(rows, list) and _is_text(names) and _is_rows(rows):
-        yield from _in_rows(rows, names, path, lines=False)  # type: ignore[arg-type]
+        units = value.get("units")
+        told = units if isinstance(units, list) and _is_text(units) else ()
+        yield from _in_rows(rows, names, path, False, told)  # type: ignore[arg-type]
         return
     if len(value) > 1 and all(key.isdecimal() for key in value) and _is_column([*value.values()]):
         yield path, _stored([*value.values()], path.rpartition(".")[2], table)
@@ -210,7 +212,11 @@ def _get(keys: Sequence[str]) -> Callable[[Json], Json]:
 
 
 def _in_rows(
-    rows: list[list[Json]], names: Sequence[str], path: str, lines: bool
+    rows: list[list[Json]],
+    names: Sequence[str],
+    path: str,
+    lines: bool,
+    units: Sequence[str] = (),
 ) -> Iterator[tuple[str, Stored]]:
     """Yield the columns of rows, whose first one may be the names."""
     if not rows:
@@ -228,7 +234,8 @@ def _in_rows(
             continue
         own = names[place] if place < len(names) else f"{path.rpartition('.')[2]}[{place}]"
         inside = own if not path else f"{path}.{own}" if names else f"{path}[{place}]"
-        yield inside, _stored_rows(rows, _at(place), own, path, lines)
+        unit = units[place] if len(units) == len(names) > place else ""
+        yield inside, _stored_rows(rows, _at(place), own, path, lines, unit)
 
 
 def _item(row: Json, place: int) -> Json:
@@ -240,9 +247,15 @@ def _at(place: int) -> Callable[[Json], Json]:
 
 
 def _stored_rows(
-    rows: Sequence[Json], get: Callable[[Json], Json], own: str, table: str, lines: bool
+    rows: Sequence[Json],
+    get: Callable[[Json], Json],
+    own: str,
+    table: str,
+    lines: bool,
+    unit: str = "",
 ) -> Stored:
-    unit, label = _dated([get(row) for row in rows[:LOOKED_AT]])
+    dated, label = _dated([get(row) for row in rows[:LOOKED_AT]])
+    unit = unit or dated
     return Stored(
         lambda: _numbers([get(row) for row in rows]), len(rows), own, unit, label, table,
         cell=lambda index: _complaint(get(rows[index])),

@@ -58,8 +58,8 @@ _WORDS = MappingProxyType(
         "nominal_stress": "stress contrainte spannung zugspannung nennspannung",
         "force": "force load kraft last charge effort f",
         "displacement": "displacement disp displ deflection lvdt travel extension weg verschiebung "
-        "deplacement stroke hub position elongation auslenkung allongement verlangerung laser "
-        "crosshead traverse course dehnung",
+        "deplacement stroke hub position elongation auslenkung langenanderung allongement "
+        "verlangerung laser crosshead traverse course dehnung",
     }
 )
 _QUANTITIES_OF: dict[str, list[str]] = {}
@@ -160,10 +160,16 @@ def names_of(quantity: str) -> str:
 def label_of(name: str, unit: str = "") -> Label:
     """Return what the column ``name`` says; ``unit`` is what the file says of it elsewhere."""
     words, found = name, unit_of(unit) if unit else None
-    for pattern in _UNIT_IN_NAME:
-        match = pattern.fullmatch(name.strip().translate(_BRACKETS))
-        if match and "[" not in match["name"] and (inside := unit_of(match["unit"])):
-            words, found = match["name"], inside
+    bracketed = name.strip().translate(_BRACKETS)
+    inside = [text for text in _IN_BRACKETS.findall(bracketed) if unit_of(text)]
+    if len(inside) > 1:  # a number beside a unit counts: Force (1) [N]
+        inside = [text for text in inside if text.strip() != "1"]
+    if len(inside) == 1:
+        words, found = bracketed.replace(f"[{inside[0]}]", " "), unit_of(inside[0])
+    for pattern in () if inside else _UNIT_IN_NAME:
+        match = pattern.fullmatch(bracketed)
+        if match and "[" not in match["name"] and (known := unit_of(match["unit"])):
+            words, found = match["name"], known
             break
     symbol, dimensions = found or ("", ())
     unknown = "" if found else unit or _unknown_unit(name)
@@ -180,8 +186,8 @@ def label_of(name: str, unit: str = "") -> Label:
 
 def _unknown_unit(name: str) -> str:
     """Return a short text in brackets at the end of ``name``, which may be a unit, or ""."""
-    match = _UNIT_IN_NAME[0].fullmatch(name.strip().translate(_BRACKETS))
-    inside = match["unit"].strip() if match else ""
+    bracketed = name.strip().translate(_BRACKETS)
+    inside = _IN_BRACKETS.findall(bracketed)[-1].strip() if bracketed.endswith("]") else ""
     return inside if len(inside) <= UNIT_MAX and re.match(r"[^\W\d]|°|%", inside) else ""
 
 
@@ -189,12 +195,12 @@ def _unknown_unit(name: str) -> str:
 UNIT_MAX = 7
 _RAW = ("displacement", "current", "voltage_monitor")
 _BRACKETS = str.maketrans("()", "[]")
+_IN_BRACKETS = re.compile(r"\[([^\[\]]+)\]")
 _UNIT_IN_NAME = (
-    re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]+)\]"),
     re.compile(r"(?P<name>.*\S)\s*,\s*(?P<unit>\S+)"),
     re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S+)"),
     re.compile(r"(?P<name>.*[^\s/])\s*/\s*(?P<unit>\S+)"),
-    re.compile(r"(?P<name>.*[^_\s])[_\s](?P<unit>[^_\s]+)"),
+    re.compile(r"(?P<name>.*[^_.\s])[_.\s]+(?P<unit>[^_.\s]+)"),
 )
 
 

@@ -46,6 +46,7 @@ _MARKS = {
     codecs.BOM_UTF16_BE: "utf-16",
 }
 _DELIMITERS = ("\t", ";", ",", "|", None)  # None: any white space
+_RULE = re.compile(r"[\s|+:=_*-]+")  # a line that is drawn below the names
 _SAMPLE = 400  # lines of data that are looked at
 _LEAST = 2  # lines of data in a row that begin a table
 
@@ -156,7 +157,8 @@ _CLOCK = re.compile(r"(?:(\d{1,5}):)?([0-5]?\d):([0-5]\d(?:\.\d+)?)")
 _MIDNIGHT = datetime(1900, 1, 1)  # as strptime has it
 _MOMENTS = (
     "%m/%d/%Y %I:%M:%S.%f %p", "%m/%d/%Y %I:%M:%S %p",
-    "%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p",
+    "%d.%m.%Y %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S", "%d.%m.%y %H:%M:%S.%f", "%d.%m.%y %H:%M:%S",
+    "%I:%M:%S.%f %p", "%I:%M:%S %p",
     "%Y-%m-%d %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S",
 )  # fmt: skip
 
@@ -213,8 +215,8 @@ def _no_table(lines: Sequence[str], start: int, path: Path) -> InputError:
 
 def holds_data(line: str) -> bool:
     """Return True unless ``line`` is blank or a comment."""
-    text = line.strip()
-    return bool(text) and not text.startswith(_COMMENTS)
+    text = line.strip(" \t\r\n\f\v;,|")  # a row of empty cells is blank
+    return bool(text) and not line.strip().startswith(_COMMENTS)
 
 
 @dataclass(frozen=True)
@@ -286,7 +288,11 @@ class _Table:
 
     def _names(self, path: Path, given: int | None) -> tuple[int, list[str], list[str]]:
         """Return the line of the names, the names, and the units below them."""
-        above = [i for i in range(self.first - 1, self.start - 1, -1) if self.lines[i].strip()]
+        above = [
+            i
+            for i in range(self.first - 1, self.start - 1, -1)
+            if self.lines[i].strip() and not _RULE.fullmatch(self.lines[i])
+        ]
         if given is not None:
             if given not in above:
                 raise InputError(
@@ -322,9 +328,16 @@ class _Table:
             for other in _DELIMITERS:
                 if len(split := cells_of(text, other)) == self.cells:
                     return split
+        if self.delimiter is None and len(cells) != self.cells:
+            # names have single blanks in them, or units in brackets behind them
+            for wide in (re.split(r"\s{2,}|\t", text.strip()), _with_brackets(cells)):
+                if len(wide) == self.cells:
+                    return wide
         return cells
 
     def _are_names(self, cells: list[str]) -> bool:
+        if self.delimiter is None and len(cells) != self.cells:
+            return False  # which is above which column cannot be told
         used = max(i for row in self.sample for i, cell in enumerate(row) if cell) + 1
         named = [cell for cell in cells if cell]
         numbers = sum(is_number(cell) for cell in named)
@@ -426,6 +439,17 @@ def _positive(text: str) -> float | None:
     except ValueError:
         return None
     return value if 0.0 < value < float("inf") else None
+
+
+def _with_brackets(cells: Sequence[str]) -> list[str]:
+    """Return ``cells`` with those in brackets behind the cell before them."""
+    found: list[str] = []
+    for cell in cells:
+        if found and cell[:1] in "[(":
+            found[-1] += f" {cell}"
+        else:
+            found.append(cell)
+    return found
 
 
 def _bare(line: str) -> str:
