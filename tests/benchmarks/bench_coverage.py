@@ -32,7 +32,7 @@ EFFECTS_DRAWN: tuple[EffectValues, ...] = (
     (("load inertia", (("moving_mass", 0.15),)),),
     (("sensor lag", (("time_constant", 8e-3),)),),
     (("electrode resistance", (("resistance", 2e7),)),),
-    (("linear drag", (("drag", 400.0),)),),
+    (("linear drag", (("drag", 3000.0),)),),
 )
 CONVERTER_STEP = 80e-3 / 2**16  # m: +-40 mm over 16 bits
 _NORMAL_95 = 1.96

@@ -183,7 +183,8 @@ class TestJson:
         assert found["J_0"]["ci95"] == [59.595, None]
         assert found["J_1"] == {
             "name": "J_1", "value": 1e4, "unit": "", "ci95": [None, None], "determined": False,
-            "free": True, "note": "not determined by these data",
+            "free": True, "at_bound": False, "systematic": 0.0, "ci95_combined": [None, None],
+            "note": "not determined by these data",
         }  # fmt: skip
         assert found["mu_0"]["free"] is False
 

@@ -58,6 +58,13 @@ MEASUREMENTS = {
         "Speed and recovery of the identification",
         ("tests.benchmarks.bench_identify", "tests.benchmarks.bench_recovery"),
     ),
+    "coverage": Measurement(
+        "How often the 95 % intervals hold the truth",
+        (
+            "tests.benchmarks.bench_coverage --rigs 100",
+            "tests.benchmarks.bench_coverage --rigs 40 --rate 200 --diagnose",
+        ),
+    ),
     "rig": Measurement(
         "Speed of the simulated rig, and long runs on the simulated card",
         (
