@@ -28,6 +28,7 @@ _POWER = 2.0  # of 1/j in a mode's standard deviation: an integrated random walk
 _AMPLITUDES = 10.0 ** np.arange(0.0, 9.0, 0.5)
 _PINK_MAX = 15.0  # Hz: faster, a sensor that averages is not white, and mains may stand out
 _PINK_LINES = 16  # of a spectrum: fewer do not show its slope
+_CLEARLY = 1.0  # of the logarithm of a likelihood: a ratio of e
 #: Frequencies in Hz below which 1/f noise is larger than white noise, among which is chosen.
 _CORNERS = 10.0 ** np.arange(-1.0, 3.01, 0.05)
 
@@ -61,7 +62,8 @@ def pink_density(records: Sequence[Record], odds: float) -> float:
 
     Whittle's likelihood of the lead-ins' periodograms below 15 Hz, of a density w + p/f over one of
     w; p is believed where twice the logarithm of their ratio is above ``odds``, and where a walk or
-    a drift, of density w + p/f^2, is less probable.
+    a drift, of density w + p/f^2, is not clearly more probable. Where the rest does not tell them
+    apart, the search tries a drift beside the 1/f noise.
     """
     frequency: list[np.ndarray] = [np.zeros(0)]
     power: list[np.ndarray] = [np.zeros(0)]
@@ -88,7 +90,7 @@ def pink_density(records: Sequence[Record], odds: float) -> float:
 
     score, found = fitted(1.0)
     gain = 2.0 * (f.size * math.log(float(np.mean(density))) - score)
-    return found if gain > odds and score < fitted(2.0)[0] else 0.0
+    return found if gain > odds and score < fitted(2.0)[0] + _CLEARLY else 0.0
 
 
 class DriftSpace:
