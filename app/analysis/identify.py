@@ -77,6 +77,7 @@ def identify_recordings(
     """
     check_named_once(train, validation)
     started = clock()
+    given = given_values(rig_file, drive)
     recordings, left_out = choose(open_all(train), ended_early)
     others, also_left_out = choose(open_all(validation), ended_early)
     check_apart(recordings, others)
@@ -103,7 +104,7 @@ def identify_recordings(
         ]
         if intervals and method == "hybrid":
             fit = add_intervals(records, fit, progress=progress)
-    fit = with_budget(records, fit, given_values(rig_file, drive), progress=progress)
+    fit = with_budget(records, fit, given, progress=progress)
     compared = [compare(r, fit.model, "train", drive) for r in recordings]
     validated = [compare(r, fit.model, "validation", drive) for r in others]
     seconds = clock() - started
