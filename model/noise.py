@@ -12,7 +12,14 @@ import numpy as np
 
 from dearig.model.errors import ModelError
 
-__all__ = ["DIFFERENCES", "LEAD_IN", "READINGS_MIN", "noise_at_rest", "noise_of"]
+__all__ = [
+    "DIFFERENCES",
+    "LEAD_IN",
+    "READINGS_MIN",
+    "noise_at_rest",
+    "noise_of",
+    "require_readings",
+]
 
 #: Sources of a noise: readings at rest, or second differences of all of them.
 LEAD_IN, DIFFERENCES = "lead-in", "second differences"
@@ -30,7 +37,7 @@ def noise_of(values: np.ndarray, valid: np.ndarray | None = None) -> float:
     From second differences, which no drift or slope disturbs: their variance is six times that of
     white noise. Readings that are not ``valid`` (N,) take no part; with too few others it is 0.
     """
-    _require_readings(values)
+    require_readings(values)
     bends = np.diff(values, 2)
     if valid is not None:
         bends = bends[valid[:-2] & valid[1:-1] & valid[2:]]
@@ -43,7 +50,7 @@ def noise_at_rest(time: np.ndarray, values: np.ndarray) -> float:
     N >= 4. About a straight line, and without what is periodic: mains on a cable is no noise, but
     something to be found; taken for noise, it would hide everything that is smaller.
     """
-    _require_readings(values)
+    require_readings(values)
     n = values.size
     t = time - time.mean()
     left = _level(t, values)
@@ -59,7 +66,8 @@ def noise_at_rest(time: np.ndarray, values: np.ndarray) -> float:
     return math.sqrt(float(left @ left) / (n - given))
 
 
-def _require_readings(values: np.ndarray) -> None:
+def require_readings(values: np.ndarray) -> None:
+    """Raise ``ModelError`` where ``values`` (N,) are too few to read a noise from."""
     if values.size < READINGS_MIN:
         raise ModelError(
             f"{values.size} samples are too few to read a noise from; {READINGS_MIN} are needed"

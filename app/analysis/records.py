@@ -22,7 +22,7 @@ from dearig.model.errors import ModelError
 from dearig.model.excitation import Lobes
 from dearig.model.film import Strip
 from dearig.model.measures import errors
-from dearig.model.noise import LEAD_IN
+from dearig.model.noise import LEAD_IN, require_readings
 from dearig.model.records import ActuatorRecord, FilmRecord, Record, counted
 from dearig.recording.early_end import early_end
 from dearig.recording.reader import open_recording
@@ -148,8 +148,9 @@ def as_record(recording: Recording, drive: str = "command") -> Record:
 def reading_noise_of(recording: Recording, valid: np.ndarray | None) -> ReadingNoise:
     """Return the noise of the ``valid`` (N,) readings, from the lead-in where there is one.
 
-    Raises ``ModelError`` where no reading differs from its neighbours.
+    Raises ``ModelError`` for too few readings, and where none differs from its neighbours.
     """
+    require_readings(recording.signal)
     noise = recording.noise if valid is None else recording.noise_of_valid(valid)
     if noise is None:
         raise ModelError(

@@ -24,6 +24,7 @@ from concurrent.futures import (
 from concurrent.futures.process import BrokenProcessPool
 from typing import TYPE_CHECKING, Any, Protocol
 
+from dearig.drivers.processes import isolated_spawn
 from dearig.errors import InputError
 from dearig.extras import import_extra
 from dearig.recording.files import in_words, journal_of, one_line
@@ -120,7 +121,8 @@ class LocalEngine:
         try:
             while waiting or running:
                 while waiting and len(running) < workers:
-                    future = pool.submit(self._work, waiting[0])
+                    with isolated_spawn():  # the first of them starts the workers
+                        future = pool.submit(self._work, waiting[0])
                     running[future] = waiting.popleft()
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     row = future.result()

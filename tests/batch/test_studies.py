@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -22,6 +23,7 @@ from tests.tools.played import Bench
 from tests.tools.recordings import run_counts, write_run
 from tests.tools.study_work import LightTask, work
 
+ROOT = Path(__file__).resolve().parents[2]
 FIRST, SECOND = "day 1/a.h5", "b.h5"
 
 
@@ -103,7 +105,10 @@ def test_the_key_of_a_row_is_of_content_options_and_name(
     assert len(others | {key}) == 4
 
 
-def test_a_worker_that_dies_costs_the_row_of_its_recording() -> None:
+def test_a_worker_that_dies_costs_the_row_of_its_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # workers import nothing from the working folder
     tasks = [LightTask(name) for name in ("a", "poison")]
     found = {task.name: row for task, row in LocalEngine(2, work).run(tasks)}
     assert {name: row["state"] for name, row in found.items()} == {
@@ -112,10 +117,14 @@ def test_a_worker_that_dies_costs_the_row_of_its_recording() -> None:
     assert "ended without a word" in found["poison"]["reason"]
 
 
-def test_workers_end_with_the_process_that_began_them_also_when_it_is_killed() -> None:
+def test_workers_end_with_the_process_that_began_them_also_when_it_is_killed(
+    tmp_path: Path,
+) -> None:
     began = subprocess.Popen(
-        [sys.executable, "-m", "tests.tools.study_work"], stdout=subprocess.PIPE, text=True
-    )
+        [sys.executable, "-m", "tests.tools.study_work"],
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
     assert began.stdout is not None
     with began.stdout:
         workers = [psutil.Process(int(began.stdout.readline())) for _ in range(2)]
