@@ -17,10 +17,15 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 
 import dearig.cli.main as command
 import dearig.sim_backend.rig as rigs
 from dearig.acquisition.run import record  # noqa: F401  (imported before the faults)
+from dearig.config.rigfile import RigFile
+from dearig.model.actuator import Actuator, Drive
+from dearig.model.material import TABLE_3
+from dearig.sim_backend import factory  # noqa: F401  (imported before the faults)
 
 __all__ = ["KINDS", "SEQUENCE", "main"]
 
@@ -128,6 +133,10 @@ def _count(kind: str) -> int:
 
 def main() -> None:
     """Read "FOLDER KIND N" from standard input, make that run in a fork, and answer its end."""
+    # loads the kernels, and what Numba imports for them: native code that aborts without memory
+    rig = RigFile()
+    still = Drive(np.linspace(0.0, 0.01, 11), np.zeros(11))
+    Actuator(rig.as_film(), rig.as_load(), TABLE_3).simulate(still)
     for line in sys.stdin:
         folder, kind, n = line.rstrip("\n").rsplit(" ", 2)
         child = os.fork()
