@@ -221,7 +221,8 @@ def _exhausted(error: Exception) -> str:
     Errors of a disk reach this only from standard output and from temporary files: what writes
     results has a sentence of its own.
     """
-    if isinstance(error, MemoryError) or _nameless(error) or _misread(error):
+    without_memory = _nameless(error) or _misread(error) or _unallocated(error)
+    if isinstance(error, MemoryError) or without_memory:
         return (
             "the computer has no memory left; close other programs, or give this command less at a "
             "time; files that it had finished are whole"
@@ -242,10 +243,18 @@ def _nameless(error: Exception) -> bool:
     )
 
 
+def _unallocated(error: Exception) -> bool:
+    """Return True if HDF5 had no memory: it says so in the words of another error."""
+    said = str(error)
+    return "unable to allocate" in said or "memory allocation failed" in said
+
+
 def _misread(error: Exception) -> bool:
     """Return True if Python refused a source that is right: its parser had no memory."""
     if not isinstance(error, SyntaxError) or not error.filename:
         return False
+    if error.filename == "<string>":
+        return True  # a program wrote it, and the same one in every run
     try:
         compile(Path(error.filename).read_bytes(), error.filename, "exec")
     except (OSError, SyntaxError, ValueError):
@@ -325,6 +334,9 @@ def _unexpected_errors_told(written: log_file.LogFile) -> Iterator[None]:
     def unraisable(args: Any) -> None:
         if isinstance(args.exc_value, KeyboardInterrupt):
             note_lost()
+            return
+        if isinstance(args.exc_value, Exception) and _exhausted(args.exc_value):
+            log.warning("an object could not be deleted: %s", args.exc_value)
             return
         # such as a library's object that cannot let go of an instrument whose link is lost
         log.error("error while an object was deleted: %r", args.object, exc_info=args.exc_value)

@@ -68,11 +68,22 @@ def test_an_unexpected_error_is_one_sentence_and_its_traceback_is_in_the_log(
     ("lack", "said"),
     [
         (MemoryError(), "no memory left"),
+        (ValueError("Unable to create dataset (unable to allocate buffer)"), "no memory left"),
+        (KeyError("Unable to open object (memory allocation failed)"), "no memory left"),
         (SystemError("error return without exception set"), "no memory left"),
         (SyntaxError("invalid syntax", (__file__, 1, 1, "", 1, 1)), "no memory left"),
+        (SyntaxError("invalid syntax", ("<string>", 4, 1, "", 4, 1)), "no memory left"),
         (OSError(errno.ENOSPC, "full"), "free some space"),
     ],
-    ids=["memory", "memory for an error", "memory for a parser", "disk"],
+    ids=[
+        "memory",
+        "HDF5",
+        "HDF5 2",
+        "memory for an error",
+        "memory for a parser",
+        "made code",
+        "disk",
+    ],
 )
 def test_a_computer_without_memory_or_disk_is_no_mistake_of_the_program(
     lack: Exception,

@@ -33,6 +33,10 @@ _RIG = '[film]\nname = "faults"\n[limits]\nramp_down_s = 0.1\n'
 _OBJECTS = 2_000_000
 
 
+#: What a library in Rust or C++ says before it ends the process.
+_ABORTED = re.compile(r"memory allocation of \d+ bytes failed|std::bad_alloc")
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What one run with a fault did: its exit code, words, and what is wrong with them."""
@@ -78,6 +82,9 @@ class Runs:
         ended = self._process.stdout.readline().strip()
         terminal = (folder / "terminal").read_text(encoding="utf-8", errors="replace")
         outcome = folder / "outcome.json"
+        # that ends the process where there is no memory, as a kill does
+        if _ABORTED.search(terminal):
+            return Outcome(n, -1, terminal[-300:], ()), 0
         if ended != "ended" or not outcome.exists():
             return Outcome(n, -1, terminal[-300:], (ended or "the process of the runs died",)), 0
         found = json.loads(outcome.read_text(encoding="utf-8"))

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import QPoint, QSettings, QTimer
+from PySide6.QtCore import QEvent, QObject, QPoint, QSettings, QTimer
 from PySide6.QtWidgets import QApplication, QDialog, QWidget
 
 from dearig.config.rigfile import RigFile
@@ -34,6 +34,17 @@ CARD = RigFile.model_validate(
     }
 )
 QUICK = RigFile.model_validate({"limits": {"ramp_down_s": 0.2}})
+
+
+class Released(QObject):
+    """Counts the keys and buttons that were let go, as the screen reports them."""
+
+    count = 0
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
+        kinds = (QEvent.Type.KeyRelease, QEvent.Type.MouseButtonRelease)
+        self.count += event.spontaneous() and event.type() in kinds
+        return super().eventFilter(watched, event)
 
 
 class Story:
@@ -191,9 +202,14 @@ def on_a_card(story: Story, port: int) -> None:
     saw["time"] = bar.time.text()
     story.on_screen(bar.stop_button, "card")
 
+    released = Released()
+    story.application.installEventFilter(released)
+
     def refused(what: Callable[[], None]) -> bool:
+        before = released.count
         what()
-        QTimer.singleShot(200, story.application.processEvents)
+        # what arrives later would act on what comes after
+        until(lambda: released.count > before, "the key or button is let go")
         return runner.state is HighVoltage.UNKNOWN and bar.alarm.isVisible()
 
     kept = []
