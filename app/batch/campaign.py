@@ -71,9 +71,10 @@ class Arming:
 class CampaignOutcome:
     """State of a campaign at the end of a session.
 
-    ``status`` is complete, ended (on request), armed_runs or armed_time (what was armed is used
-    up), band (a number has left its band), halted (a person must look), refused (a run was not
-    admitted) or interrupted; ``reason`` is a sentence, "" for complete.
+    ``status`` is complete, ended (on request), armed_runs or armed_time (all armed runs
+    are played, or the armed time is over), band (a number has left its band), halted (a person
+    must look), refused (a run was not admitted) or interrupted; ``reason`` is a sentence, "" for
+    complete.
     """
 
     name: str
@@ -223,7 +224,7 @@ class _Session:
             seen = queue.halted
             self._settle()
             if queue.halted != seen:
-                # nobody has seen this one: what is acknowledged is something else
+                # this halt was not shown yet: the acknowledgement is of another one
                 raise InputError(_halted(queue.halted))
             if arming.acknowledged and not queue.halted:
                 raise InputError(

@@ -78,8 +78,8 @@ def study(
 ) -> None:
     """Fit, diagnose or validate many recordings, each by itself, into one table.
 
-    A broken recording costs its row. What was computed is kept in the cache, so that a study that
-    was ended goes on where it stood. Ctrl-C ends it.
+    A broken recording fails alone; its row says why. What was computed is kept in the cache, so
+    that a study that was ended goes on where it stood. Ctrl-C ends it.
     """  # fmt: skip
     from dearig.batch.engines import engine_at
     from dearig.batch.fits import StudyOptions

@@ -73,7 +73,7 @@ def _show(view: _View, console: Console, every: float) -> None:
 
     shown = view.look(console)
     try:
-        # the streams of others are not redirected: what they write is printed as it is
+        # warnings and log lines are printed as they are: Live does not redirect them
         with Live(
             shown, console=console, auto_refresh=False, redirect_stdout=False, redirect_stderr=False
         ) as live:

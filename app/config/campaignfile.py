@@ -69,7 +69,7 @@ template = "{name}-{number:04d}-{segment.0.amplitudes_kV.0}kV"
 "segment.0.amplitudes_kV" = [[6.0, 6.0, 6.0, 6.0, 6.0], [7.0, 7.0, 7.0, 7.0, 7.0]]
 "segment.0.periods" = [1]
 
-# single runs beside the grid; each can be repeated, and can have a sequence of its own
+# single runs in addition to the grid; each can be repeated, and can have its own sequence
 # [[run]]
 # sequence = "rich"
 # repeat = 1
@@ -98,7 +98,7 @@ every = 1                       # keep the recording of every n-th run; 1 keeps 
 class _Run(Table):
     sequence: str | None = Field(
         default=None, min_length=1, max_length=NAME_MAX,
-        description="preset or sequence file beside the plan",
+        description="a preset, or a sequence file in the plan's folder",
     )  # fmt: skip
     repeat: int = Field(default=1, ge=1, le=RUNS_MAX, description="times that it is played")
     set: dict[str, Any] = Field(
@@ -110,7 +110,7 @@ class _WarmUp(Table):
     runs: int = Field(default=1, ge=0, le=1000, description="runs before the others")
     sequence: str | None = Field(
         default=None, min_length=1, max_length=NAME_MAX,
-        description="preset or sequence file beside the plan",
+        description="a preset, or a sequence file in the plan's folder",
     )  # fmt: skip
 
 
@@ -138,7 +138,7 @@ class _File(Table):
     name: str = Field(min_length=1, max_length=80, description="name of the campaign")
     sequence: str | None = Field(
         default=None, min_length=1, max_length=NAME_MAX,
-        description="preset or sequence file beside the plan",
+        description="a preset, or a sequence file in the plan's folder",
     )  # fmt: skip
     repeat: int = Field(default=1, ge=1, le=RUNS_MAX, description="times that each is played")
     rest_s: float = Field(
