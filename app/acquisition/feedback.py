@@ -305,12 +305,6 @@ class FeedbackLoop:
         )
 
 
-def _reading_step(rig_file: RigFile) -> float:
-    """Return the displacement in m of one count of the laser's input."""
-    volts = rig_file.card.range_displacement_V / 2**15
-    return abs(rig_file.laser.mm_per_V) * 1e-3 * volts
-
-
 _STATES = {
     "holding": ("info", "{held} are held, correction {correction}"),
     "limited": (

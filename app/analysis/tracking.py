@@ -1,8 +1,8 @@
 """Tracking: the film is made to follow a displacement, run after run.
 
-A ``Tracking`` says which voltage is played next and learns from the recording. It plays nothing:
-whoever plays runs, a command or the window, plays the proposed sequence as any other, through the
-gate, the interlocks and the guardian.
+A ``Tracking`` proposes the next voltage and learns from the recording. It plays nothing: the
+command and the window play the proposed sequence as any other, through the gate, the interlocks and
+the guardian.
 """
 
 from __future__ import annotations
@@ -52,21 +52,31 @@ _FALLBACK = 1e-7  # m: the noise of a sensor whose reading never changes
 _FINISHED = "finished"  # outcome of a recording whose run came to its end
 
 
-def _label(kind: str, iteration: int) -> str:
-    return {
-        "linear": "linear map",
-        "thesis": "compared model",
-        "model": "model",
-        "learned": f"learned, iteration {iteration}",
-    }[kind]
+@dataclass(frozen=True, eq=False)
+class _Named:
+    """A run of a target: ``kind`` is one of ``KINDS``, ``iteration`` counts from 0."""
 
+    kind: str
+    iteration: int
 
-def _stem(kind: str, iteration: int) -> str:
-    return f"{kind}-{iteration}" if kind == "learned" else kind
+    @property
+    def label(self) -> str:
+        """The run in words."""
+        return {
+            "linear": "linear map",
+            "thesis": "compared model",
+            "model": "model",
+            "learned": f"learned, iteration {self.iteration}",
+        }[self.kind]
+
+    @property
+    def stem(self) -> str:
+        """Name of its sequence's files, without an ending."""
+        return f"{self.kind}-{self.iteration}" if self.kind == "learned" else self.kind
 
 
 @dataclass(frozen=True, eq=False)
-class Proposal:
+class Proposal(_Named):
     """The next run of a target, before it is played.
 
     ``kind`` is one of ``KINDS``, ``iteration`` counts from 0. ``voltage`` (N,) in V is held between
@@ -75,23 +85,11 @@ class Proposal:
     ``target`` is the name of the target.
     """
 
-    kind: str
-    iteration: int
     voltage: np.ndarray
     expected: np.ndarray | None
     rate: float
     target: str
     model: ModelFile | None
-
-    @property
-    def label(self) -> str:
-        """The run in words."""
-        return _label(self.kind, self.iteration)
-
-    @property
-    def stem(self) -> str:
-        """Name of its files, without an ending."""
-        return _stem(self.kind, self.iteration)
 
     @property
     def name(self) -> str:
@@ -137,7 +135,7 @@ class Proposal:
 
 
 @dataclass(frozen=True, eq=False)
-class TrackedRun:
+class TrackedRun(_Named):
     """A run of a target.
 
     ``kind`` is one of ``KINDS``, ``iteration`` counts from 0. ``rms`` and ``largest`` in m are of
@@ -148,8 +146,6 @@ class TrackedRun:
     ``edge`` in Hz is up to where the next run learned from this one, 0 where it did not.
     """
 
-    kind: str
-    iteration: int
     rms: float
     largest: float
     samples: int
@@ -163,16 +159,6 @@ class TrackedRun:
     edge: float = 0.0
     contraction: float = math.nan
     notes: tuple[str, ...] = ()
-
-    @property
-    def label(self) -> str:
-        """The run in words."""
-        return _label(self.kind, self.iteration)
-
-    @property
-    def stem(self) -> str:
-        """Name of its sequence's files, without an ending."""
-        return _stem(self.kind, self.iteration)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,20 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dearig.acquisition.rigs import read_faults
 from dearig.acquisition.run import RunOptions
 from dearig.analysis import hold as holding
 from dearig.analysis.hold import HoldOptions
 from dearig.api.display import card, drawing, write_page
-from dearig.api.models import ModelSource, as_model_file
+from dearig.api.models import ModelSource, read_model
 from dearig.api.recordings import Recording, RigSource, load_rig
-from dearig.config.modelfile import ModelFile, load_model
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.files import check_output
 from dearig.recording.json_file import write_json
 from dearig.recording.reader import open_recording
 from dearig.report.hold_page import hold_figure, hold_json, hold_summary
-from dearig.sim_backend.faults import FaultPlan
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -123,16 +122,11 @@ def hold(
         For a run that ended early. The rig is safe, and the recording so far is kept.
     """
     settings, text = load_rig(rig_file)
-    try:
-        plan = FaultPlan.parse(list(faults))
-    except ValueError as error:
-        raise InputError(str(error)) from error
-    given = as_model_file(model)
     outcome = holding.hold(
-        displacement_mm * 1e-3, seconds,
-        given if isinstance(given, ModelFile) else load_model(given), rig, settings, Path(out),
+        displacement_mm * 1e-3, seconds, read_model(model), rig, settings, Path(out),
         RunOptions(
-            text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced, faults=plan
+            text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced,
+            faults=read_faults(faults),
         ),
         options, feedback=feedback, progress=progress,
     )  # fmt: skip

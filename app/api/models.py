@@ -14,7 +14,7 @@ from dearig.report.numbers import NO_VALUE, significant
 from dearig.report.sentences import describe_model
 from dearig.report.tables import Row, Table
 
-__all__ = ["Model", "ModelSource", "as_model_file"]
+__all__ = ["Model", "ModelSource", "as_model_file", "read_model"]
 
 
 class Model(ModelFile):
@@ -104,3 +104,9 @@ def as_model_file(source: ModelSource) -> str | Path | ModelFile:
             f"a model is a path, a dearig.Model or a result with one, not {type(source).__name__}"
         )
     return file
+
+
+def read_model(source: ModelSource) -> ModelFile:
+    """Return the model of ``source``, read where it is a path. Raises ``InputError``."""
+    given = as_model_file(source)
+    return given if isinstance(given, ModelFile) else load_model(given)

@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING
 import tomli_w
 
 from dearig.acquisition.overlay import OverlayModel
+from dearig.acquisition.rigs import read_faults
 from dearig.acquisition.run import RunOptions
 from dearig.acquisition.run import record as run
 from dearig.analysis.compatibility import of_rig
 from dearig.api.display import card, drawing, facts, write_page
-from dearig.api.models import ModelSource, as_model_file
+from dearig.api.models import ModelSource, read_model
 from dearig.api.sequences import SequenceSource, as_loaded
-from dearig.config.modelfile import ModelFile, load_model, model_toml
+from dearig.config.modelfile import ModelFile, model_toml
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile, load_rig_file
 from dearig.config.rigform import parse_rig_file
@@ -35,7 +36,6 @@ from dearig.recording.files import check_output, replaced_when_done
 from dearig.recording.reader import open_recording
 from dearig.report.numbers import seconds, significant
 from dearig.report.signal_figures import signal_figure
-from dearig.sim_backend.faults import FaultPlan
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -186,7 +186,7 @@ def record(
     in_step = None if overlay is None else _overlay_model(overlay)
     options = RunOptions(
         text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced,
-        actuator=actuator, faults=_fault_plan(faults),
+        actuator=actuator, faults=read_faults(faults),
     )  # fmt: skip
     folder = None if path is not None else Path(tempfile.mkdtemp(prefix="dearig-"))
     out = Path(path) if path is not None else _unnamed(folder, sequence, loaded)
@@ -208,14 +208,6 @@ def _overlay_model(source: ModelSource) -> OverlayModel:
     return OverlayModel(file.name, actuator, toml=model_toml(file.name, actuator, file.history))
 
 
-def _fault_plan(faults: Iterable[str]) -> FaultPlan:
-    """Return the plan of ``faults`` such as ``arc@3.2``. Raises ``InputError``."""
-    try:
-        return FaultPlan.parse(list(faults))
-    except ValueError as error:
-        raise InputError(str(error)) from error
-
-
 def _unnamed(folder: Path | None, source: SequenceSource, loaded: LoadedSequence) -> Path:
     """A file in ``folder`` with the name of a preset, of a sequence file, or of the sequence."""
     name = loaded.sequence.name
@@ -227,8 +219,7 @@ def _unnamed(folder: Path | None, source: SequenceSource, loaded: LoadedSequence
 
 def _actuator(source: ModelSource) -> tuple[ModelFile, Actuator]:
     """The model of ``source``, which must be of an actuator."""
-    given = as_model_file(source)
-    file = given if isinstance(given, ModelFile) else load_model(given)
+    file = read_model(source)
     if not isinstance(file.model, Actuator):
         raise InputError(
             f"the model {file.name!r} is of a bare film, which a voltage does not move: give one "

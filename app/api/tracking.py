@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dearig.acquisition.rigs import read_faults
 from dearig.acquisition.run import RunOptions
 from dearig.analysis.track import track as follow
 from dearig.analysis.track_target import plan_target
 from dearig.analysis.tracking import TrackedRun, TrackOutcome
 from dearig.api.display import card, drawing, facts, table_html, write_page
-from dearig.api.models import ModelSource, as_model_file
+from dearig.api.models import ModelSource, read_model
 from dearig.api.recordings import Recording, RigSource, load_rig
-from dearig.config.modelfile import ModelFile, load_model
 from dearig.config.targetfile import LoadedTarget, load_target, target_of
 from dearig.errors import InputError
 from dearig.model.actuator import Actuator
@@ -36,7 +36,6 @@ from dearig.report.track_page import (
     track_summary,
     write_track_report,
 )
-from dearig.sim_backend.faults import FaultPlan
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -204,7 +203,7 @@ def invert(
         ``Inversion.unreachable``.
     """
     loaded, settings = _target(target), load_rig(rig_file)[0]
-    file = _model(model)
+    file = read_model(model)
     if not isinstance(file.model, Actuator):
         raise InputError(
             f"the model {file.name!r} is of a bare film, which a voltage does not move"
@@ -261,24 +260,16 @@ def track(
         For a run that ended early. The rig is safe, and the recordings so far are kept.
     """
     settings, text = load_rig(rig_file)
-    try:
-        plan = FaultPlan.parse(list(faults))
-    except ValueError as error:
-        raise InputError(str(error)) from error
     outcome = follow(
-        _target(target), _model(model), rig, settings, Path(out),
+        _target(target), read_model(model), rig, settings, Path(out),
         RunOptions(
-            text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced, faults=plan
+            text, operator, film, notes, overwrite=overwrite, seed=seed, paced=paced,
+            faults=read_faults(faults),
         ),
-        iterations=iterations, compare=None if compare is None else _model(compare),
+        iterations=iterations, compare=None if compare is None else read_model(compare),
         nearest=nearest, within=within_um * 1e-6, progress=progress,
     )  # fmt: skip
     return TrackResult(outcome)
-
-
-def _model(source: ModelSource) -> ModelFile:
-    given = as_model_file(source)
-    return given if isinstance(given, ModelFile) else load_model(given)
 
 
 def _target(source: TargetSource) -> LoadedTarget:

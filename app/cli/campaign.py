@@ -7,7 +7,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dearig.cli.options import Faults, FilmName, Force, Json, Notes, Rig, RigFileOption, Seed
+from dearig.cli.options import (
+    Faults,
+    FilmName,
+    Force,
+    Fsync,
+    Json,
+    Notes,
+    Paced,
+    Rig,
+    RigFileOption,
+    Seed,
+)
 from dearig.cli.output import (
     check_files,
     console_for,
@@ -88,16 +99,8 @@ def campaign(
         Path | None,
         typer.Option(metavar="MODEL.toml", help="Simulate this model in place of the thesis's."),
     ] = None,
-    fsync: Annotated[
-        bool,
-        typer.Option(
-            "--fsync", help="Write every block through to the disk, so it survives a power cut."
-        ),
-    ] = False,
-    paced: Annotated[
-        bool,
-        typer.Option("--paced", help="Simulate in real time.", show_default="as fast as possible"),
-    ] = False,
+    fsync: Fsync = False,
+    paced: Paced = False,
     fault: Faults = None,
     seed: Seed = 0,
     film: FilmName = "",
@@ -111,6 +114,7 @@ def campaign(
     fault of an instrument or a doubt about 0 V halts the campaign until a person acknowledges it.
     Ctrl-C ramps the voltage down to 0 V and ends the campaign; --resume continues it.
     """  # fmt: skip
+    from dearig.acquisition.rigs import read_faults
     from dearig.acquisition.run import RunOptions
     from dearig.analysis.compatibility import of_rig
     from dearig.batch.campaign import Arming, play_campaign
@@ -126,7 +130,6 @@ def campaign(
         forecast_sentences,
         write_campaign_report,
     )
-    from dearig.sim_backend.faults import FaultPlan
 
     check_files(force, (plan, rig_file, model), json=json)
     loaded, settings = load_campaign(plan), load_rig_file(rig_file)
@@ -142,10 +145,7 @@ def campaign(
         print_lines(console, forecast_sentences(loaded, found))
         write_result(forecast_json(loaded, found), json)
         return
-    try:
-        faults = FaultPlan.parse(fault or ())
-    except ValueError as error:
-        raise InputError(str(error)) from error
+    faults = read_faults(fault or ())
     options = RunOptions(
         text, operator, film, notes, fsync=fsync, seed=seed, paced=paced, actuator=actuator,
         faults=faults,

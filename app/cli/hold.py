@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dearig.cli.options import Faults, FilmName, Force, Json, Notes, Rig, RigFileOption, Seed
+from dearig.cli.options import (
+    Faults,
+    FilmName,
+    Force,
+    Json,
+    Notes,
+    Operator,
+    Paced,
+    Rig,
+    RigFileOption,
+    Seed,
+)
 from dearig.cli.output import check_files, print_line, print_lines, working, write_result
 from dearig.errors import InputError
 
@@ -24,7 +35,6 @@ if TYPE_CHECKING:
 __all__ = ["commands"]
 
 commands = typer.Typer()
-Operator = Annotated[str, typer.Option(help="Name of the operator, kept in the recording.")]
 _PANEL = "Rig"
 _UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 _TELL_EVERY = 60.0  # s between two lines, where there is no progress bar
@@ -79,15 +89,10 @@ def hold(
         bool,
         typer.Option("--check", help="Only say whether it can be held; play and write nothing."),
     ] = False,
-    paced: Annotated[
-        bool,
-        typer.Option("--paced", help="Simulate in real time.", show_default="as fast as possible"),
-    ] = False,
+    paced: Paced = False,
     fault: Faults = None,
     seed: Seed = 0,
-    operator: Annotated[
-        str, typer.Option(help="Name of the operator, kept in the recording.")
-    ] = "",
+    operator: Operator = "",
     film: FilmName = "",
     notes: Notes = "",
     json: Json = None,
@@ -98,6 +103,7 @@ def hold(
     The model's voltage is corrected while it is played. Every correction passes the gate before it
     is output. Ctrl-C ramps the voltage down to 0 V and keeps what was recorded.
     """
+    from dearig.acquisition.rigs import read_faults
     from dearig.acquisition.run import RunOptions
     from dearig.analysis.hold import HoldOptions, actuator_of, check_hold, plan_hold
     from dearig.analysis.hold import hold as run
@@ -105,17 +111,13 @@ def hold(
     from dearig.config.rigfile import load_rig_file
     from dearig.config.toml_input import read_text
     from dearig.report.hold_page import hold_json, hold_summary
-    from dearig.sim_backend.faults import FaultPlan
 
     length = _seconds(duration)
     written = () if out is None else (out,)
     check_files(force, (model, rig_file), *written, json=json, recording=out)
     settings, ours = load_rig_file(rig_file), load_model(model)
     text = "" if rig_file is None else read_text(rig_file, "rig file")
-    try:
-        faults = FaultPlan.parse(fault or ())
-    except ValueError as error:
-        raise InputError(str(error)) from error
+    faults = read_faults(fault or ())
     run_options = RunOptions(
         text, operator, film, notes, overwrite=force, seed=seed, paced=paced, faults=faults
     )

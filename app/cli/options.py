@@ -18,11 +18,14 @@ __all__ = [
     "Faults",
     "FilmName",
     "Force",
+    "Fsync",
     "Json",
     "Kinematics",
     "ManyToValidate",
     "Method",
     "Notes",
+    "Operator",
+    "Paced",
     "Recording",
     "Report",
     "Rig",
@@ -126,6 +129,17 @@ Faults = Annotated[
 ]
 FilmName = Annotated[str, typer.Option(help="Name of the film, kept in the recording.")]
 Notes = Annotated[str, typer.Option(help="Free text, kept in the recording.")]
+Fsync = Annotated[
+    bool,
+    typer.Option(
+        "--fsync", help="Write every block through to the disk, so it survives a power cut."
+    ),
+]
+Paced = Annotated[
+    bool,
+    typer.Option("--paced", help="Simulate in real time.", show_default="as fast as possible"),
+]
+Operator = Annotated[str, typer.Option(help="Name of the operator, kept in the recording.")]
 
 # ---------------------------------------------------------------- output
 

@@ -9,7 +9,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dearig.cli.options import Faults, FilmName, Force, Json, Notes, Rig, RigFileOption, Seed
+from dearig.cli.options import (
+    Faults,
+    FilmName,
+    Force,
+    Fsync,
+    Json,
+    Notes,
+    Operator,
+    Paced,
+    Rig,
+    RigFileOption,
+    Seed,
+)
 from dearig.cli.output import announce_compilation, check_files, print_line, working, write_result
 from dearig.errors import InputError
 
@@ -60,18 +72,6 @@ ModelInStep = Annotated[
         help="Compute this model's prediction during the run, and record it.",
     ),
 ]
-Fsync = Annotated[
-    bool,
-    typer.Option(
-        "--fsync", help="Write every block through to the disk, so it survives a power cut."
-    ),
-]
-Paced = Annotated[
-    bool,
-    typer.Option("--paced", help="Simulate in real time.", show_default="as fast as possible"),
-]
-Operator = Annotated[str, typer.Option(help="Name of the operator, kept in the recording.")]
-
 # ---------------------------------------------------------------- commands
 
 
@@ -99,6 +99,7 @@ def record(
     Ctrl-C ramps the voltage down to 0 V and keeps what was recorded.
     """
     from dearig.acquisition.overlay import OverlayModel
+    from dearig.acquisition.rigs import read_faults
     from dearig.acquisition.run import RunOptions
     from dearig.acquisition.run import record as run
     from dearig.analysis.compatibility import of_rig
@@ -106,7 +107,6 @@ def record(
     from dearig.config.rigfile import load_rig_file
     from dearig.config.sequencefile import load_sequence
     from dearig.config.toml_input import read_text
-    from dearig.sim_backend.faults import FaultPlan
 
     check_files(force, (sequence, rig_file, model, overlay, like), out, json=json, recording=out)
     original = _original(sequence, like, rig_file)
@@ -123,10 +123,7 @@ def record(
         settings = of_rig(settings, actuator.film, actuator.load)
     if original is not None:
         original.check_film(settings)
-    try:
-        faults = FaultPlan.parse(fault or ())
-    except ValueError as error:
-        raise InputError(str(error)) from error
+    faults = read_faults(fault or ())
     overlaid = None
     if overlay is not None:
         overlaid = OverlayModel(

@@ -14,12 +14,13 @@ from dearig.cli.output import check_files, console_for, print_line, write_result
 __all__ = ["commands"]
 
 commands = typer.Typer()
+ToWrite = Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.")]
 _PANEL = "Set-up and help"
 
 
 @commands.command("rig-file", rich_help_panel=_PANEL)
 def rig_file_command(
-    out: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.")],
+    out: ToWrite,
     force: Force = False,
 ) -> None:
     """Write a rig file with every key, its default and its meaning."""
@@ -32,31 +33,25 @@ def rig_file_command(
 
 @commands.command("sequence-file", rich_help_panel=_PANEL)
 def sequence_file(
-    out: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.")],
+    out: ToWrite,
     force: Force = False,
 ) -> None:
     """Write a sequence file with every kind of segment, its keys and their meaning."""
     from dearig.config.sequence_example import example
-    from dearig.recording.files import replaced_when_done
 
-    check_files(force, (), out, json=None)
-    with replaced_when_done(out, overwrite=force) as partial:
-        partial.write_text(example(), encoding="utf-8", newline="\n")
+    _write_example(example(), out, force)
     print_line(console_for(), f"{out}: edit it, then run it with dearig record {out} --out FILE.h5")
 
 
 @commands.command("target-file", rich_help_panel=_PANEL)
 def target_file(
-    out: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.")],
+    out: ToWrite,
     force: Force = False,
 ) -> None:
     """Write a target file: a displacement that the film shall follow."""
     from dearig.config.targetfile import EXAMPLE
-    from dearig.recording.files import replaced_when_done
 
-    check_files(force, (), out, json=None)
-    with replaced_when_done(out, overwrite=force) as partial:
-        partial.write_text(EXAMPLE, encoding="utf-8", newline="\n")
+    _write_example(EXAMPLE, out, force)
     print_line(
         console_for(),
         f"{out}: edit it, then run dearig track {out} --model MODEL.toml --out DIR",
@@ -65,20 +60,26 @@ def target_file(
 
 @commands.command("campaign-file", rich_help_panel=_PANEL)
 def campaign_file(
-    out: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.")],
+    out: ToWrite,
     force: Force = False,
 ) -> None:
     """Write a plan file of a campaign, with every key and its meaning."""
     from dearig.config.campaignfile import EXAMPLE
-    from dearig.recording.files import replaced_when_done
 
-    check_files(force, (), out, json=None)
-    with replaced_when_done(out, overwrite=force) as partial:
-        partial.write_text(EXAMPLE, encoding="utf-8", newline="\n")
+    _write_example(EXAMPLE, out, force)
     print_line(
         console_for(),
         f"{out}: edit it, then see with dearig campaign {out} --out DIR --check how long it takes",
     )
+
+
+def _write_example(text: str, out: Path, force: bool) -> None:
+    """Write the ``text`` of a file to begin with to ``out``."""
+    from dearig.recording.files import replaced_when_done
+
+    check_files(force, (), out, json=None)
+    with replaced_when_done(out, overwrite=force) as partial:
+        partial.write_text(text, encoding="utf-8", newline="\n")
 
 
 @commands.command(rich_help_panel=_PANEL)

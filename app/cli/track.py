@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dearig.cli.options import Faults, FilmName, Force, Json, Notes, Rig, RigFileOption, Seed
+from dearig.cli.options import (
+    Faults,
+    FilmName,
+    Force,
+    Json,
+    Notes,
+    Operator,
+    Paced,
+    Rig,
+    RigFileOption,
+    Seed,
+)
 from dearig.cli.output import check_files, print_line, working, write_result
 from dearig.errors import InputError
 
@@ -79,13 +90,10 @@ def track(
         bool,
         typer.Option("--check", help="Only say what can be reached; play and write nothing."),
     ] = False,
-    paced: Annotated[
-        bool,
-        typer.Option("--paced", help="Simulate in real time.", show_default="as fast as possible"),
-    ] = False,
+    paced: Paced = False,
     fault: Faults = None,
     seed: Seed = 0,
-    operator: Annotated[str, typer.Option(help="Name of the operator, kept in recordings.")] = "",
+    operator: Operator = "",
     film: FilmName = "",
     notes: Notes = "",
     json: Json = None,
@@ -97,6 +105,7 @@ def track(
     `dearig record`. Ctrl-C ramps the voltage down to 0 V, ends the learning, and keeps what was
     done.
     """
+    from dearig.acquisition.rigs import read_faults
     from dearig.acquisition.run import RunOptions
     from dearig.analysis.track import track as follow
     from dearig.analysis.track_target import check_feasible, plan_target
@@ -106,7 +115,6 @@ def track(
     from dearig.config.targetfile import load_target
     from dearig.config.toml_input import read_text
     from dearig.report.track_page import track_json, write_track_report
-    from dearig.sim_backend.faults import FaultPlan
 
     check_files(force, (target, model, compare, rig_file), json=json)
     loaded, settings = load_target(target), load_rig_file(rig_file)
@@ -124,10 +132,7 @@ def track(
         return
     if out is None:
         raise InputError("--out DIR is missing: recordings and the report are written there")
-    try:
-        faults = FaultPlan.parse(fault or ())
-    except ValueError as error:
-        raise InputError(str(error)) from error
+    faults = read_faults(fault or ())
     options = RunOptions(
         text, operator, film, notes, overwrite=force, seed=seed, paced=paced, faults=faults
     )

@@ -320,8 +320,7 @@ class Search:
     def _regression(self, parent: Fit) -> tuple[Regression, Extent]:
         fitter, records = self.fitter, self.fitter.records
         went: np.ndarray | None = None
-        drift = parent.problem.noise_drift
-        if drift is not None and parent.drift:
+        if parent.drift:
             noise = np.concatenate([np.full(r.measured.size, r.noise) for r in records])
             went = parent.mean_drift() * noise
         times = fitter.times if fitter.of_actuator else _film_times(records)

@@ -105,7 +105,8 @@ class DriftSpace:
     ) -> None:
         self.edges = np.cumsum([0, *(len(b) for b in bases)])
         self._bases, self._pink = bases, pink
-        self._units = [self._parts(basis, np.ones(basis.shape[1])) for basis in bases]
+        # without 1/f noise the directions are those of any drift
+        self._units = [self._parts(b, np.ones(b.shape[1])) for b in bases if pink is None]
 
     @staticmethod
     def _parts(basis: np.ndarray, variances: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -28,6 +28,7 @@ from dearig.model.diagnosis.imposed import (
     springs_of_grid,
     without_sensor,
 )
+from dearig.model.diagnosis.least_squares import bounded, lagrange, well_determined
 from dearig.model.diagnosis.noise import Drift, DriftSpace, drift_modes
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import Extent, amplitudes, moved, shape_points, typical_values
@@ -35,7 +36,7 @@ from dearig.model.effects import EFFECTS, PLACES, Effect
 from dearig.model.film import Strip, unit_stresses
 from dearig.model.records import ActuatorRecord, FilmRecord, Record
 
-__all__ = ["Regression", "Start", "bounded", "contention", "electric"]
+__all__ = ["Regression", "Start", "contention", "electric"]
 
 _REST_STEP = 0.02  # of mu_0: the difference quotient of the misfit through the rest stretch
 _NEAR = 0.2  # relative: starts that differ by less are one
@@ -45,7 +46,6 @@ _SHARPENED_MIN = 8  # effects, the best ones, that are sharpened in any case
 _LINEAR = 0.02  # relative difference of two secants up to which a response is linear
 _BRANCH_POOL = 8  # nodes of the grid, the most used ones, of which sets of branches are made
 _FLAT = 1e-6  # relative singular value: flatter directions are left alone
-_WELL = 1e-2  # of the largest: directions along which the parent is straight over a step
 _POLISHING = 5  # Gauss-Newton steps of relaxation times between the nodes of the grid
 _WEAK = 1e-3  # of the largest modulus: a branch without weight still needs influence to move
 
@@ -166,7 +166,7 @@ class Regression:
         self._residuals = np.zeros(0)
         if local is not None:
             self._residuals = self._means(local[1])
-            self._directions = _well_determined(self._means(local[0].T).T)
+            self._directions = well_determined(self._means(local[0].T).T)
 
     # -- set-up
 
@@ -537,67 +537,9 @@ class Regression:
         parts, slopes = [self._triangle[:, 0]], []
         for i, t in zip(first, at, strict=True):
             nodes = self._triangle[:, 1 + i : 5 + i]
-            parts.append(nodes @ _lagrange(t))
-            slopes.append(nodes @ (_lagrange(t + 1e-3) - _lagrange(t - 1e-3)) / (2e-3 * step))
+            parts.append(nodes @ lagrange(t))
+            slopes.append(nodes @ (lagrange(t + 1e-3) - lagrange(t - 1e-3)) / (2e-3 * step))
         return np.column_stack(parts), np.column_stack(slopes)
-
-
-def _lagrange(t: float) -> np.ndarray:
-    """Return the weights (4,) of cubic interpolation at ``t`` between nodes 0, 1, 2, 3."""
-    return np.array(
-        [
-            -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0,
-            t * (t - 2.0) * (t - 3.0) / 2.0,
-            -t * (t - 1.0) * (t - 3.0) / 2.0,
-            t * (t - 1.0) * (t - 2.0) / 6.0,
-        ]
-    )
-
-
-def bounded(
-    triangle: np.ndarray,
-    inside: np.ndarray,
-    outside: np.ndarray,
-    d_inside: np.ndarray,
-    d_outside: np.ndarray,
-    low: np.ndarray,
-    high: np.ndarray,
-) -> tuple[np.ndarray, float]:
-    """Return a (k,) with low <= a <= high and the norm of the misfit, with moduli of any size >= 0.
-
-    It minimises |triangle mu - inside - d_inside a|^2 + |outside + d_outside a|^2 over mu >= 0 and
-    a; where that leaves the bounds, a is clipped and the moduli follow.
-    """
-    springs, k = triangle.shape[1], low.size
-    both = np.column_stack([d_outside, outside])
-    corner = np.asarray(np.linalg.qr(both, mode="r"))
-    two_sided = low < 0.0
-    d_in = np.hstack([-d_inside, d_inside[:, two_sided]])
-    d_out = np.hstack([-corner[:, :k], corner[:, :k][:, two_sided]])
-    rows = np.zeros((triangle.shape[0] + corner.shape[0], springs + d_in.shape[1]))
-    rows[: triangle.shape[0], :springs] = triangle
-    rows[: triangle.shape[0], springs:] = d_in
-    rows[triangle.shape[0] :, springs:] = d_out
-    scale = np.linalg.norm(rows, axis=0)
-    scale[scale == 0.0] = 1.0
-    wanted = np.concatenate([inside, corner[:, k]])
-    found, left = nnls(rows / scale, wanted, maxiter=30 * scale.size)
-    found = found / scale
-    a = found[springs : springs + k].copy()
-    a[two_sided] -= found[springs + k :]
-    held = np.clip(a, low, high)
-    if np.array_equal(held, a):
-        return a, float(left)
-    _, in_springs = nnls(triangle, inside + d_inside @ held)
-    return held, math.hypot(in_springs, float(np.linalg.norm(corner[:, k] + corner[:, :k] @ held)))
-
-
-def _well_determined(jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return directions (M, w) of the readings that are well determined, and the inverse (f, w)."""
-    scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
-    u, s, vt = np.linalg.svd(jacobian / scale, full_matrices=False)
-    used = s > _WELL * s[0]
-    return u[:, used], (vt[used] / s[used, None]).T / scale[:, None]
 
 
 def _distinct(rows: Sequence[_Row], many: int) -> list[_Row]:

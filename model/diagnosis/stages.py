@@ -88,9 +88,8 @@ def _noise_lost(thin: Sequence[Record], full: Sequence[Record]) -> float:
 
 def drift_values(fit: Fit) -> list[np.ndarray]:
     """Return the amplitudes (n,) in m of ``DRIFT_LAW`` nearest to each record's drift."""
-    drift = fit.problem.noise_drift
     basis_of = EFFECTS[DRIFT_LAW].drift_basis
-    if drift is None or basis_of is None or not fit.drift:
+    if basis_of is None or not fit.drift:
         return []
     mean = fit.mean_drift()
     found = []
@@ -119,8 +118,7 @@ def _drifting(model: Actuator | Strip, values: np.ndarray) -> Actuator | Strip:
 
 def _drift_estimates(fit: Fit) -> Iterator[Estimate]:
     """Yield the RMS of each record's drift; its interval is that of the drift's variance."""
-    drift = fit.problem.noise_drift
-    if drift is None or not fit.drift:
+    if not fit.drift:
         return
     mean = fit.mean_drift()
     for record, (a, b) in zip(fit.problem.records, pairwise(fit.problem.edges), strict=True):

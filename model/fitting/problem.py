@@ -222,12 +222,6 @@ class Problem:
         other.drift, other.own = None, np.zeros_like(self.own)
         return other
 
-    def drift_jacobian(self) -> np.ndarray:
-        """Return d(residuals)/d(drift amplitudes), (N, K n); (N, 0) where no record has drift."""
-        if self.drift is None:
-            return np.empty((self.measured.size, 0))
-        return self.drift.basis / self.sigma[:, None]
-
     def project_off_drift(self, jacobian: np.ndarray) -> np.ndarray:
         """Return the columns of ``jacobian`` (N, f) less what the drift of each record absorbs."""
         if self.drift is None:

@@ -28,7 +28,6 @@ from unittest import mock
 import numpy as np
 from scipy.stats import binomtest
 
-from dearig.analysis.records import as_record
 from dearig.config.rigfile import RigFile
 from dearig.model.actuator import Actuator
 from dearig.model.diagnosis import diagnose
@@ -39,10 +38,9 @@ from dearig.model.diagnosis.regression import Regression
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.material import TABLE_3
 from dearig.model.records import ActuatorRecord
-from dearig.recording import open_recording
 from dearig.sim_backend.laser_noise import NOISES, WHITE
 from dearig.sim_backend.truth.cases import HANDS
-from tests.blind.play import Bench, Case
+from tests.blind.play import Bench, Case, records_of
 from tests.blind.score import WITHIN
 
 Switch = Callable[[], AbstractContextManager[Any]]
@@ -134,7 +132,7 @@ def _played(
 ) -> Iterator[tuple[str, Outcome]]:
     """Record the rig of ``case``, and diagnose it by every variant."""
     folder.mkdir()
-    train, others = (_records(paths) for paths in bench.record(case, folder))
+    train, others = (records_of(paths) for paths in bench.record(case, folder))
     least = math.hypot(bench.floor_um(case.noise), bench.own_um(case)) * 1e-6
     rig = RigFile()
     base = Actuator(rig.as_film(), rig.as_load(), TABLE_3)
@@ -152,11 +150,6 @@ def _played(
             _error(model, others) / least for model in models if isinstance(model, Actuator)
         )
         yield variant.name, Outcome(right, before, after, seconds)
-
-
-def _records(paths: list[Path]) -> list[ActuatorRecord]:
-    records = [as_record(open_recording(path)) for path in paths]
-    return [r for r in records if isinstance(r, ActuatorRecord)]
 
 
 def _error(model: Actuator, records: list[ActuatorRecord]) -> float:

@@ -23,14 +23,12 @@ from pathlib import Path
 
 import numpy as np
 
-from dearig.analysis.records import as_record
 from dearig.model.actuator import Actuator
 from dearig.model.fitting import identify
 from dearig.model.material import THESIS_FILM, THESIS_LOAD, Branch, Network, Spring
 from dearig.model.records import ActuatorRecord
-from dearig.recording import open_recording
 from tests.benchmarks.residual_peers import PEERS, Course, missing, predicted
-from tests.blind.play import MODES, Bench, Case, diagnose
+from tests.blind.play import MODES, Bench, Case, diagnose, records_of
 from tests.blind.seeds import clean_seeds, drawn, family_seeds
 
 FAMILIES = (
@@ -77,7 +75,7 @@ def main() -> None:
     print("| " + " | ".join(heads) + " |\n|" + "---|" * len(heads))
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(Path(folder), given.rate)
-        _baseline(_records(bench.record(Case(seeds[0], "thesis"), Path(folder))[0]))  # compiles
+        _baseline(records_of(bench.record(Case(seeds[0], "thesis"), Path(folder))[0]))  # compiles
         for seed in seeds:
             cells = _row(bench, Case(seed, given.train), Path(folder) / str(seed))
             hidden = " + ".join(drawn(seed).families) or "nothing"
@@ -95,7 +93,7 @@ def _row(bench: Bench, case: Case, folder: Path) -> list[str]:
     """Cells of one case, from what was before to our own."""
     folder.mkdir()
     train_paths, other_paths = bench.record(case, folder)
-    train, others = _records(train_paths), _records(other_paths)
+    train, others = records_of(train_paths), records_of(other_paths)
     baseline = _baseline(train)
     before = _pooled([r.displacement - _displacement(baseline, r) for r in others])
     cells = [f"{before:.2f}", str(_more_branches(train, others, baseline.network))]
@@ -110,11 +108,6 @@ def _row(bench: Bench, case: Case, folder: Path) -> list[str]:
             cells.append(str(Result(_pooled(left), seconds)))
     cells.append(str(_ours(train_paths, other_paths, folder)))
     return cells
-
-
-def _records(paths: Sequence[Path]) -> list[ActuatorRecord]:
-    records = [as_record(open_recording(path)) for path in paths]
-    return [r for r in records if isinstance(r, ActuatorRecord)]
 
 
 def _with_branches(count: int) -> Actuator:

@@ -21,18 +21,28 @@ from typing import Any
 import numpy as np
 
 from dearig.acquisition.run import RunOptions, record
+from dearig.analysis.records import as_record
 from dearig.config.rigfile import load_rig_file
 from dearig.config.sequencefile import load_sequence
 from dearig.config.toml_input import read_text
 from dearig.errors import DearigError
-from dearig.model.records import counted
+from dearig.model.records import ActuatorRecord, counted
 from dearig.recording import open_recording
 from dearig.sim_backend.laser_noise import WHITE
 from dearig.sim_backend.streams import Streams
 from dearig.sim_backend.truth.cases import TruthCase, address_of
 from tests.blind.seeds import clean_seeds, drawn
 
-__all__ = ["MODES", "VALIDATION", "Bench", "Case", "case_of", "sources_digest"]
+__all__ = [
+    "MODES",
+    "VALIDATION",
+    "Bench",
+    "Case",
+    "case_of",
+    "diagnose",
+    "records_of",
+    "sources_digest",
+]
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -214,6 +224,12 @@ class Bench:
     def _record(self, sequence: str, rig: str, out: Path, seed: int) -> None:
         text = read_text(self.rig_path, "rig file")
         record(load_sequence(sequence), rig, self._rig, out, RunOptions(text, seed=seed))
+
+
+def records_of(paths: Sequence[Path]) -> list[ActuatorRecord]:
+    """Records of actuators at ``paths``, as a fit takes them."""
+    records = [as_record(open_recording(path)) for path in paths]
+    return [r for r in records if isinstance(r, ActuatorRecord)]
 
 
 def _processor_seconds() -> float:

@@ -17,24 +17,7 @@ from tests.tools.command import (
     thesis_model,
     write,
 )
-
-PATH = """\
-name = "up and down"
-lead_in_s = 0.5
-tail_s = 0.1
-[[segment]]
-kind = "ramp"
-to_mm = 0.3
-duration_s = 1.0
-[[segment]]
-kind = "ramp"
-to_mm = 0.04
-duration_s = 2.5
-[[segment]]
-kind = "ramp"
-to_mm = 0.0
-duration_s = 5.0
-"""
+from tests.tools.targets import UP_AND_DOWN
 
 
 @pytest.fixture
@@ -42,7 +25,7 @@ def files(tmp_path: Path) -> list[str | Path]:
     """A target, with the options for a model and a rig."""
     rig = write(tmp_path / "rig.toml", SLOW_RIG)
     model = thesis_model(tmp_path / "model.toml")
-    target = write(tmp_path / "target.toml", PATH)
+    target = write(tmp_path / "target.toml", UP_AND_DOWN)
     return [target, "--model", model, "--rig-file", rig]
 
 
@@ -73,7 +56,9 @@ def test_it_says_what_can_be_reached_and_touches_nothing(files, tmp_path: Path) 
     assert "the film can follow it, with up to" in answer.err
     assert answer.json["feasible"] is True
     assert answer.json["runs"] == []
-    target = write(tmp_path / "fast.toml", PATH.replace("duration_s = 5.0", "duration_s = 0.2"))
+    target = write(
+        tmp_path / "fast.toml", UP_AND_DOWN.replace("duration_s = 5.0", "duration_s = 0.2")
+    )
     refused(dearig("track", target, *files[1:], "--check"), "no voltage pushes it", "--nearest")
     refused(dearig("track", *files, "--within-um", "0.5", "--check"), "cannot be reached")
     assert names(tmp_path) - before == {"fast.toml"}
@@ -98,7 +83,7 @@ def test_an_early_end_keeps_what_was_done(files, tmp_path: Path) -> None:
     ],
 )
 def test_a_wrong_target_is_one_sentence(files, tmp_path: Path, changed, words) -> None:
-    text = PATH
+    text = UP_AND_DOWN
     for old, new in changed.items():
         text = text.replace(old, new)
     target = write(tmp_path / "wrong.toml", text)

@@ -99,12 +99,6 @@ def made_fit(records: Several[Record], model: Actuator | Strip, residual: np.nda
     return Fit(problem, start, held, float(np.mean(over**2)), over, empty)
 
 
-def with_residual(record: Record, residual: np.ndarray) -> tuple[Record, Fit]:
-    """``record`` and a fit that leaves ``residual`` (N,) of it."""
-    model: Actuator | Strip = PLAIN if isinstance(record, ActuatorRecord) else STRIP
-    return record, made_fit([record], model, residual)
-
-
 def masked(record: ActuatorRecord, bad: np.ndarray) -> ActuatorRecord:
     """``record`` whose readings ``bad`` (N,) are rubbish, and marked as such."""
     rubbish = np.where(bad, 5e-3, record.displacement)

@@ -23,29 +23,13 @@ from dearig.window.hv import HighVoltage
 from dearig.window.session import Session
 from dearig.window.worker import Job, Worker
 from dearig.window.worker_process import Request
+from tests.tools.targets import UP_AND_DOWN
 from tests.window.recordings import made
 from tests.window.test_run_stories import click, play, seconds
 
 _PATIENCE = 120_000  # ms; of a machine that may be busy
 RIG = RigFile(card=CardSettings(sample_rate_Hz=200.0), limits=LimitsSettings(ramp_down_s=0.1))
-PATH = """\
-name = "up and down"
-lead_in_s = 0.5
-tail_s = 0.1
-[[segment]]
-kind = "ramp"
-to_mm = 0.3
-duration_s = 1.0
-[[segment]]
-kind = "ramp"
-to_mm = 0.04
-duration_s = 2.5
-[[segment]]
-kind = "ramp"
-to_mm = 0.0
-duration_s = 5.0
-"""
-FAST = PATH.replace("duration_s = 2.5", "duration_s = 0.2")
+FAST = UP_AND_DOWN.replace("duration_s = 2.5", "duration_s = 0.2")
 
 
 class Here(Worker):
@@ -72,7 +56,7 @@ def page(session: Session, keep: Callable[[QWidget], None]) -> FollowPage:
     shown = FollowPage(session, worker=Here(owner))
     shown.resize(1190, 690)
     keep(shown)
-    shown.target.edit.setPlainText(PATH)
+    shown.target.edit.setPlainText(UP_AND_DOWN)
     return shown
 
 
@@ -99,11 +83,11 @@ def test_runs_are_shown_armed_one_by_one_stopped_and_learned_from(
     session.set_address("sim:8")
     session.set_rig_file(None, "", RIG)
     window.show_page(page)
-    page.target.edit.setPlainText(PATH.replace("to_mm = 0.3", "to_kV = 3.0"))
+    page.target.edit.setPlainText(UP_AND_DOWN.replace("to_mm = 0.3", "to_kV = 3.0"))
     done(qtbot, page, page.compute_button)
     assert "write to_mm" in page.message.text()
     assert not page.run_button.isEnabled()
-    page.target.edit.setPlainText(PATH)
+    page.target.edit.setPlainText(UP_AND_DOWN)
     done(qtbot, page, page.compute_button)
     assert page.message.text() == ""
     assert "can follow the whole target" in page.headline.text()
@@ -201,10 +185,10 @@ def test_a_changed_target_or_rig_is_computed_again(qtbot: QtBot, page: FollowPag
     session = page._session
     done(qtbot, page, page.compute_button)
     assert page.run_button.isEnabled()
-    page.target.edit.setPlainText(PATH.replace("0.3", "0.2"))
+    page.target.edit.setPlainText(UP_AND_DOWN.replace("0.3", "0.2"))
     assert "compute the voltage again" in page.state.text()
     assert not page.run_button.isEnabled()
-    page.target.edit.setPlainText(PATH)
+    page.target.edit.setPlainText(UP_AND_DOWN)
     assert page.run_button.isEnabled()
     # nothing is learned from a run on another rig
     click(qtbot, page.run_button)
@@ -228,7 +212,7 @@ def test_a_target_is_read_written_and_asked_for(
     path = tmp_path / "path.toml"
     page.target.save_file(path)
     qtbot.waitUntil(lambda: "path.toml" in page.target.file_name.text(), timeout=_PATIENCE)
-    assert path.read_text(encoding="utf-8") == PATH
+    assert path.read_text(encoding="utf-8") == UP_AND_DOWN
     page.target.edit.setPlainText(FAST)
     page.target.open_file(path)  # the answer is no
     assert "target path.toml (changed: segment 2 duration (s))" in answers.questions[0]

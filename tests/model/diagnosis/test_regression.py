@@ -9,7 +9,8 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from dearig.model.actuator import Actuator
-from dearig.model.diagnosis.regression import Regression, Start, bounded
+from dearig.model.diagnosis.least_squares import bounded
+from dearig.model.diagnosis.regression import Regression, Start
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.diagnosis.shapes import extent_of, shape_points
 from dearig.model.effects import EFFECTS
