@@ -18,6 +18,7 @@ from dearig.cli.options import (
     SpringKind,
 )
 from dearig.cli.output import check_files, print_line, working, write_result
+from dearig.errors import Interrupted
 
 __all__ = ["commands"]
 
@@ -95,7 +96,13 @@ def study(
     subjects = subjects_of(sources, out)
     engine = engine_at(on, workers)
     with working(json) as (console, progress):
-        table = study_recordings(subjects, options, out, engine, progress=progress)
+        try:
+            table = study_recordings(subjects, options, out, engine, progress=progress)
+        except KeyboardInterrupt:
+            raise Interrupted(
+                f"interrupted: the rows that were computed are kept in {out}; the same command "
+                f"goes on from there"
+            ) from None
     console.print(study_rows(table, _ROWS))
     print_line(console, f"Table: {table.table}")
     if table.parquet is not None:

@@ -186,6 +186,19 @@ def test_a_list_names_recordings_beside_it(shelf: Path, tmp_path: Path) -> None:
         subjects_of([chosen, chosen], tmp_path)
 
 
+def test_an_interrupted_study_says_what_is_kept(
+    shelf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("dearig.batch.studies._compute", interrupted)
+    out = tmp_path / "study"
+    answer = dearig("study", shelf / "recordings", "--do", "identify", "--out", out)
+    assert answer.code == 130
+    assert f"are kept in {out}; the same command goes on from there" in answer.err
+
+
 def test_the_command_from_recordings_to_its_table(shelf: Path, tmp_path: Path) -> None:
     out = tmp_path / "study"
     arguments = ["study", shelf / "recordings", "--do", "validate", "--out", out]
