@@ -23,7 +23,7 @@ __all__ = ["RecordingWatch", "Seen", "is_running", "newest_recording", "seen"]
 _MOST = 1_000_000
 #: Time in s of which the newest part of the displacement is kept, and its bins.
 _TRACE_S, _BINS = 10.0, 60
-_EVENTS = 5
+_EVENTS = 5  # the last ones, shown below the trace
 
 
 def is_running(folder: Path) -> bool:

@@ -26,7 +26,7 @@ from dearig.model.records import ActuatorRecord, Record
 __all__ = ["with_budget"]
 
 _GAIN = 1e-3  # of chi-square: both refits end at a hundredth of a standard deviation
-_ITERATIONS = 40
+_ITERATIONS = 40  # of a refit at most: it starts at an optimum one deviation away
 
 
 def with_budget(
