@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["CHANNEL_NAMES", "RESERVED_NAMES", "Channel", "Scaling"]
+__all__ = ["CHANNEL_NAMES", "HUMIDITY", "RESERVED_NAMES", "Channel", "Scaling"]
 
 #: Built-in channels in the order of a block's rows. Channels that a rig file declares follow them.
 CHANNEL_NAMES = (
@@ -16,6 +16,9 @@ CHANNEL_NAMES = (
     "displacement",
     "temperature",
 )
+
+#: Name of a declared channel that is the relative humidity near the film, in per cent.
+HUMIDITY = "relative_humidity"
 
 #: Reserved names: recordings use them otherwise, so a rig file cannot give them to a channel.
 RESERVED_NAMES = (*CHANNEL_NAMES, "time", "displacement_model", "stretch", "nominal_stress")

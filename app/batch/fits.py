@@ -19,8 +19,6 @@ from importlib import import_module, metadata
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import dearig
 from dearig.analysis.diagnose import diagnose_recordings
 from dearig.analysis.identify import identify_recordings
@@ -167,7 +165,8 @@ def _about(path: Path) -> Row:
         "rig": entry.rig,
         "operator": entry.operator,
         "title": entry.title,
-        "temperature_celsius": _mean(recording.temperature),
+        "temperature_degC": recording.temperature_degC,
+        "relative_humidity_percent": recording.relative_humidity_percent,
         "duration_s": entry.duration_s,
         "samples": entry.samples,
         "complete": entry.complete,
@@ -183,11 +182,6 @@ def _peaks(recording: Recording, peaks: Mapping[str, float]) -> Row:
         "peak_voltage_kV": None if volts is None else volts * 1e-3,
         "peak_displacement_mm": None if metres is None else metres * 1e3,
     }
-
-
-def _mean(values: np.ndarray | None) -> float | None:
-    good = None if values is None else values[np.isfinite(values)]
-    return None if good is None or not good.size else float(good.mean())
 
 
 def _computed(path: Path, options: StudyOptions, progress: Progress) -> Row:

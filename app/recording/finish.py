@@ -10,7 +10,9 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.output_state import OutputState
+from dearig.recording.arrays import Overview
 from dearig.recording.checksums import complete_checksums
+from dearig.recording.environment import mean_conditions, read_environment
 from dearig.recording.files import in_words
 from dearig.recording.flushes import flush_notes
 from dearig.recording.journal import Patched, changed_in_place, replaced
@@ -73,6 +75,7 @@ def finish(
                 entry = file["entry"]
                 samples = _write_physical(entry)
                 keep_modelled(entry, samples)
+                _note_environment(entry)
                 for plot in (entry["data"], entry.get("overview")):
                     # a very long run has its physical values, and so its time, in counts only
                     if plot is not None and "time" in plot:
@@ -96,6 +99,22 @@ def _note_output(entry: h5py.Group, state: OutputState) -> None:
     entry.attrs["output_set_by"] = fixed("guardian" if state.by_guardian else "run")
     if state.monitor is not None:
         entry.attrs["output_monitor_V"] = state.monitor
+
+
+def _note_environment(entry: h5py.Group) -> None:
+    """Keep the mean temperature and humidity, where there are any, as attributes of ``entry``."""
+    counts = Counts(entry)
+
+    def channel(name: str, points: int) -> Overview | None:
+        if name not in counts.names:
+            return None
+        return Overview(*counts.overview(name, 0, counts.samples, points))
+
+    readings = read_environment(entry, counts.rate)
+    if readings is not None:
+        entry["environment"].resize((readings.sample.size,))
+    for name, value in mean_conditions(readings, channel).items():
+        entry.attrs[name] = value
 
 
 def _check_identifier(path: Path, identifier: str) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 
 from dearig.errors import InputError
 from dearig.model.trusted_folder import cache_root
+from dearig.recording.environment import stored_means
 from dearig.recording.files import in_words, replaced_when_done
 from dearig.recording.layout import FORMAT, SIGNALS, counts_name
 from dearig.recording.opening import UNREADABLE, identifier_of, read_from
@@ -57,7 +58,7 @@ OUTLINE = 40
 #: Events of a recording in the index, at most.
 EVENTS_MAX = 12
 #: Version of the cache; another one is not read.
-KEPT = "dearig-index/3"
+KEPT = "dearig-index/4"
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,10 @@ class Entry:
 
     ``peaks`` has the largest absolute value of each channel, with its sign, in the units of the
     layout; ``outline`` is the measured signal in ``OUTLINE`` bins, as hexadecimal bytes of least
-    and greatest value, of which 0 and 255 are the extremes. ``events`` are time in s, level and
-    message of the first ``EVENTS_MAX`` events. ``identifier`` tells the recording from every other.
+    and greatest value, of which 0 and 255 are the extremes. ``room`` has the means
+    ``temperature_degC`` and ``relative_humidity_percent``, where the recording has them. ``events``
+    are time in s, level and message of the first ``EVENTS_MAX`` events. ``identifier`` tells the
+    recording from every other.
 
     ``trouble`` is the reason why it is not a recording, or "". ``passing``: the reason is one of
     the system, not of the file, which may be readable the next time.
@@ -88,6 +91,7 @@ class Entry:
     notes: str = ""
     identifier: str = ""
     peaks: dict[str, float] = field(default_factory=dict)
+    room: dict[str, float] = field(default_factory=dict)
     outline: str = ""
     events: list[list[Any]] = field(default_factory=list)
     trouble: str = ""
@@ -104,6 +108,7 @@ _TYPES: Mapping[str, Any] = MappingProxyType(
         "complete": bool,
         "passing": bool,
         "peaks": dict,
+        "room": dict,
         "events": list,
     }
 )
@@ -267,6 +272,7 @@ def _entry(path: Path, file: h5py.File, name: str, size: int) -> Entry:
         notes="" if sample is None else _text(sample, "notes"),
         identifier=identifier_of(entry),
         peaks=peaks,
+        room=stored_means(entry),
         outline=outline,
         events=[[e.time, e.level, e.message] for e in events],
     )

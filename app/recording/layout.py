@@ -14,6 +14,10 @@
 /entry/model            TOML of the live overlay (when there was one)
 /entry/events           sample, time, level, message
 /entry/wall_clock       sample, unix_time: the computer's clock at every flush (runs only)
+/entry/environment      sample, unix_time, temperature (degC), relative_humidity (%): readings of a
+                        thermo-hygrometer, NaN where it gave none (runs with one only); the means
+                        of a run are attributes of /entry: temperature_degC, and
+                        relative_humidity_percent
 /entry/pyramid/*        minima and maxima of the counts over bins (runs only)
 /entry/checksums        CRC-32 of the counts (runs only)
 /entry/overview         NXdata: minima and maxima of the physical values of a long run
@@ -33,6 +37,7 @@ import numpy as np
 from dearig.recording.text import fixed, put_text
 
 __all__ = [
+    "ENVIRONMENT_TYPE",
     "EVENT_LEVELS",
     "EVENT_TYPE",
     "FORMAT",
@@ -126,6 +131,16 @@ EVENT_TYPE = np.dtype(
 
 #: The computer's clock and the sample clock: number of samples at a Unix time in s.
 WALL_CLOCK_TYPE = np.dtype([("sample", "<i8"), ("unix_time", "<f8")])
+
+#: A reading of a thermo-hygrometer before a sample: Unix time in s, degrees Celsius, per cent.
+ENVIRONMENT_TYPE = np.dtype(
+    [
+        ("sample", "<i8"),
+        ("unix_time", "<f8"),
+        ("temperature", "<f8"),
+        ("relative_humidity", "<f8"),
+    ]
+)
 
 
 def counts_name(channel: str) -> str:

@@ -16,6 +16,7 @@ from dearig.recording.rest_noise import NEGLIGIBLE
 from dearig.recording.text import fixed, text_of
 
 __all__ = [
+    "KELVIN",
     "SLICE",
     "TEMPERATURE_UNITS",
     "Counts",

@@ -12,6 +12,7 @@ from dearig.errors import InputError
 from dearig.model.errors import ModelError
 from dearig.model.specimen import KINEMATICS, Film, Load
 from dearig.recording.arrays import Arrays
+from dearig.recording.environment import read_environment
 from dearig.recording.files import old_of
 from dearig.recording.layout import (
     FORMAT,
@@ -161,6 +162,7 @@ class _Reader:
             instruments=self._instruments(entry),
             channels=channels,
             provenance=self._provenance(entry),
+            environment=None if rate is None else read_environment(entry, rate),
         )
 
     def _check_format(self) -> None:

@@ -48,6 +48,15 @@ def is_writing() -> bool:
 
 
 @dataclass(frozen=True)
+class _Room:
+    """A reading of a thermo-hygrometer before ``sample``: degrees Celsius and per cent."""
+
+    sample: int
+    temperature: float
+    humidity: float
+
+
+@dataclass(frozen=True)
 class _End:
     outcome: str
     event: str
@@ -89,7 +98,7 @@ class Recorder:
         self._looked = clock()
         # the thread and the loop share what follows, under this lock
         self._changed = threading.Condition()
-        self._queue: deque[Block | Event] = deque()
+        self._queue: deque[Block | Event | _Room] = deque()
         self._bytes = 0
         self._next = 0  # sample to be written
         self._received = 0
@@ -179,6 +188,13 @@ class Recorder:
         with self._changed:
             if not self._dropping:
                 self._queue.append(Event(sample, level, message))
+                self._changed.notify_all()
+
+    def room(self, sample: int, temperature: float, humidity: float) -> None:
+        """Take a reading of the room before ``sample``: degrees Celsius and per cent, or NaN."""
+        with self._changed:
+            if not self._dropping:
+                self._queue.append(_Room(sample, temperature, humidity))
                 self._changed.notify_all()
 
     def _out_of_step(self, start: int) -> InstrumentFault:
@@ -292,7 +308,7 @@ class Recorder:
             self._ended = True
             self._changed.notify_all()
 
-    def _write(self, item: Block | Event) -> None:
+    def _write(self, item: Block | Event | _Room) -> None:
         modelled = None
         if isinstance(item, Block) and self._model is not None:
             modelled = self._model(item)
@@ -303,9 +319,11 @@ class Recorder:
             if self._fault is None:
                 self._put(item, modelled)
 
-    def _put(self, item: Block | Event, modelled: np.ndarray | None) -> None:
+    def _put(self, item: Block | Event | _Room, modelled: np.ndarray | None) -> None:
         if isinstance(item, Event):
             self._writer.event(item.sample, item.level, item.message)
+        elif isinstance(item, _Room):
+            self._writer.room(item.sample, item.temperature, item.humidity)
         else:
             self._writer.append(item, modelled)
             self._next = item.start + item.counts.shape[1]

@@ -15,6 +15,7 @@ from dearig.extras import import_extra
 from dearig.model.noise import LEAD_IN
 from dearig.model.specimen import Film, Load
 from dearig.recording.arrays import Arrays, Overview
+from dearig.recording.environment import MEANS, Environment, mean_conditions
 from dearig.recording.files import file_sha256
 from dearig.recording.layout import SIGNALS, UNITS, variable_attributes
 from dearig.recording.rest_noise import MIN_QUIET, ReadingNoise, noise_of_readings
@@ -53,7 +54,8 @@ class Recording:
     conversion of the sensor, ``displacement_delay`` in s the sensor's own lag, known within
     ``displacement_delay_error``; neither has been subtracted from ``time``. ``temperature`` is in
     degrees Celsius. ``complete`` is False for a run that was killed; ``outcome`` says how it ended.
-    ``rate`` in Hz is that of the sample clock, None for data without one.
+    ``rate`` in Hz is that of the sample clock, None for data without one. ``environment`` are the
+    readings of a thermo-hygrometer, None for a run without one.
     """
 
     path: Path
@@ -82,6 +84,7 @@ class Recording:
     instruments: tuple[Instrument, ...] = ()
     channels: tuple[Channel, ...] = ()
     provenance: dict[str, object] = field(default_factory=dict)
+    environment: Environment | None = None
 
     @property
     def time(self) -> np.ndarray:
@@ -112,6 +115,33 @@ class Recording:
     def temperature(self) -> np.ndarray | None:
         """Temperature in degrees Celsius."""
         return self._row("temperature")
+
+    def room(self, name: str) -> np.ndarray | None:
+        """Return ``name``, a key of ``environment.MEANS``, over the time of the samples: (N,).
+
+        From a channel at the card, or else from the thermo-hygrometer; None where neither gave it.
+        """
+        row = self._row(MEANS[name])
+        if row is None and self.environment is not None:
+            row = self.environment.at(name, self.time)
+        return row
+
+    @property
+    def temperature_degC(self) -> float | None:  # noqa: N802
+        """Mean temperature of the run in degrees Celsius; None where it is not known."""
+        return self._means.get("temperature_degC")
+
+    @property
+    def relative_humidity_percent(self) -> float | None:
+        """Mean relative humidity of the run in per cent; None where it is not known."""
+        return self._means.get("relative_humidity_percent")
+
+    @cached_property
+    def _means(self) -> dict[str, float]:
+        def channel(name: str, points: int) -> Overview | None:
+            return self.overview(name, points) if name in self.arrays.names else None
+
+        return mean_conditions(self.environment, channel)
 
     @property
     def displacement_model(self) -> np.ndarray | None:
@@ -198,7 +228,8 @@ class Recording:
     def until(self, end: float) -> Recording:
         """Return the recording up to ``end`` in s, at least its first sample."""
         samples = max(int(np.searchsorted(self.time, end, side="right")), 1)
-        return replace(self, arrays=self.arrays.shortened(samples))
+        room = None if self.environment is None else self.environment.until(end)
+        return replace(self, arrays=self.arrays.shortened(samples), environment=room)
 
     def _check_channel(self, channel: str) -> None:
         if channel not in self.arrays.names:

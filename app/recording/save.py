@@ -11,6 +11,8 @@ import numpy as np
 
 from dearig.drivers.rig import Event
 from dearig.progress import Progress, quiet
+from dearig.recording.arrays import Overview
+from dearig.recording.environment import mean_conditions
 from dearig.recording.files import check_output, replaced_when_done
 from dearig.recording.layout import (
     EVENT_TYPE,
@@ -98,10 +100,20 @@ def save_recording(
         write_provenance(entry, noted)
         entry.create_group("instrument").attrs["NX_class"] = fixed("NXcollection")
         entry.attrs["samples"] = size
+        means = mean_conditions(None, lambda channel, _: _whole(values, channel))
+        for name, value in means.items():
+            entry.attrs[name] = value
         entry.attrs["outcome"] = fixed("finished")
         entry.attrs["complete"] = True
         progress("writing", 1.0)
     return path
+
+
+def _whole(values: Mapping[str, np.ndarray], channel: str) -> Overview | None:
+    if channel not in values:
+        return None
+    row = np.asarray(values[channel], dtype=np.float64)
+    return Overview(np.asarray(values["time"]), row, row)
 
 
 def _write_events(entry: h5py.Group, events: tuple[Event, ...], time_s: np.ndarray) -> None:

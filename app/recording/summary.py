@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dearig.recording.environment import MEANS
 from dearig.recording.layout import FORMAT, LINEAR, ZERO_ORDER
 from dearig.recording.recording import Recording
 from dearig.recording.timestamps import local_time
@@ -65,6 +66,9 @@ def describe(recording: Recording, checksum: bool = True) -> dict[str, Any]:
         "noise_floor_m": noise.value if noise and recording.kind == "actuator" else None,
         "noise_floor_Pa": noise.value if noise and recording.kind == "film" else None,
         "noise_from": noise.source if noise else None,
+        "temperature_degC": recording.temperature_degC,
+        "relative_humidity_percent": recording.relative_humidity_percent,
+        "environment": _environment(recording),
         "rest_reading_m": recording.rest_reading,
         "displacement_skew_s": recording.displacement_skew,
         "displacement_delay_s": recording.displacement_delay,
@@ -86,6 +90,36 @@ def describe(recording: Recording, checksum: bool = True) -> dict[str, Any]:
         "events": [asdict(event) for event in recording.events],
         "provenance": recording.provenance,
     }
+
+
+def _environment(recording: Recording) -> dict[str, Any] | None:
+    """Return how many readings of a thermo-hygrometer there are, and their ranges."""
+    readings = recording.environment
+    if readings is None:
+        return None
+    told: dict[str, Any] = {"readings": int(readings.sample.size)}
+    for name in MEANS:
+        values = getattr(readings, name)
+        known = values[np.isfinite(values)]
+        told[name] = [float(known.min()), float(known.max())] if known.size else None
+    return told
+
+
+def _room_row(environment: dict[str, Any]) -> str:
+    """Return the ranges of a thermo-hygrometer's readings in words."""
+    parts = []
+    for name, what, unit in (
+        ("temperature_degC", "temperature", "°C"),
+        ("relative_humidity_percent", "humidity", "%"),
+    ):
+        span = environment[name]
+        if span is None:
+            parts.append(f"no {what}")
+        else:
+            ends = [f"{value:.1f}" for value in span]
+            parts.append(f"{what} {' to '.join(dict.fromkeys(ends))} {unit}")
+    count = environment["readings"]
+    return f"{', '.join(parts)}; {count} reading{'s' if count > 1 else ''} of a thermo-hygrometer"
 
 
 def _channel(recording: Recording, name: str) -> dict[str, Any]:
@@ -139,6 +173,8 @@ def describe_rows(recording: Recording) -> list[tuple[str, str]]:
             span = f"{channel['min'] * scale:.6g} to {channel['max'] * scale:.6g} {unit}"
             shown = channel.get("label", channel["name"].replace("_", " "))
             rows.append((shown, span.rstrip()))
+    if d["environment"] is not None:
+        rows.append(("room", _room_row(d["environment"])))
     noise = recording.noise
     if noise is not None and d["kind"] == "actuator":
         rows.append(("noise floor", f"{noise.value * 1e6:.3g} um, {noise.words}"))

@@ -21,7 +21,7 @@ from dearig.recording.journal import whole_journal
 from dearig.recording.layout import EVENT_LEVELS, SIGNALS, counts_name
 from dearig.recording.lock import refuse_in_use
 from dearig.recording.opening import LOOKS, UNREADABLE, damage, file_state, opened
-from dearig.recording.physical import SLICE, Counts
+from dearig.recording.physical import KELVIN, SLICE, Counts
 from dearig.recording.provenance import CONTINUES
 from dearig.recording.pyramid import BINS
 from dearig.recording.reader import open_recording
@@ -125,6 +125,7 @@ class _Check:
             self.physical(counts)
             self.long_overview(counts)
             self.wall_clock()
+            self.environment()
         self.events()
         self.provenance()
         self.for_viewers()
@@ -345,6 +346,24 @@ class _Check:
             # the first row was written before the run started
             self.rate_of_clock(at[1:], moments[1:])
         self.done("the sample clock against the computer's clock")
+
+    def environment(self) -> None:
+        """Check the readings of a thermo-hygrometer: their order, and that they are possible."""
+        readings = self.recording.environment
+        if readings is None:
+            return
+        claimed = self.entry["environment"].shape[0]
+        if self.finished and claimed != readings.sample.size:
+            self.fault(
+                f"/entry/environment has {claimed} rows, of which {readings.sample.size} are filled"
+            )
+        at = readings.sample
+        if (np.diff(at) < 0).any() or at[0] < 0 or (self.finished and at[-1] > self.samples):
+            self.fault("/entry/environment has sample numbers that go back, or that do not exist")
+        celsius, percent = readings.temperature_degC, readings.relative_humidity_percent
+        if (celsius < -KELVIN).any() or (percent < 0.0).any() or np.isinf([celsius, percent]).any():
+            self.fault("/entry/environment has values that no room has")
+        self.done(f"{at.size} readings of temperature and humidity")
 
     def start_of_clock(self, moments: np.ndarray) -> None:
         """Check that the clock's first time is the start of the run; both were read at once."""

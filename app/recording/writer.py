@@ -38,6 +38,7 @@ from dearig.recording.files import (
 )
 from dearig.recording.finish import finish
 from dearig.recording.layout import (
+    ENVIRONMENT_TYPE,
     EVENT_LEVELS,
     EVENT_TYPE,
     IDENTIFIER,
@@ -79,7 +80,8 @@ class RecordingWriter:
     clock. ``samples_expected`` is only stored, so that a reader sees how many samples are missing.
     Without a title in ``metadata`` the run takes the name of its sequence, without a seed that of
     the identity. With ``overlay`` every block comes with the displacement of an overlay model; the
-    metadata's ``model_toml`` has its parameters. ``now`` returns Unix time in s. With ``fsync``
+    metadata's ``model_toml`` has its parameters. With ``environment`` there are readings of a
+    thermo-hygrometer, see ``room``. ``now`` returns Unix time in s. With ``fsync``
     every flush reaches the disk, so that flushed samples survive a power cut. A recording that is
     overwritten stays until the first flush of samples, as ``FILE.h5.old``. ``first_sample`` is that
     of a run which has begun in another file; there its ``rest`` was measured.
@@ -99,6 +101,7 @@ class RecordingWriter:
         overwrite: bool = False,
         fsync: bool = False,
         overlay: bool = False,
+        environment: bool = False,
         first_sample: int = 0,
         rest: Rest | None = None,
         now: Callable[[], float] = time.time,
@@ -113,6 +116,8 @@ class RecordingWriter:
         self._metadata = metadata
         self._expected = samples_expected
         self._overlay = overlay
+        self._room: h5py.Dataset | None = None
+        self._has_room = environment
         self._first = first_sample
         self._rest = rest
         self._command = [c.name for c in identity.channels].index("voltage_command")
@@ -193,6 +198,7 @@ class RecordingWriter:
             entry = self._file["entry"]
             self._counts = [entry["data"][counts_name(c.name)] for c in self._channels]
             self._events, self._wall_clock = entry["events"], entry["wall_clock"]
+            self._room = entry["environment"] if self._has_room else None
             for part in (self._pyramid, self._checksums, self._modelled):
                 if part is not None:
                     part.move_to(entry)
@@ -231,6 +237,11 @@ class RecordingWriter:
         )
         self._pyramid = PyramidWriter(entry, len(self._channels), self._rate)
         self._checksums = ChecksumWriter(entry, len(self._channels), self._rate)
+        if self._has_room:
+            room = entry.create_dataset(
+                "environment", shape=(0,), maxshape=(None,), chunks=(64,), dtype=ENVIRONMENT_TYPE
+            )
+            make_own_scale(room)
         # created last: a flush writes datasets in this order and stops where the disk refuses one,
         # so that its note is in the file only if all samples up to it are
         self._wall_clock = entry.create_dataset(
@@ -319,6 +330,18 @@ class RecordingWriter:
             self._append_events((Event(sample, level, message),))
             self._flush_when_due()
 
+    def room(self, sample: int, temperature: float, humidity: float) -> None:
+        """Record a reading before ``sample``: degrees Celsius and per cent, NaN for no value."""
+        if self._room is None:
+            raise ValueError("a recording without readings of the room cannot take one")
+        with self._writing():
+            row = self._room.shape[0]
+            self._room.resize((row + 1,))
+            at = max(sample - self._first, 0)
+            self._room[row] = (at, self._now(), temperature, humidity)
+            self._dirty = True
+            self._flush_when_due()
+
     @contextmanager
     def _writing(self) -> Iterator[None]:
         """Guard a write to the file; after a failure nothing more is written."""
@@ -400,6 +423,7 @@ class RecordingWriter:
             replace(self._metadata, provenance={**self._metadata.provenance, **from_here}),
             fsync=self._fsync,
             overlay=self._overlay,
+            environment=self._has_room,
             first_sample=first_sample,
             rest=self._rest,
             now=self._now,

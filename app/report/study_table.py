@@ -12,7 +12,16 @@ from dearig.report.tables import Row, Table
 __all__ = ["study_table_json", "study_table_rows", "study_table_sentences"]
 
 #: Columns that a terminal shows, where the rows have them.
-_COLUMNS = ("film", "verdict", "effects", "mu_0_kPa", "rms_um", "rms_kPa", "temperature_celsius")
+_COLUMNS = (
+    "film",
+    "verdict",
+    "effects",
+    "mu_0_kPa",
+    "rms_um",
+    "rms_kPa",
+    "temperature_degC",
+    "relative_humidity_percent",
+)
 
 
 def study_table_json(table: StudyTable) -> dict[str, Any]:
