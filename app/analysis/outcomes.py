@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from dearig.model.fitting import Contribution, Identification
     from dearig.model.measures import Errors
     from dearig.recording.early_end import EarlyEnd
+    from dearig.recording.origin import Origin
 
 __all__ = [
     "BranchTrial",
@@ -65,7 +66,8 @@ class Comparison:
     ``dearig.model.noise``. ``rms_without_events`` is the error in the measured unit
     without the recording's own drift and ``events``, None where it has none of these. ``ended``
     says how the run ended if it ended early. ``quiet_count`` are the readings at rest that
-    ``noise`` is from.
+    ``noise`` is from. ``origin`` says where the recording is from, None where it is not known.
+    ``step`` is the converter step of ``measured``, 0.0 where it is not known.
     """
 
     name: str
@@ -86,6 +88,13 @@ class Comparison:
     events: tuple[Event, ...] = ()
     ended: EarlyEnd | None = None
     quiet_count: int = 0
+    origin: Origin | None = None
+    step: float = 0.0
+
+    @property
+    def is_simulated(self) -> bool:
+        """True if the recording is known to be from a simulated rig, or from a model."""
+        return self.origin is not None and self.origin.simulated is True
 
     @property
     def marked_name(self) -> str:

@@ -25,6 +25,9 @@ from dearig.model.measures import errors
 from dearig.model.noise import LEAD_IN, require_readings
 from dearig.model.records import ActuatorRecord, FilmRecord, Record, counted
 from dearig.recording.early_end import early_end
+from dearig.recording.layout import SIGNALS
+from dearig.recording.origin import origin_of
+from dearig.recording.physical import resolution
 from dearig.recording.reader import open_recording
 from dearig.recording.recording import Recording
 from dearig.recording.rest_noise import MIN_QUIET, ReadingNoise
@@ -286,7 +289,34 @@ def compare(
         warnings=tuple(warnings),
         ended=ended,
         quiet_count=noise.count if noise and noise.source == LEAD_IN else 0,
+        origin=origin_of(recording),
+        step=_converter_step(recording),
     )
+
+
+#: Samples from which the step of imported values is read.
+_STEP_SAMPLES = 100_000
+#: Step as a share of the largest value, below which it is rounding; deviation from whole steps.
+_ROUNDING, _OFF_STEP = 1e-9, 0.02
+
+
+def _converter_step(recording: Recording) -> float:
+    """Return the step of the converter in the measured unit, 0.0 where none is known.
+
+    Imported values have no counts: theirs is the step of which all their differences are multiples.
+    """
+    for channel in recording.channels:
+        if channel.name == SIGNALS[recording.kind]:
+            return resolution(channel)
+    levels = np.unique(recording.signal[:_STEP_SAMPLES])
+    rises = np.diff(levels)
+    if rises.size < MIN_QUIET:
+        return 0.0
+    step = float(rises.min())
+    # a step of rounding errors, or one of which the others are no multiples, is none
+    off = np.abs(rises / step - np.round(rises / step))
+    is_even = step > _ROUNDING * float(np.abs(levels).max()) and float(off.max()) < _OFF_STEP
+    return step if is_even else 0.0
 
 
 def _other_rig(recording: Recording, model: Actuator) -> list[str]:

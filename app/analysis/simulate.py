@@ -18,6 +18,7 @@ from dearig.model.film import Strip
 from dearig.model.stability import pull_in_voltage
 from dearig.recording.files import check_output, replaced_when_done
 from dearig.recording.metadata import RunMetadata
+from dearig.recording.origin import MODEL
 from dearig.recording.reader import open_recording
 from dearig.recording.recording import Recording
 from dearig.recording.save import save_recording
@@ -127,6 +128,7 @@ def save_prediction(prediction: Prediction, out: str | Path, overwrite: bool = F
             sequence_toml=prediction.sequence_toml,
             model_toml=model_toml(given.name, given.model, {}),
             notes="a prediction of a model, not a measurement",
+            provenance={"simulated": True, MODEL: given.name},
         ),
         hold=prediction.hold,
         kinematics=prediction.kinematics,

@@ -17,7 +17,14 @@ from dearig.recording.layout import iso_time
 from dearig.recording.metadata import RunMetadata
 from dearig.recording.text import fixed, put_text, text_of
 
-__all__ = ["CONTINUES", "gather", "git_revision", "read_provenance", "write_provenance"]
+__all__ = [
+    "CONTINUES",
+    "gather",
+    "git_revision",
+    "installed_version",
+    "read_provenance",
+    "write_provenance",
+]
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -46,18 +53,22 @@ def git_revision(root: Path = ROOT) -> str:
     return answer.stdout.strip() if answer.returncode == 0 else ""
 
 
+def installed_version() -> str:
+    """Return the version of the installed package, "unknown" where it is not installed."""
+    try:
+        return version("dearig")
+    except PackageNotFoundError:
+        return "unknown"
+
+
 def gather(started: float, metadata: RunMetadata) -> dict[str, object]:
     """Return the provenance of a recording that was started at the Unix time ``started`` in s."""
-    try:
-        installed = version("dearig")
-    except PackageNotFoundError:
-        installed = "unknown"
     found: dict[str, object] = {
         "start_time": iso_time(started),
         "operator": metadata.operator,
         "host": platform.node(),
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
-        "dearig_version": installed,
+        "dearig_version": installed_version(),
         "git_revision": git_revision(),
         "python_version": platform.python_version(),
         "numpy_version": np.__version__,

@@ -12,6 +12,8 @@ from dearig.batch.campaign import CampaignOutcome
 from dearig.batch.forecast import Forecast
 from dearig.batch.queue import DONE, LOST, PLAYED, RUNNING, SKIPPED, STOPPED, WAITING, Queue
 from dearig.config.campaignfile import Campaign, settings_text
+from dearig.recording.origin import origins_of_files
+from dearig.report.head import head_of
 from dearig.report.html import picture, prefixes, write_page
 from dearig.report.numbers import NO_VALUE, seconds, significant
 from dearig.report.tables import Row, Table
@@ -74,6 +76,13 @@ def _recording(folder: Path, run: RunState) -> str:
     """Return the recording of a run, "" where there is none or where it was reduced."""
     played = run.state in (*PLAYED, RUNNING) and not run.extremes
     return str(folder / run.recording) if run.recording and played else ""
+
+
+def _recordings(outcome: CampaignOutcome) -> Iterator[Path]:
+    """Yield the recordings of the runs that were played, in their order."""
+    for run in outcome.queue.listed:
+        if recording := _recording(outcome.folder, run):
+            yield Path(recording)
 
 
 def forecast_json(campaign: Campaign, forecast: Forecast) -> dict[str, Any]:
@@ -208,6 +217,8 @@ def _contents(outcome: CampaignOutcome) -> Callable[[], dict[str, Any]]:
         )
         return {
             "title": outcome.name,
+            "lead": "Campaign",
+            "head": head_of(origins_of_files(_recordings(outcome))),
             "summary": campaign_summary(outcome),
             "warnings": [queue.halted] if queue.halted else [],
             "runs": campaign_table(outcome),

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from dearig.report.diagnosis import (
     warnings,
 )
 from dearig.report.figures import comparison_figure
+from dearig.report.head import head_of, origins_of
 from dearig.report.html import Picture, picture, prefixes, write_page
 from dearig.report.numbers import seconds, significant
 from dearig.report.residual_figures import residual_panels
@@ -71,7 +72,6 @@ class FoundEffect:
 class DiagnosisPage:
     """Values of the template; empty tuples leave their sections out."""
 
-    title: str
     headline: str
     summary: tuple[str, ...]
     warnings: tuple[str, ...]
@@ -99,10 +99,19 @@ class DiagnosisPage:
 def write_diagnosis_report(outcome: DiagnoseOutcome, path: str | Path) -> Path:
     """Write the report of a diagnosis to ``path``. Raises ``InputError``."""
     title = f"Missing effects: {outcome.title}"
-    return write_page(path, "diagnosis.html.j2", lambda: {"d": _page(outcome, title, prefixes())})
+
+    def contents() -> dict[str, Any]:
+        return {
+            "d": _page(outcome, prefixes()),
+            "title": title,
+            "lead": "Diagnosis",
+            "head": head_of(origins_of((*outcome.after.train, *outcome.after.validation))),
+        }
+
+    return write_page(path, "diagnosis.html.j2", contents)
 
 
-def _page(outcome: DiagnoseOutcome, title: str, names: Iterator[str]) -> DiagnosisPage:
+def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
     finding, kind = outcome.finding, outcome.kind
     changed = bool(finding.steps)
     errors = []
@@ -131,7 +140,6 @@ def _page(outcome: DiagnoseOutcome, title: str, names: Iterator[str]) -> Diagnos
     experiments = experiment_table(outcome)
     worst = sorted(finding.before, key=lambda s: -s.rms / s.noise)[:_DRAWN_MAX]
     return DiagnosisPage(
-        title=title,
         headline=headline(outcome),
         summary=summary(outcome),
         warnings=warnings(outcome),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from dearig.analysis.outcomes import pooled_over_noise
 from dearig.report.figure_export import svg
 from dearig.report.figures import comparison_figure, loop_figure
+from dearig.report.head import head_of, origins_of
 from dearig.report.numbers import NO_VALUE, seconds, significant
 from dearig.report.parameter_figures import branches_figure, parameters_figure
 from dearig.report.residual_figures import residual_panels
@@ -46,6 +47,13 @@ __all__ = [
     "write_page",
     "write_validate_report",
 ]
+
+#: A page runs no script and loads nothing, whatever is in it; its links to CSV files are data.
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
+#: Sections from which on a page has a list of them.
+_CONTENTS_MIN = 4
+#: Where the list of contents is put; escaped text cannot contain it.
+_CONTENTS_PLACE = "<!-- contents -->"
 
 
 @dataclass(frozen=True)
@@ -86,12 +94,13 @@ class Part:
 
 def write_identify_report(outcome: IdentifyOutcome, path: str | Path) -> Path:
     """Write the report of an identification to ``path``. Raises ``InputError``."""
-    return _write(path, outcome.title, lambda p: (_identify_part(outcome, p),))
+    compared = (*outcome.train, *outcome.validation)
+    return _write(path, outcome.title, compared, lambda p: (_identify_part(outcome, p),))
 
 
 def write_validate_report(outcome: ValidateOutcome, path: str | Path) -> Path:
     """Write the report of a validation to ``path``. Raises ``InputError``."""
-    return _write(path, outcome.title, lambda p: (_validate_part(outcome, p),))
+    return _write(path, outcome.title, outcome.comparisons, lambda p: (_validate_part(outcome, p),))
 
 
 def write_demo_report(
@@ -103,18 +112,24 @@ def write_demo_report(
     return _write(
         path,
         identify.title,
+        (*identify.train, *identify.validation, *validate.comparisons),
         lambda p: (_identify_part(identify, p), _validate_part(validate, p)),
     )
 
 
 def _write(
-    path: str | Path, title: str, parts: Callable[[Iterator[str]], tuple[Part, ...]]
+    path: str | Path,
+    title: str,
+    compared: Sequence[Comparison],
+    parts: Callable[[Iterator[str]], tuple[Part, ...]],
 ) -> Path:
     def contents() -> dict[str, Any]:
         made = parts(prefixes())
         return {
             "parts": made,
             "title": title,
+            "lead": " and ".join(p.lead for p in made).capitalize(),
+            "head": head_of(origins_of(compared)),
             "film": all(p.film for p in made),
             "rest_length_known": any(p.rest_length_known for p in made),
         }
@@ -123,7 +138,12 @@ def _write(
 
 
 def write_page(path: str | Path, template: str, contents: Callable[[], dict[str, Any]]) -> Path:
-    """Write ``template`` with ``contents`` to ``path``. Raises ``InputError``."""
+    """Write ``template`` with ``contents`` to ``path``. Raises ``InputError``.
+
+    ``contents`` returns the values of the template, among them those of every page: ``title``,
+    ``lead`` (the kind of the report) and ``head`` (a ``dearig.report.head.Head``). A list of the
+    sections, which are its ``h2`` with an ``id``, is put after the head.
+    """
     from dearig.recording.files import check_output, replaced_when_done
 
     path = check_output(path, overwrite=True)  # before seconds are spent on figures
@@ -136,6 +156,7 @@ def write_page(path: str | Path, template: str, contents: Callable[[], dict[str,
 
 def _render(template: str, contents: dict[str, Any]) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
 
     environment = Environment(
         loader=PackageLoader("dearig.report"),
@@ -145,7 +166,25 @@ def _render(template: str, contents: dict[str, Any]) -> str:
         lstrip_blocks=True,
     )
     environment.filters["non_breaking"] = _non_breaking
-    return environment.get_template(template).render(contents)
+    page = environment.get_template(template).render(
+        contents,
+        policy=_POLICY,
+        contents_place=Markup(_CONTENTS_PLACE),  # noqa: S704
+    )
+    return page.replace(_CONTENTS_PLACE, _contents_list(page), 1)
+
+
+def _contents_list(page: str) -> str:
+    """Return a list of links to the sections of ``page``; "" where there are few."""
+    # text of others has no such element: the templates escape it
+    found = re.findall(r'<(h[12]) id="([^"]+)">(.*?)</\1>', page, re.DOTALL)
+    if len(found) < _CONTENTS_MIN:
+        return ""
+    rows = []
+    for level, name, title in found:
+        look = ' class="part"' if level == "h1" else ""
+        rows.append(f'<li{look}><a href="#{name}">{title}</a></li>')
+    return f'<nav aria-label="Contents"><ol>{"".join(rows)}</ol></nav>'
 
 
 def _non_breaking(sentence: str) -> str:

@@ -26,6 +26,7 @@ from dearig.report.figure_style import (
     legend,
     style,
 )
+from dearig.report.head import head_of
 from dearig.report.html import Picture, picture, prefixes, write_page
 from dearig.report.numbers import NO_VALUE, significant
 from dearig.report.tables import Row, Table
@@ -283,6 +284,8 @@ def track_json(outcome: TrackOutcome) -> dict[str, Any]:
 
 def _contents(outcome: TrackOutcome) -> Callable[[], dict[str, Any]]:
     def contents() -> dict[str, Any]:
+        from dearig.recording.origin import origins_of_files  # imports h5py
+
         numbers: Iterator[str] = prefixes()
         pictures: list[Picture] = []
         if outcome.runs:
@@ -297,6 +300,8 @@ def _contents(outcome: TrackOutcome) -> Callable[[], dict[str, Any]]:
             ]  # fmt: skip
         return {
             "title": outcome.target.name,
+            "lead": "Tracking",
+            "head": head_of(origins_of_files(run.recording for run in outcome.runs)),
             "summary": track_summary(outcome),
             "warnings": track_warnings(outcome),
             "runs": runs_table(outcome),
