@@ -310,15 +310,14 @@ class TestRig:
         assert names(tmp_path / "d") == {"thesis.h5", "report.html", "model.toml"}
 
     @pytest.mark.parametrize(
-        ("ends", "code", "interrupted"),
+        ("at", "ends", "code", "interrupted"),
         [
-            (SafetyStop("displacement: at 3 s the film stood 30 mm away"), 3, False),
-            (InstrumentFault("the card does not answer"), 4, False),
-            (DiskFault("the disk is full"), 4, False),
-            (Interrupted("interrupted: the voltage was ramped down"), 130, True),
+            ("experiment-1", SafetyStop("displacement: the film stood 30 mm away"), 3, False),
+            ("experiment-1", InstrumentFault("the card does not answer"), 4, False),
+            ("experiment-1", DiskFault("the disk is full"), 4, False),
+            ("validation-b-7.0", Interrupted("interrupted: ramped down"), 130, True),
         ],
     )
-    @pytest.mark.parametrize("at", ["experiment-1", "validation-b-7.0"])
     def test_what_ends_a_run_loses_nothing_of_what_was_found(
         self, bench, tmp_path, monkeypatch, ends, code, interrupted, at
     ):

@@ -14,7 +14,7 @@ PATIENCE = 20.0
 @pytest.mark.parametrize(
     "kind",
     ["hold-client-killed", "client-frozen", "guardian-killed", "amplifier-trip", "disk-full",
-     "server-gone", "operator-stops", "serial-garbage"],
+     "operator-stops", "serial-garbage"],
 )  # fmt: skip
 def test_it_ends_at_zero_volts_with_what_was_recorded(kind, tmp_path):
     outcome = run_case(kind, 1, tmp_path, PATIENCE)

@@ -182,14 +182,12 @@ def test_a_clean_film_is_that_film_and_nothing_else():
 def test_sizes_are_worth_finding_and_bearable(family, form):
     time, voltage = load_sequence("thesis").sample(1000.0)
     rich = load_sequence("rich").sample(1000.0)
-    for seed in range(2):
-        generator = np.random.default_rng(seed)
-        film = draw(seed, "clean").network
-        effect = form(generator, THESIS_LOAD)
-        case = cases.TruthCase(seed, THESIS_FILM, THESIS_LOAD, (effect,), film)
-        assert 1e-6 < case.size(time, voltage) < 400e-6
-        # what resonates shows more on the chirp, but nothing fails
-        assert 1e-6 < case.size(*rich) < 2e-3
+    effect = form(np.random.default_rng(0), THESIS_LOAD)
+    film = draw(0, "clean").network
+    case = cases.TruthCase(0, THESIS_FILM, THESIS_LOAD, (effect,), film)
+    assert 1e-6 < case.size(time, voltage) < 400e-6
+    # what resonates shows more on the chirp, but nothing fails
+    assert 1e-6 < case.size(*rich) < 2e-3
 
 
 @pytest.mark.parametrize(("family", "form"), FORMS)
@@ -208,7 +206,7 @@ def test_all_but_a_walk_is_the_same_in_every_run(family, form):
 
 def test_drawn_cases_are_worth_finding_and_bearable():
     time, voltage = load_sequence("thesis").sample(1000.0)
-    sizes = np.array([draw(s).size(time, voltage) for s in range(120) if draw(s).effects]) * 1e6
+    sizes = np.array([draw(s).size(time, voltage) for s in range(60) if draw(s).effects]) * 1e6
     assert sizes.min() > 1.0
     assert sizes.max() < 400.0
     # a decade and more between the smaller and the larger ones
