@@ -13,5 +13,5 @@ from tests.crash.changes import able
 @pytest.mark.slow
 @pytest.mark.skipif(not able(), reason="writes are noted with a C compiler on Linux only")
 def test_no_crash_point_loses_what_was_flushed(tmp_path: Path) -> None:
-    points, rich = replay(tmp_path, blocks=5, size=200, overwrite=True, torn=False)
+    points, rich = replay(tmp_path, blocks=2, size=200, overwrite=True, torn=False)
     assert points > rich > 30
