@@ -11,7 +11,7 @@ __all__ = ["instruments"]
 def instruments(
     settings: RigSettings, *, card_model: str, card_serial: str, unnamed: str
 ) -> tuple[Instrument, ...]:
-    """Return card, amplifier, laser and thermometer; ``unnamed`` is a missing serial number.
+    """Return the rig's instruments; ``unnamed`` stands for a serial number that is not known.
 
     The card reports its own model and serial number; those of the others come from the rig file.
     """
@@ -66,6 +66,20 @@ def instruments(
                 thermometer.model,
                 thermometer.serial or unnamed,
                 (("scaling", f"{thermometer.celsius_per_V:g} C/V"),),
+            )
+        )
+    if settings.thermohygrometer is not None:
+        sensor = settings.thermohygrometer
+        found.append(
+            Instrument(
+                "thermohygrometer",
+                sensor.model,
+                sensor.serial or unnamed,
+                (
+                    ("port", sensor.port or "none"),
+                    ("interval", f"{sensor.interval_s:g} s"),
+                    ("too old after", f"{sensor.stale_s:g} s"),
+                ),
             )
         )
     return tuple(found)

@@ -9,19 +9,28 @@ from dearig.drivers.findings import Finding
 from dearig.drivers.laser import LaserDriver, LaserInspection, analog_findings
 from dearig.drivers.registry import Registry
 from dearig.drivers.settings import RigSettings
+from dearig.drivers.thermohygrometer import ThermohygrometerDriver
 
-__all__ = ["INSTRUMENTS", "InstrumentDriver", "instrument_findings", "reading_findings"]
+__all__ = [
+    "INSTRUMENTS",
+    "InstrumentDriver",
+    "instrument_findings",
+    "reading_findings",
+    "room_driver",
+]
 
 
-InstrumentDriver = LaserDriver | AmplifierDriver
+InstrumentDriver = LaserDriver | AmplifierDriver | ThermohygrometerDriver
 
-_ROLES = ("laser", "amplifier")
+_ROLES = ("laser", "amplifier", "thermohygrometer")
 
 
 def _check(name: str, driver: Any) -> None:
-    # both kinds of drivers have the same members; ``role`` tells them apart
+    # all kinds of drivers have these members; ``role`` tells them apart
     if not isinstance(driver, LaserDriver) or driver.role not in _ROLES:
         raise TypeError(f"{name} is no driver: it needs a role ({' or '.join(_ROLES)}) and inspect")
+    if driver.role == "thermohygrometer" and not isinstance(driver, ThermohygrometerDriver):
+        raise TypeError(f"{name} is no driver of a thermohygrometer: it needs open too")
 
 
 #: One line for each driver; other distributions add theirs by the entry point.
@@ -30,6 +39,7 @@ INSTRUMENTS: Registry[InstrumentDriver] = Registry(
     {
         "keyence": "dearig.drivers.keyence.driver:DRIVER",
         "trek": "dearig.drivers.trek:DRIVER",
+        "vaisala": "dearig.drivers.vaisala:DRIVER",
     },
     _check,
 )
@@ -40,11 +50,12 @@ def instrument_findings(
     monitors: Monitors | None,
     displacement_volts: float | None,
     laser: LaserDriver | None = None,
+    room: ThermohygrometerDriver | None = None,
 ) -> tuple[Finding, ...]:
-    """Return the findings of the amplifier's and the laser's drivers, with 0 V commanded.
+    """Return the findings of the instruments' drivers, with 0 V commanded.
 
     ``monitors`` and ``displacement_volts`` are the card's readings, None where there are none.
-    ``laser`` replaces the driver that the rig file names.
+    ``laser`` and ``room`` replace the drivers that the rig file names.
     """
     found: list[Finding] = []
     name = settings.amplifier.driver
@@ -61,7 +72,22 @@ def instrument_findings(
         found += inspection.findings
     else:
         found.append(_unknown(settings.laser.model, "laser", name))
-    return (*found, *analog_findings(settings.laser, displacement_volts, inspection))
+    found += analog_findings(settings.laser, displacement_volts, inspection)
+    if settings.thermohygrometer is not None:
+        sensor, name = settings.thermohygrometer, settings.thermohygrometer.driver
+        air = room or room_driver(name)
+        if air is None:
+            found.append(_unknown(sensor.model, "thermohygrometer", name))
+        else:
+            found += air.inspect(sensor)
+    return tuple(found)
+
+
+def room_driver(name: str) -> ThermohygrometerDriver | None:
+    """Return the driver ``name`` of a thermo-hygrometer, None where there is none."""
+    driver = INSTRUMENTS.get(name)
+    # the registry has checked that such a driver has all that it needs
+    return driver if isinstance(driver, ThermohygrometerDriver) else None
 
 
 def reading_findings(settings: RigSettings, readings: dict[str, float]) -> tuple[Finding, ...]:

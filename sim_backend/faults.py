@@ -35,6 +35,9 @@ class FaultKind(StrEnum):
     SERVER_GONE = "server-gone"
     # at the laser's serial port
     SERIAL_GARBAGE = "serial-garbage"
+    # at the thermo-hygrometer
+    ROOM_SENSOR_GONE = "room-sensor-gone"
+    ROOM_SENSOR_GARBAGE = "room-sensor-garbage"
 
 
 #: Default duration of a fault in s. Kinds that are not listed last until the run ends.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from typing import Literal
 
@@ -12,16 +13,24 @@ from dearig.drivers.channels import Channel
 from dearig.drivers.errors import RigError
 from dearig.drivers.findings import Finding
 from dearig.drivers.gate import Prediction, admit
-from dearig.drivers.instruments import INSTRUMENTS, instrument_findings, reading_findings
+from dearig.drivers.instruments import (
+    INSTRUMENTS,
+    instrument_findings,
+    reading_findings,
+    room_driver,
+)
 from dearig.drivers.keyence.driver import KeyenceDriver
 from dearig.drivers.laser import LaserDriver, LaserInspection
 from dearig.drivers.rig import Rig, RigIdentity
 from dearig.drivers.rig_kind import RigOptions
 from dearig.drivers.settings import LaserSettings, RigSettings
+from dearig.drivers.thermohygrometer import ThermohygrometerDriver
+from dearig.drivers.vaisala import VaisalaDriver
 from dearig.model.material import Film
 from dearig.sim_backend.factory import open_simulated_rig
 from dearig.sim_backend.faults import FaultKind, FaultPlan
 from dearig.sim_backend.keyence import SimulatedController, SimulatedLine
+from dearig.sim_backend.room import Air, SimulatedSource, local_seconds, time_in_room
 
 __all__ = ["KIND", "SimulatedKind"]
 
@@ -72,9 +81,10 @@ class SimulatedKind:
         volts = laser.direction * readings["displacement"] * 1e3 / laser.mm_per_V
         monitors = Monitors(readings["voltage_monitor"], readings["current_monitor"])
         shown, driver = _simulated_laser(settings, readings["displacement"], FaultPlan(serial))
+        shown, air = _simulated_room(shown, faults)
         return (
             *_card(settings, identity, rate),
-            *instrument_findings(shown, monitors, volts, driver),
+            *instrument_findings(shown, monitors, volts, driver, air),
             *reading_findings(settings, readings),
         )
 
@@ -113,6 +123,19 @@ def _simulated_laser(
         return line
 
     return settings.model_copy(update={"laser": laser}), KeyenceDriver(opened, line.now)
+
+
+def _simulated_room(
+    settings: RigSettings, faults: FaultPlan
+) -> tuple[RigSettings, ThermohygrometerDriver | None]:
+    """Return the driver for the inspection of a thermo-hygrometer, and the settings to show."""
+    sensor = settings.thermohygrometer
+    if sensor is None or not isinstance(room_driver(sensor.driver), VaisalaDriver):
+        return settings, None
+    air = Air(settings.room, time_in_room(settings.room, 0, lambda: local_seconds(time.time)))
+    source = SimulatedSource(sensor, air, faults=faults)
+    shown = sensor.model_copy(update={"port": source.port})
+    return settings.model_copy(update={"thermohygrometer": shown}), source.driver
 
 
 def _at_zero(

@@ -10,25 +10,26 @@ import math
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from dearig.acquisition import ending
 from dearig.acquisition.check import check_rig
 from dearig.acquisition.event_log import EventLog
-from dearig.acquisition.feedback import Feedback, FeedbackLoop, FeedbackReport
+from dearig.acquisition.feedback import Feedback, FeedbackLoop
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.marks import RunMarks
 from dearig.acquisition.output import LastSamples, after_run, unknown
 from dearig.acquisition.overlay import Overlay, OverlayModel
-from dearig.acquisition.plan import Plan, plan
+from dearig.acquisition.plan import plan
 from dearig.acquisition.rigs import is_simulated, kind_of, options_of
+from dearig.acquisition.room import RoomOfRun, open_room
+from dearig.acquisition.run_parts import RunObserver, RunOptions, RunResult
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
 from dearig.drivers.errors import AddressError, NotAtZero, RefusedWaveform, RigError
-from dearig.drivers.gate import Margin
 from dearig.drivers.interlocks import Interlocks, Trip
-from dearig.drivers.rig import Block, Event, Rig, RigIdentity
+from dearig.drivers.rig import Block, Event, Rig
 from dearig.errors import (
     DearigError,
     InputError,
@@ -37,8 +38,6 @@ from dearig.errors import (
     NotSafe,
     SafetyStop,
 )
-from dearig.model.actuator import Actuator
-from dearig.model.control import HoldAnswer
 from dearig.model.errors import ModelError
 from dearig.output_state import Known, OutputState
 from dearig.progress import Progress, quiet
@@ -47,7 +46,6 @@ from dearig.recording.files import check_output
 from dearig.recording.metadata import RunMetadata
 from dearig.recording.recorder import Recorder
 from dearig.recording.writer import RecordingWriter
-from dearig.sim_backend.faults import FaultPlan
 
 __all__ = ["RunObserver", "RunOptions", "RunResult", "open_rig", "record"]
 
@@ -60,80 +58,7 @@ _GIVE_UP = 2
 _GUARDIAN_POLL = 0.25  # s between two looks at what the operator asks
 
 
-@dataclass(frozen=True)
-class RunOptions:
-    """Options of a run, and metadata for its recording.
-
-    ``configuration`` is the text of the rig file, kept with the recording. ``operator``,
-    ``film_id`` (by default the rig file's film) and ``notes`` are kept too. With ``overwrite`` an
-    existing file is replaced; with ``fsync`` flushed data survive a power cut. ``waveform_digest``
-    is that of the plan that was shown and armed: another waveform is refused; "" admits any.
-
-    Only for a simulated rig: ``seed`` of its noise, ``paced`` for real time, ``actuator`` in place
-    of the film that ``sim`` has by default, and the ``faults`` that occur in it.
-    """
-
-    configuration: str = ""
-    operator: str = ""
-    film_id: str = ""
-    notes: str = ""
-    overwrite: bool = False
-    fsync: bool = False
-    waveform_digest: str = ""
-    seed: int = 0
-    paced: bool = False
-    actuator: Actuator | None = None
-    faults: FaultPlan | None = None
-
-
 _DEFAULT = RunOptions()
-
-
-@dataclass(frozen=True)
-class RunResult:
-    """A recorded run: its file, size, outcome and events.
-
-    ``path`` is not the wanted one where another program has deleted, moved or replaced that file;
-    the ``events`` say so.
-
-    ``margins`` are the distances of the voltage from each limit of the gate, and ``output_state``
-    is what was known of the rig's output after the run. ``feedback`` is what a feedback did.
-    """
-
-    path: Path
-    samples: int
-    rate_Hz: float
-    outcome: str
-    events: tuple[str, ...]
-    margins: tuple[Margin, ...]
-    output_state: OutputState
-    feedback: FeedbackReport | None = None
-
-
-class RunObserver:
-    """Receives samples and events of a run while it goes on; the methods here do nothing.
-
-    The thread that runs the rig calls them and waits for them: an observer that draws or computes
-    must copy the samples and return at once.
-    """
-
-    def started(self, planned: Plan, identity: RigIdentity, rate: float) -> None:
-        """Receive the plan before the sample clock of ``rate`` Hz starts."""
-
-    def block(self, block: Block) -> None:
-        """Receive the next samples, as they were recorded."""
-
-    def answered(self, time: float, answer: HoldAnswer) -> None:
-        """Receive the feedback's answer to the readings about ``time`` s of the run."""
-
-    def event(self, event: Event) -> None:
-        """Receive an event that is in the recording."""
-
-    def output(self, state: OutputState) -> None:
-        """Receive what is known of the output after the run.
-
-        It comes a second time where the guardian goes on trying after the run could not set 0 V.
-        """
 
 
 def open_rig(address: str, rig_file: RigFile, options: RunOptions = _DEFAULT) -> Rig:
@@ -205,6 +130,8 @@ def record(
     lets other threads set marks and notes, which are recorded as events. ``feedback`` corrects the
     voltage while it is played, see ``dearig.acquisition.feedback``.
 
+    A room out of its limits is a ``SafetyStop`` before anything is started.
+
     Raises ``InputError`` before anything is changed. After the rig was made safe and the recording
     was closed, it raises ``SafetyStop`` where an interlock ended the run, ``InstrumentFault`` or
     ``DiskFault`` where an instrument or the disk failed, and ``Interrupted`` where the operator
@@ -226,13 +153,17 @@ def record(
         )
         waveform = loop.gate.waveform
     rig = open_rig(address, rig_file, options)
+    room = RoomOfRun(None, None)
     try:
+        room = open_room(address, rig_file, options.seed, options.faults)
+        room.check()
         if loop is not None and not getattr(rig, "plays_growing_waveforms", False):
             raise InputError(f"rig {address!r}: its driver cannot correct a run while it goes on")
         with interrupts or Interrupts() as interrupts:
             try:
                 rate = rig.load(waveform)
                 identity = rig.identify()
+                room.begin(rate)
                 if loop is not None:
                     loop.begin(identity.channels)
             except RefusedWaveform as error:
@@ -261,6 +192,7 @@ def record(
             writer = RecordingWriter(
                 out, identity, rate, waveform.samples, metadata,
                 overwrite=options.overwrite, fsync=options.fsync, overlay=stepped is not None,
+                environment=room.exists,
             )  # fmt: skip
             observer = observer or RunObserver()
             observer.started(planned, identity, rate)
@@ -285,7 +217,7 @@ def record(
                 last = LastSamples(identity.channels, rig_file.limits.zero_tolerance_kV * 1e3)
                 run = _Run(
                     rig, recorder, interlocks, interrupts, marks or RunMarks(), observer,
-                    event_log, last, progress, clock, loop,
+                    event_log, last, progress, clock, loop, room,
                 )  # fmt: skip
                 try:
                     events = run.follow(waveform.samples)
@@ -298,7 +230,10 @@ def record(
             None if loop is None else loop.report(),
         )  # fmt: skip
     finally:
-        ending.close(rig, sys.exc_info()[1])
+        try:
+            ending.close(rig, sys.exc_info()[1])
+        finally:
+            room.close()
 
 
 class _Run:
@@ -317,8 +252,10 @@ class _Run:
         progress: Progress,
         clock: Callable[[], float],
         loop: FeedbackLoop | None,
+        room: RoomOfRun,
     ) -> None:
         self._rig = rig
+        self._room = room
         self._loop = loop
         self._recorder = recorder
         self._interlocks = interlocks
@@ -454,12 +391,22 @@ class _Run:
         late = self._interlocks.late(self._unread)
         full = None if free is None else self._interlocks.disk(free)
         trips += [trip for trip in (late, full) if trip is not None]
+        trips += self._look_at_room()
         for trip in trips:
             self._note_trip(trip)
         if not trips:
             return None
         # the stronger action is taken
         return next((trip for trip in trips if trip.action == "at once"), trips[0])
+
+    def _look_at_room(self) -> list[Trip]:
+        """Record and show a new reading of the room; return the interlocks that it trips."""
+        readings, events, trips = self._room.take(self._recorder.received)
+        for sample, reading in readings:
+            self._recorder.room(sample, reading.temperature, reading.humidity)
+            self._observer.room(sample / self._recorder.rate, reading)
+        self._note_events(events)
+        return trips
 
     def _correct(self, block: Block) -> Trip | None:
         """Let the feedback answer ``block``; return a trip where the run must end."""

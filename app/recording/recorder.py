@@ -121,6 +121,11 @@ class Recorder:
         return self._writer.path
 
     @property
+    def rate(self) -> float:
+        """Rate of the sample clock in Hz."""
+        return self._writer.rate_Hz
+
+    @property
     def received(self) -> int:
         """Samples that ``append`` has taken."""
         return self._received

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import errno
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import Enum
 from types import TracebackType
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from dearig.drivers.errors import RigError
 from dearig.drivers.keyence.commands import (
@@ -25,11 +23,11 @@ from dearig.drivers.keyence.commands import (
     Command,
 )
 from dearig.drivers.keyence.compare import ControllerSettings
+from dearig.drivers.serial_line import POLL, Port, PortError, open_serial_port
 from dearig.drivers.settings import LaserSettings
 
 __all__ = ["POLL", "Keyence", "LaserError", "NoReading", "Port", "open_port"]
 
-POLL = 0.05  #: s that one read of the port waits
 _ATTEMPTS = 3
 _PATIENCE = 1.0  # s; after a longer silence a command is not repeated
 _LINE_MAX = 200  # bytes; the longest expected reply has 40
@@ -70,75 +68,15 @@ _STATES = {
 }
 
 
-class Port(Protocol):
-    """Interface of a serial port, which pyserial's ports have. Faults are ``OSError``.
-
-    ``read`` returns the bytes that arrive within ``POLL`` s, up to ``size`` of them, or none.
-    """
-
-    @property
-    def in_waiting(self) -> int:
-        """Return the number of bytes that can be read at once."""
-        ...
-
-    def read(self, size: int = 1, /) -> bytes:
-        """Read."""
-        ...
-
-    def write(self, data: bytes, /) -> object:
-        """Write all of ``data``."""
-        ...
-
-    def close(self) -> None:
-        """Release the port."""
-        ...
-
-
 def open_port(settings: LaserSettings) -> Port:
     """Open ``settings.port``, a name such as COM3 or a URL that pyserial knows.
 
     Raises ``LaserError`` where the port cannot be opened.
     """
     try:
-        import serial
-    except ModuleNotFoundError as error:
-        raise LaserError(
-            "pyserial, which speaks to serial ports, is not installed",
-            'pip install "dearig[rig]"',
-        ) from error
-    name = settings.port
-    try:
-        port: Port = serial.serial_for_url(
-            name, baudrate=settings.baud_rate, timeout=POLL, write_timeout=1.0, exclusive=True
-        )
-    except (OSError, ValueError) as error:
-        raise _cannot_open(name, error) from error
-    return port
-
-
-def _cannot_open(name: str, error: Exception) -> LaserError:
-    from serial.tools.list_ports import comports
-
-    # on Windows only the text gives the cause
-    text, number = str(error), getattr(error, "errno", None)
-    denied = number == errno.EACCES or "PermissionError" in text
-    if number == errno.ENOENT or "FileNotFoundError" in text:
-        there = ", ".join(sorted(port.device for port in comports())) or "none"
-        return LaserError(
-            f"there is no serial port {name}",
-            f"set laser.port to where the controller is; serial ports here: {there}",
-        )
-    if number in (errno.EBUSY, errno.EAGAIN) or (denied and sys.platform == "win32"):
-        return LaserError(f"serial port {name} is in use", "close the program that uses it")
-    if denied:
-        return LaserError(
-            f"this user may not open serial port {name}",
-            "join the group that owns it, often dialout, and log in again",
-        )
-    return LaserError(
-        f"serial port {name} cannot be opened: {text}",
-        "set laser.port to the name of a serial port, such as COM3 or /dev/ttyUSB0",
-    )
+        return open_serial_port(settings.port, settings.baud_rate, "laser.port", "controller")
+    except PortError as error:
+        raise LaserError(error.what, error.advice) from error
 
 
 class _Garbled(Exception):  # noqa: N818  (not an error of the program)

@@ -11,6 +11,7 @@ from dearig.drivers.settings.channel import ChannelSettings, ThermometerSettings
 from dearig.drivers.settings.laser import LaserSettings
 from dearig.drivers.settings.limits import GuardianSettings, InterlockSettings, LimitsSettings
 from dearig.drivers.settings.rig import RigSettings
+from dearig.drivers.settings.room import RoomSettings, ThermohygrometerSettings
 from dearig.drivers.settings.section import Action, Section
 
 __all__ = [
@@ -23,6 +24,8 @@ __all__ = [
     "LaserSettings",
     "LimitsSettings",
     "RigSettings",
+    "RoomSettings",
     "Section",
+    "ThermohygrometerSettings",
     "ThermometerSettings",
 ]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from dearig.drivers.channels import RESERVED_NAMES
+from dearig.drivers.channels import HUMIDITY, RESERVED_NAMES
 from dearig.drivers.settings.section import Action, AnalogInput, InputRange, Section, Wiring
 
 __all__ = ["ChannelSettings", "ThermometerSettings"]
@@ -109,6 +109,15 @@ class ChannelSettings(Section):
         if value in RESERVED_NAMES or value.endswith("_counts"):
             raise ValueError("recordings use this name for something else; choose another one")
         return value
+
+    @model_validator(mode="after")
+    def _humidity_is_in_per_cent(self) -> ChannelSettings:
+        if self.name == HUMIDITY and self.unit != "%":
+            raise ValueError(
+                f'channel {HUMIDITY}: unit = "{self.unit}" is not "%": what is known of the room '
+                f"is in per cent"
+            )
+        return self
 
     @field_validator("unit_per_V")
     @classmethod

@@ -12,6 +12,7 @@ from dearig.drivers.settings.card import CardSettings
 from dearig.drivers.settings.channel import ChannelSettings, ThermometerSettings
 from dearig.drivers.settings.laser import LaserSettings
 from dearig.drivers.settings.limits import GuardianSettings, InterlockSettings, LimitsSettings
+from dearig.drivers.settings.room import RoomSettings, ThermohygrometerSettings
 from dearig.drivers.settings.section import Section
 
 __all__ = ["RigSettings"]
@@ -34,6 +35,9 @@ class RigSettings(Section):
     thermometer: ThermometerSettings | None = Field(
         default=None, description="leave the table out when there is none"
     )
+    thermohygrometer: ThermohygrometerSettings | None = Field(
+        default=None, description="leave the table out when there is none"
+    )
     channel: tuple[ChannelSettings, ...] = Field(
         default=(),
         strict=False,  # TOML has lists, not tuples; their items are validated strictly
@@ -42,6 +46,7 @@ class RigSettings(Section):
     limits: LimitsSettings = LimitsSettings()
     interlocks: InterlockSettings = InterlockSettings()
     guardian: GuardianSettings = GuardianSettings()
+    room: RoomSettings = RoomSettings()
 
     @property
     def channel_names(self) -> tuple[str, ...]:

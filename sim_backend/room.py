@@ -1,0 +1,182 @@
+"""Room of a simulated rig: temperature and humidity with daily and heating cycles and slow weather.
+
+Everything follows from the settings and the time, so that a run can be repeated and its film knows
+what the room was like before. ``Air`` is the room as one run sees it, ``SimulatedSource`` the
+thermo-hygrometer in it, read by the real driver through a simulated line.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from dearig.drivers.errors import RigError
+from dearig.drivers.instruments import room_driver
+from dearig.drivers.settings import RoomSettings, ThermohygrometerSettings
+from dearig.drivers.thermohygrometer import NO_READING, RoomReading, ThermohygrometerError
+from dearig.drivers.vaisala import VaisalaDriver
+from dearig.sim_backend.faults import FaultKind, FaultPlan
+from dearig.sim_backend.keyence import SimulatedLine
+from dearig.sim_backend.vaisala import SimulatedProbe
+
+__all__ = ["Air", "SimulatedSource", "local_seconds", "still_air", "time_in_room"]
+
+_HOUR = 3600.0  # s
+_DAY = 24.0 * _HOUR
+_WARMEST = 15.0 * _HOUR
+_COOLING = 0.6  # share of a heating cycle in which the room cools; it warms in the rest
+_WEATHERS = 6  # sines that make up the slow changes
+_WEATHER_PERIODS = (0.5 * _DAY, 10.0 * _DAY)
+
+
+def time_in_room(settings: RoomSettings, run: int, computer: Callable[[], float]) -> float:
+    """Return the time in s in the room, 0 at a midnight, at which run number ``run`` starts.
+
+    ``computer`` returns the computer's clock: s since a midnight.
+    """
+    if settings.clock == "computer":
+        return computer()
+    return (settings.start_h + settings.hours_per_run * run) * _HOUR
+
+
+def local_seconds(computer: Callable[[], float]) -> float:
+    """Return the s since a midnight of local time, by a clock of Unix time."""
+    now = computer()
+    return now + time.localtime(now).tm_gmtoff
+
+
+@dataclass(frozen=True)
+class Air:
+    """Room of ``settings`` as a run sees it that starts at ``start`` s in the room.
+
+    Times are s after the start of the run, any shape; earlier ones are the past of the room.
+    """
+
+    settings: RoomSettings
+    start: float = 0.0
+
+    def temperature(self, at: np.ndarray) -> np.ndarray:
+        """Return the temperature in degrees Celsius."""
+        s = self.settings
+        changes = self._changes(at, s.daily_K, s.heating_K, s.weather_K, 0)
+        return np.asarray(s.temperature_degC + changes)
+
+    def humidity(self, at: np.ndarray) -> np.ndarray:
+        """Return the relative humidity in per cent: lower where it is warmer."""
+        s = self.settings
+        changes = self._changes(at, s.daily_percent, s.heating_percent, s.weather_percent, 1)
+        return np.clip(s.relative_humidity_percent - changes, 0.0, 100.0)
+
+    @cached_property
+    def steady(self) -> bool:
+        """True where nothing changes."""
+        s = self.settings
+        return not any(
+            (s.daily_K, s.heating_K, s.weather_K, s.daily_percent, s.heating_percent,
+             s.weather_percent)
+        )  # fmt: skip
+
+    def _changes(
+        self, at: np.ndarray, daily: float, heating: float, weather: float, which: int
+    ) -> np.ndarray:
+        now = self.start + np.asarray(at, dtype=np.float64)
+        changes = daily * np.cos(2.0 * math.pi * (now - _WARMEST) / _DAY)
+        phase = np.mod(now / (60.0 * self.settings.heating_period_min), 1.0)
+        warming = (phase - _COOLING) / (1.0 - _COOLING)
+        changes += heating * (np.where(phase < _COOLING, 1.0 - phase / _COOLING, warming) - 0.5)
+        if weather > 0.0:
+            generator = np.random.default_rng((self.settings.seed, which))
+            ends = np.log(_WEATHER_PERIODS)
+            for _ in range(_WEATHERS):
+                period = math.exp(generator.uniform(*ends))
+                turned = 2.0 * math.pi * (now / period + generator.random())
+                changes += weather * math.sqrt(2.0 / _WEATHERS) * np.sin(turned)
+        return np.asarray(changes)
+
+
+def still_air(temperature: float, humidity: float) -> Air:
+    """Return air that stays at so many degrees Celsius and per cent."""
+    return Air(RoomSettings(temperature_degC=temperature, relative_humidity_percent=humidity))
+
+
+class SimulatedSource:
+    """The thermo-hygrometer of a simulated rig; see ``RoomSource``.
+
+    The driver that the rig file names reads a simulated probe; only the driver ``vaisala`` has one.
+    Of the ``faults``, ``room-sensor-garbage`` and ``room-sensor-gone`` occur on its line.
+
+    Raises ``ThermohygrometerError`` for another driver.
+    """
+
+    def __init__(
+        self,
+        settings: ThermohygrometerSettings,
+        air: Air,
+        seed: tuple[int, ...] = (0,),
+        faults: FaultPlan | None = None,
+    ) -> None:
+        if not isinstance(room_driver(settings.driver), VaisalaDriver):
+            raise ThermohygrometerError(
+                f"a thermo-hygrometer of the driver {settings.driver!r} is not simulated",
+                "set thermohygrometer.driver to vaisala on a simulated rig",
+            )
+        shown = settings.model_copy(update={"port": f"{settings.port or 'a port'} (simulated)"})
+        self._settings = shown
+        self._elapsed = 0.0
+        self._faults = faults or FaultPlan()
+        self._probe = SimulatedProbe(
+            shown,
+            lambda: self._measured(air),
+            seed=seed,
+            garbled=lambda: self._has(FaultKind.ROOM_SENSOR_GARBAGE),
+        )
+        line = SimulatedLine(self._probe, shown.baud_rate)
+        self.driver = VaisalaDriver(lambda _: line, line.now)
+        self._sensor = self.driver.open(shown)
+        self._due = 0.0  # s of the run at which it is read next
+        self._newest, self._at = NO_READING, -math.inf
+        self._trouble = ""
+
+    def reading(self, elapsed: float) -> RoomReading:
+        """Return the newest reading; the sensor is read where one is due at ``elapsed`` s."""
+        if elapsed >= self._due:
+            # a reader that looks rarely gets one reading, at the time of the last one due
+            every = self._settings.interval_s
+            self._elapsed = self._due + every * math.floor((elapsed - self._due) / every)
+            self._due = self._elapsed + every
+            try:
+                if self._has(FaultKind.ROOM_SENSOR_GONE):
+                    raise ThermohygrometerError("serial port fails: unplugged", "plug it in")
+                self._newest, self._at = self._sensor.read(), self._elapsed
+                self._trouble = ""
+            except RigError as error:
+                self._trouble = str(error).partition(";")[0]
+        age = max(elapsed - self._at, 0.0)
+        if age > self._settings.stale_s:
+            return replace(NO_READING, trouble=self._trouble)
+        return replace(self._newest, age=age, trouble=self._trouble)
+
+    @property
+    def port(self) -> str:
+        """Name of the line, for messages."""
+        return self._settings.port
+
+    def close(self) -> None:
+        """Release the line."""
+        self._sensor.close()
+
+    def _has(self, kind: FaultKind) -> bool:
+        return any(f.at <= self._elapsed < f.end for f in self._faults.of(kind))
+
+    def _measured(self, air: Air) -> tuple[float, float]:
+        at, noise = np.array(self._elapsed), self._probe.noise(2)
+        room = air.settings
+        return (
+            float(air.temperature(at)) + room.sensor_noise_K * noise[0],
+            float(air.humidity(at)) + room.sensor_noise_percent * noise[1],
+        )
