@@ -5,35 +5,28 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dearig.cli.options import Force, Json
-from dearig.cli.output import check_files, console_for, write_result
+from dearig.cli.output import check_files, console_for, print_line, write_result
 from dearig.errors import InputError
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
-    from dearig.batch.campaign import CampaignOutcome
-    from dearig.batch.watching import RecordingWatch, Seen
+    from dearig.batch.watching import Seen, SourceWatch
 
 __all__ = ["commands"]
 
 commands = typer.Typer()
 
-_CHANNELS = (
-    ("voltage_command", "command", 1e-3, "kV", 3),
-    ("voltage_monitor", "monitor", 1e-3, "kV", 3),
-    ("current_monitor", "current", 1e3, "mA", 3),
-    ("displacement", "displacement", 1e3, "mm", 4),
-    ("displacement_model", "model", 1e3, "mm", 4),
-    ("temperature", "temperature", 1.0, "degC", 2),
-)
 _BARS = "\u2581\u2582\u2583\u2584\u2585\u2586\u2587\u2588"
 _ASCII_BARS = "_.-=*#"
 _RUNS = 12  # runs of a campaign that are shown
+_EVENTS = 5  # the last ones, below the values
+_COLUMNS = 60  # bars of the newest displacement
 
 
 @commands.command(rich_help_panel="Rig")
@@ -47,9 +40,43 @@ def watch(
             show_default=False,
         ),
     ],
+    port: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=65535,
+            help="Show it as a web page at this port, to be opened in a browser; 0 takes a free "
+            "one.",
+            show_default="no page",
+        ),
+    ] = None,
+    host: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Address of this computer at which the page can be reached from others; they need "
+            "the token in the printed address.",
+            show_default="127.0.0.1",
+        ),
+    ] = None,
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--token-file",
+            metavar="FILE",
+            help="Take the token from this file, so that the page keeps its address.",
+            show_default="a new token each time",
+        ),
+    ] = None,
     every: Annotated[
-        float, typer.Option(min=0.1, max=3600.0, help="Seconds between two looks.")
-    ] = 0.5,
+        float | None,
+        typer.Option(
+            min=0.05,
+            max=3600.0,
+            help="Seconds between two looks.",
+            show_default="0.5, and 0.1 for the page",
+        ),
+    ] = None,
     once: Annotated[bool, typer.Option("--once", help="Look once, and end.")] = False,
     json: Json = None,
     force: Force = False,
@@ -57,21 +84,54 @@ def watch(
     """Look on while a run or a campaign goes on, in this or another process.
 
     It only reads, and ends when the run or the campaign ends, or with ctrl-C. --json looks once.
+    --port shows a web page until ctrl-C, which takes the extra "web".
     """
+    from dearig.batch.watching import SourceWatch
+
     check_files(force, (source,) if source.is_file() else (), json=json)
-    view = _View(source)
+    if port is None and (host is not None or token_file is not None):
+        raise InputError("--host and --token-file belong to the web page: give its --port too")
+    if port is not None and (once or json is not None):
+        raise InputError("--once and --json look once, and --port shows a page: give one of them")
+    view = SourceWatch(source)
+    if port is not None:
+        _serve(view, port, host, token_file, every or 0.1)
+        return
+    from dearig.report.watch_state import watch_json
+
     console = console_for(json)
     if once or json is not None or not console.is_terminal:
-        console.print(view.look(console))
-        write_result(view.json, json)
+        console.print(_look(view, console))
+        write_result(watch_json(view), json)
         return
-    _show(view, console, every)
+    _show(view, console, every or 0.5)
 
 
-def _show(view: _View, console: Console, every: float) -> None:
+def _serve(
+    view: SourceWatch, port: int, host: str | None, token_file: Path | None, every: float
+) -> None:
+    from dearig.web.server import serve_watch, token_from
+
+    token = None if token_file is None else token_from(token_file)
+    console = console_for(None)
+
+    def started(address: str, shared: bool) -> None:
+        """Tell where the page is."""
+        print_line(console, f"{view.source} is shown at {address} until ctrl-C")
+        if shared:
+            print_line(
+                console,
+                "Whoever has this address can look on; nobody can change anything. The connection "
+                "is not encrypted.",
+            )
+
+    serve_watch(view, port, host, token, every, started)
+
+
+def _show(view: SourceWatch, console: Console, every: float) -> None:
     from rich.live import Live
 
-    shown = view.look(console)
+    shown = _look(view, console)
     try:
         # warnings and log lines are printed as they are: Live does not redirect them
         with Live(
@@ -79,130 +139,63 @@ def _show(view: _View, console: Console, every: float) -> None:
         ) as live:
             while not view.ended:
                 time.sleep(every)
-                live.update(view.look(console), refresh=True)
+                live.update(_look(view, console), refresh=True)
     except KeyboardInterrupt:
         return  # the end that a watcher has
 
 
-class _View:
-    """What is shown of a campaign, of a recording, or of both."""
+def _look(view: SourceWatch, console: Console) -> RenderableType:
+    """Return the present state to be printed."""
+    from rich.console import Group
 
-    def __init__(self, source: Path) -> None:
-        from dearig.batch.journal import JOURNAL
+    from dearig.cli.terminal import campaign_runs
 
-        if not source.exists():
-            raise InputError(f"{source} is not there")
-        self._source = source
-        self._campaign = source.is_dir() and (source / JOURNAL).exists()
-        self._watch: RecordingWatch | None = None
-        self._outcome: CampaignOutcome | None = None
-        self.ended = False
-
-    def look(self, console: Console) -> RenderableType:
-        """Return the present state to be printed."""
-        from rich.console import Group
-
-        ascii_only = console.options.ascii_only
-        parts: list[RenderableType] = []
-        path: Path | None = self._source
-        if self._campaign:
-            path = self._look_at_campaign(parts)
-        elif self._source.is_dir():
-            path = self._newest()
-        state = None if path is None else self._follow(path)
-        if state is not None:
-            parts += _recording_lines(state, ascii_only)
-        if not self._campaign:
-            self.ended = state is None or state.ended or self._is_over()
-        return Group(*parts)
-
-    def _look_at_campaign(self, parts: list[RenderableType]) -> Path | None:
-        from dearig.batch.watching import seen
-        from dearig.cli.terminal import campaign_runs
-
-        outcome = self._outcome = seen(self._source)
-        self.ended = outcome.status not in ("running", "paused")
-        parts.append(campaign_runs(outcome, _RUNS))
-        run = outcome.queue.running
-        if run is None or run.recorded or not (self._source / run.recording).exists():
-            return None
-        return self._source / run.recording
-
-    def _newest(self) -> Path:
-        from dearig.batch.watching import newest_recording
-
-        newest = newest_recording(self._source)
-        if newest is None:
-            raise InputError(f"{self._source} has neither a campaign nor a recording")
-        return newest
-
-    def _follow(self, path: Path) -> Seen:
-        from dearig.batch.watching import RecordingWatch
-
-        if self._watch is None or self._watch.state.path != path:
-            self._watch = RecordingWatch(path)
-        return self._watch.look()
-
-    def _is_over(self) -> bool:
-        """Return True if no process writes the recording any more: its run was killed."""
-        from dearig.recording.lock import refuse_in_use
-
-        assert self._watch is not None  # noqa: S101  (made by the look before)
-        try:
-            refuse_in_use(self._watch.state.path)
-        except InputError:
-            return False
-        return True
-
-    @property
-    def json(self) -> dict[str, Any]:
-        """The present state for programs, in SI units."""
-        from dearig.report.campaign_page import campaign_json
-
-        state = None if self._watch is None else self._watch.state
-        return {
-            "format": "dearig-watch/1",
-            "campaign": None if self._outcome is None else campaign_json(self._outcome),
-            "recording": None if state is None else {
-                "path": str(state.path),
-                "samples": state.samples,
-                "time_s": state.time,
-                "ended": state.ended,
-                "now": state.now,
-                "peak": state.peak,
-                "events": [
-                    {"time_s": e.time, "level": e.level, "message": e.message}
-                    for e in state.events
-                ],
-                "trouble": state.trouble,
-            },
-        }  # fmt: skip
+    view.look()
+    parts: list[RenderableType] = []
+    if view.outcome is not None:
+        parts.append(campaign_runs(view.outcome, _RUNS))
+    if view.recording is not None:
+        parts += _recording_lines(view.recording, console.options.ascii_only)
+    return Group(*parts)
 
 
 def _recording_lines(state: Seen, ascii_only: bool) -> Iterator[RenderableType]:
     from rich.text import Text
 
     from dearig.printable import printable
+    from dearig.report.watch_state import in_order, shown_channel
 
-    ended = "ended" if state.ended else "recording"
+    how = "ended" if state.ended else "killed" if state.abandoned else "recording"
+    simulated = ", simulated" if state.simulated else ""
     yield Text()
-    yield Text(printable(f"{state.path}: {ended}, {state.time:.1f} s, {state.samples} samples"))
+    yield Text(
+        printable(f"{state.path}: {how}, {state.time:.1f} s, {state.samples} samples{simulated}")
+    )
     if state.trouble:
         yield Text(printable(state.trouble), style="yellow")
-    for name, label, factor, unit, digits in _CHANNELS:
-        if name in state.now:
-            now, peak = state.now[name] * factor, state.peak[name] * factor
-            yield Text(f"  {label:13s} {now:10.{digits}f} {unit:4s}  peak {peak:10.{digits}f}")
-    if state.trace.size > 1:
-        yield Text(f"  last {'10 s':10s} {_bars(state, ascii_only)}")
-    for event in state.events:
+    for name in in_order(state):
+        label, factor, unit, digits = shown_channel(name, state.described)
+        form = "10.4g" if digits is None else f"10.{digits}f"
+        now, peak = state.now[name] * factor, state.peak[name] * factor
+        text = f"  {label:13s} {now:{form}} {unit:4s}  peak {peak:{form}}"
+        if ascii_only:
+            text = text.replace("\u00b0", "deg").encode("ascii", "replace").decode()
+        yield Text(printable(text))
+    if "displacement" in state.recent:
+        yield Text(f"  last {'20 s':10s} {_bars(state, ascii_only)}")
+    for event in state.events[-_EVENTS:]:
         yield Text(printable(f"  {event.time:8.2f} s  {event.level}: {event.message}"))
 
 
 def _bars(state: Seen, ascii_only: bool) -> str:
     """Return the newest displacement as a row of bars."""
+    import numpy as np
+
     bars = _ASCII_BARS if ascii_only else _BARS
-    low, high = float(state.trace.min()), float(state.trace.max())
+    _, lows, highs = state.recent["displacement"].extremes
+    trace = [float(part.mean()) for part in np.array_split(0.5 * (lows + highs), _COLUMNS)
+             if part.size]  # fmt: skip
+    low, high = min(trace), max(trace)
     span = high - low
-    places = [int((v - low) / span * (len(bars) - 1) + 0.5) if span else 0 for v in state.trace]
+    places = [int((v - low) / span * (len(bars) - 1) + 0.5) if span else 0 for v in trace]
     return "".join(bars[place] for place in places)

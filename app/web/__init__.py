@@ -1,0 +1,1 @@
+"""Read-only web page of ``dearig watch``: what a campaign and a running recording do now."""

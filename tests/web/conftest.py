@@ -1,0 +1,5 @@
+"""Fixtures of campaigns."""
+
+from tests.tools.played import bench, made_runs
+
+__all__ = ["bench", "made_runs"]
