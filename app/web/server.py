@@ -16,7 +16,7 @@ from dearig.input_file import read_input
 from dearig.recording.files import in_words
 
 if TYPE_CHECKING:
-    import uvicorn
+    from uvicorn import Server
 
 __all__ = ["WatchServer", "serve_watch", "token_from"]
 
@@ -67,7 +67,7 @@ class WatchServer:
             log_config=None, access_log=False, log_level="error", server_header=False,
             ws="none", lifespan="off", limit_concurrency=200, timeout_graceful_shutdown=3,
         )  # fmt: skip
-        self._server: uvicorn.Server = uvicorn.Server(config)
+        self._server: Server = uvicorn.Server(config)
         name = host
         if host in ("0.0.0.0", "::", ""):  # noqa: S104  (a name for all addresses)
             name = socket.gethostname()
