@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import importlib.util
-import io
 import json
 import logging
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,17 +13,17 @@ from dearig.batch.engines import ClusterLost, Engine, LocalEngine
 from dearig.batch.fits import KINDS, Row, StudyOptions, Task, key_of
 from dearig.batch.journal import JOURNAL
 from dearig.batch.queue import Queue
+from dearig.batch.table_file import write_csv, write_parquet
 from dearig.config.modelfile import load_model
 from dearig.config.toml_input import read_text
 from dearig.errors import InputError
-from dearig.extras import import_extra
 from dearig.input_file import read_input
 from dearig.progress import Progress, quiet
-from dearig.recording.files import in_words, replaced_when_done, write_whole
+from dearig.recording.files import in_words
 from dearig.recording.index import ENDINGS, list_folder
 from dearig.recording.json_file import write_json
 
-__all__ = ["StudyTable", "Subject", "columns_of", "study_recordings", "subjects_of", "with_model"]
+__all__ = ["StudyTable", "Subject", "study_recordings", "subjects_of", "with_model"]
 
 log = logging.getLogger(__name__)
 
@@ -203,8 +200,9 @@ def study_recordings(
     made = [{**rows[s.name], **s.beside} for s in subjects]
     made.sort(key=lambda row: (str(row.get("started", "")), row["recording"]))
     table = out / "study.csv"
-    _write_csv(made, table)
-    return StudyTable(options, tuple(made), cached, table, _write_parquet(made, out), moved)
+    write_csv(made, table)
+    parquet = write_parquet(made, out / "study.parquet")
+    return StudyTable(options, tuple(made), cached, table, parquet, moved)
 
 
 def _compute(
@@ -238,47 +236,3 @@ def _kept(path: Path) -> Row | None:
         return None
     row = found.get("row")
     return row if isinstance(row, dict) and {"recording", "state"} <= set(row) else None
-
-
-def columns_of(rows: Sequence[Row]) -> list[str]:
-    """Return the names of all columns, in the order in which they occur."""
-    return list(dict.fromkeys(name for row in rows for name in row))
-
-
-def _write_csv(rows: Sequence[Row], path: Path) -> None:
-    text = io.StringIO()
-    columns = columns_of(rows)
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(columns)
-    # the shortest text of a number that is read as the same number
-    table.writerows([_cell(row.get(name)) for name in columns] for row in rows)
-    write_whole(path, text.getvalue().encode())
-
-
-def _cell(value: object) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, list | dict):
-        return json.dumps(value)
-    return repr(value) if isinstance(value, float) else str(value)
-
-
-def _write_parquet(rows: Sequence[Row], out: Path) -> Path | None:
-    """Write the rows as Parquet; None where pyarrow is not installed."""
-    if importlib.util.find_spec("pyarrow") is None:
-        return None
-    pyarrow = import_extra("pyarrow", "parquet", "a table in Parquet")
-    parquet = import_extra("pyarrow.parquet", "parquet", "a table in Parquet")
-    columns = {}
-    for name in columns_of(rows):
-        values = [row.get(name) for row in rows]
-        kinds = {type(value) for value in values if value is not None}
-        if kinds <= {int, float} and float in kinds:
-            values = [None if value is None else float(value) for value in values]
-        elif len(kinds) > 1 or kinds & {list, dict}:
-            values = [None if value is None else _cell(value) for value in values]
-        columns[name] = pyarrow.array(values, type=pyarrow.string() if not kinds else None)
-    path = out / "study.parquet"
-    with replaced_when_done(path, overwrite=True) as partial:
-        parquet.write_table(pyarrow.table(columns), partial)
-    return path

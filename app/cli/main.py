@@ -25,7 +25,7 @@ import typer
 from typer.exceptions import TyperException
 
 from dearig import log_file
-from dearig.cli import campaign, files, fit, hold, run, study, tools, track, watch
+from dearig.cli import campaign, files, fit, hold, run, study, tools, track, trends, watch
 from dearig.cli.last_words import LastingStream, leave, silence_libraries
 from dearig.cli.lost_interrupt import note_lost
 from dearig.cli.output import version
@@ -44,7 +44,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _group in (run, track, hold, campaign, watch, files, fit, study, tools):
+for _group in (run, track, hold, campaign, watch, files, fit, study, trends, tools):
     app.add_typer(_group.commands)
 
 

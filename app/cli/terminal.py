@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from dearig.analysis.tracking import TrackOutcome
     from dearig.batch.campaign import CampaignOutcome
     from dearig.batch.studies import StudyTable
+    from dearig.batch.trends import Trends
 
 __all__ = [
     "branch_table",
@@ -53,6 +54,7 @@ __all__ = [
     "identify_table",
     "study_rows",
     "track_table",
+    "trend_tables",
     "validate_tables",
 ]
 
@@ -101,6 +103,15 @@ def track_table(outcome: TrackOutcome) -> RenderableType:
     from dearig.report.track_page import runs_table, track_summary, track_warnings
 
     return _Fitted([*track_summary(outcome), runs_table(outcome)], track_warnings(outcome))
+
+
+def trend_tables(trends: Trends) -> RenderableType:
+    """Return trends as sentences, the effects, and what to vary next."""
+    from dearig.report.trend_words import effect_table, proposal_sentences, trends_sentences
+
+    return _Fitted(
+        [*trends_sentences(trends), effect_table(trends), *proposal_sentences(trends)], ()
+    )
 
 
 def campaign_runs(outcome: CampaignOutcome, most: int = 40) -> RenderableType:

@@ -1,0 +1,134 @@
+"""What single films do otherwise: slopes of their own, and jumps from one run to the next."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dearig.batch.changes import RUNS_MIN, find_jumps, jump_penalty
+from dearig.batch.mixed_model import LinearFit, Sample, fit_linear, with_extra
+
+__all__ = ["DIFFER", "Explained", "Extra", "explain"]
+
+#: Probability of equal slopes below which films differ: it is asked of every number and column.
+DIFFER = 0.01
+_CALMER_MIN = 0.3  # of the scatter: neighbours that differ less have drifted together
+#: Part of the films that may have a slope of their own; of more it is said that films differ.
+_OWN_MAX = 1.0 / 3.0
+
+
+@dataclass(frozen=True)
+class Extra:
+    """A column of one ``film``: its own slope of ``column``, or a jump before its run ``run``."""
+
+    film: int
+    column: int | None = None
+    run: int = 0
+
+    def values(self, sample: Sample) -> np.ndarray:
+        """Return the column (n,); the runs of a film are in the order of time."""
+        mine = sample.film == self.film
+        if self.column is not None:
+            x = sample.x[:, self.column]
+            # about the film's own mean, so that its intercept stays the film's level
+            return np.where(mine, x - x[mine].mean(), 0.0)
+        return mine & (np.cumsum(mine) > self.run)
+
+
+@dataclass(frozen=True)
+class Explained:
+    """The model of a number with the ``extras`` of single films after its common ``columns``.
+
+    ``films`` are their names. With ``relative`` the number's logarithm is modelled.
+    """
+
+    sample: Sample
+    films: tuple[str, ...]
+    columns: int
+    extras: tuple[Extra, ...]
+    fit: LinearFit
+    relative: bool
+
+    def told(self, value: float) -> float:
+        """Return a difference of the model in percent, or in the number's unit."""
+        return 100.0 * math.expm1(value) if self.relative else value
+
+    def slopes_of(self, i: int) -> list[int]:
+        """Return the places of the films' own slopes of column ``i``."""
+        return [self.columns + k for k, extra in enumerate(self.extras) if extra.column == i]
+
+    def without_slopes_of(self, i: int) -> Explained:
+        """Return the model without the films' own slopes of column ``i``, not fitted again."""
+        kept = np.delete(self.sample.x, self.slopes_of(i), axis=1)
+        extras = tuple(extra for extra in self.extras if extra.column != i)
+        return replace(self, sample=replace(self.sample, x=kept), extras=extras)
+
+
+def explain(sample: Sample, films: tuple[str, ...], relative: bool) -> Explained:
+    """Return the model of ``sample`` with what single films do otherwise, one after the other.
+
+    Own slopes and jumps compete: the one that explains most beyond what chance does is taken
+    first, since each looks like the other in a few runs. Rows are in the order of time.
+    """
+    columns = sample.x.shape[1]
+    extras: list[Extra] = []
+    fit = fit_linear(sample)
+    while len(extras) < 2 * sample.films:
+        best = max(
+            [*_slopes(sample, fit, columns, extras), *_jumps(sample, fit, extras)],
+            key=lambda each: each[0],
+            default=None,
+        )
+        if best is None or best[0] <= 0.0:
+            break
+        extras.append(best[1])
+        sample = sample.extended(best[1].values(sample))
+        fit = fit_linear(sample)
+    return Explained(sample, films, columns, tuple(extras), fit, relative)
+
+
+def _slopes(
+    sample: Sample, fit: LinearFit, columns: int, extras: list[Extra]
+) -> list[tuple[float, Extra]]:
+    """Return films' own slopes, with the chi-square that each gains beyond what chance does."""
+    most = max(_OWN_MAX * sample.films, 1.0)
+    open_ones = [i for i in range(columns) if sum(e.column == i for e in extras) < most]
+    tried = [Extra(film, i) for i in open_ones for film in range(sample.films)]
+    if sample.films < 2 or not tried:
+        return []
+    t, p = with_extra(sample, fit.variances, np.column_stack([e.values(sample) for e in tried]))
+    # of so many slopes the largest by chance has about this chi-square
+    chance = 2.0 * math.log(len(tried) / DIFFER)
+    return [
+        (value**2 - chance, extra)
+        for value, each, extra in zip(t, p, tried, strict=True)
+        if each * len(tried) < DIFFER and extra not in extras
+    ]
+
+
+def _jumps(sample: Sample, fit: LinearFit, extras: list[Extra]) -> list[tuple[float, Extra]]:
+    """Return jumps, with the chi-square that each gains beyond what chance does."""
+    left = sample.y - (sample.x - fit.centre) @ fit.slopes
+    order = [np.flatnonzero(sample.film == film) for film in range(sample.films)]
+    steps = np.concatenate([np.diff(left[mine]) for mine in order])
+    if not steps.size:
+        return []
+    # jumps must not count as scatter, so that it comes from neighbours: the median of |N(0, 1)| is
+    # 0.6745, and a difference has twice the variance
+    around = float(np.median(np.abs(steps))) / 0.6745 / math.sqrt(2.0)
+    errors = np.sqrt(fit.variances)
+    calmer = float(np.clip(around / np.median(errors), _CALMER_MIN, 1.0))
+    found = []
+    for film, mine in enumerate(order):
+        penalty = jump_penalty(mine.size, sample.films)
+        scaled = (left[mine] - left[mine].mean()) / (errors[mine] * calmer)
+        for run in find_jumps(scaled, penalty):
+            extra = Extra(film, run=run)
+            known = [e.run for e in extras if e.film == film and e.column is None]
+            if any(abs(run - other) < RUNS_MIN for other in known):
+                continue
+            t, _ = with_extra(sample, fit.variances * calmer**2, extra.values(sample)[:, None])
+            found.append((float(t[0]) ** 2 - penalty, extra))
+    return found

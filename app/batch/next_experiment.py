@@ -1,0 +1,112 @@
+"""What the next experiment should vary, by what the columns of a table leave open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from dearig.batch.trend_columns import Design
+    from dearig.batch.trends import Trend
+
+__all__ = ["Proposal", "proposals"]
+
+_FILMS_MIN = 5  # films from which their scatter is known within a factor of two
+_WIDE = 0.5  # half an interval over its slope, above which a seen effect is poorly known
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What to vary: ``kind`` is vary, separate, record, films, repeat or narrow; and why."""
+
+    kind: str
+    columns: tuple[str, ...]
+    sentence: str
+
+
+def proposals(design: Design, trends: Sequence[Trend], films: int) -> tuple[Proposal, ...]:
+    """Return what to vary next, the most useful first.
+
+    First what shows no effect because it was not varied or not recorded, then what cannot be told
+    apart, then films that are few or differ, and last the effect that is known least.
+    """
+    found = [
+        Proposal("record", (label,), f"Record the {label}: fewer than half of the runs have it.")
+        for label in design.missing
+    ]
+    for sentence in design.left_out:
+        label, _, why = sentence.partition(": ")
+        if label not in design.missing:
+            verb = "Vary" if "the same" in why else "Separate"
+            kind = "vary" if "the same" in why else "separate"
+            found.append(Proposal(kind, (label,), f"{verb} the {label}: {why}"))
+    for column in design.columns:
+        low, high = column.range
+        if high - low < column.hardly:
+            found.append(
+                Proposal(
+                    "vary",
+                    (column.label,),
+                    f"Vary the {column.label} by {column.hardly:g} {column.unit} and more: it was "
+                    f"within {low:.4g} and {high:.4g} {column.unit}.",
+                )
+            )
+    for a, b, r in design.entangled:
+        wider = 1.0 / math.sqrt(max(1.0 - r * r, 1e-6))
+        found.append(
+            Proposal(
+                "separate",
+                (a, b),
+                f"Vary {a} and {b} independently of each other: their correlation is {r:.2f}, so "
+                f"that the interval of each is {wider:.1f} times as wide as it need be.",
+            )
+        )
+    if films < _FILMS_MIN:
+        found.append(
+            Proposal(
+                "films",
+                ("film",),
+                f"Measure more films: with {films}, how films differ is hardly known; "
+                f"{_FILMS_MIN} or more tell a common effect from one film's own.",
+            )
+        )
+    for trend in trends:
+        for effect in trend.effects:
+            if effect.verdict == "one_film":
+                film = effect.own[0].film
+                found.append(
+                    Proposal(
+                        "repeat",
+                        (effect.column.label,),
+                        f"Repeat film {film} over its range of {effect.column.label}: its "
+                        f"{trend.name} changes otherwise than that of the other films.",
+                    )
+                )
+    return (*found, *_least_known(trends))
+
+
+def _least_known(trends: Sequence[Trend]) -> list[Proposal]:
+    """Return the seen effect whose interval is widest for its size."""
+    wide = [
+        (0.5 * (effect.high - effect.low) / abs(effect.slope), trend.name, effect.column)
+        for trend in trends
+        for effect in trend.effects
+        if effect.verdict in ("common", "untold", "doubtful") and effect.slope != 0.0
+    ]
+    if not wide:
+        return []
+    part, name, column = max(wide, key=lambda each: each[0])
+    if part < _WIDE:
+        return []
+    low, high = column.range
+    return [
+        Proposal(
+            "narrow",
+            (column.label,),
+            f"Repeat runs at both ends of {column.label} ({low:.4g} and {high:.4g} "
+            f"{column.unit}".rstrip()
+            + f"): its effect on {name} is known within {100.0 * part:.0f} % only.",
+        )
+    ]

@@ -1,0 +1,205 @@
+"""Columns of a study's table by which its numbers may change, and which of them can be told apart.
+
+The columns are temperature, humidity, cycles and days of the film, the settings of a campaign and
+the rig. Cycles and days are counted for each film from its first run in the table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+
+from dearig.errors import InputError
+
+__all__ = ["Column", "Design", "columns_in", "days_of_films", "design_of", "films_in"]
+
+#: Label, unit, column of the table, and range below which it is hardly varied.
+_ENVIRONMENT = (
+    ("temperature", "°C", "temperature_degC", 3.0),
+    ("humidity", "% RH", "relative_humidity_percent", 10.0),
+)
+_CYCLES = "cycles"
+_SECONDS_A_DAY = 86400.0
+_RIGS_MAX = 8  # more rigs than these are not compared one by one
+#: Part of a column's variance that the columns before it explain, above which it is left out: its
+#: interval would be ten times as wide as by itself.
+_CONFOUNDED = 0.99
+#: Correlation of two columns above which an experiment should separate them.
+_ENTANGLED = 0.8
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column that may change the numbers: ``values`` (n,) of all rows, NaN where not known.
+
+    A number is told per ``unit``; ``hardly`` is the range below which it is hardly varied.
+    """
+
+    label: str
+    unit: str
+    values: np.ndarray
+    hardly: float = 0.0
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Least and greatest value."""
+        return float(np.nanmin(self.values)), float(np.nanmax(self.values))
+
+
+@dataclass(frozen=True)
+class Design:
+    """Columns whose effects are estimated together, and sentences on those that are not.
+
+    ``entangled`` are pairs of columns with their correlation, where it is large.
+    """
+
+    columns: tuple[Column, ...]
+    left_out: tuple[str, ...]
+    entangled: tuple[tuple[str, str, float], ...]
+    missing: tuple[str, ...]
+
+
+def films_in(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the name of the film of each row, "" where it has none."""
+    return [str(row.get("film") or "") for row in rows]
+
+
+def columns_in(
+    rows: Sequence[Mapping[str, Any]], films: Sequence[str], against: Sequence[str] = ()
+) -> list[Column]:
+    """Return the columns of ``rows`` by which their numbers may change, in order of interest.
+
+    ``against`` names columns of the table to use in place of all these. Raises ``InputError`` for
+    one that is not there or has no numbers.
+    """
+    if against:
+        return [_named(rows, name) for name in against]
+    found = [
+        Column(label, unit, _numbers(rows, name), hardly)
+        for label, unit, name, hardly in _ENVIRONMENT
+        if any(row.get(name) is not None for row in rows)
+    ]
+    days = days_of_films(rows, films)
+    order = np.argsort(np.where(np.isfinite(days), days, np.inf), kind="stable")
+    if any(row.get(_CYCLES) is not None for row in rows):
+        found.append(Column("cycles", "1000 cycles", _cycles_before(rows, films, order) / 1e3))
+    if np.isfinite(days).any():
+        found.append(Column("days", "day", days))
+    settings = [n for n in dict.fromkeys(n for row in rows for n in row) if n.startswith("set ")]
+    for name in settings:
+        values = _numbers(rows, name)
+        if np.isfinite(values).any():
+            found.append(Column(name.removeprefix("set "), "", values))
+    return found + _rigs(rows)
+
+
+def _named(rows: Sequence[Mapping[str, Any]], name: str) -> Column:
+    values = _numbers(rows, name)
+    if not np.isfinite(values).any():
+        known = sorted({n for row in rows for n in row})
+        raise InputError(
+            f"column {name!r} is not in the table, or has no numbers; its columns are "
+            f"{', '.join(known[:40])}"
+        )
+    return Column(name, "", values)
+
+
+def _numbers(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
+    """Return the numbers of a column (n,), NaN where there is none."""
+    values = [row.get(name) for row in rows]
+    return np.array(
+        [float(v) if isinstance(v, int | float) and math.isfinite(v) else np.nan for v in values]
+    )
+
+
+def days_of_films(rows: Sequence[Mapping[str, Any]], films: Sequence[str]) -> np.ndarray:
+    """Return the days (n,) of each run since the first run of its film."""
+    starts = np.array([_seconds(row.get("started")) for row in rows])
+    first: dict[str, float] = {}
+    for film, start in zip(films, starts, strict=True):
+        if math.isfinite(start):
+            first[film] = min(start, first.get(film, start))
+    since = np.array([first.get(film, np.nan) for film in films])
+    return np.asarray((starts - since) / _SECONDS_A_DAY)
+
+
+def _seconds(started: object) -> float:
+    try:
+        return datetime.fromisoformat(str(started)).timestamp()
+    except (ValueError, OverflowError, OSError):
+        return math.nan
+
+
+def _cycles_before(
+    rows: Sequence[Mapping[str, Any]], films: Sequence[str], order: np.ndarray
+) -> np.ndarray:
+    """Return the cycles (n,) that the film of each run had done before it, in this table."""
+    own = np.nan_to_num(_numbers(rows, _CYCLES))
+    before, count = np.zeros(len(rows)), dict.fromkeys(films, 0.0)
+    for i in order:
+        before[i] = count[films[i]]
+        count[films[i]] += own[i]
+    return before
+
+
+def _rigs(rows: Sequence[Mapping[str, Any]]) -> list[Column]:
+    """Return a column of zeros and ones for each rig but the first."""
+    names = [str(row.get("rig") or "") for row in rows]
+    rigs = sorted(set(names))
+    if not 1 < len(rigs) <= _RIGS_MAX:
+        return []
+    return [
+        Column(f"rig {rig} in place of {rigs[0]}", "", np.array([n == rig for n in names], float))
+        for rig in rigs[1:]
+    ]
+
+
+def design_of(columns: Sequence[Column], used: np.ndarray) -> Design:
+    """Return what can be estimated together on the rows ``used`` (n,) bool.
+
+    A column that is constant, or that follows from those before it, is left out.
+    """
+    kept: list[Column] = []
+    left_out: list[str] = []
+    missing: list[str] = []
+    basis = [np.ones(int(used.sum()))]
+    for column in columns:
+        values = column.values[used]
+        if np.isfinite(values).sum() < 0.5 * values.size:
+            missing.append(column.label)
+            left_out.append(f"{column.label}: fewer than half of the runs have a value.")
+            continue
+        filled = np.where(np.isfinite(values), values, np.nanmean(values))
+        spread = float(np.std(filled))
+        if spread <= 1e-9 * max(float(np.max(np.abs(filled))), 1e-300):
+            left_out.append(f"{column.label}: the same in all runs, so that it shows no effect.")
+            continue
+        standard = (filled - filled.mean()) / spread
+        matrix = np.column_stack(basis)
+        solution, *_ = np.linalg.lstsq(matrix, standard, rcond=1e-9)
+        explained = 1.0 - float(np.mean((standard - matrix @ solution) ** 2))
+        if explained > _CONFOUNDED:
+            others = [
+                c.label
+                for c, b in zip(kept, basis[1:], strict=True)
+                if abs(float(np.mean(b * standard))) > _ENTANGLED
+            ] or [c.label for c in kept]
+            left_out.append(
+                f"{column.label}: it follows from {' and '.join(others)}, so that their effects "
+                f"cannot be told apart."
+            )
+            continue
+        kept.append(column)
+        basis.append(standard)
+    entangled = [
+        (a.label, b.label, float(np.mean(x * y)))
+        for i, (a, x) in enumerate(zip(kept, basis[1:], strict=True))
+        for b, y in list(zip(kept, basis[1:], strict=True))[i + 1 :]
+        if abs(float(np.mean(x * y))) > _ENTANGLED
+    ]
+    return Design(tuple(kept), tuple(left_out), tuple(entangled), tuple(missing))

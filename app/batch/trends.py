@@ -1,0 +1,470 @@
+"""Trends of the numbers of many recordings: what changes them, in all films or in one.
+
+A study's table gives parameters with their intervals, errors, and what was beside them. Each number
+is fitted by a mixed model with the columns as common effects and a random intercept of each film.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dearig.batch.film_effects import DIFFER, Explained, explain
+from dearig.batch.mixed_model import LinearFit, Sample, fit_linear, slopes_differ
+from dearig.batch.next_experiment import Proposal, proposals
+from dearig.batch.table_file import write_csv, write_parquet
+from dearig.batch.trend_columns import (
+    Column,
+    Design,
+    columns_in,
+    days_of_films,
+    design_of,
+    films_in,
+)
+from dearig.errors import InputError
+from dearig.progress import Progress, quiet
+from dearig.recording.files import in_words
+
+__all__ = [
+    "VERDICTS",
+    "Change",
+    "Curve",
+    "Effect",
+    "FilmSlope",
+    "Trend",
+    "Trends",
+    "find_trends",
+    "table_of",
+    "write_trends",
+]
+
+log = logging.getLogger(__name__)
+
+#: What is said of an effect, by its key.
+VERDICTS = {
+    "common": "common",
+    "one_film": "one film's own",
+    "differs": "films differ",
+    "doubtful": "doubtful",
+    "none": "not seen",
+    "untold": "one film only",
+}
+#: Errors of the model that are trended, beside the parameters.
+_ERRORS = ("rms_um", "rms_kPa", "nrmse_pct", "peak_displacement_mm")
+_RUNS_MIN = 5  # with a value, for a trend
+_SIGNIFICANT = 0.05
+_QUANTILE_95 = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class FilmSlope:
+    """Slope of one film that differs from the others': its value and 95 % interval."""
+
+    film: str
+    slope: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Effect of a column on a number: ``slope`` per unit of the column, with its 95 % interval.
+
+    Of a number on a logarithmic scale the slope is in percent per unit. ``p`` is the probability of
+    one as large if there were none, ``p_equal`` that of slopes as unequal if all films had one
+    (None where that cannot be asked). ``verdict`` is a key of ``VERDICTS``; with "one_film" the
+    slope is that of the other films.
+    """
+
+    column: Column
+    slope: float
+    low: float
+    high: float
+    p: float
+    p_equal: float | None
+    verdict: str
+    own: tuple[FilmSlope, ...] = ()
+
+
+@dataclass(frozen=True)
+class Change:
+    """Jump of a number of one film: between the recordings ``last`` and ``first``.
+
+    ``size`` is in percent on a logarithmic scale, else in the number's unit, after the effects of
+    the columns were taken off.
+    """
+
+    film: str
+    last: str
+    first: str
+    started: str
+    size: float
+    low: float
+    high: float
+    row: int
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Number (m,) over ``x`` (m,) of one column, the others at their means, with its 95 % band."""
+
+    x: np.ndarray
+    y: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+@dataclass(frozen=True)
+class Trend:
+    """Trend of the number ``name`` over the ``rows`` (n,) of the table that have it.
+
+    ``values`` (n,) with errors as 95 % intervals ``low``, ``high`` (n,). Where all are positive
+    their logarithm is modelled.
+    """
+
+    name: str
+    rows: np.ndarray
+    values: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    design: Design
+    model: Explained
+    effects: tuple[Effect, ...]
+    changes: tuple[Change, ...]
+
+    @property
+    def relative(self) -> bool:
+        """Whether the logarithm of the number is modelled."""
+        return self.model.relative
+
+    @property
+    def fit(self) -> LinearFit:
+        """The fitted model."""
+        return self.model.fit
+
+    def spread(self, deviation: float) -> float:
+        """Return a standard deviation of the model in percent, or in the number's unit."""
+        return 100.0 * math.expm1(deviation) if self.relative else deviation
+
+    def natural(self, y: np.ndarray) -> np.ndarray:
+        """Return modelled values in the number's unit."""
+        return np.exp(y) if self.relative else y
+
+    def curve(self, i: int, points: int = 60) -> Curve:
+        """Return the number over column ``i``, the others at their means."""
+        x = np.linspace(*self.design.columns[i].range, points)
+        shifted = x - self.fit.centre[i]
+        y = self.fit.intercept + self.fit.slopes[i] * shifted
+        c = self.fit.covariance
+        variance = c[0, 0] + 2.0 * shifted * c[0, 1 + i] + shifted**2 * c[1 + i, 1 + i]
+        half = self.fit.quantiles[i] * np.sqrt(np.maximum(variance, 0.0))
+        return Curve(x, self.natural(y), self.natural(y - half), self.natural(y + half))
+
+    def adjusted(self, i: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return column ``i`` (n,) and the number (n,) less film and the other columns' effects."""
+        sample, fit = self.model.sample, self.fit
+        # a film's own slope of this column is to be seen
+        kept = [i, *self.model.slopes_of(i)]
+        others = np.delete((sample.x - fit.centre) * fit.slopes, kept, axis=1).sum(axis=1)
+        away = fit.film_intercepts[sample.film] + others
+        return sample.x[:, i], self.natural(sample.y - away)
+
+
+@dataclass(frozen=True)
+class Trends:
+    """Trends of a table: its ``rows``, their ``films``, the trend of each number, what is next.
+
+    ``left_out`` are sentences on columns and numbers without a trend. ``days`` (n,) are the days of
+    each row since the first one of its film.
+    """
+
+    rows: tuple[Mapping[str, Any], ...]
+    films: tuple[str, ...]
+    failed: int
+    trends: tuple[Trend, ...]
+    left_out: tuple[str, ...]
+    proposals: tuple[Proposal, ...]
+    days: np.ndarray
+
+    def effect_rows(self) -> list[dict[str, Any]]:
+        """Return one row of plain values for each number and column, for a table."""
+        return [
+            {
+                "number": trend.name,
+                "column": effect.column.label,
+                "per": effect.column.unit,
+                "slope": effect.slope,
+                "low95": effect.low,
+                "high95": effect.high,
+                "slope_unit": "percent" if trend.relative else "of the number",
+                "p": effect.p,
+                "p_equal_slopes": effect.p_equal,
+                "verdict": effect.verdict,
+                "films_of_their_own": ", ".join(own.film for own in effect.own),
+                "runs": trend.rows.size,
+                "films": trend.model.sample.films,
+                "model": "mixed" if trend.fit.mixed else "ordinary least squares",
+                "between_films": trend.spread(trend.fit.between),
+                "scatter": trend.spread(trend.fit.scatter),
+                "measured": trend.spread(trend.fit.measured),
+            }
+            for trend in self.trends
+            for effect in trend.effects
+        ]
+
+    def change_rows(self) -> list[dict[str, Any]]:
+        """Return one row of plain values for each change point, for a table."""
+        return [
+            {
+                "number": trend.name,
+                "film": change.film,
+                "last": change.last,
+                "first": change.first,
+                "started": change.started,
+                "jump": change.size,
+                "low95": change.low,
+                "high95": change.high,
+                "jump_unit": "percent" if trend.relative else "of the number",
+            }
+            for trend in self.trends
+            for change in trend.changes
+        ]
+
+
+def table_of(path: Path) -> Path:
+    """Return the table of a study: ``path`` itself, or that in the folder ``path``."""
+    if not path.is_dir():
+        return path
+    found = path / "study.csv"
+    if not found.is_file():
+        raise InputError(
+            f"{path} has no study.csv: give the folder of a study (dearig study), or its table"
+        )
+    return found
+
+
+def write_trends(trends: Trends, folder: Path) -> dict[str, Path | None]:
+    """Write effects and change points as tables to ``folder``; return the files by their kinds."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder} cannot be created: {in_words(error)}") from error
+    effects, changes = folder / "trends.csv", folder / "changes.csv"
+    write_csv(trends.effect_rows(), effects)
+    write_csv(trends.change_rows(), changes)
+    parquet = write_parquet(trends.effect_rows(), folder / "trends.parquet")
+    return {"effects": effects, "changes": changes, "parquet": parquet}
+
+
+def numbers_in(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the numbers of a table that are trended: parameters with an interval, and errors."""
+    names = dict.fromkeys(name for row in rows for name in row)
+    return [name for name in names if f"{name}_low95" in names or name in _ERRORS]
+
+
+def find_trends(
+    rows: Sequence[Mapping[str, Any]],
+    *,
+    source: Path,
+    numbers: Sequence[str] = (),
+    against: Sequence[str] = (),
+    progress: Progress = quiet,
+) -> Trends:
+    """Return the trends of the rows of a study's table from the file ``source``.
+
+    ``numbers`` and ``against`` name columns of the table, by default all parameters and errors, and
+    temperature, humidity, cycles, days, settings and rig. Parameters that the data of a recording
+    do not determine are left out. Raises ``InputError`` where nothing can be trended.
+    """
+    if not rows or "recording" not in rows[0]:
+        raise InputError(f"{source} is not a table of a study: it has no rows with recordings")
+    good = [row for row in rows if row.get("state", "ok") == "ok"]
+    if not good:
+        raise InputError(f"{source}: no recording in it has a result")
+    # in the order of time: jumps are looked for in it
+    good.sort(key=lambda row: (str(row.get("started") or ""), str(row["recording"])))
+    names = list(numbers) or numbers_in(good)
+    unknown = [n for n in numbers if not any(n in row for row in good)]
+    if unknown:
+        raise InputError(
+            f"{source} has no column {unknown[0]!r}; its numbers are {', '.join(numbers_in(good))}"
+        )
+    films = films_in(good)
+    columns = columns_in(good, films, against)
+    found: list[Trend] = []
+    told: list[str] = []
+    for i, name in enumerate(names):
+        progress("trends", i / len(names))
+        trend = _trend(good, films, columns, name, told)
+        if trend is not None:
+            found.append(trend)
+    progress("trends", 1.0)
+    if not found:
+        raise InputError(
+            f"{source}: no trend can be computed. {' '.join(dict.fromkeys(told))}".rstrip()
+        )
+    found = _judged(found)
+    every = np.ones(len(good), dtype=bool)
+    return Trends(
+        tuple(good), tuple(films), len(rows) - len(good), tuple(found),
+        tuple(dict.fromkeys(told)), proposals(design_of(columns, every), found, len(set(films))),
+        days_of_films(good, films),
+    )  # fmt: skip
+
+
+def _trend(
+    rows: Sequence[Mapping[str, Any]],
+    films: Sequence[str],
+    columns: Sequence[Column],
+    name: str,
+    told: list[str],
+) -> Trend | None:
+    """Return the trend of one number; where there is none, ``told`` receives the reason."""
+    at = np.array([i for i, row in enumerate(rows) if _is_known(row, name)], dtype=int)
+    if at.size < _RUNS_MIN:
+        told.append(f"{name}: {at.size} runs have a value that their data determine.")
+        return None
+    used = np.zeros(len(rows), dtype=bool)
+    used[at] = True
+    design = design_of(columns, used)
+    if not design.columns:
+        told.extend(design.left_out)
+        return None
+    whole = np.all([np.isfinite(column.values[at]) for column in design.columns], axis=0)
+    if not whole.all():
+        told.append(f"{name}: {int((~whole).sum())} runs lack a value of a column.")
+        at = at[whole]
+        used[:] = False
+        used[at] = True
+        design = design_of(columns, used)
+    if not design.columns or at.size < len(design.columns) + 3:
+        told.append(f"{name}: {at.size} runs are too few for {len(design.columns)} columns.")
+        return None
+    told.extend(design.left_out)
+    values, low, high = (
+        np.array([float(rows[i][name] if end is None else end(rows[i], name)) for i in at])
+        for end in (None, _low, _high)
+    )
+    if float(np.ptp(values)) <= 1e-9 * float(np.max(np.abs(values))):
+        told.append(f"{name}: the same in all runs: it was given, not measured.")
+        return None
+    relative = bool((values > 0.0).all() and (low > 0.0).all())
+    y, ends = (np.log(values), np.log([low, high])) if relative else (values, np.array([low, high]))
+    error = (ends[1] - ends[0]) / (2.0 * _QUANTILE_95)
+    _, film = np.unique([films[i] for i in at], return_inverse=True)
+    x = np.column_stack([column.values[at] for column in design.columns])
+    sample = Sample(y, x, film, error)
+    local = tuple(replace(c, values=c.values[at]) for c in design.columns)
+    design = replace(design, columns=local)
+    names = tuple(films[int(at[film == f][0])] for f in range(sample.films))
+    model = explain(sample, names, relative)
+    effects = tuple(_effect(model, model.fit, local, i) for i in range(len(local)))
+    changes = tuple(_changes(rows, at, model))
+    return Trend(name, at, values, low, high, design, model, effects, changes)
+
+
+def _is_known(row: Mapping[str, Any], name: str) -> bool:
+    value = row.get(name)
+    return (
+        isinstance(value, int | float)
+        and math.isfinite(value)
+        and row.get(f"{name}_determined") is not False
+    )
+
+
+def _low(row: Mapping[str, Any], name: str) -> float:
+    value, low = row[name], row.get(f"{name}_low95")
+    # an end that is not known lies as far away as the other one
+    high = row.get(f"{name}_high95")
+    if low is None:
+        low = value if high is None else value - (high - value)
+    return float(low)
+
+
+def _high(row: Mapping[str, Any], name: str) -> float:
+    value, high = row[name], row.get(f"{name}_high95")
+    return float(value + (value - _low(row, name)) if high is None else high)
+
+
+def _effect(model: Explained, fit: LinearFit, columns: Sequence[Column], i: int) -> Effect:
+    """Return the effect of column ``i``, and which films have another one."""
+    sample, told = model.sample, model.told
+    p_equal = slopes_differ(sample, fit.variances, i) if sample.films > 1 else None
+    places = model.slopes_of(i)
+    verdict = "common" if sample.films > 1 else "untold"
+    if len(places) == 1:
+        verdict = "one_film"
+    elif places or (p_equal is not None and p_equal < DIFFER):
+        # films as a sample: the interval of the mean slope has their scatter in it
+        verdict, fit = "differs", fit_linear(model.without_slopes_of(i).sample, random_slope=i)
+    slope, (low, high) = float(fit.slopes[i]), fit.interval(i)
+    if verdict in ("common", "untold") and low <= 0.0 <= high:
+        verdict = "none"
+    own = tuple(_own_slope(model, i, place) for place in places)
+    return Effect(
+        columns[i], told(slope), told(low), told(high), float(fit.p_values[i]), p_equal, verdict,
+        own,
+    )  # fmt: skip
+
+
+def _own_slope(model: Explained, i: int, place: int) -> FilmSlope:
+    """Return the slope of a film that has one of its own: the common one and its difference."""
+    fit = model.fit
+    at = [1 + i, 1 + place]
+    slope = float(fit.slopes[i] + fit.slopes[place])
+    half = fit.quantiles[place] * math.sqrt(max(float(fit.covariance[np.ix_(at, at)].sum()), 0.0))
+    film = model.films[model.extras[place - model.columns].film]
+    told = model.told
+    return FilmSlope(film, told(slope), told(slope - half), told(slope + half))
+
+
+def _judged(trends: Sequence[Trend]) -> list[Trend]:
+    """Return the trends with doubtful effects marked: by Holm's correction over all of them."""
+    every = sorted(
+        (effect.p, trend.name, i)
+        for trend in trends
+        for i, effect in enumerate(trend.effects)
+    )  # fmt: skip
+    sure: set[tuple[str, int]] = set()
+    for place, (p, name, i) in enumerate(every):
+        if p * (len(every) - place) >= _SIGNIFICANT:
+            break
+        sure.add((name, i))
+    return [
+        replace(
+            trend,
+            effects=tuple(
+                replace(effect, verdict="doubtful")
+                if effect.verdict in ("common", "untold") and (trend.name, i) not in sure
+                else effect
+                for i, effect in enumerate(trend.effects)
+            ),
+        )
+        for trend in trends
+    ]
+
+
+def _changes(rows: Sequence[Mapping[str, Any]], at: np.ndarray, model: Explained) -> list[Change]:
+    """Return the jumps of each film; ``at`` (n,) are the rows of the sample."""
+    found = []
+    for place, extra in enumerate(model.extras, start=model.columns):
+        if extra.column is not None:
+            continue
+        mine = np.flatnonzero(model.sample.film == extra.film)
+        before, after = int(at[mine[extra.run - 1]]), int(at[mine[extra.run]])
+        low, high = model.fit.interval(place)
+        size = float(model.fit.slopes[place])
+        found.append(
+            Change(
+                model.films[extra.film], str(rows[before]["recording"]),
+                str(rows[after]["recording"]), str(rows[after].get("started") or ""),
+                model.told(size), model.told(low), model.told(high), after,
+            )
+        )  # fmt: skip
+    return sorted(found, key=lambda change: change.row)

@@ -1,0 +1,181 @@
+"""Trends of many recordings: known effects are found, and told common or one film's own."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dearig.batch.changes import find_jumps, jump_penalty
+from dearig.batch.mixed_model import Sample, fit_linear
+from dearig.batch.table_file import read_table, write_csv, write_parquet
+from dearig.batch.trends import Trends, find_trends
+from dearig.errors import InputError
+from tests.tools.command import dearig, done, refused
+from tests.tools.made_campaign import TRUTH, made_rows
+
+pytest.importorskip("statsmodels")
+pytest.importorskip("ruptures")
+
+SOURCE = Path("study.csv")
+STORY = {"own": {"F05": 0.03}, "jump": ("F07", 6, -0.12)}
+
+
+def trends_of(rows: list, **options) -> Trends:
+    return find_trends(rows, source=SOURCE, **options)
+
+
+def verdicts(trends: Trends) -> dict[tuple[str, str], str]:
+    return {
+        (trend.name, effect.column.label): effect.verdict
+        for trend in trends.trends
+        for effect in trend.effects
+    }
+
+
+@pytest.fixture(scope="module")
+def story() -> Trends:
+    return trends_of(made_rows(1, films=12, **STORY), numbers=["mu_0_kPa", "permittivity"])
+
+
+def test_common_effects_are_recovered_beside_those_of_single_films(story: Trends) -> None:
+    seen = verdicts(story)
+    assert seen["mu_0_kPa", "temperature"] == "one_film"
+    assert seen["mu_0_kPa", "humidity"] == "common"
+    assert seen["permittivity", "humidity"] == "common"
+    for trend in story.trends:
+        assert trend.fit.mixed
+        for effect in trend.effects[:2]:
+            true = 100.0 * math.expm1(TRUTH[trend.name][effect.column.label])
+            # three standard errors: one seed
+            half = 1.5 * (effect.high - effect.low) / 2.0
+            assert abs(effect.slope - true) < half
+
+
+def test_one_films_own_slope_and_its_neighbours_jump_are_told_apart(story: Trends) -> None:
+    mu = story.trends[0]
+    (own,) = mu.effects[0].own
+    assert own.film == "F05"
+    assert own.low < 100.0 * math.expm1(0.03 + TRUTH["mu_0_kPa"]["temperature"]) < own.high
+    (change,) = mu.changes
+    assert (change.film, change.last, change.first) == ("F07", "F07-06.h5", "F07-07.h5")
+    assert change.low < -12.0 < change.high
+    assert not story.trends[1].changes
+
+
+def test_known_errors_of_the_fits_are_weights() -> None:
+    random = np.random.default_rng(4)
+    film = np.repeat(np.arange(8), 10)
+    x = random.normal(size=(80, 1))
+    error = np.where(np.arange(80) % 2, 0.01, 1.0)
+    y = 0.5 * x[:, 0] + random.normal(size=8)[film] + error * random.normal(size=80)
+    weighted = fit_linear(Sample(y, x, film, error))
+    blind = fit_linear(Sample(y, x, film, np.zeros(80)))
+    assert weighted.errors[0] < 0.1 * blind.errors[0]
+    low, high = weighted.interval(0)
+    assert low < 0.5 < high
+    # the scatter beyond the errors is none
+    assert weighted.scatter < 0.02
+
+
+def test_films_that_do_not_differ_are_no_failure_of_the_model() -> None:
+    random = np.random.default_rng(0)
+    film = np.repeat(np.arange(10), 10)
+    x = random.normal(size=(100, 1))
+    fit = fit_linear(Sample(random.normal(size=100), x, film, np.zeros(100)))
+    assert fit.mixed
+    assert 0.05 < fit.errors[0] < 0.2
+
+
+@pytest.mark.parametrize(
+    ("films", "runs", "why"),
+    [(1, 12, "there is one film"), (12, 1, "each film has one run")],
+)
+def test_a_table_without_films_to_compare_is_fitted_by_least_squares(
+    films: int, runs: int, why: str
+) -> None:
+    rows = made_rows(2, films=films, runs=runs)
+    found = trends_of(rows, numbers=["mu_0_kPa"], against=["temperature_degC"])
+    (trend,) = found.trends
+    assert not trend.fit.mixed
+    assert trend.fit.why == why
+    if films == 1:
+        assert trend.effects[0].verdict in ("untold", "none", "doubtful")
+        assert any(p.kind == "films" for p in found.proposals)
+
+
+def test_columns_that_show_nothing_are_what_to_vary_next() -> None:
+    rows = made_rows(4, films=6)
+    for row in rows:
+        row["temperature_degC"] = 21.0
+        row["cycles"] = None
+        # the same to the last digits: humidity and the setting cannot be told apart
+        row["set gain"] = 2.0 * row["relative_humidity_percent"]
+    found = trends_of(rows, numbers=["permittivity"])
+    assert [e.column.label for e in found.trends[0].effects] == ["humidity", "days"]
+    told = {(p.kind, p.columns[0]) for p in found.proposals}
+    assert {("vary", "temperature"), ("separate", "gain")} <= told
+    assert any("humidity" in s and "gain" in s for s in found.left_out)
+
+
+def test_a_series_without_a_change_has_none_and_a_jump_is_placed() -> None:
+    random = np.random.default_rng(7)
+    quiet = [find_jumps(random.normal(100.0, 1.0, 40), jump_penalty(40, 1)) for _ in range(100)]
+    assert sum(map(bool, quiet)) <= 3
+    series = random.normal(0.0, 1.0, 40) + np.where(np.arange(40) < 25, 0.0, 5.0)
+    assert find_jumps(series, jump_penalty(40, 1)) == [25]
+
+
+def test_tables_are_read_as_they_were_written(tmp_path: Path) -> None:
+    rows = made_rows(5, films=2, runs=2)
+    rows[0]["mu_0_kPa"] = None
+    rows[1]["film"] = "12"
+    write_csv(rows, tmp_path / "study.csv")
+    assert read_table(tmp_path / "study.csv") == [
+        {**row, "reason": row["reason"] or None} for row in rows
+    ]
+    pytest.importorskip("pyarrow")
+    write_parquet(rows, tmp_path / "study.parquet")
+    assert read_table(tmp_path / "study.parquet") == rows
+
+
+def test_the_command_writes_tables_a_report_and_json(tmp_path: Path) -> None:
+    write_csv(made_rows(1, films=4, runs=8), tmp_path / "study.csv")
+    answer = done("trends", tmp_path, "--number", "mu_0_kPa", "--json", tmp_path / "trends.json")
+    assert "mu_0_kPa" in answer.out
+    told = json.loads((tmp_path / "trends.json").read_text("utf-8"))
+    assert told["format"] == "dearig-trends/1"
+    assert [number["name"] for number in told["numbers"]] == ["mu_0_kPa"]
+    page = (tmp_path / "trends.html").read_text("utf-8")
+    assert page.count("<svg") == 2
+    assert {row["column"] for row in read_table(tmp_path / "trends.csv")} >= {"temperature"}
+    # the report is there now
+    assert dearig("trends", tmp_path).code == 2
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("", "not a table of a study"),
+        ("a,b\n1,2\n", "not a table of a study"),
+        ("recording,recording\nx,y\n", "two columns"),
+        ("recording,state\nx\n", "1 cells for 2 columns"),
+        ("recording,state\nx,failed\n", "no recording in it has a result"),
+        ("recording,state,mu_0_kPa,mu_0_kPa_low95\nx,ok,1,1\n", "1 runs have a value"),
+    ],
+)
+def test_a_table_that_is_none_is_refused_in_a_sentence(
+    content: str, words: str, tmp_path: Path
+) -> None:
+    (tmp_path / "t.csv").write_text(content, "utf-8")
+    refused(dearig("trends", tmp_path / "t.csv"), words)
+
+
+def test_unknown_columns_are_named() -> None:
+    with pytest.raises(InputError, match="no column 'mu_7'; its numbers are mu_0_kPa"):
+        trends_of(made_rows(0, films=2), numbers=["mu_7"])
+    with pytest.raises(InputError, match="'moon' is not in the table"):
+        trends_of(made_rows(0, films=2), against=["moon"])
