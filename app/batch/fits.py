@@ -19,6 +19,8 @@ from importlib import import_module, metadata
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import dearig
 from dearig.analysis.diagnose import diagnose_recordings
 from dearig.analysis.identify import identify_recordings
@@ -170,8 +172,18 @@ def _about(path: Path) -> Row:
         "duration_s": entry.duration_s,
         "samples": entry.samples,
         "complete": entry.complete,
+        "cycles": _cycles(recording),
         **_peaks(recording, entry.peaks),
     }
+
+
+def _cycles(recording: Recording) -> int | None:
+    """Return how often the commanded voltage rises above half of its peak; None for a film."""
+    voltage = recording.voltage_command
+    if voltage is None or not voltage.size:
+        return None
+    high = np.abs(voltage) > 0.5 * np.nanmax(np.abs(voltage))
+    return int(np.count_nonzero(high[1:] & ~high[:-1]) + high[0])
 
 
 def _peaks(recording: Recording, peaks: Mapping[str, float]) -> Row:

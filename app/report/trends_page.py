@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from dearig.batch.trends import Trends
+from dearig.recording.origin import Origin
+from dearig.recording.timestamps import local_time
+from dearig.report.head import head_of
 from dearig.report.html import picture, prefixes, write_page
 from dearig.report.trend_words import (
     change_table,
@@ -19,6 +22,7 @@ from dearig.report.trend_words import (
 
 __all__ = ["write_trends_report"]
 
+_NAMED_MAX = 24  # films that the head names
 _DRAWN = 8  # numbers with figures; all are in the table
 
 
@@ -54,6 +58,7 @@ def _contents(trends: Trends, title: str) -> Callable[[], dict[str, Any]]:
         return {
             "title": title,
             "lead": "Trends",
+            "head": head_of(_origins(trends), [("Film", [_films(trends)])]),
             "summary": tuple(trends_sentences(trends)),
             "tables": tables,
             "next": proposal_sentences(trends),
@@ -62,3 +67,28 @@ def _contents(trends: Trends, title: str) -> Callable[[], dict[str, Any]]:
         }
 
     return contents
+
+
+def _origins(trends: Trends) -> Iterator[Origin]:
+    """Yield what the table says of each recording."""
+    for row in trends.rows:
+        rig = str(row.get("rig") or "")
+        yield Origin(
+            name=str(row["recording"]),
+            sha256=str(row.get("sha256") or ""),
+            # a recording that was imported has no rig
+            simulated=rig.partition(":")[0] == "sim" if rig else None,
+            source=f"rig {rig}" if rig else "",
+            started=local_time(str(row.get("started") or "")),
+            operator=str(row.get("operator") or ""),
+            film=str(row.get("film") or ""),
+        )
+
+
+def _films(trends: Trends) -> str:
+    """Return the names of the films in a line."""
+    names = sorted(set(trends.films) - {""})
+    if not names:
+        return "no film has a name"
+    more = f" and {len(names) - _NAMED_MAX} more" if len(names) > _NAMED_MAX else ""
+    return f"{len(names)}: {', '.join(names[:_NAMED_MAX])}{more}"
