@@ -34,7 +34,7 @@ class Extra:
             x = sample.x[:, self.column]
             # about the film's own mean, so that its intercept stays the film's level
             return np.where(mine, x - x[mine].mean(), 0.0)
-        return mine & (np.cumsum(mine) > self.run)
+        return np.asarray(mine & (np.cumsum(mine) > self.run), dtype=float)
 
 
 @dataclass(frozen=True)

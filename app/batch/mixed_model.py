@@ -182,7 +182,7 @@ def _generalised(
         normal += solved.T @ x
         target += solved.T @ y
     covariance = np.linalg.pinv(normal, hermitian=True)
-    return covariance @ target, covariance
+    return np.asarray(covariance @ target), np.asarray(covariance)
 
 
 def _made(
@@ -255,7 +255,7 @@ def _degrees(sample: Sample, random_slope: int | None) -> np.ndarray:
     ).astype(float)
     if random_slope is not None:
         degrees[random_slope] = films - 1
-    return np.maximum(degrees, 1.0)
+    return np.asarray(np.maximum(degrees, 1.0))
 
 
 def _within(values: np.ndarray, film: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -156,6 +156,11 @@ class Trend:
         """Return modelled values in the number's unit."""
         return np.exp(y) if self.relative else y
 
+    @property
+    def at_means(self) -> float:
+        """The number where all columns are at their means, in its unit."""
+        return float(self.natural(np.array(self.fit.intercept)))
+
     def curve(self, i: int, points: int = 60) -> Curve:
         """Return the number over column ``i``, the others at their means."""
         x = np.linspace(*self.design.columns[i].range, points)

@@ -48,7 +48,7 @@ def _trend_json(trend: Trend) -> dict[str, Any]:
         "model": "mixed" if trend.fit.mixed else "ordinary_least_squares",
         "why_not_mixed": trend.fit.why or None,
         "unit": "percent" if trend.relative else "of the number",
-        "value_at_means": float(trend.natural(trend.fit.intercept)),
+        "value_at_means": trend.at_means,
         "between_films": trend.spread(trend.fit.between),
         "scatter": trend.spread(trend.fit.scatter),
         "measured": trend.spread(trend.fit.measured),
