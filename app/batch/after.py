@@ -18,7 +18,7 @@ from dearig.config.rigfile import RigFile
 from dearig.errors import InputError, Interrupted
 from dearig.progress import Progress, quiet
 
-__all__ = ["Computed", "compute", "left_band"]
+__all__ = ["Compute", "Computed", "compute", "left_band"]
 
 log = logging.getLogger(__name__)
 
@@ -33,6 +33,10 @@ class Computed:
     numbers: dict[str, float] = field(default_factory=dict)
     model: str = ""
     problems: list[str] = field(default_factory=list)
+
+
+#: What computes after a run, with the parameters of ``compute``.
+Compute = Callable[[Campaign, Path, Path, str, RigFile, Progress], Computed]
 
 
 def compute(

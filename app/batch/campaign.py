@@ -8,22 +8,30 @@ a kill at any moment leaves a campaign that can be continued where it stood.
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.plan import plan
 from dearig.acquisition.rigs import is_simulated, kind_of
 from dearig.acquisition.run import RunObserver, RunOptions, record
-from dearig.batch.after import compute, left_band
+from dearig.batch.after import Compute, compute, left_band
 from dearig.batch.extremes import write_extremes
 from dearig.batch.forecast import Forecast, foresee
 from dearig.batch.journal import FORMAT, JOURNAL, REQUESTS, Journal, read_lines
-from dearig.batch.queue import DONE, LOST, REQUEST_KINDS, STOPPED, Queue, RunState
+from dearig.batch.queue import (
+    DONE,
+    LOST,
+    REQUEST_KINDS,
+    STOPPED,
+    Queue,
+    RunState,
+    sha256_of,
+)
 from dearig.config.campaignfile import Campaign, PlannedRun, digest_of, settings_text
 from dearig.config.modelfile import load_actuator
 from dearig.config.rigfile import RigFile
@@ -45,10 +53,12 @@ from dearig.recording.reader import open_recording
 from dearig.recording.recover import recover
 from dearig.recording.text import text_of
 
-__all__ = ["Arming", "CampaignOutcome", "play_campaign"]
+__all__ = ["Arming", "CampaignOutcome", "Noted", "play_campaign"]
 
 log = logging.getLogger(__name__)
 
+#: Receives entries of the journal, in the thread that plays the campaign.
+Noted = Callable[[Sequence[Mapping[str, Any]]], None]
 #: Time in s between two looks at the requests, while nothing is played.
 _POLL = 0.5
 
@@ -58,13 +68,15 @@ class Arming:
     """What a person has released: so many ``runs`` within so many ``hours``; None for no limit.
 
     ``by`` names the person. ``acknowledged`` says what the person looked at after an interlock or
-    a doubt about 0 V, "" for nothing.
+    a doubt about 0 V, "" for nothing. ``shown`` has the digests of the sequences that the person
+    has seen, one for each run of the plan: others are refused; none for any.
     """
 
     by: str = ""
     runs: int | None = None
     hours: float | None = None
     acknowledged: str = ""
+    shown: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -95,6 +107,9 @@ def play_campaign(
     resume: bool = False,
     observer: RunObserver | None = None,
     ended: Callable[[CampaignOutcome], None] | None = None,
+    noted: Noted | None = None,
+    interrupts: Interrupts | None = None,
+    computing: Compute | None = None,
     progress: Progress = quiet,
     now: Callable[[], float] = time.time,
     wait: Callable[[float], None] = time.sleep,
@@ -104,7 +119,10 @@ def play_campaign(
     With ``resume`` the campaign in ``folder`` is continued. A rig that is not simulated needs an
     ``arming`` with a number of runs, hours and a name, or what is left of an earlier one. ``now``
     is Unix time in s, ``wait`` waits for so many s. A simulated rig that is not paced has no rests.
-    ``ended`` is called with the outcome before an error is raised.
+    ``ended`` is called with the outcome before an error is raised, ``noted`` with the entries that
+    are in the journal, and then with each new one. ``interrupts`` lets another thread end the run
+    and the campaign; by default ctrl-C does. ``computing`` stands in for ``compute`` after each
+    run.
 
     Raises ``InputError`` before anything is played, and for a run that the gate refuses at its
     turn; ``SafetyStop``, ``InstrumentFault`` or ``NotSafe`` where a run ended so that a person must
@@ -116,8 +134,19 @@ def play_campaign(
     _check_folder(folder, resume)
     if not resume:
         _check_arming(arming, address, left=False)
-    progress("planning", 0.0)
-    forecast = foresee(campaign, rig_file, folder, options.actuator, options.film_id, progress)
+
+    def planning(stage: str, part: float) -> None:
+        if interrupts is not None and interrupts.asked():
+            raise Interrupted("interrupted while the campaign was planned; nothing was played")
+        progress(stage, part)
+
+    planning("planning", 0.0)
+    forecast = foresee(campaign, rig_file, folder, options.actuator, options.film_id, planning)
+    if arming.shown not in ((), forecast.digests):
+        raise InputError(
+            "the sequences of the campaign are not those that were armed: a file has changed since "
+            "the runs were shown; look at them again, then arm them again"
+        )
     if not resume:
         forecast.check_room(folder)
     try:
@@ -126,8 +155,9 @@ def play_campaign(
         raise InputError(f"{folder} cannot be created: {error.strerror or error}") from error
     with Journal(folder, now) as journal:
         session = _Session(
-            campaign, address, rig_file, folder, options, journal, observer, progress, now, wait
-        )
+            campaign, address, rig_file, folder, options, journal, observer, noted, interrupts,
+            computing or compute, progress, now, wait,
+        )  # fmt: skip
         session.begin(forecast, arming)
         stop: DearigError | None
         try:
@@ -195,6 +225,9 @@ class _Session:
         options: RunOptions,
         journal: Journal,
         observer: RunObserver | None,
+        noted: Noted | None,
+        interrupts: Interrupts | None,
+        computing: Compute,
         progress: Progress,
         now: Callable[[], float],
         wait: Callable[[float], None],
@@ -202,15 +235,25 @@ class _Session:
         self._campaign, self._address, self._rig_file = campaign, address, rig_file
         self._folder, self._options, self._journal = folder, options, journal
         self._observer, self._progress, self._now, self._wait = observer, progress, now, wait
+        self._noted, self._interrupts, self._computing = noted, interrupts, computing
         self._simulated = is_simulated(address)
         self._planned = {run.name: run for run in campaign.runs}
         self.queue = Queue.after(journal.entries, journal.path)
         # a session that continues another one does not know how long the film has rested
         self._rested = not any(run.attempts for run in self.queue.runs.values())
+        if noted is not None:
+            noted(tuple(journal.entries))
 
     def note(self, event: str, **facts: Any) -> None:
         """Write an entry to the journal, and change the state as it says."""
-        self.queue.take(self._journal.append(event, **facts))
+        entry = self._journal.append(event, **facts)
+        self.queue.take(entry)
+        if self._noted is not None:
+            self._noted((entry,))
+
+    def _check_interrupts(self) -> None:
+        if self._interrupts is not None and self._interrupts.asked():
+            raise Interrupted("interrupted between two runs, at 0 V")
 
     # ------------------------------------------------------------ begin
 
@@ -220,7 +263,14 @@ class _Session:
         if not queue.runs:
             self.note("planned", **self._plan_entry(forecast))
         else:
-            self._check_same(forecast)
+            changed = queue.changed(
+                self._campaign, forecast.digests, self._address, self._options.configuration
+            )
+            if changed:
+                raise InputError(
+                    f"the campaign in {self._folder} cannot be continued: {changed}; continue it "
+                    f"with what it began with, or begin another one in another folder"
+                )
             seen = queue.halted
             self._settle()
             if queue.halted != seen:
@@ -261,8 +311,9 @@ class _Session:
             "format": FORMAT,
             "name": campaign.name,
             "rig": self._address,
-            "plan_sha256": _digest(campaign.toml),
-            "rig_file_sha256": _digest(self._options.configuration),
+            "plan_folder": str(campaign.folder.absolute()),
+            "plan_sha256": sha256_of(campaign.toml),
+            "rig_file_sha256": sha256_of(self._options.configuration),
             "rest_s": campaign.rest,
             "repeat_lost": campaign.repeat_lost,
             "seconds": forecast.seconds,
@@ -280,28 +331,6 @@ class _Session:
                 )
             ],
         }
-
-    def _check_same(self, forecast: Forecast) -> None:
-        """Refuse to continue a campaign with another plan, rig or sequence than it began with."""
-        queue, campaign = self.queue, self._campaign
-        changed = ""
-        if queue.plan != _digest(campaign.toml):
-            changed = f"the plan has changed since (it began with {self._folder / 'plan.toml'})"
-        elif queue.rig != self._address:
-            changed = f"it began on the rig {queue.rig}, not on {self._address}"
-        elif queue.rig_file != _digest(self._options.configuration):
-            changed = "the rig file has changed since"
-        else:
-            for run, digest in zip(campaign.runs, forecast.digests, strict=True):
-                known = queue.runs.get(run.name)
-                if known is None or known.digest != digest:
-                    changed = f"the sequence of run {run.name} has changed since"
-                    break
-        if changed:
-            raise InputError(
-                f"the campaign in {self._folder} cannot be continued: {changed}; continue it with "
-                f"what it began with, or begin another one in another folder"
-            )
 
     def _settle(self) -> None:
         """Settle what a kill cut off: a run is done, lost, or was not started."""
@@ -340,6 +369,7 @@ class _Session:
     def play(self) -> tuple[str, str, DearigError | None]:
         """Play until the end; return status, reason, and an error that the end is."""
         while True:
+            self._check_interrupts()
             self._take_requests()
             queue = self.queue
             if queue.halted:
@@ -385,6 +415,7 @@ class _Session:
         while (left := end - self._now()) > 0.0 and not self.queue.ending:
             self._progress("resting", self._part())
             self._wait(min(left, _POLL))
+            self._check_interrupts()
             self._take_requests()
 
     def _take_requests(self) -> None:
@@ -410,7 +441,7 @@ class _Session:
         try:
             result = record(
                 loaded, self._address, self._rig_file, path, self._run_options(run),
-                observer=self._observer, progress=self._of_run(state),
+                observer=self._observer, interrupts=self._interrupts, progress=self._of_run(state),
             )  # fmt: skip
         except DearigError as error:
             return self._failed(state, path, error)
@@ -491,7 +522,7 @@ class _Session:
         if run.warm_up:
             self._end(state, DONE, "")
             return
-        found = compute(
+        found = self._computing(
             self._campaign, recording, self._folder, self.queue.model, self._rig_file,
             self._of_run(state),
         )  # fmt: skip
@@ -525,10 +556,6 @@ def _halted(reason: str) -> str:
         f"the campaign is halted: {reason}; look at the rig and the film, and then continue with "
         f'--resume --operator NAME --acknowledge "what was seen"'
     )
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _output(state: OutputState) -> dict[str, Any]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from dearig.batch.journal import FORMAT, read_lines
+from dearig.config.campaignfile import Campaign
 from dearig.config.toml_input import shown
 from dearig.errors import InputError
 
-__all__ = ["LOST", "PLAYED", "REQUEST_KINDS", "Queue", "RunState"]
+__all__ = ["LOST", "PLAYED", "REQUEST_KINDS", "Queue", "RunState", "sha256_of"]
 
 #: States of a run whose voltage was played, or may have been.
 DONE, LOST, STOPPED = "done", "lost", "stopped"
@@ -52,6 +54,7 @@ class RunState:
 class Queue:
     """State of a campaign, made by ``take`` from the entries of its journal in their order.
 
+    ``plan_folder`` is where the files lay that the plan names, "" where the journal does not say.
     ``order`` has the names of all runs as they are played. ``halted`` says why a person must look
     before anything is played, "" if nothing is in the way. ``status`` is how the last session
     ended, "" while one goes on. ``armed_until`` is Unix time in s, None for no limit, and
@@ -62,6 +65,7 @@ class Queue:
     name: str = ""
     rig: str = ""
     plan: str = ""
+    plan_folder: str = ""
     rig_file: str = ""
     rest: float = 0.0
     runs: dict[str, RunState] = field(default_factory=dict)
@@ -146,6 +150,7 @@ class Queue:
             )
         self.name, self.rig = str(entry["name"]), str(entry["rig"])
         self.plan, self.rig_file = str(entry["plan_sha256"]), str(entry["rig_file_sha256"])
+        self.plan_folder = str(entry.get("plan_folder", ""))
         self.repeat_lost, self.rest = int(entry["repeat_lost"]), float(entry["rest_s"])
         self.started = str(entry["at"])
         for run in entry["runs"]:
@@ -188,6 +193,25 @@ class Queue:
         if run.state == LOST and run.attempts <= self.repeat_lost:
             run.state = WAITING
 
+    def changed(
+        self, campaign: Campaign, digests: Sequence[str], address: str, configuration: str
+    ) -> str:
+        """Return what is not as when the campaign began, "" where it can be continued.
+
+        ``digests`` are those of the sequences of all runs, ``configuration`` is the rig file.
+        """
+        if self.plan != sha256_of(campaign.toml):
+            return "the plan has changed since (plan.toml in its folder is the one it began with)"
+        if self.rig != address:
+            return f"it began on the rig {self.rig}, not on {address}"
+        if self.rig_file != sha256_of(configuration):
+            return "the rig file has changed since"
+        for run, digest in zip(campaign.runs, digests, strict=True):
+            known = self.runs.get(run.name)
+            if known is None or known.digest != digest:
+                return f"the sequence of run {run.name} has changed since"
+        return ""
+
     @property
     def listed(self) -> Sequence[RunState]:
         """All runs in the order in which they are played."""
@@ -224,3 +248,8 @@ def _name(value: Any) -> str:
     if not isinstance(value, str) or "\0" in value:
         raise ValueError(value)
     return value
+
+
+def sha256_of(text: str) -> str:
+    """Return what tells a plan or a rig file from another one."""
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -7,17 +7,21 @@ from dataclasses import replace
 
 import pytest
 
+from dearig.acquisition.interrupts import Interrupts
 from dearig.batch import campaign as module
 from dearig.batch.after import Computed
 from dearig.batch.ask import ask
 from dearig.batch.campaign import Arming
+from dearig.batch.forecast import foresee, survey
 from dearig.batch.journal import JOURNAL, REQUESTS
+from dearig.batch.queue import Queue
 from dearig.batch.watching import seen
 from dearig.config.modelfile import save_model
 from dearig.errors import DiskFault, InputError, InstrumentFault, Interrupted, SafetyStop
 from dearig.model.actuator import Actuator
 from dearig.model.material import TABLE_3, THESIS_FILM, THESIS_LOAD
-from tests.tools.played import PLAN, UNKNOWN, Bench, Killed
+from tests.tools.command import LOBE
+from tests.tools.played import PLAN, RIG_FILE, UNKNOWN, Bench, Killed
 
 NAMES = ["three-0001", "three-0002", "three-0003"]
 LOOKED = Arming("Ada", acknowledged="0 V at the amplifier")
@@ -181,6 +185,51 @@ def test_ctrl_c_between_two_runs_ends_the_session(bench: Bench) -> None:
     with pytest.raises(Interrupted, match="2 runs are left"):
         bench.play(PLAN + "rest_s = 5.0\n", wait=interrupt, paced=True)
     assert seen(bench.out).status == "interrupted"
+
+
+def test_another_thread_ends_it_between_two_runs_and_in_a_computation(bench: Bench) -> None:
+    interrupts = Interrupts()
+    with pytest.raises(Interrupted, match="2 runs are left"):
+        bench.play(
+            PLAN + "rest_s = 5.0\n", computing=lambda *_: interrupts.ask() or Computed(),
+            interrupts=interrupts,
+        )  # fmt: skip
+    assert states(bench) == ["done", "waiting", "waiting"]
+    with pytest.raises(Interrupted, match="nothing was played"):
+        bench.play(PLAN + "rest_s = 5.0\n", resume=True, interrupts=interrupts)
+    assert bench.played.total() == 1
+
+
+def test_who_looks_on_sees_the_journal_and_comes_to_the_same_state(bench: Bench) -> None:
+    bench.fates["three-0002"] = "killed"
+    with pytest.raises(Killed):
+        bench.play()
+    told: list[dict] = []
+    bench.play(resume=True, noted=told.extend)
+    journal = bench.out / JOURNAL
+    assert Queue.after(told, journal) == Queue.of(journal)
+
+
+def test_other_sequences_than_those_that_were_shown_are_refused(bench: Bench) -> None:
+    shown = survey(bench.campaign(), RIG_FILE, bench.out).digests
+    (bench.folder / "lobe.toml").write_text(
+        LOBE.replace("frequency_Hz = 1.0", "frequency_Hz = 0.9"), "utf-8"
+    )
+    with pytest.raises(InputError, match="not those that were armed"):
+        bench.play(arming=Arming("Ada", shown=shown))
+    assert not bench.out.exists()
+    shown = survey(bench.campaign(), RIG_FILE, bench.out).digests
+    assert bench.play(arming=Arming("Ada", shown=shown)).status == "complete"
+
+
+def test_a_survey_says_of_every_run_why_it_is_refused(bench: Bench) -> None:
+    plan = PLAN.replace("repeat = 3", "") + '[grid]\n"segment.0.amplitude_kV" = [6.0, 99.0, 5.0]\n'
+    found = survey(bench.campaign(plan), RIG_FILE, bench.out)
+    assert [bool(reason) for reason in found.refused] == [False, True, False]
+    assert "99 kV" in found.refused[1]
+    assert found.sizes[0] > 0
+    with pytest.raises(InputError, match=r"run three-0002: .* is refused"):
+        foresee(bench.campaign(plan), RIG_FILE, bench.out)
 
 
 # ---------------------------------------------------------------- arming

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -76,13 +77,13 @@ class Bench:
 
     def play(
         self, plan: str = PLAN, arming: Arming | None = None, *, resume: bool = False,
-        wait: Callable[[float], None] | None = None, paced: bool = False,
+        wait: Callable[[float], None] | None = None, paced: bool = False, **more: Any,
     ) -> CampaignOutcome:  # fmt: skip
         self.appended = 0
         return play_campaign(
             self.campaign(plan), "sim", RIG_FILE, self.folder / "out",
             RunOptions(paced=paced), arming or Arming(), resume=resume, now=lambda: self.at,
-            wait=wait or self.pass_time,
+            wait=wait or self.pass_time, **more,
         )  # fmt: skip
 
     def pass_time(self, seconds: float) -> None:
