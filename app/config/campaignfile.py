@@ -244,13 +244,13 @@ def digest_of(loaded: LoadedSequence) -> str:
     return hashlib.sha256(loaded.toml.encode()).hexdigest()
 
 
-def load_campaign(path: str | Path) -> Campaign:
-    """Return the plan in the file ``path``.
+def load_campaign(path: str | Path, folder: Path | None = None) -> Campaign:
+    """Return the plan in the file ``path``; files that it names lie in ``folder``, or beside it.
 
     Raises ``InputError`` with one sentence: file, key, value, and what is allowed.
     """
     path = Path(path)
-    return parse_campaign(read_text(path, "plan"), f"plan {path}", path.parent)
+    return parse_campaign(read_text(path, "plan"), f"plan {path}", folder or path.parent)
 
 
 def parse_campaign(text: str, name: str, folder: Path) -> Campaign:

@@ -25,6 +25,7 @@ from PySide6.QtWidgets import (
 from dearig.config.toml_input import read_text
 from dearig.errors import InputError
 from dearig.window.banners import Banners
+from dearig.window.campaign_page import CampaignPage
 from dearig.window.compilation import Compilation, CompilationBar
 from dearig.window.dialogs import run_dialog
 from dearig.window.error_panel import ErrorPanel
@@ -38,6 +39,7 @@ from dearig.window.questions import may_close, offer_unsaved
 from dearig.window.recordings_page import RecordingsPage
 from dearig.window.rig_page import RigPage
 from dearig.window.run_page import RunPage
+from dearig.window.running import Play
 from dearig.window.sequence_page import SequencePage
 from dearig.window.session import Session
 from dearig.window.settings import kept_bytes, kept_number, kept_text
@@ -73,6 +75,7 @@ class MainWindow(QMainWindow):
         self.recordings_page = RecordingsPage(session)
         self.study_page = StudyPage(session)
         self.follow_page = FollowPage(session)
+        self.campaign_page = CampaignPage(session, self.run_page.runner)
         self.pages: tuple[QWidget, ...] = (
             self.rig_page,
             self.sequence_page,
@@ -80,6 +83,7 @@ class MainWindow(QMainWindow):
             self.recordings_page,
             self.study_page,
             self.follow_page,
+            self.campaign_page,
         )
         self.stop_keys = StopKeys(self.run_page.stop, lambda: session.busy, self)
         self._guide: Guide | None = None
@@ -116,7 +120,10 @@ class MainWindow(QMainWindow):
         """Give all parts the sizes and places of the first start."""
         for key in ("geometry", "page", GROUP):
             self.session.settings.remove(key)
-        for page in (self.sequence_page, self.recordings_page, self.study_page, self.follow_page):
+        for page in (
+            self.sequence_page, self.recordings_page, self.study_page, self.follow_page,
+            self.campaign_page,
+        ):  # fmt: skip
             page.reset_layout()
         self._default_geometry()
         self.show_page(self.run_page)
@@ -160,7 +167,7 @@ class MainWindow(QMainWindow):
         self.planner.close()
         for page in (
             self.rig_page, self.sequence_page, self.recordings_page, self.study_page,
-            self.follow_page,
+            self.follow_page, self.campaign_page,
         ):  # fmt: skip
             page.close_work()
         event.accept()
@@ -183,6 +190,7 @@ class MainWindow(QMainWindow):
                 "sequence": self.sequence_page.restore,
                 "rig file": self.rig_page.restore,
                 "target": self.follow_page.target.restore,
+                "plan": self.campaign_page.plan.restore,
             },
         )
 
@@ -191,10 +199,17 @@ class MainWindow(QMainWindow):
         runner = self.run_page.runner
         runner.stop()
         asked = QMessageBox(self)
-        asked.setWindowTitle("A run is in progress")
+        campaign = runner.playing is Play.CAMPAIGN
+        what = "campaign" if campaign else "run"
+        asked.setWindowTitle(f"A {what} is in progress")
         asked.setIcon(QMessageBox.Icon.Warning)
-        asked.setText("The run is being stopped: the voltage is ramped down to 0 V.")
-        asked.setInformativeText("The recording is kept. Close the window at 0 V?")
+        asked.setText(f"The {what} is being stopped: the voltage is ramped down to 0 V.")
+        kept = (
+            "The recordings are kept, and the campaign can be continued."
+            if campaign
+            else "The recording is kept."
+        )
+        asked.setInformativeText(f"{kept} Close the window at 0 V?")
         close = asked.addButton("Close", QMessageBox.ButtonRole.AcceptRole)
         asked.addButton("Keep open", QMessageBox.ButtonRole.RejectRole)
         run_dialog(asked, self.session)
@@ -305,6 +320,7 @@ class MainWindow(QMainWindow):
         self.follow_page.play_sequence.connect(self._play_file)
         self.follow_page.use_model.connect(run.show_model)
         self.follow_page.waits.connect(run.follow_button.setVisible)
+        self.campaign_page.show_recording.connect(self._show_recording)
         run.show_follow.connect(lambda: self.show_page(self.follow_page))
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_colour_scheme)
         session.running_changed.connect(self._watch_keys)

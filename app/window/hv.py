@@ -25,6 +25,7 @@ class HighVoltage(Enum):
     COMMANDED = "0 V NOT CONFIRMED"
     UNKNOWN = "UNKNOWN"
     ARMED = "ARMED"
+    BETWEEN = "BETWEEN RUNS"
     ON = "HIGH VOLTAGE"
     RAMPING = "RAMPING DOWN"
 
@@ -40,6 +41,8 @@ EXPLAINED = {
     "hand.",
     HighVoltage.ARMED: "Start (F6) begins the run; Esc or Space disarms. Keep away from the "
     "electrodes.",
+    HighVoltage.BETWEEN: "The output is at 0 V, and the campaign starts its next run by itself. "
+    "Esc, Space or STOP ends the campaign. Keep away from the electrodes.",
     HighVoltage.ON: "A sequence is playing. The electrodes may carry 8 kV and more. Esc or Space "
     "stops.",
     HighVoltage.RAMPING: "The voltage is being ramped down to 0 V. Esc, Space or STOP: 0 V at "
@@ -52,6 +55,7 @@ _COLOURS = {
     HighVoltage.COMMANDED: ("#16181d", "#f0e442"),
     HighVoltage.UNKNOWN: ("#16181d", "#f0e442"),
     HighVoltage.ARMED: ("#f0b429", "#16181d"),
+    HighVoltage.BETWEEN: ("#f0b429", "#16181d"),
     HighVoltage.ON: ("#c43d00", "#ffffff"),
     HighVoltage.RAMPING: ("#f0b429", "#16181d"),
 }
@@ -150,7 +154,7 @@ def _shape(painter: QPainter, state: HighVoltage, spot: QRectF, colour: QColor) 
     """Draw the shape of ``state``.
 
     A dashed ring (not contacted), a ring (0 V), a crossed box (not confirmed, unknown), a triangle
-    (armed), a bolt (on) or an arrow down (ramping).
+    (armed, between runs), a bolt (on) or an arrow down (ramping).
     """
     pen = QPen(colour, max(2.0, spot.width() / 9))
     if state is HighVoltage.NOT_CONTACTED:
@@ -172,7 +176,7 @@ def _shape(painter: QPainter, state: HighVoltage, spot: QRectF, colour: QColor) 
         painter.drawLine(spot.topLeft(), spot.bottomRight())
         painter.drawLine(spot.topRight(), spot.bottomLeft())
         return
-    if state is HighVoltage.ARMED:
+    if state in (HighVoltage.ARMED, HighVoltage.BETWEEN):
         painter.drawPolygon(points((0.5, 0.05), (1.0, 0.95), (0.0, 0.95)))
         return
     painter.setBrush(colour)

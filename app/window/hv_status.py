@@ -76,7 +76,9 @@ class HighVoltageStatus(QObject):
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._session = session
-        self._phase: HighVoltage | None = None  # armed, on or ramping; None at rest
+        # armed, on, ramping, or between two runs of a campaign; None at rest
+        self._phase: HighVoltage | None = None
+        self._next = ""  # what a campaign does next
         self._output: OutputState | None = None
         self._address = session.address  # of the rig that ``output`` belongs to
         self._told = False  # during a run: the output at its end is known
@@ -123,6 +125,8 @@ class HighVoltageStatus(QObject):
         elif not self.live:
             output = self.output
             words = "the voltage was not read yet" if output is None else output.sentence
+            if self._state is HighVoltage.BETWEEN:
+                words = f"{words}; {self._next}"
         simulated = is_simulated(self._session.address)
         return " · ".join(part for part in (words, "simulated" if simulated else "") if part)
 
@@ -146,6 +150,11 @@ class HighVoltageStatus(QObject):
             self.reading, self._told = None, False
         self._phase = phase
         self._refresh()
+
+    def set_between(self, words: str) -> None:
+        """Set that a campaign is between two runs; ``words`` say what it does next."""
+        self._next = words
+        self.set_phase(HighVoltage.BETWEEN)
 
     def set_output(self, output: OutputState) -> None:
         """Set what was measured of the output at the end of a run, also before the run's end."""
@@ -209,6 +218,8 @@ class HighVoltageStatus(QObject):
         if self._phase is HighVoltage.ARMED or self.live:
             return self._phase or HighVoltage.UNKNOWN
         output = self.output
+        if self._phase is HighVoltage.BETWEEN and (output is None or output.confirmed):
+            return HighVoltage.BETWEEN
         if output is not None:
             return state_at_rest(output.known)
         return HighVoltage.NOT_CONTACTED

@@ -14,7 +14,7 @@ from dearig.window.session import Session
 from dearig.window.theme import SPACE
 from dearig.window.widgets import Message, Readout, card, label, set_role
 
-__all__ = ["RunControls"]
+__all__ = ["RunControls", "StepButton"]
 
 _WIDTH = 268  # px
 _STOP_HEIGHT = 92  # px

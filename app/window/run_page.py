@@ -24,7 +24,7 @@ from dearig.window.live import Live
 from dearig.window.overlay_chooser import OverlayChooser
 from dearig.window.run_controls import RunControls
 from dearig.window.run_display import RunDisplay
-from dearig.window.running import RunEnd, Runner, RunRequest
+from dearig.window.running import Play, RunEnd, Runner, RunRequest
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
 from dearig.window.widgets import Message, button, label
@@ -152,7 +152,8 @@ class RunPage(QWidget):
         session, running = self.session, self.runner.running
         preview = session.preview
         ready = preview is not None and preview.playable and not running and not session.blocks
-        armed = self.runner.armed
+        armed = self.runner.armed_for(Play.RUN)
+        ready = ready and armed == self.runner.armed  # a campaign is not armed
         if not ready and armed:
             armed = self.runner.arm(armed=False)
         self.arm_button.setEnabled(ready)
@@ -200,6 +201,9 @@ class RunPage(QWidget):
         live = self.live
         if live is None:
             return
+        if self.runner.playing is Play.CAMPAIGN:  # its readings are shown now
+            self._numbers.stop()
+            return
         now = live.now()
         self.display.take_events()
         if now is None:
@@ -223,6 +227,9 @@ class RunPage(QWidget):
 
     @Slot(object)
     def _run_ended(self, end: RunEnd) -> None:
+        if end.play is not Play.RUN:
+            self._refresh()
+            return
         self._update_readouts()
         self.controls.time_left.setText(end.headline)
         if end.result is not None:

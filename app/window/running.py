@@ -6,6 +6,7 @@ import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 
 from PySide6.QtCore import QObject, QThread, Signal, Slot
@@ -33,20 +34,36 @@ from dearig.window.hv_status import HighVoltageStatus, LatchedAlarm
 from dearig.window.live import Live
 from dearig.window.session import Session
 
-__all__ = ["RunEnd", "RunRequest", "Runner", "next_recording_path"]
+__all__ = [
+    "ENDS",
+    "PROGRAM_FAULT",
+    "Play",
+    "PlayThread",
+    "RunEnd",
+    "RunRequest",
+    "Runner",
+    "next_recording_path",
+]
 
-_PROGRAM_FAULT = (
+PROGRAM_FAULT = (
     "an error in the program ended the run: check that the amplifier is at 0 V; the log has the "
     "details of the error"
 )
 _ALARM_MAX = 1000  # characters of an alarm; the settings keep it
-_ENDS: dict[type[DearigError], str] = {
+ENDS: dict[type[DearigError], str] = {
     Interrupted: "Stopped",
     SafetyStop: "Stopped by an interlock",
     InstrumentFault: "Instrument fault",
     DiskFault: "Disk fault",
     InputError: "Refused",
 }
+
+
+class Play(Enum):
+    """What is armed or played: one thing at a time."""
+
+    RUN = "run"
+    CAMPAIGN = "campaign"
 
 
 @dataclass(frozen=True)
@@ -80,6 +97,7 @@ class RunEnd:
 
     ``output`` is what was measured of the output after it, None where the rig was not contacted:
     then it is as it was before. ``alarming`` is True where the operator must acknowledge the end.
+    ``play`` says what has ended.
     """
 
     headline: str
@@ -88,10 +106,25 @@ class RunEnd:
     output: OutputState | None
     result: RunResult | None = None
     alarming: bool = False
+    play: Play = Play.RUN
+
+
+class PlayThread(QThread):
+    """Thread that plays something; its subclass sets ``end`` and obeys ``interrupts``.
+
+    ``output_known`` carries the ``OutputState`` at the end of a run.
+    """
+
+    output_known = Signal(object)
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self.interrupts = Interrupts()
+        self.end = RunEnd("Ended", PROGRAM_FAULT, None, None)
 
 
 class Runner(QObject):
-    """Plays one run after another, never two at once.
+    """Plays runs and campaigns one after another, never two at once.
 
     ``status`` has the state of the high voltage. ``state_changed`` carries the ``HighVoltage``,
     ``ended`` the ``RunEnd``; both come in the interface thread. Only ``wait`` blocks it.
@@ -103,7 +136,9 @@ class Runner(QObject):
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._session = session
-        self._thread: _RunThread | None = None
+        self._thread: PlayThread | None = None
+        self._armed_for = Play.RUN
+        self.playing: Play | None = None  #: what goes on
         self.status = HighVoltageStatus(session, self)
         self.status.state_changed.connect(self.state_changed)
         self.status.disarm_due.connect(self.stop)
@@ -123,26 +158,41 @@ class Runner(QObject):
 
     @property
     def armed(self) -> bool:
-        """True while ``start`` would begin a run."""
+        """True while a next step would begin a run or a campaign."""
         return self.state is HighVoltage.ARMED
 
-    def arm(self, armed: bool) -> bool:
-        """Arm or disarm the rig; return whether it is armed. What blocks arming is obeyed."""
+    def armed_for(self, play: Play) -> bool:
+        """Return whether the rig is armed, and for ``play``."""
+        return self.armed and self._armed_for is play
+
+    def arm(self, armed: bool, play: Play = Play.RUN) -> bool:
+        """Arm the rig for ``play``, or disarm it; return whether it is armed for that.
+
+        What blocks arming is obeyed. A rig that is armed for something else stays so.
+        """
         if not self.running and armed != self.armed and not (armed and self._session.blocks):
+            self._armed_for = play
             self.status.set_phase(HighVoltage.ARMED if armed else None)
-        return self.armed
+        return self.armed_for(play)
 
     def start(self, order: RunRequest, live: Live) -> bool:
-        """Begin a run; return False if the rig is not armed."""
-        if self.running or not self.armed:
+        """Begin a run; return False if the rig is not armed for one."""
+        if self.running or not self.armed_for(Play.RUN):
+            return False
+        self.begin(_RunThread(order, live, self), Play.RUN)
+        self.status.set_phase(HighVoltage.ON)
+        return True
+
+    def begin(self, thread: PlayThread, play: Play) -> bool:
+        """Begin what ``thread`` plays; return False if the rig is not armed for ``play``."""
+        if self.running or not self.armed_for(play):
             return False
         self.status.run_begins()
-        self._thread = _RunThread(order, live, self)
-        self._thread.output_known.connect(self.status.set_output)
-        self._thread.finished.connect(self._finished)
-        self.status.set_phase(HighVoltage.ON)
+        self._thread, self.playing = thread, play
+        thread.output_known.connect(self.status.set_output)
+        thread.finished.connect(self._finished)
         # the samples of the rig must be read in time, whatever the interface draws
-        self._thread.start(QThread.Priority.TimeCriticalPriority)
+        thread.start(QThread.Priority.TimeCriticalPriority)
         return True
 
     @Slot()
@@ -176,7 +226,7 @@ class Runner(QObject):
 
     @Slot()
     def _finished(self) -> None:
-        thread, self._thread = self._thread, None
+        thread, self._thread, self.playing = self._thread, None, None
         if thread is None:
             return
         thread.deleteLater()
@@ -219,15 +269,11 @@ class _Observed(RunObserver):
         self._tell(state)
 
 
-class _RunThread(QThread):
-    output_known = Signal(object)
-
+class _RunThread(PlayThread):
     def __init__(self, order: RunRequest, live: Live, parent: QObject) -> None:
         super().__init__(parent)
         self._order = order
         self._live = live
-        self.interrupts = Interrupts()
-        self.end = RunEnd("Ended", _PROGRAM_FAULT, None, None)
 
     def run(self) -> None:
         order = self._order
@@ -261,7 +307,7 @@ class _RunThread(QThread):
         except BaseException:
             # an error of the program may leave a voltage
             known = observer.output_state or OutputState(Known.UNKNOWN, time.time())
-            self.end = RunEnd("Ended", _PROGRAM_FAULT, None, known, alarming=True)
+            self.end = RunEnd("Ended", PROGRAM_FAULT, None, known, alarming=True)
             raise
         else:
             seconds = result.samples / result.rate_Hz
@@ -277,7 +323,7 @@ class _RunThread(QThread):
 
 def _early_end(error: DearigError, out: Path, played: bool) -> RunEnd:
     """Describe a run that ended early; ``played`` is True where its rig was ready to start."""
-    headline = next((words for kind, words in _ENDS.items() if isinstance(error, kind)), "Ended")
+    headline = next((words for kind, words in ENDS.items() if isinstance(error, kind)), "Ended")
     sentence = str(error).removeprefix("interrupted: ")
     output = error.output_state
     fault = played and isinstance(error, SafetyStop | InstrumentFault)

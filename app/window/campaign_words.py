@@ -1,0 +1,80 @@
+"""Sentences of the page Campaign: what a plan takes, how a campaign stands, what is in the way."""
+
+from __future__ import annotations
+
+from dearig.acquisition.rigs import is_simulated
+from dearig.batch.queue import DONE, LOST, SKIPPED, STOPPED, WAITING, Queue
+from dearig.report.campaign_page import duration_text
+from dearig.window.campaign_plan import PlanSurvey
+from dearig.window.session import Session
+
+__all__ = ["counted", "obstacle", "plan_words", "runs_text"]
+
+
+def runs_text(count: int) -> str:
+    """Return a number of runs in words."""
+    return f"{count:,} run{'' if count == 1 else 's'}"
+
+
+def plan_words(found: PlanSurvey) -> str:
+    """Return time, disk and margins of a plan that was surveyed."""
+    campaign, forecast = found.campaign, found.forecast
+    if campaign is None:
+        return ""
+    if forecast is None:
+        return "Checking the runs …"
+    warm = sum(run.warm_up for run in campaign.runs)
+    margins = "; ".join(
+        f"{m.quantity} {m.reached:.3g} of {m.allowed:.3g} {m.unit}" for m in forecast.margins
+    )
+    return (
+        f"{duration_text(forecast.seconds)} without computations"
+        + (f", {runs_text(warm)} to warm up" if warm else "")
+        + f" · {forecast.size / 1e6:.3g} MB of {forecast.free / 1e9:.3g} GB free"
+        + (f"\nAt most {margins}" if margins else "")
+    )
+
+
+def counted(queue: Queue) -> str:
+    """Return name and counts of a campaign that was begun."""
+    parts = ", ".join(
+        f"{count} {what}"
+        for count, what in (
+            (queue.count(DONE), "done"), (queue.count(LOST, STOPPED), "failed"),
+            (queue.count(SKIPPED), "left out"), (queue.count(WAITING), "waiting"),
+        )
+        if count
+    )  # fmt: skip
+    return f"{queue.name}: {runs_text(len(queue.runs))}" + (f", {parts}" if parts else "")
+
+
+def obstacle(
+    session: Session, found: PlanSurvey | None, queue: Queue, begun: bool, seen: str
+) -> str:
+    """Return why a batch cannot be armed, "" where it can, apart from what blocks the rig.
+
+    ``seen`` is what the operator writes after a halt.
+    """
+    if found is None:
+        return "the runs are being checked"
+    if found.trouble or found.campaign is None or found.forecast is None:
+        return found.trouble or "the plan has a fault"
+    if begun:
+        changed = queue.changed(
+            found.campaign, found.forecast.digests, session.address, session.rig_text
+        )
+        if changed:
+            return f"the campaign cannot be continued: {changed}"
+        if not queue.waiting and queue.running is None:
+            return "no run waits"
+    elif found.refused:
+        return (
+            f"{runs_text(found.refused)} cannot be played: see the table; change the plan, or the "
+            f"limits on the page Rig"
+        )
+    named = bool(session.operator.strip())
+    if not is_simulated(session.address) and not named:
+        return "the operator has no name: write it in Operator"
+    if queue.halted and not (named and seen.strip()):
+        return "the campaign is halted: look at the rig, then write your name and what you saw"
+    return ""
