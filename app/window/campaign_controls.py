@@ -134,13 +134,13 @@ class CampaignControls(QWidget):
         self.hours = QDoubleSpinBox(minimum=_STEP, maximum=_HOURS_MAX, decimals=1, singleStep=_STEP)
         self.hours.setSuffix(" h")
         self.hours.setToolTip("Time from now on; no run starts that would end later")
-        self.paced = QCheckBox("Real &time")
+        self.paced = QCheckBox("Real t&ime")
         self.paced.setToolTip(
             "Run the simulated rig in real time, with rests; otherwise as fast as it can"
         )
         row = QHBoxLayout()
         for words, field, share in (
-            ("Opera&tor", self.operator, 1), ("&Runs", self.runs, 0), ("&Within", self.hours, 0),
+            ("Opera&tor", self.operator, 1), ("&Runs", self.runs, 0), ("Wit&hin", self.hours, 0),
         ):  # fmt: skip
             caption = label(words)
             caption.setBuddy(field)

@@ -34,6 +34,7 @@ from dearig.window.campaign_plan import (
     Surveyor,
     SurveyRequest,
     open_campaign,
+    with_requests,
 )
 from dearig.window.campaign_table import CampaignTable, rows_of_plan, rows_of_queue
 from dearig.window.campaign_thread import CampaignRequest, CampaignThread
@@ -78,6 +79,7 @@ class CampaignPage(QWidget):
         self._worker = Worker(self)
         self._folder: Path | None = None  # of the campaign that was begun
         self._queue = Queue()  # its state, as its journal says
+        self._soon = self._queue  # with the requests that it has not taken yet
         self._survey: PlanSurvey | None = None  # of the present text
         self._sizes: dict[str, int] = {}
         self._thread: CampaignThread | None = None
@@ -136,7 +138,7 @@ class CampaignPage(QWidget):
         resume = self._folder is not None
         try:
             folder = self._folder or numbered_folder(session.folder, "campaign")
-            if self._queue.paused:  # who starts it wants it to go on
+            if self._soon.paused:  # who starts it wants it to go on
                 ask(folder, [("continue", "")], session.operator)
         except InputError as error:
             self._fail(str(error))
@@ -177,10 +179,6 @@ class CampaignPage(QWidget):
         except InputError as error:
             self._fail(str(error))
             return
-        for what, name in wishes:
-            # shown at once; the entry of the journal says the same again
-            number = self._queue.requests
-            self._queue.take({"event": "request", "number": number, "what": what, "run": name})
         self._show_queue()
 
     @Slot()
@@ -268,6 +266,7 @@ class CampaignPage(QWidget):
     @Slot(object)
     def _opened(self, found: OpenedCampaign) -> None:
         self._folder, self._queue = found.folder, found.queue
+        self._soon = found.queue
         self.message.show_text("")
         self.controls.forget_proposal()
         self._sizes = {}
@@ -298,12 +297,19 @@ class CampaignPage(QWidget):
             self._show_queue()
 
     def _show_queue(self) -> None:
-        queue = self._queue
+        try:
+            if self._folder is not None:
+                self._soon = with_requests(self._queue, self._folder)
+        except InputError as error:
+            self._fail(str(error))
+        queue = self._soon
         self.table.show_rows(rows_of_queue(queue, self._sizes))
         self.headline.setText(counted(queue))
         left = f"{duration_text(queue.time_left)} are left" if queue.waiting else "No run waits"
+        soon = "ends" if queue.ending else "pauses" if queue.paused else ""
+        asked = f" · {soon} after this run" if soon and self._queue.running is not None else ""
         where = "" if self._folder is None else f" · {self._folder}"
-        self.summary.show_text(f"{left}{where}", "muted")
+        self.summary.show_text(f"{left}{asked}{where}", "muted")
         if not self._session.running:
             self.controls.propose(len(queue.waiting), queue.time_left)
         self._refresh()
@@ -346,7 +352,8 @@ class CampaignPage(QWidget):
             self._folder = None
         finished = self._queue.status == "complete"
         role = "good" if finished else "bad" if end.alarming or self._queue.halted else "warn"
-        self.message.show_text(f"{end.headline}: {end.sentence}.", role)
+        halted = bool(self._queue.halted)  # shown where a person says what was seen
+        self.message.show_text("" if halted else f"{end.headline}: {end.sentence}.", role)
         self.controls.forget_proposal()
         self._session.unblock(_BLOCK)
         self._session.set_running(False)
@@ -416,6 +423,10 @@ class CampaignPage(QWidget):
         self._disarm()
         survey_folder, toml = self.plan.folder, self.plan.toml
         self._folder, self._queue, self._sizes = None, Queue(), {}
+        self._soon = self._queue
+        self.table.show_rows([])
+        self.headline.setText("No runs yet")
+        self.summary.show_text("")
         self.message.show_text("")
         self.controls.forget_proposal()
         self.controls.show_numbers(None, False)
@@ -470,7 +481,7 @@ class CampaignPage(QWidget):
     def _obstacle(self) -> str:
         """Return why the batch cannot be armed, "" where it can, apart from the rig's blocks."""
         begun, said = self._folder is not None, self.controls.seen.text()
-        return obstacle(self._session, self._survey, self._queue, begun, said)
+        return obstacle(self._session, self._survey, self._soon, begun, said)
 
     @Slot()
     def _refresh(self) -> None:
@@ -497,7 +508,7 @@ class CampaignPage(QWidget):
         controls.blocked.show_text(
             "\n".join(f"{w[:1].upper()}{w[1:]}." for w in [*words, *blocks]), "warn"
         )
-        queue, begun = self._queue, self._folder is not None
+        queue, begun = self._soon, self._folder is not None
         chosen = [row for row in self.table.chosen if row.state == WAITING]
         controls.first.setEnabled(begun and bool(chosen))
         controls.skip.setEnabled(begun and bool(chosen))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from PySide6.QtCore import QTimer, Signal, Slot
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QPlainTextEdit, QWidget
 
 from dearig.acquisition.rigs import is_simulated
 from dearig.batch.forecast import Forecast, survey
@@ -22,12 +22,19 @@ from dearig.window.background import Background
 from dearig.window.session import Session
 from dearig.window.toml_editor import EditorWords, TomlEditor
 
-__all__ = ["OpenedCampaign", "PlanEditor", "PlanSurvey", "Surveyor", "open_campaign"]
+__all__ = [
+    "OpenedCampaign",
+    "PlanEditor",
+    "PlanSurvey",
+    "Surveyor",
+    "open_campaign",
+    "with_requests",
+]
 
 _WAIT = 400  # ms after a change of the text, before it is surveyed
 _WORDS = EditorWords(
     what="plan",
-    caption="&Plan",
+    caption="Pl&an",
     tip="Sequence, grid of its keys, repeats, rests, order, and what is computed after each run",
     open_tip="Read a plan file; sequence files that it names lie beside it",
     example_tip="Replace the plan by a commented one with every key",
@@ -40,6 +47,7 @@ class PlanEditor(TomlEditor):
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(session, _WORDS, EXAMPLE, parent)
+        self.edit.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
 
     def set_fixed(self, fixed: bool) -> None:
         """Make the text that of a campaign that was begun: it can be read and saved only."""
@@ -97,7 +105,7 @@ class OpenedCampaign:
 
 
 def open_campaign(folder: Path) -> OpenedCampaign:
-    """Read the campaign in ``folder``, with the requests that it has not taken yet.
+    """Read the campaign in ``folder``.
 
     Raises ``InputError`` for a folder without a campaign.
     """
@@ -108,14 +116,22 @@ def open_campaign(folder: Path) -> OpenedCampaign:
         )
     queue = outcome.queue
     toml = read_text(folder / "plan.toml", "plan")
-    for number, entry in enumerate(read_lines(folder / REQUESTS, tolerant=True), start=1):
-        if number > queue.requests and entry["event"] in REQUEST_KINDS:
-            queue.take(
-                {"event": "request", "number": number, "what": entry["event"],
-                 "run": str(entry.get("run", ""))}
-            )  # fmt: skip
     plan_folder = Path(queue.plan_folder) if queue.plan_folder else folder
     return OpenedCampaign(folder, toml, plan_folder, queue, outcome.status, outcome.reason)
+
+
+def with_requests(queue: Queue, folder: Path) -> Queue:
+    """Return ``queue`` as it will be when the requests in ``folder`` are taken."""
+    asked = read_lines(folder / REQUESTS, tolerant=True)[queue.requests :]
+    if not asked:
+        return queue
+    runs = {name: replace(run) for name, run in queue.runs.items()}
+    soon = replace(queue, runs=runs, order=list(queue.order))
+    for number, entry in enumerate(asked, start=queue.requests + 1):
+        if entry["event"] in REQUEST_KINDS:
+            run = str(entry.get("run", ""))
+            soon.take({"event": "request", "number": number, "what": entry["event"], "run": run})
+    return soon
 
 
 class Surveyor(Background):

@@ -29,7 +29,8 @@ from dearig.window.widgets import plain_tip
 __all__ = ["CampaignTable", "RunRow", "rows_of_plan", "rows_of_queue"]
 
 _HEADS = ("Run", "State", "Time", "Disk", "Settings", "Result")
-_WIDTHS = (210, 110, 70, 80, 220)  # px; the last column takes what is left
+_WIDTHS = (190, 105, 65, 75, 280)  # px; the last column takes what is left
+_HEIGHT_MIN = 110  # px
 _NUMBERS = 3  # of a run that are shown; the tooltip has all
 #: States of a run to words and the colour of the theme.
 _STATES = {
@@ -183,6 +184,7 @@ class CampaignTable(QTableView):
         self.setShowGrid(False)
         self.setWordWrap(False)
         self.setTabKeyNavigation(False)
+        self.setMinimumHeight(_HEIGHT_MIN)
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.verticalHeader().setDefaultSectionSize(26)
         header = self.horizontalHeader()

@@ -134,7 +134,7 @@ def _left(outcome: CampaignOutcome) -> str:
     left = len(outcome.queue.waiting) + (outcome.queue.running is not None)
     if not left:
         return "all runs were played"
-    return f"{left} run{'s' if left > 1 else ''} wait; arm and start again to go on"
+    return f"{left} run{'s wait' if left > 1 else ' waits'}; arm and start again to go on"
 
 
 class _Observed(RunObserver):

@@ -10,6 +10,8 @@ from dearig.window.session import Session
 
 __all__ = ["counted", "obstacle", "plan_words", "runs_text"]
 
+_USED = 0.1  # of a limit: what uses less of it is not named
+
 
 def runs_text(count: int) -> str:
     """Return a number of runs in words."""
@@ -24,9 +26,8 @@ def plan_words(found: PlanSurvey) -> str:
     if forecast is None:
         return "Checking the runs …"
     warm = sum(run.warm_up for run in campaign.runs)
-    margins = "; ".join(
-        f"{m.quantity} {m.reached:.3g} of {m.allowed:.3g} {m.unit}" for m in forecast.margins
-    )
+    near = [m for m in forecast.margins if m.allowed and m.reached > _USED * m.allowed]
+    margins = "; ".join(f"{m.quantity} {m.reached:.3g} of {m.allowed:.3g} {m.unit}" for m in near)
     return (
         f"{duration_text(forecast.seconds)} without computations"
         + (f", {runs_text(warm)} to warm up" if warm else "")
@@ -68,10 +69,8 @@ def obstacle(
         if not queue.waiting and queue.running is None:
             return "no run waits"
     elif found.refused:
-        return (
-            f"{runs_text(found.refused)} cannot be played: see the table; change the plan, or the "
-            f"limits on the page Rig"
-        )
+        first = next(reason for reason in found.forecast.refused if reason)
+        return f"{runs_text(found.refused)} cannot be played, the first of them as {first}"
     named = bool(session.operator.strip())
     if not is_simulated(session.address) and not named:
         return "the operator has no name: write it in Operator"
