@@ -24,6 +24,7 @@ from dearig.acquisition.run import RunOptions, record
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import load_sequence
+from dearig.window.document import TextFile
 from dearig.window.frame import MainWindow
 from dearig.window.session import Session
 from dearig.window.theme import LIGHT, prepare_plots
@@ -60,6 +61,7 @@ GUIDE = {
     "recordings.png": ("recordings-several", "light"),
     "study.png": ("study-residual", "light"),
     "follow.png": ("follow-learned", "light"),
+    "campaign.png": ("campaign-going", "light"),
     "dark.png": ("run-going", "dark"),
 }
 
@@ -165,6 +167,7 @@ def views(window: MainWindow) -> Iterator[str]:
         study.tabs.setCurrentIndex(index)
         yield f"study-{study.tabs.tabText(index).lower()}"
     yield from following(window)
+    yield from campaigning(window)
 
 
 def following(window: MainWindow) -> Iterator[str]:
@@ -194,6 +197,42 @@ def following(window: MainWindow) -> Iterator[str]:
     yield "follow-learned"
 
 
+def campaigning(window: MainWindow) -> Iterator[str]:
+    """The page Campaign: a plan, one that is refused, a campaign that goes on, and its end."""
+    page, runner = window.campaign_page, window.run_page.runner
+    window.session.set_address("sim")
+    window.show_page(page)
+    example = page.plan.toml
+
+    def checked(toml: str) -> None:
+        page.plan.restore(toml, TextFile("plan", toml))
+        until(lambda: page._survey is not None and not page.surveyor.waits, "the runs of a plan")
+
+    checked(example.replace("[7.0, 7.0", "[12.0, 7.0"))
+    yield "campaign-refused"
+    checked(example.replace("rest_s = 5.0", "rest_s = 0.0"))
+    yield "campaign-ready"
+    page.controls.operator.setText("Ada")
+    page.controls.paced.setChecked(True)
+    page.controls.arm.click()
+    yield "campaign-armed"
+    page.controls.start.click()
+
+    def playing(run: int, seconds: float) -> bool:
+        """Return True once the campaign has come that far."""
+        going = page.queue.order.index(page.queue.running.name) if page.queue.running else -1
+        return going >= run and page._thread is not None and far(page._thread, seconds)
+
+    until(lambda: playing(1, 6.0), "the second run of a campaign")
+    page.table.choose([page.table.rows[4].name])
+    page.controls.first.click()
+    yield "campaign-going"
+    window.run_page.stop_button.click()
+    until(lambda: not runner.running, "the end of a campaign")
+    until(lambda: page._survey is not None and not page.surveyor.waits, "the runs of a plan")
+    yield "campaign-stopped"
+
+
 def planned(session: Session, toml: str) -> None:
     """Put a sequence in, and wait for its plan."""
     session.set_sequence(toml, Path())
@@ -202,7 +241,8 @@ def planned(session: Session, toml: str) -> None:
 
 def far(run: object, seconds: float) -> bool:
     """True once a run has come that far."""
-    now = run.live.now()  # type: ignore[attr-defined]
+    live = run.live  # type: ignore[attr-defined]
+    now = None if live is None else live.now()
     return now is not None and now.samples / now.rate > seconds
 
 
