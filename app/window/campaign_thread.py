@@ -64,6 +64,7 @@ class CampaignThread(PlayThread):
         self._told = False
         self._stage = ""
         self.live: Live | None = None
+        self._looking: Live | None = None  # whose thread has not ended
         self.output: OutputState | None = None
         self.end = RunEnd("Ended", PROGRAM_FAULT, None, None, play=Play.CAMPAIGN)
 
@@ -98,12 +99,15 @@ class CampaignThread(PlayThread):
 
     def follow(self, live: Live | None) -> None:
         """Look on with ``live`` from now on; None ends the look at the last run."""
-        if self.live is not None:
-            self.live.close()
+        if self._looking is not None:
+            self._looking.close()
+        self._looking = live
         if live is not None:
             self.live = live
 
     def _note(self, entries: Sequence[Mapping[str, Any]]) -> None:
+        if self._told and entries[-1]["event"] == "started":
+            self.live = None  # the readings of the last run are no longer those of this moment
         self.noted.emit(entries, not self._told)
         self._told = True
 
