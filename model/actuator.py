@@ -21,7 +21,7 @@ from dearig.model.effects import (
 from dearig.model.errors import ModelError
 from dearig.model.kinematics import thinning
 from dearig.model.material import VACUUM_PERMITTIVITY, Film, Load, Network
-from dearig.model.network import HEAD, nominal_pull
+from dearig.model.network import HEAD, nominal_pull, shape_at
 from dearig.model.sensor import at_sensor
 
 __all__ = [
@@ -235,7 +235,7 @@ def effect_values(effects: EffectValues, drive: str) -> np.ndarray:
 def _modulus_at_rest(c: np.ndarray, stretch: float) -> float:
     """mu_0 with which the load rests at ``stretch``."""
     held, k = int(c[at.HELD]), HEAD
-    pull = nominal_pull(held, int(c[k + at.KIND]), c[k + at.LIMIT], c[k + at.LOCKING], stretch)
+    pull = nominal_pull(held, int(c[k + at.KIND]), shape_at(c, k), c[k + at.LOCKING], stretch)
     if not 0.0 < pull < np.inf:
         raise ModelError(
             f"load: a measured rest stretch of {stretch:.4g} needs a pull between 0 and the "

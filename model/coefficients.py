@@ -22,6 +22,7 @@ __all__ = [
     "RATE",
     "REST",
     "SECTION",
+    "SHAPE",
     "THICKNESS",
     "UNIFORM",
     "WIDTH",
@@ -45,4 +46,5 @@ MODULUS = 1  #: Pa
 LIMIT = 2  #: J or n
 LOCKING = 3  #: I1 - 3 where it locks
 RATE = 4  #: 1/T in 1/s; of no meaning for the equilibrium spring
-WIDTH = 5
+SHAPE = 5  #: further parameters of the strain energy, up to three
+WIDTH = 8

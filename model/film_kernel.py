@@ -12,13 +12,21 @@ import math
 
 import numpy as np
 
-from dearig.model.coefficients import HELD, KIND, LIMIT, LOCKING, RATE, WIDTH
+from dearig.model.coefficients import HELD, KIND, LOCKING, RATE, WIDTH
 from dearig.model.effects import assembly
 from dearig.model.jit import allocating, jit
 from dearig.model.kernel import BAD_INPUT, LOCKED, NOT_CONVERGED, OK
 from dearig.model.kernel.rodas_coefficients import ALPHA, GAMMA, A, C, D
 from dearig.model.kinematics import strain_and_pull
-from dearig.model.network import HEAD, branch_count, nominal_pull, nominal_pull_slope, true_pull
+from dearig.model.network import (
+    HEAD,
+    branch_count,
+    nominal_pull,
+    nominal_pull_slope,
+    shape_at,
+    true_pull,
+)
+from dearig.model.springs import Shape
 
 __all__ = ["add_effects", "drive_by_stretch"]
 
@@ -31,17 +39,17 @@ _commit, _felt, _acting = assembly.commit, assembly.measured_stress, assembly.ac
 
 
 @jit
-def _flow(held: int, kind: int, limit: float, rate: float, lam: float, xi: float) -> float:
+def _flow(held: int, kind: int, shape: Shape, rate: float, lam: float, xi: float) -> float:
     """Flow of a branch d(xi)/dt in 1/s at stretch ``lam`` and inner stretch ``xi``."""
     s = (lam / xi) ** 2
-    return rate * true_pull(held, kind, limit, s, 1.0 / s)
+    return rate * true_pull(held, kind, shape, s, 1.0 / s)
 
 
 @jit
 def _cross(
     held: int,
     kind: int,
-    limit: float,
+    shape: Shape,
     locking: float,
     rate: float,
     xi: float,
@@ -56,14 +64,14 @@ def _cross(
     Returns (status, xi, part of the next interval to try).
     """
     farthest, _ = strain_and_pull(held, (lam1 / xi) ** 2, (xi / lam1) ** 2)
-    slow = rate * nominal_pull_slope(held, kind, limit, locking, lam0 / xi) * dt < _NOT_STIFF
+    slow = rate * nominal_pull_slope(held, kind, shape, locking, lam0 / xi) * dt < _NOT_STIFF
     if slow and farthest < 0.5 * locking:
         # slow against the interval: one Runge-Kutta step is exact enough, and four times as quick
         middle = 0.5 * (lam0 + lam1)
-        k1 = _flow(held, kind, limit, rate, lam0, xi)
-        k2 = _flow(held, kind, limit, rate, middle, xi + 0.5 * dt * k1)
-        k3 = _flow(held, kind, limit, rate, middle, xi + 0.5 * dt * k2)
-        k4 = _flow(held, kind, limit, rate, lam1, xi + dt * k3)
+        k1 = _flow(held, kind, shape, rate, lam0, xi)
+        k2 = _flow(held, kind, shape, rate, middle, xi + 0.5 * dt * k1)
+        k3 = _flow(held, kind, shape, rate, middle, xi + 0.5 * dt * k2)
+        k4 = _flow(held, kind, shape, rate, lam1, xi + dt * k3)
         stepped = xi + dt / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
         if stepped > 0.0 and math.isfinite(stepped):
             return OK, stepped, first
@@ -75,8 +83,8 @@ def _cross(
         h = step * dt
         lam = lam0 + (lam1 - lam0) * done
         e = lam / xi
-        bend = nominal_pull_slope(held, kind, limit, locking, e)
-        both = nominal_pull(held, kind, limit, locking, e) + e * bend
+        bend = nominal_pull_slope(held, kind, shape, locking, e)
+        both = nominal_pull(held, kind, shape, locking, e) + e * bend
         slope_lam = rate * both / xi
         slope_xi = -e * slope_lam
         ramp = slope_lam * (lam1 - lam0) / dt
@@ -98,7 +106,7 @@ def _cross(
                 good = strain < locking
             if not good:
                 break
-            f = _flow(held, kind, limit, rate, there, z) + h * D[stage] * ramp
+            f = _flow(held, kind, shape, rate, there, z) + h * D[stage] * ramp
             for m in range(stage):
                 f += C[stage, m] / h * u[m]
             u[stage] = f * inverse
@@ -140,12 +148,12 @@ def drive_by_stretch(
             break
         for i in range(springs):
             j = HEAD + WIDTH * i
-            kind, limit, locking = int(c[j + KIND]), c[j + LIMIT], c[j + LOCKING]
+            kind, shape, locking = int(c[j + KIND]), shape_at(c, j), c[j + LOCKING]
             e = lam
             if i:
                 if k:
                     status, xi[i - 1], part[i] = _cross(
-                        held, kind, limit, locking, c[j + RATE],
+                        held, kind, shape, locking, c[j + RATE],
                         xi[i - 1], stretch[k - 1], lam, dt, part[i], u,
                     )  # fmt: skip
                 e = lam / xi[i - 1]
@@ -155,7 +163,7 @@ def drive_by_stretch(
                 status = LOCKED
             if status != OK:
                 break
-            parts[i, k] = true_pull(held, kind, limit, s, 1.0 / s) / lam
+            parts[i, k] = true_pull(held, kind, shape, s, 1.0 / s) / lam
         if status != OK:
             reached = k
             break

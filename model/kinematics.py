@@ -24,6 +24,8 @@ __all__ = [
     "electric_slope",
     "pull_slope",
     "strain_and_pull",
+    "thickness",
+    "thickness_slope",
     "thinning",
     "thinning_squared",
     "thinning_squared_slope",
@@ -57,6 +59,26 @@ def pull_slope(held: int, e: float) -> float:
         return 1.0 + 2.0 * u * u * u
     u3 = u * u * u
     return 1.0 + 5.0 * u3 * u3
+
+
+@jit
+def thickness(held: int, e: float) -> float:
+    """Return lam3, the stretch of the thickness, of a spring at its own stretch ``e``."""
+    if held == 0:
+        return 1.0 / e
+    if held == 1:
+        return 1.0 / math.sqrt(e)
+    return 1.0 / (e * e)
+
+
+@jit
+def thickness_slope(held: int, e: float) -> float:
+    """Return d(lam3)/de."""
+    if held == 0:
+        return -1.0 / (e * e)
+    if held == 1:
+        return -0.5 / (e * math.sqrt(e))
+    return -2.0 / (e * e * e)
 
 
 @jit

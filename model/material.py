@@ -11,14 +11,14 @@ import numpy as np
 from dearig.model import coefficients as at
 from dearig.model.effects import NEUTRAL, PARAMETER_COUNT
 from dearig.model.errors import ModelError
-from dearig.model.network import HEAD
+from dearig.model.network import HEAD, shape_at
 from dearig.model.specimen import (
     STANDARD_GRAVITY,
     VACUUM_PERMITTIVITY,
     Film,
     Load,
 )
-from dearig.model.springs import SPRINGS, locking_strain
+from dearig.model.springs import LIMIT, SPRING_LAWS, SPRINGS, ShapeParameter, locking_strain
 
 __all__ = [
     "STANDARD_GRAVITY",
@@ -36,23 +36,59 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Spring:
-    """One spring: ``kind`` of strain energy, ``modulus`` in Pa, ``limit`` J (Gent) or n (links)."""
+    """One spring: ``kind`` of strain energy and ``modulus`` in Pa, the initial shear modulus.
+
+    ``limit`` is the locking limit of a law that has one: J, or the links n of a chain. ``shape``
+    are the law's other parameters in its order (``dearig.model.springs.SPRING_LAWS``); empty for
+    their neutral values.
+    """
 
     modulus: float
     limit: float = math.inf
     kind: str = "gent"
+    shape: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if self.kind not in SPRINGS:
             raise ModelError(f"spring: kind {self.kind!r} is not one of {', '.join(SPRINGS)}")
         if not (math.isfinite(self.modulus) and self.modulus >= 0.0):
             raise ModelError(f"spring: modulus = {self.modulus!r} Pa must be finite, 0 or more")
-        lowest = 1.0 if self.kind == "arruda-boyce" else 0.0
-        if not self.limit > lowest:
-            raise ModelError(f"spring ({self.kind}): limit = {self.limit!r} must be above {lowest}")
-        if math.isinf(self.limit) and self.kind != "neo-hookean":
-            # without a limit both other springs are the neo-Hookean one
+        law = SPRING_LAWS[self.kind]
+        others = law.parameters[law.has_limit :]
+        if not self.shape:
+            object.__setattr__(self, "shape", tuple(p.neutral for p in others))
+        if len(self.shape) != len(others):
+            raise ModelError(
+                f"spring ({self.kind}): shape = {self.shape!r} must be "
+                f"{len(others)} numbers ({', '.join(p.name for p in others) or 'none'})"
+            )
+        for parameter, value in self.values:
+            if not parameter.allows(value):
+                low, high = parameter.bounds
+                asked = (
+                    f"must be above {low}"
+                    if parameter.name == LIMIT
+                    else f"must be from {low:g} to {high:g}"
+                )
+                raise ModelError(f"spring ({self.kind}): {parameter.name} = {value!r} {asked}")
+        if math.isinf(self.limit) and self.kind in ("gent", "arruda-boyce"):
+            # without a limit these are the neo-Hookean one
             object.__setattr__(self, "kind", "neo-hookean")
+
+    @property
+    def values(self) -> tuple[tuple[ShapeParameter, float], ...]:
+        """The law's parameters beside the modulus, with their values."""
+        law = SPRING_LAWS[self.kind]
+        numbers = (self.limit, *self.shape) if law.has_limit else self.shape
+        return tuple(zip(law.parameters, numbers, strict=True))
+
+    @classmethod
+    def of(cls, kind: str, modulus: float, values: Sequence[float]) -> Spring:
+        """Return the spring with all parameters of its law, ``limit`` included, in its order."""
+        limited = SPRING_LAWS[kind].has_limit
+        return cls(
+            modulus, values[0] if limited else math.inf, kind, tuple(values[1 if limited else 0 :])
+        )
 
 
 @dataclass(frozen=True)
@@ -114,7 +150,8 @@ class Network:
             c[k + at.KIND] = kind
             c[k + at.MODULUS] = spring.modulus
             c[k + at.LIMIT] = spring.limit
-            c[k + at.LOCKING] = locking_strain(kind, spring.limit)
+            c[k + at.SHAPE : k + at.SHAPE + len(spring.shape)] = spring.shape
+            c[k + at.LOCKING] = locking_strain(kind, shape_at(c, k))
             if i:
                 # a branch that relaxes within a nanosecond carries no stress; 1/0 is avoided
                 c[k + at.RATE] = 1.0 / max(self.times[i - 1], 1e-9)

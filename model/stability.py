@@ -13,10 +13,10 @@ from collections.abc import Callable
 import numpy as np
 
 from dearig.model.actuator import Actuator
-from dearig.model.coefficients import ELECTRIC, FORCE, HELD, KIND, LIMIT, LOCKING, MODULUS
+from dearig.model.coefficients import ELECTRIC, FORCE, HELD, KIND, LOCKING, MODULUS
 from dearig.model.errors import ModelError
 from dearig.model.kinematics import electric, electric_slope, strain_and_pull
-from dearig.model.network import HEAD, nominal_pull, nominal_pull_slope
+from dearig.model.network import HEAD, nominal_pull, nominal_pull_slope, shape_at
 
 __all__ = ["pull_in_voltage", "static_stretch"]
 
@@ -59,7 +59,7 @@ def static_stretch(actuator: Actuator, voltage: float) -> float:
 
 def _pull(c: np.ndarray, lam: float) -> tuple[float, float]:
     """Stress in Pa that the field has to hold at stretch ``lam``, and its slope."""
-    spring = (int(c[HELD]), int(c[HEAD + KIND]), c[HEAD + LIMIT], c[HEAD + LOCKING], lam)
+    spring = (int(c[HELD]), int(c[HEAD + KIND]), shape_at(c, HEAD), c[HEAD + LOCKING], lam)
     modulus = c[HEAD + MODULUS]
     return modulus * nominal_pull(*spring) - c[FORCE], modulus * nominal_pull_slope(*spring)
 

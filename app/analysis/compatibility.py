@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import fields
 
@@ -13,6 +12,7 @@ from dearig.model.actuator import Actuator
 from dearig.model.errors import ModelError
 from dearig.model.film import Strip
 from dearig.model.material import Branch, Film, Load, Network, Spring
+from dearig.model.springs import SPRING_LAWS, SPRINGS
 from dearig.recording.assumed import assumed_of
 from dearig.recording.recording import Recording
 
@@ -28,13 +28,32 @@ __all__ = [
 #: Maxwell branches of a model, at most: no data of this kind determine more.
 BRANCHES_MAX = 8
 
+_WIDE_LIMIT = 1e4  # of a spring that does not stiffen
+_SIMPLE = ("neo-hookean", "gent", "arruda-boyce")  # of which the branches are made too
 
-def check_branches(count: int) -> None:
-    """Refuse a number of branches that cannot be fitted."""
-    if not 1 <= count <= BRANCHES_MAX:
+
+def check_branches(count: int, least: int = 1) -> None:
+    """Refuse a number of branches that cannot be fitted; ``least`` is 0 for an elastic film."""
+    if not least <= count <= BRANCHES_MAX:
         raise InputError(
-            f"{count} branches cannot be fitted; give a number from 1 to {BRANCHES_MAX}"
+            f"{count} branches cannot be fitted; give a number from {least} to {BRANCHES_MAX} "
+            f"branches"
         )
+
+
+def _network(branches: int, spring: str, branch_spring: str) -> Network:
+    """Return a network of that structure, practically neo-Hookean."""
+    for kind in (spring, branch_spring or spring):
+        if kind not in SPRINGS:
+            raise InputError(f"spring {kind!r} is not one of {', '.join(SPRINGS)}")
+
+    def one(kind: str) -> Spring:
+        law = SPRING_LAWS[kind]
+        wide = (_WIDE_LIMIT, *law.neutral[1:]) if law.has_limit else law.neutral
+        return Spring.of(kind, 1e5, wide)
+
+    other = branch_spring or (spring if spring in _SIMPLE else "gent")
+    return Network(one(spring), tuple(Branch(one(other), 1.0) for _ in range(branches)))
 
 
 def base_model(
@@ -43,13 +62,14 @@ def base_model(
     spring: str,
     rest_length_mm: float | None,
     rig_file: RigFile | None,
+    branch_spring: str = "",
 ) -> Actuator | Strip:
-    """Return the model to fit; its structure matters, its parameter values do not."""
-    limit = {"neo-hookean": math.inf, "gent": 1e4, "arruda-boyce": 1e4}.get(spring)
-    if limit is None:
-        raise InputError(f"spring {spring!r} is not one of neo-hookean, gent, arruda-boyce")
-    one = Spring(1e5, limit, spring)
-    network = Network(one, tuple(Branch(one, 1.0) for _ in range(branches)))
+    """Return the model to fit; its structure matters, its parameter values do not.
+
+    ``spring`` is the strain energy of the equilibrium spring, ``branch_spring`` that of the
+    branches: by default the same where it is one of the thesis's three, else Gent's.
+    """
+    network = _network(branches, spring, branch_spring)
     if recordings[0].kind == "film":
         held = {r.kinematics for r in recordings}
         if len(held) > 1:

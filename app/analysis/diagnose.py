@@ -74,6 +74,8 @@ def diagnose_recordings(
     *,
     validation: Sequence[Source] = (),
     branches: int = 3,
+    spring: str = "gent",
+    branch_spring: str = "",
     drive: str = "command",
     rig_file: RigFile | None = None,
     thorough: bool = False,
@@ -84,7 +86,8 @@ def diagnose_recordings(
     """Find the effects that the thesis's model of ``train`` lacks.
 
     The ``validation`` recordings are read last, and play no part in the search. ``progress``
-    receives the fraction of the whole work. ``ended_early`` is keep, cut or leave-out: what is done
+    receives the fraction of the whole work. ``spring`` and ``branch_spring`` are the strain
+    energies of the baseline. ``ended_early`` is keep, cut or leave-out: what is done
     with recordings whose runs ended early. A search that is not ``thorough`` ends after about a
     minute. The first ctrl-C ends it and keeps what was found (``finding.interrupted``); the second
     raises. Nothing is written; ``save_fitted_model`` writes the improved model. Raises
@@ -92,7 +95,7 @@ def diagnose_recordings(
     """
     started = clock()
     check_named_once(train, validation)
-    settings = _Settings(branches, drive, rig_file, thorough, ended_early)
+    settings = _Settings(branches, spring, branch_spring, drive, rig_file, thorough, ended_early)
     recordings, left_out = choose(open_all(train), ended_early)
     others, also_left_out = choose(open_all(validation), ended_early)
     base, quality = _prepared(recordings, others, settings)
@@ -109,6 +112,8 @@ def diagnose_rig(
     train: Sequence[Source] = (),
     validation: Sequence[Source] = (),
     branches: int = 3,
+    spring: str = "gent",
+    branch_spring: str = "",
     drive: str = "command",
     rig_file: RigFile | None = None,
     configuration: str = "",
@@ -131,7 +136,7 @@ def diagnose_rig(
     """
     started = clock()
     check_named_once(train, validation)
-    settings = _Settings(branches, drive, rig_file, thorough, ended_early)
+    settings = _Settings(branches, spring, branch_spring, drive, rig_file, thorough, ended_early)
     names = [*([] if train else ["thesis"]), *(_experiment_name(n) for n in range(experiments))]
     planned = [*names, *([] if validation else VALIDATION)]
     for name in planned:
@@ -172,6 +177,8 @@ class _Settings:
     """Settings of a diagnosis, as of ``diagnose_recordings``."""
 
     branches: int
+    spring: str
+    branch_spring: str
     drive: str
     rig_file: RigFile | None
     thorough: bool
@@ -291,7 +298,10 @@ def _prepared(
     """Return the baseline to fit, and sentences on the recordings. Raises ``InputError``."""
     check_branches(settings.branches)
     check_apart(recordings, others)
-    base = base_model(recordings, settings.branches, "gent", None, settings.rig_file)
+    base = base_model(
+        recordings, settings.branches, settings.spring, None, settings.rig_file,
+        settings.branch_spring,
+    )  # fmt: skip
     said = [
         f"{r.name}: {sentence}"
         for r in (*recordings, *others)

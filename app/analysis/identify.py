@@ -22,6 +22,7 @@ from dearig.analysis.outcomes import (
     BranchTrial,
     Comparison,
     IdentifyOutcome,
+    SpringCandidate,
     budget_table,
     covariance_table,
     pooled_over_noise,
@@ -39,14 +40,19 @@ from dearig.analysis.records import (
 from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
+from dearig.model.diagnosis.spring_choice import choose_springs
 from dearig.model.errors import ModelError
 from dearig.model.fitting import Identification, add_intervals, identify, with_budget
 from dearig.model.material import Network
 from dearig.model.records import Record
+from dearig.model.springs import SPRINGS
 from dearig.progress import Progress, quiet
 from dearig.recording.recording import Recording
 
-__all__ = ["identify_recordings"]
+__all__ = ["CHOOSE", "identify_recordings"]
+
+#: In place of a strain energy: the most probable one.
+CHOOSE = "choose"
 
 
 @for_simulations()
@@ -57,6 +63,7 @@ def identify_recordings(
     method: str = "hybrid",
     branches: Sequence[int] = (3,),
     spring: str = "gent",
+    branch_spring: str = "",
     drive: str = "command",
     rest_length_mm: float | None = None,
     rig_file: RigFile | None = None,
@@ -71,6 +78,9 @@ def identify_recordings(
     With several numbers of ``branches`` each is fitted, and the one with the lowest information
     criterion on the training data is kept; the ``validation`` recordings are read once, at the end,
     and play no part in the choice. Film and load come from the recordings, else from ``rig_file``.
+    ``spring`` is the strain energy of the equilibrium spring; with ``choose`` each one is fitted
+    with each number of branches, and the most probable on the training data is kept
+    (``choose_springs``). ``branch_spring`` is that of the branches, "" for the usual one.
     ``ended_early`` is keep, cut or leave-out: what is done with recordings whose runs ended early.
     ``clock`` gives seconds. Nothing is written; ``save_fitted_model`` writes the model. Raises
     ``InputError`` for everything that cannot be fitted.
@@ -83,14 +93,22 @@ def identify_recordings(
     check_apart(recordings, others)
     records = [as_record(r, drive) for r in recordings]
     for count in branches:
-        check_branches(count)
+        check_branches(count, least=0 if recordings[0].kind == "film" else 1)
     counts = sorted(set(branches))
+
+    def base_of(count: int, spring: str) -> Any:
+        return base_model(recordings, count, spring, rest_length_mm, rig_file, branch_spring)
+
+    springs: tuple[SpringCandidate, ...] = ()
+    if spring == CHOOSE:
+        springs = _spring_candidates(records, recordings, others, base_of, counts, drive, progress)
+        best_one = next(s for s in springs if s.chosen)
+        spring, counts = best_one.spring, [best_one.branches]
     alone = len(counts) == 1
 
-    def base_of(count: int) -> Any:
-        return base_model(recordings, count, spring, rest_length_mm, rig_file)
-
-    fits = _fits(records, base_of, counts, method, seed, intervals and alone, progress)
+    fits = _fits(
+        records, lambda n: base_of(n, spring), counts, method, seed, intervals and alone, progress
+    )
     # one number of independent samples for all, from the fit with the least structured residual
     correlation = max(1.0, min(fit.correlation for fit in fits))
     scores = [_bic(fit, records, correlation) for fit in fits]
@@ -122,12 +140,52 @@ def identify_recordings(
         train=tuple(compared),
         validation=tuple(validated),
         trials=tuple(trials),
+        springs=springs,
         seconds=seconds,
         quality=(*left_out, *also_left_out, *noise_sentences((*recordings, *others))),
         few_data=few_data(recordings, drive),
         assumed=assumed_by(recordings, rig_file),
         published_fit=PUBLISHED_FIT if is_thesis_run else None,
     )
+
+
+def _spring_candidates(
+    records: Sequence[Record],
+    train: Sequence[Recording],
+    others: Sequence[Recording],
+    base_of: Callable[[int, str], Any],
+    counts: Sequence[int],
+    drive: str,
+    progress: Progress,
+) -> tuple[SpringCandidate, ...]:
+    """Return every strain energy with every number of branches, the most probable first.
+
+    ``others`` are read here too, but for each candidate's error alone.
+    """
+    kinds = [(kind, count) for kind in SPRINGS for count in counts]
+    try:
+        trials = choose_springs(records, [base_of(n, k) for k, n in kinds], progress=progress)
+    except ModelError as error:
+        raise InputError(f"these recordings cannot be fitted: {error}") from error
+    found: list[SpringCandidate] = []
+    for trial in sorted(trials, key=lambda t: t.criterion):
+        checked = [compare(r, trial.model, "validation", drive) for r in others]
+        fitted = [compare(r, trial.model, "train", drive) for r in train]
+        found.append(
+            SpringCandidate(
+                spring=trial.kind,
+                branches=len(trial.model.network.branches),
+                free=trial.free,
+                criterion=trial.criterion,
+                probability=trial.probability,
+                train_rms=_pooled(fitted),
+                left_out_rms=trial.left_out_rms,
+                validation_rms=_pooled(checked) if checked else None,
+                validation_peak_pct=_mean_peak(checked) if checked else None,
+                chosen=not found,
+            )
+        )
+    return tuple(found)
 
 
 def _fits(

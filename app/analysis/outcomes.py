@@ -32,6 +32,7 @@ __all__ = [
     "IdentifyOutcome",
     "Published",
     "SeparatingExperiment",
+    "SpringCandidate",
     "Stand",
     "ValidateOutcome",
     "budget_table",
@@ -148,6 +149,28 @@ class BranchTrial:
 
 
 @dataclass(frozen=True)
+class SpringCandidate:
+    """One strain energy with one number of branches: evidence on the training data, and errors.
+
+    ``criterion`` is minus twice the logarithm of the evidence, above the least of all candidates;
+    the probabilities of all add up to 1. Errors are RMS in Pa or m: of the fit, of each tenth of
+    the training data predicted by a fit to the others, and of the validation data, which have no
+    part in the choice.
+    """
+
+    spring: str
+    branches: int
+    free: int
+    criterion: float
+    probability: float
+    train_rms: float
+    left_out_rms: float
+    validation_rms: float | None
+    validation_peak_pct: float | None
+    chosen: bool
+
+
+@dataclass(frozen=True)
 class IdentifyOutcome:
     """A finished identification: fit, training runs, and validation runs if any.
 
@@ -166,6 +189,7 @@ class IdentifyOutcome:
     validation: tuple[Comparison, ...]
     trials: tuple[BranchTrial, ...]
     seconds: float
+    springs: tuple[SpringCandidate, ...] = ()
     model_path: str = ""
     quality: tuple[str, ...] = ()
     few_data: str = ""

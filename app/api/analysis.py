@@ -45,6 +45,7 @@ def identify(
     method: str = "hybrid",
     branches: int | Iterable[int] = 3,
     spring: str = "gent",
+    branch_spring: str = "",
     drive: str = "command",
     rest_length_mm: float | None = None,
     rig_file: RigSource | None = None,
@@ -67,7 +68,12 @@ def identify(
         Number of Maxwell branches; of several the one with the lowest information criterion on the
         fitted recordings is kept.
     spring : str
-        Strain energy: ``gent``, ``neo-hookean`` or ``arruda-boyce``.
+        Strain energy of the equilibrium spring: ``gent``, ``neo-hookean``, ``arruda-boyce``,
+        ``yeoh``, ``mooney-rivlin``, ``ogden``, ``ogden-two-terms``, ``extended-tube``; or
+        ``choose`` for the most probable one on the fitted recordings.
+    branch_spring : str
+        Strain energy of the branches: by default as ``spring`` where that is one of the first
+        three, else ``gent``.
     drive : str
         Voltage that drives the model: ``command`` or ``monitor``.
     rest_length_mm : float, optional
@@ -95,6 +101,7 @@ def identify(
         method=method,
         branches=[branches] if isinstance(branches, int) else list(branches),
         spring=spring,
+        branch_spring=branch_spring,
         drive=drive,
         rest_length_mm=rest_length_mm,
         rig_file=None if rig_file is None else load_rig(rig_file)[0],
@@ -148,6 +155,8 @@ def diagnose(
     *,
     validate: Recordings = (),
     branches: int = 3,
+    spring: str = "gent",
+    branch_spring: str = "",
     drive: str = "command",
     rig_file: RigSource | None = None,
     thorough: bool = False,
@@ -164,6 +173,8 @@ def diagnose(
         Read once at the end: errors before and after on what no fit has used.
     branches : int
         Number of Maxwell branches of the baseline.
+    spring, branch_spring : str
+        Strain energies of the baseline, as of ``identify``.
     drive : str
         Voltage that drives the model: ``command`` or ``monitor``.
     rig_file : path or mapping, optional
@@ -186,6 +197,8 @@ def diagnose(
         _some(recordings),
         validation=_listed(validate),
         branches=branches,
+        spring=spring,
+        branch_spring=branch_spring,
         drive=drive,
         rig_file=None if rig_file is None else load_rig(rig_file)[0],
         thorough=thorough,

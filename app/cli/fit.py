@@ -22,6 +22,7 @@ from dearig.cli.options import (
     Report,
     RigFileOption,
     Seed,
+    SpringChoice,
     SpringKind,
     Validation,
 )
@@ -48,6 +49,14 @@ Train = Annotated[
 ]
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL.toml", help="A model file.")]
 
+BranchSpring = Annotated[
+    SpringKind | None,
+    typer.Option(
+        help="Strain energy of the branches.",
+        show_default="as --spring where it is gent, neo-hookean or arruda-boyce, else gent",
+    ),
+]
+
 # ---------------------------------------------------------------- options of diagnose
 
 OptionalTrain = Annotated[
@@ -60,6 +69,9 @@ ModelOut = Annotated[
 ]
 BaselineBranches = Annotated[
     int, typer.Option(help="Number of Maxwell branches of the baseline model.")
+]
+BaselineSpring = Annotated[
+    SpringKind, typer.Option(help="Strain energy of the baseline's equilibrium spring.")
 ]
 RigToRecordOn = Annotated[
     str | None,
@@ -140,7 +152,14 @@ def identify(
     ] = Method.hybrid,
     validate_: Validation = None,
     branches: Branches = "3",
-    spring: Annotated[SpringKind, typer.Option(help="Strain energy.")] = SpringKind.gent,
+    spring: Annotated[
+        SpringChoice,
+        typer.Option(
+            help="Strain energy of the equilibrium spring; choose fits each and keeps the most "
+            "probable one."
+        ),
+    ] = SpringChoice.gent,
+    branch_spring: BranchSpring = None,
     drive: Drive = DriveChannel.command,
     rest_length_mm: Annotated[
         float | None,
@@ -166,7 +185,7 @@ def identify(
     """
     from dearig.analysis.identify import identify_recordings
     from dearig.analysis.outcomes import save_fitted_model
-    from dearig.cli.terminal import branch_table, identify_table
+    from dearig.cli.terminal import branch_table, identify_table, spring_table
     from dearig.config.rigfile import load_rig_file
     from dearig.report.as_json import outcome_json
 
@@ -180,6 +199,7 @@ def identify(
             method=method.value,
             branches=numbers,
             spring=spring.value,
+            branch_spring="" if branch_spring is None else branch_spring.value,
             drive=drive.value,
             rest_length_mm=rest_length_mm,
             rig_file=None if rig_file is None else load_rig_file(rig_file),
@@ -193,6 +213,8 @@ def identify(
             from dearig.report.html import write_identify_report
 
             write_identify_report(outcome, report)
+    if outcome.springs:
+        console.print(spring_table(outcome))
     if outcome.trials:
         console.print(branch_table(outcome))
     console.print(identify_table(outcome))
@@ -212,10 +234,10 @@ def _branches(text: str) -> list[int]:
     low, high = int(found[1]), int(found[2] or found[1])
     if low > high:
         raise InputError(f"--branches {text} goes from more to fewer; write {high}-{low}")
-    if not (low >= 1 and high <= BRANCHES_MAX):
+    if high > BRANCHES_MAX:
         raise InputError(
-            f"--branches {text}: a model has from 1 to {BRANCHES_MAX} branches; write such a "
-            f"number, or a range such as 1-4"
+            f"--branches {text}: a model has from 1 to {BRANCHES_MAX} branches, a film also 0; "
+            f"write such a number, or a range such as 1-4"
         )
     return list(range(low, high + 1))
 
@@ -256,6 +278,8 @@ def diagnose(
     report: Report = None,
     model_out: ModelOut = None,
     branches: BaselineBranches = 3,
+    spring: BaselineSpring = SpringKind.gent,
+    branch_spring: BranchSpring = None,
     drive: Drive = DriveChannel.command,
     rig_file: RigFileOption = None,
     rig: RigToRecordOn = None,
@@ -290,6 +314,7 @@ def diagnose(
         force, (*given, *others, rig_file), *optional(report), *optional(model_out), json=json
     )
     settings = None if rig_file is None else load_rig_file(rig_file)
+    of_branches = "" if branch_spring is None else branch_spring.value
     if rig is not None:
         result_folder(out, force)
         report, model_out = report or out / "report.html", model_out or out / "model.toml"
@@ -297,14 +322,15 @@ def diagnose(
         print_early_ends(console, [*given, *others], ended_early.value)
         if rig is None:
             outcome = diagnose_recordings(
-                given, validation=others, branches=branches, drive=drive.value,
-                rig_file=settings, thorough=thorough, ended_early=ended_early.value,
-                progress=progress,
+                given, validation=others, branches=branches, spring=spring.value,
+                branch_spring=of_branches, drive=drive.value, rig_file=settings,
+                thorough=thorough, ended_early=ended_early.value, progress=progress,
             )  # fmt: skip
         else:
             outcome = diagnose_rig(
                 rig, out, experiments=experiments, train=given, validation=others,
-                branches=branches, drive=drive.value, rig_file=settings,
+                branches=branches, spring=spring.value, branch_spring=of_branches,
+                drive=drive.value, rig_file=settings,
                 configuration="" if rig_file is None else read_text(rig_file, "rig file"),
                 seed=seed, thorough=thorough, ended_early=ended_early.value, overwrite=force,
                 progress=progress,

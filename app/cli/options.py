@@ -31,6 +31,7 @@ __all__ = [
     "Rig",
     "RigFileOption",
     "Seed",
+    "SpringChoice",
     "SpringKind",
     "Validation",
 ]
@@ -49,6 +50,25 @@ class SpringKind(StrEnum):
     gent = "gent"
     neo_hookean = "neo-hookean"
     arruda_boyce = "arruda-boyce"
+    yeoh = "yeoh"
+    mooney_rivlin = "mooney-rivlin"
+    ogden = "ogden"
+    ogden_two_terms = "ogden-two-terms"
+    extended_tube = "extended-tube"
+
+
+class SpringChoice(StrEnum):
+    """Strain energies, and their choice by the evidence."""
+
+    gent = "gent"
+    neo_hookean = "neo-hookean"
+    arruda_boyce = "arruda-boyce"
+    yeoh = "yeoh"
+    mooney_rivlin = "mooney-rivlin"
+    ogden = "ogden"
+    ogden_two_terms = "ogden-two-terms"
+    extended_tube = "extended-tube"
+    choose = "choose"
 
 
 class DriveChannel(StrEnum):

@@ -31,6 +31,7 @@ from dearig.report.tables import (
     by_thesis_table,
     error_table,
     parameter_table,
+    spring_candidates,
     thesis_error_table,
 )
 
@@ -96,6 +97,11 @@ def branch_table(outcome: IdentifyOutcome) -> RenderableType:
     if not outcome.trials:
         return Group()
     return _Fitted([branch_trials(outcome.trials, outcome.kind)], ())
+
+
+def spring_table(outcome: IdentifyOutcome) -> RenderableType:
+    """Return the strain energies that were compared."""
+    return _Fitted([spring_candidates(outcome.springs, outcome.kind)], ())
 
 
 def track_table(outcome: TrackOutcome) -> RenderableType:

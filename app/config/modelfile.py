@@ -18,6 +18,7 @@ from dearig.model.effects import EFFECTS
 from dearig.model.errors import ModelError
 from dearig.model.film import Strip
 from dearig.model.material import Branch, Film, Load, Network, Spring
+from dearig.model.springs import LIMIT, SPRING_LAWS
 from dearig.recording.files import check_output, replaced_when_done
 
 __all__ = ["FORMAT", "ModelFile", "load_actuator", "load_model", "model_toml", "save_model"]
@@ -29,7 +30,10 @@ FORMAT = "dearig-model/1"
 PARTS_MAX = 100
 
 _Positive = Annotated[float, Field(gt=0.0)]
-_Kind = Literal["neo-hookean", "gent", "arruda-boyce"]
+_Kind = Literal[
+    "neo-hookean", "gent", "arruda-boyce", "yeoh", "mooney-rivlin", "ogden", "ogden-two-terms",
+    "extended-tube",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -74,9 +78,28 @@ class _Spring(Table):
     spring: _Kind = "gent"
     modulus_Pa: Annotated[float, Field(ge=0.0)]
     limit: _Positive | None = None
+    exponent: float | None = None
+    second_exponent: float | None = None
+    share: float | None = None
+    release: float | None = None
+    quadratic: float | None = None
+    cubic: float | None = None
 
     def build(self) -> Spring:
-        return Spring(self.modulus_Pa, math.inf if self.limit is None else self.limit, self.spring)
+        law = SPRING_LAWS[self.spring]
+        names = [p.name for p in law.parameters if p.name != LIMIT]
+        for name in _SHAPES:
+            if name not in names and getattr(self, name) is not None:
+                takes = ", ".join(p.name for p in law.parameters) or "nothing"
+                raise ModelError(f"spring ({self.spring}): {name} is not its key: it takes {takes}")
+            if name in names and getattr(self, name) is None:
+                raise ModelError(f"spring ({self.spring}): {name} is missing")
+        limit = math.inf if self.limit is None else self.limit
+        return Spring(self.modulus_Pa, limit, self.spring, tuple(getattr(self, n) for n in names))
+
+
+#: Keys of the parameters of all strain energies, beside the limit.
+_SHAPES = [name for name in _Spring.model_fields if name not in ("spring", "modulus_Pa", "limit")]
 
 
 class _Branch(_Spring):
@@ -238,6 +261,7 @@ def _spring_table(spring: Spring) -> dict[str, Any]:
     table: dict[str, Any] = {"spring": spring.kind, "modulus_Pa": spring.modulus}
     if math.isfinite(spring.limit):
         table["limit"] = spring.limit
+    table |= {p.name: value for p, value in spring.values if p.name != LIMIT}
     return table
 
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         DiagnoseOutcome,
         IdentifyOutcome,
         Published,
+        SpringCandidate,
         Stand,
         ValidateOutcome,
     )
@@ -68,6 +69,7 @@ def outcome_json(outcome: IdentifyOutcome | ValidateOutcome) -> dict[str, Any]:
         "train": [_comparison_json(c) for c in outcome.train],
         "validation": [_comparison_json(c) for c in outcome.validation],
         "trials": [_trial_json(t, outcome.kind) for t in outcome.trials],
+        "springs": [_spring_json(s, outcome.kind) for s in outcome.springs],
         "published_fit": _published_json(outcome.published_fit),
         "simulations": int(fit.simulations),
         "few_data": outcome.few_data,
@@ -150,6 +152,26 @@ def _published_json(published: Published | None) -> dict[str, Any] | None:
     if published is None:
         return None
     return {"e_rms_pct": _number(published.e_rms_pct), "e_m_pct": _number(published.e_m_pct)}
+
+
+def _spring_json(candidate: SpringCandidate, kind: str) -> dict[str, Any]:
+    shown = SHOWN[kind]
+
+    def error(value: float | None) -> float | None:
+        return None if value is None else _number(value * shown.error_factor)
+
+    return {
+        "spring": candidate.spring,
+        "branches": int(candidate.branches),
+        "free": int(candidate.free),
+        "criterion": _number(candidate.criterion),
+        "probability": _number(candidate.probability),
+        f"train_rms_{shown.suffix}": error(candidate.train_rms),
+        f"left_out_rms_{shown.suffix}": error(candidate.left_out_rms),
+        f"validation_rms_{shown.suffix}": error(candidate.validation_rms),
+        "validation_peak_pct": _number(candidate.validation_peak_pct),
+        "chosen": bool(candidate.chosen),
+    }
 
 
 def _trial_json(trial: BranchTrial, kind: str) -> dict[str, Any]:

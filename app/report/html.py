@@ -28,6 +28,7 @@ from dearig.report.tables import (
     by_thesis_table,
     error_table,
     parameter_table,
+    spring_candidates,
     thesis_error_table,
 )
 from dearig.units import SHOWN
@@ -210,8 +211,10 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
         pictures.append(("Validation", _comparison_pictures(outcome.validation, prefixes)))
     branch_tables: tuple[Table, ...] = ()
     branch_pictures: tuple[Picture, ...] = ()
+    if outcome.springs:
+        branch_tables = (spring_candidates(outcome.springs, outcome.kind),)
     if outcome.trials:
-        branch_tables = (branch_trials(outcome.trials, outcome.kind),)
+        branch_tables = (*branch_tables, branch_trials(outcome.trials, outcome.kind))
         branch_pictures = (
             picture(
                 branches_figure(outcome.trials, outcome.kind),

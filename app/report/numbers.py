@@ -40,7 +40,7 @@ _PLAIN = str.maketrans(
         "\N{PLUS-MINUS SIGN}": "+-",
     }
 )
-_NAMED = re.compile(r"(mu|J|T)_(\d+)")
+_NAMED = re.compile(r"(mu|alpha|beta|share|c2|c3|J|T)_(\d+)")
 _DIGITS_MAX = 6  # significant digits of a value
 _WIDE = 5.0  # ratio of its ends above which an interval gives no digits
 

@@ -8,10 +8,16 @@ from typing import TYPE_CHECKING
 from dearig.analysis.outcomes import noise_from, pooled_noise, pooled_over_noise, pooled_rms
 from dearig.model.noise import LEAD_IN
 from dearig.report.numbers import seconds, significant, symbol
+from dearig.report.spring_names import spring_name
 from dearig.units import SHOWN
 
 if TYPE_CHECKING:
-    from dearig.analysis.outcomes import Comparison, IdentifyOutcome, ValidateOutcome
+    from dearig.analysis.outcomes import (
+        Comparison,
+        IdentifyOutcome,
+        SpringCandidate,
+        ValidateOutcome,
+    )
     from dearig.model.actuator import Actuator
     from dearig.model.film import Strip
     from dearig.model.fitting import Identification
@@ -31,6 +37,7 @@ _METHODS = {
     "de": "the thesis's Algorithm 1 (differential evolution) as printed",
 }
 _NAMES_MAX = 6  # more recordings than this are counted and not named
+_LIKELY = 0.05  # a strain energy that is less probable is not named
 # RMS over noise floor below which the residual is almost only noise, and mostly noise
 _AT_NOISE, _NEAR_NOISE = 1.1, 1.5
 
@@ -57,8 +64,7 @@ def describe_model(model: Actuator | Strip) -> str:
     """Return springs, branches and effects of a model in a few words."""
     network = model.network
     kinds = sorted({s.kind for s in network.springs})
-    names = {"gent": "Gent", "neo-hookean": "neo-Hookean", "arruda-boyce": "Arruda-Boyce"}
-    springs = listed(names.get(k, k) for k in kinds)
+    springs = listed(map(spring_name, kinds))
     words = f"{springs} springs with {_counted(len(network.branches), 'relaxation branch')}"
     words = words.replace("branchs", "branches")
     effects = [name for name, _ in model.effects]
@@ -87,6 +93,7 @@ def identify_summary(outcome: IdentifyOutcome) -> tuple[str, ...]:
             f"{outcome.published_fit.e_m_pct:g} % for its own fit; by the same formulas this one "
             f"has {_worst(train, 'e_rms_thesis_pct')} and {_worst(train, 'e_m_thesis_pct')}."
         )
+    said += _spring_sentence(outcome.springs)
     chosen = [t for t in outcome.trials if t.chosen]
     if chosen:
         tried = listed(str(t.branches) for t in outcome.trials)
@@ -98,6 +105,26 @@ def identify_summary(outcome: IdentifyOutcome) -> tuple[str, ...]:
         said.append(few_data_sentence(outcome.few_data))
     said.append(undetermined_sentence(outcome.fit))
     return tuple(said)
+
+
+def _spring_sentence(candidates: Sequence[SpringCandidate]) -> list[str]:
+    """Return a sentence on the strain energy that was chosen; none where there was no choice."""
+    if not candidates:
+        return []
+    # the same energy with other numbers of branches counts as one
+    odds: dict[str, float] = {}
+    for candidate in candidates:
+        odds[candidate.spring] = odds.get(candidate.spring, 0.0) + candidate.probability
+    chosen = next(c.spring for c in candidates if c.chosen)
+    rest = listed(
+        f"{spring_name(kind)} ({p:.2f})"
+        for kind, p in sorted(odds.items(), key=lambda item: -item[1])
+        if kind != chosen and p >= _LIKELY
+    )
+    return [
+        f"Of {len(odds)} strain energies the training data ask for {spring_name(chosen)}, with "
+        f"probability {odds[chosen]:.2f}" + (f"; not excluded: {rest}." if rest else ".")
+    ]
 
 
 def few_data_sentence(few: str) -> str:

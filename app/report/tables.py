@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dearig.report.numbers import NO_VALUE, interval, quoted, significant, symbol
+from dearig.report.spring_names import spring_name
 from dearig.report.thesis import table_3
 from dearig.units import SHOWN, parameter_unit
 
 if TYPE_CHECKING:
-    from dearig.analysis.outcomes import BranchTrial, Comparison, Published
+    from dearig.analysis.outcomes import BranchTrial, Comparison, Published, SpringCandidate
     from dearig.model.fitting import Identification
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "by_thesis_table",
     "error_table",
     "parameter_table",
+    "spring_candidates",
     "thesis_error_table",
 ]
 
@@ -201,6 +203,43 @@ def parameter_table(fit: Identification) -> Table:
     if published:
         notes.append("Branches, also those of Table 3, are sorted by relaxation time.")
     return Table("Parameters", tuple(head), tuple(rows), " ".join(notes))
+
+
+def spring_candidates(candidates: Sequence[SpringCandidate], kind: str) -> Table:
+    """Return evidence and errors of each strain energy."""
+    shown = SHOWN[kind]
+
+    def error(value: float | None) -> str:
+        return NO_VALUE if value is None else significant(value * shown.error_factor)
+
+    several = len({c.branches for c in candidates}) > 1
+    rows = []
+    for c in candidates:
+        name = spring_name(c.spring) + (f", {c.branches} branches" if several else "")
+        cells = (
+            f"{name}{' *' if c.chosen else ''}",
+            f"{c.free}",
+            significant(c.criterion),
+            f"{c.probability:.2f}",
+            error(c.train_rms),
+            error(c.left_out_rms),
+            error(c.validation_rms),
+        )
+        rows.append(Row(cells, mark=c.chosen))
+    head = (
+        ("Spring", ""),
+        ("Free", ""),
+        ("Criterion", "above best"),
+        ("Prob.", ""),
+        ("Training", shown.error_unit),
+        ("Left out", shown.error_unit),
+        ("Validation", shown.error_unit),
+    )
+    note = (
+        "* chosen by the evidence in the training data. Left out: each tenth of the training data, "
+        "predicted by a fit to the others. Validation data are not used for the choice."
+    )
+    return Table("Strain energies", head, tuple(rows), note)
 
 
 def branch_trials(trials: Sequence[BranchTrial], kind: str) -> Table:

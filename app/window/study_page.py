@@ -26,6 +26,7 @@ from PySide6.QtWidgets import (
 from dearig.analysis.compatibility import BRANCHES_MAX
 from dearig.analysis.study import Study, Task
 from dearig.errors import InputError
+from dearig.model.springs import SPRINGS
 from dearig.recording.files import check_output, replaced_when_done
 from dearig.report.study_file import StudyEntry, make_study, open_study, studies_in
 from dearig.report.study_view import StudyView, view_of
@@ -44,7 +45,7 @@ from dearig.window.worker import Job, Worker
 
 __all__ = ["StudyPage"]
 
-_SPRINGS = ("gent", "neo-hookean", "arruda-boyce")
+_SPRINGS = ("gent", *(kind for kind in SPRINGS if kind != "gent"))
 _DRIVES = (("commanded voltage", "command"), ("monitored voltage", "monitor"))
 _ENDED_EARLY = (
     ("Cut the end that may show a fault", "cut"),

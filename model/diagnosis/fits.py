@@ -34,7 +34,7 @@ from dearig.model.fitting.parameters import Layout
 from dearig.model.fitting.search import voltage_starts
 from dearig.model.records import ActuatorRecord, Record, counted
 
-__all__ = ["DRIFT", "Fit", "Fitter", "Work", "with_effect"]
+__all__ = ["DRIFT", "Fit", "Fitter", "Work", "fit_of", "with_effect"]
 
 #: How the marginalised drift is named among the members of a fit.
 DRIFT = "drift"
@@ -271,7 +271,7 @@ class Fitter:
                 for q in layout.quantities
             ]
         )
-        held[layout.column("J")] = True
+        held[layout.shapes] = True
         if self._limits.size:
             held[: self._limits.size] = self._limits
         return held

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -37,7 +38,7 @@ from dearig.model.film import Strip, unit_stresses
 from dearig.model.kernel import OK, read_sensor
 from dearig.model.kernel.balance import carried_stress, effect_inertia
 from dearig.model.kinematics import electric_along
-from dearig.model.material import Branch, Network, Spring
+from dearig.model.material import Branch, Network
 from dearig.model.network import HEAD
 from dearig.model.records import ActuatorRecord, FilmRecord
 
@@ -61,10 +62,11 @@ def springs_of_grid(model: Actuator | Strip, grid: np.ndarray) -> Network:
     """
     springs = model.network.springs
     wide = isinstance(model, Actuator)
-    first = _WIDE_LIMIT if wide else springs[0].limit
-    limit = _WIDE_LIMIT if wide else max(s.limit for s in springs[1:])
-    branches = tuple(Branch(Spring(1.0, limit, springs[-1].kind), float(t)) for t in grid)
-    return Network(Spring(1.0, first, springs[0].kind), branches)
+    first, last = springs[0], max(springs[1:], key=lambda s: s.limit)
+    if wide:
+        first, last = (replace(s, limit=_WIDE_LIMIT) for s in (first, last))
+    branch = replace(last, modulus=1.0)
+    return Network(replace(first, modulus=1.0), tuple(Branch(branch, float(t)) for t in grid))
 
 
 def without_sensor(record: ActuatorRecord, model: Actuator, smoothing: float) -> np.ndarray:

@@ -233,14 +233,13 @@ def fit_globally(
 ) -> tuple[LocalFit, np.ndarray]:
     """Fit by global search, descents, then the limits; return the fit and what is held (d,).
 
-    The locking limits of an actuator are first held where springs do not stiffen: at a few per cent
-    of strain they are undetermined and distort the relaxation times. They are freed at the end, and
-    stay free only if that lowers chi-square significantly. Those of a film are free
-    unless ``stiffening`` is False.
+    The limits and shapes of the strain energies of an actuator are first held where springs are
+    neo-Hookean: at a few per cent of strain they are undetermined and distort the relaxation times.
+    They are freed at the end, and stay free only if that lowers chi-square significantly. Those of
+    a film are free unless ``stiffening`` is False.
     """
     layout = problem.layout
-    limits = np.zeros(layout.size, dtype=bool)
-    limits[layout.column("J")] = True
+    limits = layout.shapes
     driven_by_voltage = isinstance(layout.base, Actuator)
     first = limits if driven_by_voltage or not stiffening else np.zeros_like(limits)
     progress("global search", 0.0)

@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dearig.model.actuator import Actuator
-from dearig.model.coefficients import FORCE, HELD, KIND, LIMIT, LOCKING, MODULUS, RATE, WIDTH
+from dearig.model.coefficients import (
+    FORCE,
+    HELD,
+    KIND,
+    LIMIT,
+    LOCKING,
+    MODULUS,
+    RATE,
+    SHAPE,
+    WIDTH,
+)
 from dearig.model.effects import EFFECTS, PLACES, EffectValues, Parameter, any_hysteretic
 from dearig.model.errors import ModelError
 from dearig.model.film import Strip
 from dearig.model.material import Branch, Network, Spring
-from dearig.model.network import HEAD, nominal_pull
-from dearig.model.springs import SPRINGS, locking_strain
+from dearig.model.network import HEAD, nominal_pull, shape_at
+from dearig.model.springs import LIMIT as LIMIT_NAME
+from dearig.model.springs import SPRING_LAWS, SPRINGS, ShapeParameter, locking_strain
 
 __all__ = [
     "NORMAL_95",
@@ -33,58 +45,80 @@ THESIS_RANGES = {"mu": (0.0, 8e6), "J": (0.0, 9e8), "T": (0.0, 3e6)}
 NORMAL_95 = 1.959963984540054
 
 # Lower ends for logarithmic coordinates; below, a spring or branch has no measurable influence.
-_FLOOR = {"mu": 1e-2, "J": 1e-3, "T": 1e-6}
+_FLOOR = {"mu": 1e-2, "T": 1e-6}
 
 
 @dataclass(frozen=True)
 class Quantity:
     """One free parameter.
 
-    ``kind`` is mu, J or T of spring ``index`` (0 is the equilibrium spring), or ``effect``: then it
-    is parameter ``index`` of the effect ``effect``.
+    ``kind`` is mu, J, T or ``shape`` of spring ``index`` (0 is the equilibrium spring), or
+    ``effect``: then it is parameter ``index`` of the effect ``effect``. J and ``shape`` are
+    parameter ``place`` of the strain energy ``law``.
     """
 
     kind: str
     index: int
     effect: str = ""
+    law: str = ""
+    place: int = 0
 
     @property
-    def parameter(self) -> Parameter:
-        """Description of the parameter by its effect."""
-        return EFFECTS[self.effect].parameters[self.index]
+    def parameter(self) -> Parameter | ShapeParameter:
+        """Description of the parameter by its effect or its strain energy."""
+        if self.kind == "effect":
+            return EFFECTS[self.effect].parameters[self.index]
+        return SPRING_LAWS[self.law].parameters[self.place]
+
+    @property
+    def is_shape(self) -> bool:
+        """Whether it is a number of a strain energy: a locking limit, an exponent, a share."""
+        return self.kind in ("J", "shape")
 
     @property
     def name(self) -> str:
         """mu_0, J_0, T_1, ..., or effect and parameter, as in ``linear drag: drag``."""
         if self.kind == "effect":
             return f"{self.effect}: {self.parameter.name}"
+        if self.is_shape:
+            return f"{SPRING_LAWS[self.law].parameters[self.place].symbol}_{self.index}"
         return f"{self.kind}_{self.index}"
 
     @property
     def unit(self) -> str:
         """SI unit, empty for a pure number."""
         if self.kind == "effect":
-            return self.parameter.unit
-        return {"mu": "Pa", "J": "", "T": "s"}[self.kind]
+            return EFFECTS[self.effect].parameters[self.index].unit
+        return {"mu": "Pa", "T": "s"}.get(self.kind, "")
 
     @property
     def bounds(self) -> tuple[float, float]:
         """Search range."""
-        if self.kind == "effect":
+        if self.kind in ("effect", "J", "shape"):
             return self.parameter.fit_bounds
         return _FLOOR[self.kind], THESIS_RANGES[self.kind][1]
 
     @property
     def logarithmic(self) -> bool:
         """Whether the coordinate is the logarithm."""
-        return self.parameter.logarithmic if self.kind == "effect" else self.kind != "mu"
+        if self.kind in ("effect", "J", "shape"):
+            return self.parameter.logarithmic
+        return self.kind == "T"
+
+    @property
+    def typical(self) -> float:
+        """Scale of a fit's steps; 0 for moduli, times and locking limits."""
+        return self.parameter.typical if self.kind in ("effect", "shape") else 0.0
 
     @property
     def column(self) -> int:
         """Index in the coefficient vector (a relaxation time is stored as its inverse)."""
         if self.kind == "effect":
             return PLACES[self.effect].at + self.index
-        return HEAD + WIDTH * self.index + {"mu": MODULUS, "J": LIMIT, "T": RATE}[self.kind]
+        at = {"mu": MODULUS, "J": LIMIT, "T": RATE}.get(self.kind)
+        if at is None:
+            at = SHAPE + self.place - SPRING_LAWS[self.law].has_limit
+        return HEAD + WIDTH * self.index + at
 
 
 @dataclass(frozen=True)
@@ -164,7 +198,7 @@ class Layout:
         springs = self.network.springs
         self.quantities: tuple[Quantity, ...] = (
             *(Quantity("mu", i) for i in range(len(springs)) if i or self._rest is None),
-            *(Quantity("J", i) for i, s in enumerate(springs) if s.kind != "neo-hookean"),
+            *_shapes(springs),
             *(Quantity("T", i) for i in range(1, len(springs))),
             *(
                 Quantity("effect", i, name)
@@ -174,9 +208,7 @@ class Layout:
         )
         self._columns = np.array([q.column for q in self.quantities])
         self._log = np.array([q.logarithmic for q in self.quantities])
-        self._typical = np.array(
-            [q.parameter.typical if q.kind == "effect" else 0.0 for q in self.quantities]
-        )
+        self._typical = np.array([q.typical for q in self.quantities])
         bounds = np.array([q.bounds for q in self.quantities])
         if times is not None:
             bounds[self.column("T")] = times
@@ -195,6 +227,11 @@ class Layout:
     def column(self, kind: str) -> np.ndarray:
         """Indices of the free parameters of one kind."""
         return np.array([i for i, q in enumerate(self.quantities) if q.kind == kind], dtype=int)
+
+    @property
+    def shapes(self) -> np.ndarray:
+        """Which free parameters are numbers of strain energies, limits included, (d,) bool."""
+        return np.array([q.is_shape for q in self.quantities], dtype=bool)
 
     def coordinates(self, values: np.ndarray) -> np.ndarray:
         """Return coordinates (..., d) of natural ``values`` (..., d)."""
@@ -227,7 +264,8 @@ class Layout:
         moduli = springs * np.maximum(np.abs(x), 1e-3 * self.reach(x))
         # but not across an instant or a spectral line
         placed = [
-            q.kind == "effect" and q.parameter.relative_to in ("duration", "spectrum")
+            q.kind == "effect"
+            and EFFECTS[q.effect].parameters[q.index].relative_to in ("duration", "spectrum")
             for q in self.quantities
         ]
         sizes = np.maximum(np.where(placed, 0.0, 1e-3 * np.abs(x)), 0.02 * self._typical)
@@ -271,11 +309,11 @@ class Layout:
         for j in self.column("J"):
             k = HEAD + WIDTH * self.quantities[j].index
             kind = int(self._c[k + KIND])
-            c[:, k + LOCKING] = [locking_strain(kind, v) for v in c[:, k + LIMIT]]
+            c[:, k + LOCKING] = [locking_strain(kind, shape_at(row, k)) for row in c]
         if self._rest is not None:
             for row in c:
                 pull = nominal_pull(
-                    int(row[HELD]), int(row[HEAD + KIND]), row[HEAD + LIMIT],
+                    int(row[HELD]), int(row[HEAD + KIND]), shape_at(row, HEAD),
                     row[HEAD + LOCKING], self._rest,
                 )  # fmt: skip
                 row[HEAD + MODULUS] = row[FORCE] / pull
@@ -284,14 +322,7 @@ class Layout:
     def build(self, values: np.ndarray) -> Network:
         """Return the network with the free parameters at natural ``values`` (d,)."""
         c = self.coefficients(values)[0]
-        springs = [
-            Spring(
-                modulus=float(c[k + MODULUS]),
-                limit=float(c[k + LIMIT]),
-                kind=SPRINGS[int(c[k + KIND])],
-            )
-            for k in range(HEAD, c.size, WIDTH)
-        ]
+        springs = [_spring(c, k) for k in range(HEAD, c.size, WIDTH)]
         times = [float(1.0 / c[k + RATE]) for k in range(HEAD + WIDTH, c.size, WIDTH)]
         branches = tuple(Branch(s, t) for s, t in zip(springs[1:], times, strict=True))
         return Network(springs[0], branches)
@@ -324,11 +355,31 @@ class Layout:
         times = self.column("T")
         order = np.argsort(values[times], kind="stable")
         sorted_values = values.copy()
-        for kind in ("mu", "J", "T"):
-            columns = [j for j in self.column(kind) if self.quantities[j].index > 0]
+        alike: dict[tuple[str, int], list[int]] = {}
+        for j, q in enumerate(self.quantities):
+            if q.kind != "effect" and q.index > 0:
+                alike.setdefault((q.kind, q.place), []).append(j)
+        for columns in alike.values():
             if len(columns) == len(order):
-                sorted_values[columns] = values[np.array(columns, dtype=int)[order]]
+                sorted_values[columns] = values[np.array(columns)[order]]
         return sorted_values
+
+
+def _shapes(springs: Sequence[Spring]) -> Iterator[Quantity]:
+    """Yield the parameters of the strain energies of ``springs``, the locking limits first."""
+    for limits in (True, False):
+        for i, spring in enumerate(springs):
+            for place, parameter in enumerate(SPRING_LAWS[spring.kind].parameters):
+                if (parameter.name == LIMIT_NAME) == limits:
+                    yield Quantity("J" if limits else "shape", i, law=spring.kind, place=place)
+
+
+def _spring(c: np.ndarray, k: int) -> Spring:
+    """Return the spring whose numbers begin at ``k`` of the coefficients ``c``."""
+    kind = SPRINGS[int(c[k + KIND])]
+    law = SPRING_LAWS[kind]
+    shape = c[k + SHAPE : k + SHAPE + len(law.parameters) - law.has_limit]
+    return Spring(float(c[k + MODULUS]), float(c[k + LIMIT]), kind, tuple(map(float, shape)))
 
 
 def require_free(layout: Layout, samples: int) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
-from math import comb
+from math import comb, inf
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -22,6 +22,7 @@ from dearig.model.kinematics import electric_along
 from dearig.model.material import Branch, Network, Spring
 from dearig.model.network import HEAD
 from dearig.model.records import ActuatorRecord, FilmRecord
+from dearig.model.springs import SPRING_LAWS
 
 __all__ = [
     "ALGORITHM_1",
@@ -40,6 +41,7 @@ Progress = Callable[[str, float], None]
 SMOOTHING = 0.015
 _WIDE_LIMIT = 1e4  # of J: a spring that does not stiffen within any stretch of an actuator
 _REST_ITERATIONS = 6
+_LEAST = {"mu": 1e-9, "J": 1e-9, "T": 1e-300}  # of Algorithm 1's values, natural
 _SETS_MAX = 6000  # of branches, each tried by least squares: a third of a second
 
 
@@ -70,11 +72,11 @@ def algorithm_1(
     coordinates. Eq. 50's e_rms is in the displacement's own unit, taken as mm.
     """
     layout = problem.layout
-    bounds = np.array([THESIS_RANGES[q.kind] for q in layout.quantities])
+    bounds = np.array([THESIS_RANGES.get(q.kind, q.bounds) for q in layout.quantities])
     rng = np.random.default_rng(seed)
     members = rng.uniform(bounds[:, 0], bounds[:, 1], (settings.members, layout.size))
     # the open ends of the ranges: a modulus or a limit of exactly 0 is no spring
-    lowest = np.array([1e-300 if q.kind == "T" else 1e-9 for q in layout.quantities])
+    lowest = np.array([_LEAST.get(q.kind, -inf) for q in layout.quantities])
 
     def cost(population: np.ndarray) -> np.ndarray:
         values = np.maximum(np.atleast_2d(population.T), lowest)
@@ -121,7 +123,7 @@ def voltage_starts(problem: Problem, progress: Progress, starts: int = 6) -> np.
     """
     layout = problem.layout
     candidates, parts, target = _at_rest_balance(problem, progress)
-    found = _subsets(layout, _WIDE_LIMIT, candidates, parts, target)
+    found = _subsets(layout, _wide(layout), candidates, parts, target)
     progress("global search", 1.0)
     return _ranked(layout, found, starts)
 
@@ -136,7 +138,8 @@ def moving_starts(problem: Problem, starts: int = 6) -> tuple[np.ndarray, float]
     c = layout.coefficients(_start_values(layout))[0]
     candidates, parts, target = _at_rest_balance(problem, lambda *_: None, moving=True)
     weights, _ = nnls(parts.T, target)
-    found = _subsets(layout, _WIDE_LIMIT, candidates, parts[:-1], target - weights[-1] * parts[-1])
+    less = target - weights[-1] * parts[-1]
+    found = _subsets(layout, _wide(layout), candidates, parts[:-1], less)
     mass = max(weights[-1] - c[INERTIA], 0.0) * c[SECTION] / c[LENGTH]
     return _ranked(layout, found, starts), float(mass)
 
@@ -166,7 +169,21 @@ def _start_values(layout: Layout) -> np.ndarray:
     """Return natural start values (d,) at which no spring stiffens."""
     values = layout.initial()
     values[layout.column("J")] = _WIDE_LIMIT
+    for j in layout.column("shape"):
+        q = layout.quantities[j]
+        values[j] = SPRING_LAWS[q.law].neutral[q.place]
     return values
+
+
+def _wide(layout: Layout) -> tuple[float, ...]:
+    """Return the values at which the equilibrium spring does not stiffen."""
+    return _shape_values(layout.network.equilibrium.kind, _WIDE_LIMIT)
+
+
+def _shape_values(kind: str, limit: float) -> tuple[float, ...]:
+    """Return the parameters of a strain energy with that ``limit``, otherwise neutral."""
+    law = SPRING_LAWS[kind]
+    return (limit, *law.neutral[1:]) if law.has_limit else law.neutral
 
 
 def _candidates(problem: Problem) -> np.ndarray:
@@ -219,8 +236,9 @@ def _balance(
             # from the rest state, so that the measured stretch starts where the branches do
             stretch[0] = rest
             part, _ = _unit_stresses(
-                base.network, base.film.held, _WIDE_LIMIT, candidates, record.time, stretch
-            )
+                base.network, base.film.held, _wide(problem.layout), candidates, record.time,
+                stretch,
+            )  # fmt: skip
             part -= part[:, :1]
             thrust = electric_along(base.film.held, stretch)
             target = c[ELECTRIC] * record.drive.voltage**2 * thrust
@@ -245,15 +263,15 @@ def film_starts(
     Springs are practically neo-Hookean unless ``stiffening``.
 
     With the stretch imposed the stress is linear in the moduli: an exhaustive search over sets of
-    branches (each a relaxation time and a locking limit) and over the limit of the equilibrium
-    spring, with non-negative least squares for the moduli.
+    branches (each a relaxation time and a locking limit) and over the starts of the equilibrium
+    spring's law, with non-negative least squares for the moduli.
     """
     layout = problem.layout
     records = [r for r in problem.records if isinstance(r, FilmRecord)]
     greatest = max(float(np.max(r.stretch)) for r in records)
-    firsts = greatest**2 * np.array([1.2, 3.0, 10.0, 100.0])
-    if not stiffening or layout.network.equilibrium.kind == "neo-hookean":
-        firsts = np.array([_WIDE_LIMIT])
+    firsts = SPRING_LAWS[layout.network.equilibrium.kind].starts(greatest**2)
+    if not stiffening:
+        firsts = (_wide(layout),)
     # a branch with a low limit flows at a nearly constant stress at any rate
     limits: tuple[float, ...] = (_WIDE_LIMIT, 1.0, 0.03)
     if not stiffening or layout.network.springs[-1].kind != "gent":
@@ -274,7 +292,7 @@ def film_starts(
             candidates = np.concatenate([group for group, _ in groups])
             parts = np.concatenate([groups[0][1][:1], *(part[1:] for _, part in groups)])
             found += _subsets(layout, first, candidates, parts * weight, problem.measured * weight)
-        progress("global search", (n + 1) / firsts.size)
+        progress("global search", (n + 1) / len(firsts))
     return _ranked(layout, found, starts)
 
 
@@ -294,27 +312,28 @@ def _time_grid(problem: Problem, points: int = 16) -> np.ndarray:
 def _unit_stresses(
     network: Network,
     held: int,
-    first: float,
+    first: tuple[float, ...],
     candidates: np.ndarray,
     time: np.ndarray,
     stretch: np.ndarray,
 ) -> tuple[np.ndarray, bool]:
     """Return stress per unit modulus (1 + G, N) of the equilibrium spring and candidate branches.
 
-    ``first`` is the limit of the equilibrium spring, ``candidates`` (G, 2) are relaxation times and
-    limits of the branches.
+    ``first`` are the values of the equilibrium spring's law, ``candidates`` (G, 2) relaxation times
+    and limits of the branches.
     """
     springs = network.springs
     kind = springs[-1].kind
-    equilibrium = Spring(1.0, first, springs[0].kind)
-    many = Network(equilibrium, tuple(Branch(Spring(1.0, j, kind), t) for t, j in candidates))
+    equilibrium = Spring.of(springs[0].kind, 1.0, first)
+    branches = (Branch(Spring.of(kind, 1.0, _shape_values(kind, j)), t) for t, j in candidates)
+    many = Network(equilibrium, tuple(branches))
     parts, status, _ = unit_stresses(many.coefficients(held), time, stretch)
     return parts, status == kernel.OK
 
 
 def _subsets(
     layout: Layout,
-    first: float,
+    first: tuple[float, ...],
     candidates: np.ndarray,
     parts: np.ndarray,
     target: np.ndarray,
@@ -335,17 +354,21 @@ def _subsets(
         while comb(keep + 1, branches) <= _SETS_MAX:
             keep += 1
         pool = sorted(order[:keep])
-    mu, limits, times = (layout.column(k) for k in ("mu", "J", "T"))
+    mu, times = layout.column("mu"), layout.column("T")
     found = []
     for chosen in combinations(pool, branches):
         columns = [0, *(1 + i for i in chosen)]
         moduli, misfit = nnls(triangle[:, columns], triangle[:, -1])
         # a branch of zero weight still needs influence for the descent to move it
         moduli = np.maximum(moduli, 1e-3 * max(float(moduli.max()), 1.0))
-        spring_limits = np.array([first, *candidates[list(chosen), 1]])
         values = layout.initial()
+        for j in np.flatnonzero(layout.shapes):
+            q = layout.quantities[j]
+            own = first
+            if q.index:
+                own = _shape_values(q.law, float(candidates[chosen[q.index - 1], 1]))
+            values[j] = own[q.place]
         values[mu] = moduli[[layout.quantities[j].index for j in mu]]
-        values[limits] = spring_limits[[layout.quantities[j].index for j in limits]]
         values[times] = candidates[list(chosen), 0]
         found.append((misfit, layout.coordinates(values)))
     return found
@@ -359,11 +382,14 @@ def _ranked(layout: Layout, found: list[tuple[float, np.ndarray]], starts: int) 
             "voltage are in the right units"
         )
     kept: list[np.ndarray] = []
-    told_apart = np.concatenate([layout.column("T"), layout.column("J")])
+    # times and limits are logarithmic; a shape has a scale of its own
+    told_apart = np.concatenate([layout.column("T"), np.flatnonzero(layout.shapes)])
+    scale = np.array([layout.quantities[j].typical or 1.0 for j in told_apart])
     for _, x in sorted(found, key=lambda f: f[0]):
         start = np.clip(x, layout.lower, layout.upper)
-        # only times and limits are compared: the moduli follow from them
-        if not kept or all(np.max(np.abs((start - k)[told_apart]), initial=0) > 0.7 for k in kept):
+        # the moduli follow from the times and shapes: they are not compared
+        far = [np.max(np.abs((start - k)[told_apart]) / scale, initial=0) > 0.7 for k in kept]
+        if all(far):
             kept.append(start)
         if len(kept) == starts:
             break

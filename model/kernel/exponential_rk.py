@@ -30,11 +30,11 @@ from dearig.model.kernel.propagator import (
     STIFFNESS,
 )
 from dearig.model.network import HEAD, branch_count
-from dearig.model.springs import SPRINGS, gent
+from dearig.model.springs import SPRINGS
 
 __all__ = ["BRANCHES_MAX", "exponential_steps", "film_table", "is_swift"]
 
-_GENT = SPRINGS.index(gent.NAME)  # the neo-Hookean spring comes before it
+_GENT = SPRINGS.index("gent")  # the neo-Hookean spring comes before it
 BRANCHES_MAX = 3  #: written out in the step
 _INERTIA_AT = 2 + 3 * (1 + BRANCHES_MAX)  # in the film table
 

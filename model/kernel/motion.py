@@ -16,13 +16,14 @@ from dearig.model.coefficients import (
     LOCKING,
     MODULUS,
     RATE,
+    SHAPE,
     WIDTH,
 )
 from dearig.model.jit import allocating, inlined, jit
 from dearig.model.kernel.status import LOCKED, NOT_CONVERGED, PULL_IN
 from dearig.model.kinematics import electric, electric_slope, strain_and_pull
-from dearig.model.network import HEAD, branch_count, nominal_pull_slope, true_pull
-from dearig.model.springs import SPRINGS, neo_hookean
+from dearig.model.network import HEAD, branch_count, nominal_pull_slope, shape_at, true_pull
+from dearig.model.springs import SPRINGS, Shape
 
 __all__ = [
     "STIFFENING",
@@ -36,7 +37,7 @@ __all__ = [
 ]
 
 STRETCH_MAX = 100.0  #: beyond any elastomer: a runaway, whatever the springs say
-_NEO_HOOKEAN = SPRINGS.index(neo_hookean.NAME)
+_NEO_HOOKEAN = SPRINGS.index("neo-hookean")
 _LOCKED = 0.9  # of the locking strain: a film that fails beyond it is locked
 
 # rows of the spring table behind those of ``dearig.model.coefficients``
@@ -50,6 +51,12 @@ def strain_at(held: int, e: float) -> float:
     """I1 - 3 of a spring at its own stretch ``e``."""
     strain, _ = strain_and_pull(held, e * e, 1.0 / (e * e))
     return strain
+
+
+@jit
+def _shape(springs: np.ndarray, i: int) -> Shape:
+    """Shape of spring ``i`` of the spring table."""
+    return springs[LIMIT, i], springs[SHAPE, i], springs[SHAPE + 1, i], springs[SHAPE + 2, i]
 
 
 @inlined
@@ -70,11 +77,11 @@ def rates(
     s = lam * lam
     inverse = 1.0 / s
     kind = uniform if uniform >= 0 else int(springs[KIND, 0])
-    stress = springs[MODULUS, 0] * true_pull(held, kind, springs[LIMIT, 0], s, inverse)
+    stress = springs[MODULUS, 0] * true_pull(held, kind, _shape(springs, 0), s, inverse)
     for i in range(1, springs.shape[1]):
         inner = y[1 + i] * y[1 + i]
         kind = uniform if uniform >= 0 else int(springs[KIND, i])
-        pull = true_pull(held, kind, springs[LIMIT, i], s / inner, inner * inverse)
+        pull = true_pull(held, kind, _shape(springs, i), s / inner, inner * inverse)
         stress += springs[MODULUS, i] * pull
         dy[1 + i] = springs[RATE, i] * pull
     dy[0] = y[1]
@@ -92,13 +99,13 @@ def network_stiffness(c: np.ndarray, y: np.ndarray, branches: np.ndarray) -> tup
     held = int(c[HELD])
     lam = y[0]
     stiffness = c[HEAD + MODULUS] * nominal_pull_slope(
-        held, int(c[HEAD + KIND]), c[HEAD + LIMIT], c[HEAD + LOCKING], lam
+        held, int(c[HEAD + KIND]), shape_at(c, HEAD), c[HEAD + LOCKING], lam
     )
     fastest = 0.0
     for i in range(branch_count(c)):
         k = HEAD + WIDTH * (i + 1)
         e = lam / y[2 + i]
-        bend = nominal_pull_slope(held, int(c[k + KIND]), c[k + LIMIT], c[k + LOCKING], e)
+        bend = nominal_pull_slope(held, int(c[k + KIND]), shape_at(c, k), c[k + LOCKING], e)
         branches[0, i] = c[k + MODULUS] * bend / (y[2 + i] * y[2 + i]) / c[INERTIA]
         branches[1, i] = c[k + RATE] * bend * e / y[2 + i]
         stiffness += branches[0, i] * c[INERTIA]
@@ -116,13 +123,13 @@ def reason_to_fail(c: np.ndarray, y: np.ndarray, field2: float) -> int:
     held = int(c[HELD])
     lam = y[0]
     stiffness = c[HEAD + MODULUS] * nominal_pull_slope(
-        held, int(c[HEAD + KIND]), c[HEAD + LIMIT], c[HEAD + LOCKING], lam
+        held, int(c[HEAD + KIND]), shape_at(c, HEAD), c[HEAD + LOCKING], lam
     )
     used = strain_at(held, lam) / c[HEAD + LOCKING]
     for i in range(branch_count(c)):
         k = HEAD + WIDTH * (i + 1)
         e = lam / y[2 + i]
-        bend = nominal_pull_slope(held, int(c[k + KIND]), c[k + LIMIT], c[k + LOCKING], e)
+        bend = nominal_pull_slope(held, int(c[k + KIND]), shape_at(c, k), c[k + LOCKING], e)
         stiffness += c[k + MODULUS] * bend / (y[2 + i] * y[2 + i])
         used = max(used, strain_at(held, e) / c[k + LOCKING])
     if lam > 0.5 * STRETCH_MAX or stiffness <= c[ELECTRIC] * field2 * electric_slope(held, lam):

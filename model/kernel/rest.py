@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from dearig.model.coefficients import ELECTRIC, FORCE, HELD, KIND, LIMIT, LOCKING, MODULUS
+from dearig.model.coefficients import ELECTRIC, FORCE, HELD, KIND, LOCKING, MODULUS
 from dearig.model.jit import jit
 from dearig.model.kernel.motion import STRETCH_MAX, strain_at
 from dearig.model.kernel.status import NO_REST, OK, PULL_IN
 from dearig.model.kinematics import electric
-from dearig.model.network import HEAD, nominal_pull
+from dearig.model.network import HEAD, nominal_pull, shape_at
 
 __all__ = ["rest_stretch"]
 
@@ -24,7 +24,7 @@ def rest_stretch(c: np.ndarray, field2: float) -> tuple[int, float]:
     """
     held = int(c[HELD])
     kind, modulus = int(c[HEAD + KIND]), c[HEAD + MODULUS]
-    limit, locking = c[HEAD + LIMIT], c[HEAD + LOCKING]
+    shape, locking = shape_at(c, HEAD), c[HEAD + LOCKING]
     if not (modulus > 0.0 and c[FORCE] >= 0.0 and field2 >= 0.0):
         return NO_REST, 1.0
     drive = c[ELECTRIC] * field2
@@ -35,7 +35,7 @@ def rest_stretch(c: np.ndarray, field2: float) -> tuple[int, float]:
         if strain_at(held, high) >= locking:
             # the pull is infinite at the locking stretch: the root lies before it
             break
-        balance = modulus * nominal_pull(held, kind, limit, locking, high)
+        balance = modulus * nominal_pull(held, kind, shape, locking, high)
         if balance >= c[FORCE] + drive * electric(held, high):
             break
         low = high
@@ -45,7 +45,7 @@ def rest_stretch(c: np.ndarray, field2: float) -> tuple[int, float]:
         middle = 0.5 * (low + high)
         if middle in (low, high):
             break
-        balance = modulus * nominal_pull(held, kind, limit, locking, middle)
+        balance = modulus * nominal_pull(held, kind, shape, locking, middle)
         if balance >= c[FORCE] + drive * electric(held, middle):
             high = middle
         else:

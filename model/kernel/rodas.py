@@ -15,7 +15,6 @@ from dearig.model.coefficients import (
     HELD,
     INERTIA,
     KIND,
-    LIMIT,
     LOCKING,
     MODULUS,
     RATE,
@@ -27,7 +26,7 @@ from dearig.model.kernel.motion import admissible, rates
 from dearig.model.kernel.rodas_coefficients import ALPHA, GAMMA, A, C, D
 from dearig.model.kernel.status import NOT_CONVERGED, OK
 from dearig.model.kinematics import electric, electric_slope
-from dearig.model.network import HEAD, branch_count, nominal_pull, nominal_pull_slope
+from dearig.model.network import HEAD, branch_count, nominal_pull, nominal_pull_slope, shape_at
 
 __all__ = ["LONGEST", "WORTH", "cross_by_rodas", "rodas_step"]
 
@@ -56,15 +55,15 @@ def _jacobian(
     held, lam, mass = int(c[HELD]), y[0], c[INERTIA]
     jvl = c[ELECTRIC] * v0 * v0 * electric_slope(held, lam)
     jvl -= c[HEAD + MODULUS] * nominal_pull_slope(
-        held, int(c[HEAD + KIND]), c[HEAD + LIMIT], c[HEAD + LOCKING], lam
+        held, int(c[HEAD + KIND]), shape_at(c, HEAD), c[HEAD + LOCKING], lam
     )
     for i in range(branch_count(c)):
         k = HEAD + WIDTH * (i + 1)
         inner = 1.0 / y[2 + i]
         e = lam * inner
-        kind, limit, locking = int(c[k + KIND]), c[k + LIMIT], c[k + LOCKING]
-        pull = nominal_pull(held, kind, limit, locking, e)
-        bend = nominal_pull_slope(held, kind, limit, locking, e)
+        kind, shape, locking = int(c[k + KIND]), shape_at(c, k), c[k + LOCKING]
+        pull = nominal_pull(held, kind, shape, locking, e)
+        bend = nominal_pull_slope(held, kind, shape, locking, e)
         both = pull + e * bend
         jvl -= c[k + MODULUS] * bend * inner * inner
         jvx[i] = c[k + MODULUS] * both * inner * inner / mass

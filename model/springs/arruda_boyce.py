@@ -13,8 +13,20 @@ from __future__ import annotations
 import math
 
 from dearig.model.jit import jit
+from dearig.model.springs.description import LIMIT, ShapeParameter, SpringLaw
 
-NAME = "arruda-boyce"
+SPRING = SpringLaw(
+    name="arruda-boyce",
+    summary="Stress of eight chains of finitely many links, which lock when they are straight.",
+    source="E. M. Arruda and M. C. Boyce, J. Mech. Phys. Solids 41, 389 (1993)",
+    parameters=(
+        ShapeParameter(
+            LIMIT, "J", (1.0, math.inf), math.inf, "number of links of a chain",
+            fit_within=(1.001, 9e8),
+        ),
+    ),
+    starts=lambda square: tuple((square * f,) for f in (1.2, 3.0, 10.0, 100.0)),
+)  # fmt: skip
 
 
 @jit
@@ -53,39 +65,39 @@ def inverse_langevin(x: float) -> float:
 
 
 @jit
-def energy(strain: float, modulus: float, limit: float) -> float:
-    """Return the free energy density in J/m^3 at ``strain`` = I1 - 3, ``limit`` = n; 0 at rest."""
-    root = math.sqrt(limit)
+def energy(strain: float, shape: tuple[float, float, float, float]) -> float:
+    """Return U at ``strain`` = I1 - 3; 0 at rest."""
+    root = math.sqrt(shape[0])
     total = 0.0
     for sign, invariant in ((1.0, strain + 3.0), (-1.0, 3.0)):
         chain = math.sqrt(invariant / 3.0)
         beta = inverse_langevin(chain / root)
         # ln(sinh b / b) without overflow
         log_sinhc = beta + math.log1p(-math.exp(-2.0 * beta)) - math.log(2.0 * beta)
-        total += sign * modulus * root * (beta * chain - root * log_sinhc)
+        total += sign * root * (beta * chain - root * log_sinhc)
     return total
 
 
 @jit
-def slope(strain: float, modulus: float, limit: float) -> float:
-    """Return dW/dI1 in Pa: mu sqrt(n) beta / (6 lambda_c)."""
+def slope(strain: float, shape: tuple[float, float, float, float]) -> float:
+    """Return dU/dI1: sqrt(n) beta / (6 lambda_c)."""
     chain = math.sqrt((strain + 3.0) / 3.0)
-    root = math.sqrt(limit)
-    return modulus * root * inverse_langevin(chain / root) / (6.0 * chain)
+    root = math.sqrt(shape[0])
+    return root * inverse_langevin(chain / root) / (6.0 * chain)
 
 
 @jit
-def curvature(strain: float, modulus: float, limit: float) -> float:
-    """Return d2W/dI1^2 in Pa."""
+def curvature(strain: float, shape: tuple[float, float, float, float]) -> float:
+    """Return d2U/dI1^2."""
     chain = math.sqrt((strain + 3.0) / 3.0)
-    root = math.sqrt(limit)
+    root = math.sqrt(shape[0])
     beta = inverse_langevin(chain / root)
     _, rate = langevin(beta)
     dbeta_dchain = 1.0 / (rate * root)
-    return modulus * root / 36.0 * (dbeta_dchain - beta / chain) / (chain * chain)
+    return root / 36.0 * (dbeta_dchain - beta / chain) / (chain * chain)
 
 
 @jit
-def locking_strain(limit: float) -> float:
+def locking_strain(shape: tuple[float, float, float, float]) -> float:
     """Return I1 - 3 at which the chains are straight: 3 n - 3."""
-    return 3.0 * limit - 3.0
+    return 3.0 * shape[0] - 3.0

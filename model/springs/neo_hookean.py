@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 from dearig.model.jit import jit
+from dearig.model.springs.description import SpringLaw
 
-NAME = "neo-hookean"
-
-
-@jit
-def energy(strain: float, modulus: float, limit: float) -> float:
-    """Return the free energy density in J/m^3 at ``strain`` = I1 - 3; ``limit`` is not used."""
-    return 0.5 * modulus * strain
-
-
-@jit
-def slope(strain: float, modulus: float, limit: float) -> float:
-    """Return dW/dI1 in Pa."""
-    return 0.5 * modulus
+SPRING = SpringLaw(
+    name="neo-hookean",
+    summary="Stress of Gaussian chains, which never lock.",
+    source="R. S. Rivlin, Phil. Trans. R. Soc. A 240, 459 (1948)",
+    parameters=(),
+    starts=lambda _: ((),),
+)
 
 
 @jit
-def curvature(strain: float, modulus: float, limit: float) -> float:
-    """Return d2W/dI1^2 in Pa."""
-    return 0.0
+def energy(strain: float, shape: tuple[float, float, float, float]) -> float:
+    """Return U at ``strain`` = I1 - 3."""
+    return 0.5 * strain
 
 
 @jit
-def locking_strain(limit: float) -> float:
-    """Return I1 - 3 at which the spring locks: never."""
-    return float("inf")
+def slope(strain: float, shape: tuple[float, float, float, float]) -> float:
+    """Return dU/dI1."""
+    return 0.5

@@ -6,11 +6,12 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
-from dearig.config.modelfile import load_model, save_model
+from dearig.config.modelfile import _File, load_model, save_model
 from dearig.errors import InputError
 from dearig.model.actuator import Actuator
 from dearig.model.film import Strip
@@ -24,6 +25,7 @@ from dearig.model.material import (
     Network,
     Spring,
 )
+from dearig.model.springs import SPRINGS
 
 STRANGE_FILM = Film(0.05, 0.04, 0.0005, 3.1, 970.0, "uniaxial")
 MODELS = {
@@ -36,6 +38,17 @@ MODELS = {
             (Branch(Spring(2e4, math.inf), 0.5), Branch(Spring(3e4, 99.0, "gent"), 7.0)),
         ),
         "equibiaxial",
+    ),
+    "springs of newer laws": Strip(
+        Network(
+            Spring(1e4, 50.0, "extended-tube", (0.2, 0.5)),
+            (
+                Branch(Spring(2e4, kind="ogden", shape=(-1.5,)), 0.5),
+                Branch(Spring(2e4, kind="ogden-two-terms", shape=(1.0, 4.0, 0.1)), 0.5),
+                Branch(Spring(2e4, kind="yeoh", shape=(-0.1, 0.01)), 0.5),
+                Branch(Spring(2e4, kind="mooney-rivlin", shape=(0.3,)), 0.5),
+            ),
+        ),
     ),
     "effects": Actuator(
         THESIS_FILM,
@@ -142,3 +155,29 @@ def test_a_model_is_not_overwritten(tmp_path: Path) -> None:
     save_model(path, "two", MODELS["thesis"], {}, overwrite=True)
     assert load_model(path).name == "two"
     assert [p.name for p in tmp_path.iterdir()] == ["m.toml"]
+
+
+@pytest.mark.parametrize(
+    ("spring", "words"),
+    [
+        ('"ogden"', "spring (ogden): exponent is missing"),
+        ('"ogden"\nexponent = 40.0', "exponent = 40.0 must be from -20 to 20"),
+        ('"gent"\nshare = 0.1', "spring (gent): share is not its key: it takes limit"),
+        ('"neo-hookean"\ncubic = 0.1', "cubic is not its key: it takes nothing"),
+        ('"ogdn"', '"ogden"'),
+    ],
+)
+def test_a_spring_has_the_numbers_of_its_law(tmp_path: Path, spring: str, words: str) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text(
+        'format = "dearig-model/1"\nname = "m"\nkinematics = "uniaxial"\n'
+        f"[equilibrium]\nmodulus_Pa = 1e4\nspring = {spring}\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match=re.escape(words)):
+        load_model(path)
+
+
+def test_a_file_takes_every_law() -> None:
+    taken = _File.model_fields["equilibrium"].annotation.model_fields["spring"].annotation
+    assert get_args(taken) == SPRINGS
