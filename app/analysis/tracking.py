@@ -25,7 +25,7 @@ from dearig.config.targetfile import LoadedTarget
 from dearig.drivers.gate import Margin
 from dearig.errors import InputError
 from dearig.model.actuator import Actuator
-from dearig.model.control import Inversion, Learner, TrackingTask, invert
+from dearig.model.control import Inversion, Learner, TrackingTask, invert, mean_without_outliers
 from dearig.model.effects import EFFECTS
 from dearig.model.errors import ModelError
 from dearig.model.excitation import Sampled, Sequence
@@ -343,7 +343,8 @@ class Tracking:
         usable = np.isfinite(reading[:n]) if valid is None else valid[:n] & np.isfinite(reading[:n])
         rest = usable & (np.arange(n) < self.task.lead_in)
         measured = np.full(inversion.time.size, np.nan)
-        zero = float(np.median(reading[:n][rest])) if rest.any() else 0.0
+        noise = _noise(recording)
+        zero = mean_without_outliers(reading[:n][rest], noise) if rest.any() else 0.0
         measured[:n] = np.where(usable, reading[:n] - zero, np.nan)
         error = (inversion.reference - measured)[inversion.reachable & np.isfinite(measured)]
         commanded = recording.voltage_command
@@ -363,7 +364,7 @@ class Tracking:
             measured=measured,
             predicted=None if predicted is None or predicted.size != n else predicted,
             voltage=voltage,
-            noise=_noise(recording),
+            noise=noise,
         )
 
 

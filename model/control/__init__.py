@@ -6,6 +6,7 @@ from dearig.model.control.hold import HoldAnswer, HoldController, HoldSettings, 
 from dearig.model.control.inversion import CAUSES, Inversion, Unreachable, invert
 from dearig.model.control.learning import Learner, Lesson
 from dearig.model.control.limits import VoltageLimits
+from dearig.model.control.readings import mean_without_outliers
 from dearig.model.control.task import BANDWIDTH, TrackingTask
 
 __all__ = [
@@ -21,5 +22,6 @@ __all__ = [
     "Unreachable",
     "VoltageLimits",
     "invert",
+    "mean_without_outliers",
     "sensitivity_of",
 ]

@@ -23,13 +23,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from dearig.model.actuator import Actuator
+from dearig.model.control.readings import mean_without_outliers
 from dearig.model.errors import ModelError
 from dearig.model.stability import static_stretch
 
 __all__ = ["HoldAnswer", "HoldController", "HoldSettings", "sensitivity_of"]
 
 _STEP = 0.01  # of the voltage, either way, for the sensitivity
-_OUTLIER = 6.0  # times the median deviation of a block: 4 standard deviations of a normal one
 _NEGLIGIBLE = 1e-12  # of a limit: a correction so near to it stands at it
 
 
@@ -140,11 +140,7 @@ def block_mean(readings: np.ndarray, usable: np.ndarray, resolution: float) -> f
         return math.nan
     if readings.size > 1 and seen.max() == seen.min():
         return math.nan
-    middle = np.median(seen)
-    off = np.abs(seen - middle)
-    # with coarse counts most readings may be the same
-    spread = max(float(np.median(off)), resolution)
-    return float(seen[off <= _OUTLIER * spread].mean())
+    return mean_without_outliers(seen, resolution)
 
 
 def sensitivity_of(model: Actuator, voltage: float) -> float:

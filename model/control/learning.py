@@ -42,6 +42,7 @@ from dearig.model.actuator import Actuator
 from dearig.model.control.bands import low_pass, pass_band
 from dearig.model.control.inversion import Inversion, invert
 from dearig.model.control.linear import linearise
+from dearig.model.control.readings import mean_without_outliers
 from dearig.model.control.task import TrackingTask
 from dearig.model.errors import ModelError
 
@@ -442,9 +443,9 @@ class Learner:
         """Return the power (M,) of the noise of so many ``samples``, as of ``_around``."""
         low, high = self._near()
         power = self._noise**2 * samples * (high - low)
-        # the zero is the median of the lead-in, and its error is that of all samples
+        # the zero is the mean of the lead-in, and its error is that of all samples
         at_rest = max(self._task.lead_in, 1)
-        power[:_LOWEST] += 0.5 * np.pi / at_rest * (self._noise * samples) ** 2
+        power[:_LOWEST] += (self._noise * samples) ** 2 / at_rest
         return power
 
     def _near(self) -> tuple[np.ndarray, np.ndarray]:
@@ -480,7 +481,7 @@ class Learner:
         given = np.where(usable, given, 0.0)
         lead = usable & (np.arange(n) < self._task.lead_in)
         if lead.any():
-            given = given - float(np.median(given[lead]))
+            given = given - mean_without_outliers(given[lead], self._noise)
         off = given - self._now.reading
         spikes = usable & (np.abs(off - median_filter(off, _SPIKE_WINDOW)) > _SPIKE * self._noise)
         stuck = self._stuck(given) & usable
