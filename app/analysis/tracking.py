@@ -26,9 +26,9 @@ from dearig.drivers.gate import Margin
 from dearig.errors import InputError
 from dearig.model.actuator import Actuator
 from dearig.model.control import Inversion, Learner, TrackingTask, invert, mean_without_outliers
-from dearig.model.effects import EFFECTS
 from dearig.model.errors import ModelError
 from dearig.model.excitation import Sampled, Sequence
+from dearig.model.fitting.parameters import NORMAL_95, Layout
 from dearig.model.noise import noise_of
 from dearig.model.stability import static_stretch
 from dearig.recording.recording import Recording
@@ -369,53 +369,42 @@ class Tracking:
 
 
 def alternatives_of(model: ModelFile) -> tuple[Actuator, ...]:
-    """Return models with one parameter each at an end of its 95 % interval.
+    """Return models that are 1.96 standard deviations away, one in each independent direction.
 
-    They are taken from the history that ``dearig identify`` writes; without one there are none.
+    The directions are the principal axes of the covariance of the fitted parameters, which
+    ``dearig identify`` and ``dearig diagnose`` write; a model without one has none. No parameter is
+    moved farther than a fit's linearisation holds, nor out of its range.
     """
-    estimates = model.history.get("estimate")
-    actuator = model.model
-    if not isinstance(actuator, Actuator) or not isinstance(estimates, list):
+    actuator, table = model.model, model.history.get("covariance")
+    if not isinstance(actuator, Actuator) or not isinstance(table, dict):
         return ()
-    found = []
-    for estimate in estimates:
-        if not isinstance(estimate, dict) or not estimate.get("determined"):
-            continue
-        for end in ("low95", "high95"):
-            value = estimate.get(end)
-            if isinstance(value, int | float):
-                found += _with(actuator, str(estimate.get("name", "")), float(value))
-    return tuple(found)
-
-
-def _with(actuator: Actuator, name: str, value: float) -> list[Actuator]:
-    """Return ``actuator`` with the parameter ``name`` at ``value``; nothing where it has none."""
-    network = actuator.network
+    layout = Layout(actuator)
     try:
-        effect, colon, parameter = name.partition(": ")
-        if colon and effect in EFFECTS:
-            effects = tuple(
-                (n, tuple((p, value if n == effect and p == parameter else v) for p, v in values))
-                for n, values in actuator.effects
-            )
-            return [replace(actuator, effects=effects)]
-        symbol, _, number = name.partition("_")
-        if symbol not in ("mu", "T") or not number.isdigit():
-            return []  # a limit J hardly changes a film that is stretched so little
-        i = int(number)
-        if i == 0 and symbol == "mu":
-            spring = replace(network.equilibrium, modulus=value)
-            return [replace(actuator, network=replace(network, equilibrium=spring))]
-        branches = list(network.branches)
-        branch = branches[i - 1]
-        branches[i - 1] = (
-            replace(branch, relaxation_time=value)
-            if symbol == "T"
-            else replace(branch, spring=replace(branch.spring, modulus=value))
-        )
-        return [replace(actuator, network=replace(network, branches=tuple(branches)))]
-    except (ModelError, IndexError):
-        return []
+        columns = [layout.names.index(name) for name in table["names"]]
+        covariance = np.array(table["matrix"], dtype=np.float64)
+    except (KeyError, TypeError, ValueError) as error:
+        log.info("the covariance of the model %r is of no use: %s", model.name, error)
+        return ()
+    if covariance.shape != (len(columns), len(columns)) or not np.isfinite(covariance).all():
+        log.info("the covariance of the model %r is not that of its names", model.name)
+        return ()
+    values = layout.initial()
+    x = layout.coordinates(values)
+    natural = np.array([q.logarithmic for q in layout.quantities])
+    by = np.where(natural, values, 1.0)[columns]
+    # standard deviations apart, the axes do not depend on units
+    spread = np.sqrt(np.diag(covariance)) / by
+    spread = np.where(spread > 0.0, spread, 1.0)
+    sizes, axes = np.linalg.eigh(covariance / np.outer(by * spread, by * spread))
+    found = []
+    for size, axis in zip(sizes, axes.T, strict=True):
+        step = np.zeros(x.size)
+        step[columns] = NORMAL_95 * math.sqrt(max(float(size), 0.0)) * spread * axis
+        step /= max(1.0, float(np.max(np.abs(step) / layout.reach(x))))
+        moved = layout.model(layout.values(np.clip(x + step, layout.lower, layout.upper)))
+        if isinstance(moved, Actuator) and np.any(step):
+            found.append(moved)
+    return tuple(found)
 
 
 def _actuator(model: ModelFile, option: str) -> Actuator:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dearig.model.control.hold import HoldAnswer, HoldController, HoldSettings, sensitivity_of
 from dearig.model.control.inversion import CAUSES, Inversion, Unreachable, invert
 from dearig.model.control.learning import Learner, Lesson
+from dearig.model.control.learning_settings import LearningSettings
 from dearig.model.control.limits import VoltageLimits
 from dearig.model.control.readings import mean_without_outliers
 from dearig.model.control.task import BANDWIDTH, TrackingTask
@@ -17,6 +18,7 @@ __all__ = [
     "HoldSettings",
     "Inversion",
     "Learner",
+    "LearningSettings",
     "Lesson",
     "TrackingTask",
     "Unreachable",

@@ -30,7 +30,7 @@ from scipy.ndimage import binary_closing, binary_dilation
 from dearig.model.actuator import STATUS_WORDS, Actuator, Drive, at_rest, reading_of
 from dearig.model.coefficients import ELECTRIC, FORCE, HELD, MODULUS, WIDTH
 from dearig.model.control.bands import low_pass
-from dearig.model.control.linear import linearise, repeatable_part
+from dearig.model.control.linear import level_of, linearise, repeatable_part
 from dearig.model.control.task import TrackingTask
 from dearig.model.effects import PLACES, SENSOR_MEMORY
 from dearig.model.errors import ModelError
@@ -262,9 +262,8 @@ class _Job:
         best = now = self._started(u)
         if now.u.max() <= (_AT_LIMIT * self.limits.voltage) ** 2:
             return best  # nothing is asked for
-        level = float(np.mean(now.u[now.u > 0.01 * now.u.max()]))
         try:
-            linear = linearise(self.model, self.target.size, self.rate, level, self.lag)
+            linear = linearise(self.model, self.target.size, self.rate, level_of(now.u), self.lag)
         except ModelError:  # the film stands so much for a moment, and not for as long as this
             return best
         inverse = linear.inverse(self.bandwidth)

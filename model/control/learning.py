@@ -36,53 +36,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import binary_dilation, maximum_filter1d, median_filter, uniform_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from dearig.model.actuator import Actuator
 from dearig.model.control.bands import low_pass, pass_band
 from dearig.model.control.inversion import Inversion, invert
-from dearig.model.control.linear import linearise
-from dearig.model.control.readings import mean_without_outliers
+from dearig.model.control.learning_settings import LearningSettings
+from dearig.model.control.linear import level_of, linearise
+from dearig.model.control.readings import bridged, has_jump, sorted_out
 from dearig.model.control.task import TrackingTask
 from dearig.model.errors import ModelError
 
-__all__ = ["CONTRACTION", "Learner", "Lesson"]
-
-#: Largest |Q| W that is learned with: the error of a run is at most this part of the last one's.
-CONTRACTION = 0.8
+__all__ = ["Learner", "Lesson"]
 
 _IS_NOISE = "the error is noise: nothing more is learned, and its voltage is kept"
 _NO_BETTER = (
     "what was learned last has not made the error significantly smaller: nothing more is learned, "
     "and the voltage before it is kept"
 )
-_USABLE = 0.5  # of the path's samples: with fewer a run teaches nothing
-_SIGNIFICANT = 2.0  # standard errors: one in 44 differences is so large by chance, either way
-#: Noises: a single reading so far from its neighbours is a spike. Gaussian noise reaches 5 once in
-#: a million readings; the rest is for noise with heavier tails.
-_SPIKE = 8.0
-_SPIKE_WINDOW = 11  # samples
-_STUCK = 0.05  # s of one and the same reading while the film is predicted to move
-_MOVED = 6.0  # noises that the prediction moves meanwhile
-_RELEASED = 0.1  # s without a voltage, after which a film that is above its target is let go
-_WEAK = 0.05  # of the highest voltage: its square pulls 1/400 as much
-_JUMP_WINDOW = 0.02  # s on either side of a jump
-_JUMP = _SPIKE  # standard deviations of such differences elsewhere in the run
-_APART = 4  # times as long: over that a jump is no larger, and what moves steadily four times
-_SUDDEN = 0.5 * (1.0 + 1.0 / _APART)  # of the change over so much longer: half way between these
-_WIDENED = 2.0  # times the band of the last run, at most: Q passes something up to there
-_LOWEST = 3  # lines of a spectrum in which an error of the zero shows
-_COUNTS = 0.02  # of the power of an error: a band with less decides nothing
-_TOLD = 4.0  # times the power of the noise: what is less tells nothing
-# With a film of g exp(i phi) times the model's response, learning with the model alone would
-# converge where |1 - g exp(i phi)| < 1: up to g = 2, or to phi = 60 degrees. Beyond, the model is
-# wrong in another way than a ratio corrects for.
-_GAIN = (0.5, 2.0)
-_PHASE = np.pi / 3.0  # rad
-#: Power over that of the noise from which a path tells the response of the film: the error of their
-#: ratio is the root of its inverse, and less than what a contraction leaves.
-_CLEAR = (1.0 - CONTRACTION) ** -2
-_NARROWED = 1.0 / _WIDENED  # of Q's band, where a run was stepped back from
+#: Lines of a spectrum in which an error of the zero shows: that of a constant over most of a path
+#: falls as 1/(pi k) at line k, to a hundredth of its power at the third.
+_LOWEST = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,15 +106,15 @@ class _Run:
         repeatable = max(mean - power, 0.0)
         return mean, float(np.sqrt((4.0 * repeatable + 2.0 * power) * power / squares.size))
 
-    def is_noise(self, noise: float, readings: int) -> bool:
-        """Return whether its error is not significantly above the ``noise`` in m.
+    def is_noise(self, noise: float, readings: int, significant: float) -> bool:
+        """Return whether its error is less than so many standard errors above the ``noise`` in m.
 
         The noise was measured from so many ``readings`` at rest: its power is known to a part
         sqrt(2/readings).
         """
         power = noise * noise
         alone = power * np.sqrt(2.0 / max(int(np.count_nonzero(self.counted)), 1) + 2.0 / readings)
-        return bool(self.mean_square(noise)[0] - power <= _SIGNIFICANT * alone)
+        return bool(self.mean_square(noise)[0] - power <= significant * alone)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,17 +134,28 @@ class Learner:
     model, task
         As of ``invert``; ``first`` is its result.
     alternatives : sequence of Actuator
-        Models that the data allow as well, such as those at the ends of the parameters' intervals.
+        Models that the data allow as well, each as far from ``model`` as they may be 95 % of the
+        time in one of their independent directions: what they differ by adds in squares.
+    settings : LearningSettings, optional
+        Numbers of the learning.
     """
 
     def __init__(
-        self, model: Actuator, task: TrackingTask, *, alternatives: Sequence[Actuator] = ()
+        self,
+        model: Actuator,
+        task: TrackingTask,
+        *,
+        alternatives: Sequence[Actuator] = (),
+        settings: LearningSettings | None = None,
     ) -> None:
+        self._settings = settings or LearningSettings()
         self._model, self._task, self._rate, self._noise = model, task, task.rate, 0.0
         self.first: Inversion = invert(model, task)
         self._inside = task.inside
         self._edge = task.edge
         self._frequency = np.fft.rfftfreq(task.samples, 1.0 / task.rate)
+        # a path has lines of little power between its own, so narrower bands tell of chance
+        self._bands = _bands(self._frequency.size, self._settings.octaves)
         self._uncertain = self._spread(alternatives)
         self._now = self.first
         self._known = np.zeros(self.first.time.size)
@@ -206,21 +191,27 @@ class Learner:
         """
         if not 0.0 < noise < np.inf:
             raise ModelError(f"noise = {noise!r} m must be above 0")
-        self._noise = noise
-        usable, reading, notes = self._usable(reading, valid)
+        task, settings = self._task, self._settings
+        found = sorted_out(
+            reading, valid, self._now.reading, noise, task.rate, task.lead_in, settings
+        )
+        self._noise = noise = found.noise
+        usable, reading, notes = found.usable, found.values, found.notes
         counted = usable & self.first.reachable & ~self._let_go(reading, notes)
         error = np.where(counted, self.first.reference - reading, 0.0)
         rms, largest, samples = np.nan, np.nan, int(np.count_nonzero(counted))
         if samples:
             rms = float(np.sqrt(np.mean(error[counted] ** 2)))
             largest = float(np.abs(error).max())
-        if np.count_nonzero(usable & self._inside) < _USABLE * np.count_nonzero(self._inside):
+        if np.count_nonzero(usable & self._inside) < settings.usable * np.count_nonzero(
+            self._inside
+        ):
             notes.append("too few readings can be used: nothing is learned from this run")
             return self._lesson(rms, largest, samples, learned=False, notes=notes)
         if self.settled:
             notes.append(self.settled)
             return self._lesson(rms, largest, samples, learned=False, notes=notes)
-        lacking = self._bridged(reading - self._now.reading, usable)
+        lacking = bridged(reading - self._now.reading, self._known, usable)
         best = self._best
         if best is None:
             self._ratio, self._told_up_to = self._film_over_model(lacking)
@@ -229,7 +220,7 @@ class Learner:
         run = _Run(self._now, self._known, lacking, rms, error, counted, left, edge)
         if best is not None:
             (now, within), (before, before_within) = (one.mean_square(noise) for one in (run, best))
-            scatter = _SIGNIFICANT * np.hypot(within, before_within)
+            scatter = settings.significant * np.hypot(within, before_within)
             # what did not repeat and was learned adds its power to the error, and no more
             added = 0.0 if self._learned is None else self._learned.power
             if now > before + added + scatter:
@@ -246,7 +237,8 @@ class Learner:
         self, run: _Run, rms: float, largest: float, samples: int, notes: list[str]
     ) -> Lesson:
         """Take the next voltage from what ``run`` has shown."""
-        if run.is_noise(self._noise, self._task.lead_in or self._task.samples):
+        at_rest = self._task.lead_in or self._task.samples
+        if run.is_noise(self._noise, at_rest, self._settings.significant):
             self._settle(run, _IS_NOISE, notes)
             return self._lesson(rms, largest, samples, learned=False, notes=notes)
         edge, contraction = self._pass(run)
@@ -279,7 +271,7 @@ class Learner:
         """Go back to the run of the smallest error, and learn less of it."""
         failed = self._edge if self._learned is None else self._learned.edge
         # the band that made the best run is known to be safe
-        self._edge = best.edge if 0.0 < best.edge < failed else _NARROWED * failed
+        self._edge = best.edge if 0.0 < best.edge < failed else failed / self._settings.widening
         self._learned = None
         notes.append(
             f"the error has grown from {best.rms * 1e6:.3g} um: the run is stepped back from, and "
@@ -303,7 +295,7 @@ class Learner:
     # ------------------------------------------------------------ uncertainty
 
     def _spread(self, alternatives: Sequence[Actuator]) -> np.ndarray:
-        """Return |G_other/(k G) - 1| (M,), the largest of all ``alternatives``.
+        """Return |G_other/(k G) - 1| (M,), the root of the squares of all ``alternatives``.
 
         ``k`` is a gain over the lines of the path, which learning finds by itself.
         """
@@ -311,7 +303,7 @@ class Learner:
         square = np.square(self.first.voltage)
         if not alternatives or not square.any():
             return spread
-        n, level = square.size, float(np.mean(square[square > 0.01 * square.max()]))
+        n, level = square.size, level_of(square)
         own = linearise(self._model, n, self._rate, level, self._task.lag)
         power = np.abs(np.fft.rfft(self.first.reading, own.length)) ** 2
         for other in alternatives:
@@ -323,11 +315,12 @@ class Learner:
             ratio = np.where(np.isfinite(ratio), ratio, 0.0)
             k = float(np.sum(power * ratio.real) / np.sum(power))
             off = np.abs(ratio / k - 1.0) if k > 0.0 else np.full(ratio.size, np.inf)
-            spread = np.maximum(spread, np.interp(self._frequency, own.frequency, off))
+            spread = np.hypot(spread, np.interp(self._frequency, own.frequency, off))
         return spread
 
     def _pass(self, run: _Run) -> tuple[float, float]:
         """Return the edge in Hz of Q, and the largest |Q| W with it; 0 where nothing passes."""
+        settings = self._settings
         highest, least = self._edge, self._rate / self.first.time.size
         off = self._off_by_prediction(run.lacking)
         if self._learned is not None and self._learned.before is not run.left:
@@ -339,26 +332,25 @@ class Learner:
             left = np.nan_to_num(left)
             beyond = left[band][-1] * np.maximum(self._frequency / learned, 1.0) ** 2
             off = np.where(band, left, np.minimum(off, beyond))
-            highest = min(highest, _WIDENED * learned)
+            highest = min(highest, settings.widening * learned)
             worst = float(np.max(left[band]))
-            if worst > CONTRACTION:
+            if worst > settings.contraction:
                 # no wider: it still shrinks as a whole, or it does not
                 shrinks = np.sum(run.left[band] ** 2) < np.sum(before[band] ** 2)
-                return min(highest, learned if shrinks else _NARROWED * learned), worst
+                return min(highest, learned if shrinks else learned / settings.widening), worst
         off = np.maximum(off, self._uncertain)
-        edge = highest
-        while edge > least:
-            contraction = float(np.max(pass_band(self._frequency, edge) * off))
-            if contraction <= CONTRACTION:
-                return edge, contraction
-            edge *= 0.9
-        return 0.0, np.nan
+        edge = min(highest, _widest(self._frequency, off, settings.contraction))
+        if edge <= least:
+            return 0.0, np.nan
+        worst = float(np.max(pass_band(self._frequency, edge) * off))
+        return edge, min(worst, settings.contraction)  # which rounding may exceed
 
     def _left(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """Return the part (M,) of an error that is left, from amplitudes; NaN where it is noise."""
         noise = self._noise_around(int(np.count_nonzero(self.first.reachable)))
         had, left = self._around(before), self._around(after)
-        told = np.maximum(had, left) > np.maximum(_TOLD * noise, _COUNTS * np.sum(after**2))
+        minor = self._settings.minor * np.sum(after**2)
+        told = np.maximum(had, left) > np.maximum(self._settings.told * noise, minor)
         part = np.sqrt(np.maximum(left - noise, 0.0) / np.maximum(had, noise))
         return np.where(told, part, np.nan)
 
@@ -370,7 +362,7 @@ class Learner:
         )
         expected = self._ratio * moved
         shown, predicted = self._around(np.abs(more + moved - expected)), self._around(expected)
-        told = np.flatnonzero(predicted > _TOLD * noise)
+        told = np.flatnonzero(predicted > self._settings.told * noise)
         if told.size == 0:
             return np.full(shown.size, np.inf)
         ratio = np.sqrt(np.maximum(shown - noise, 0.0)[told] / predicted[told])
@@ -385,17 +377,15 @@ class Learner:
         """Return the film's response over the model's (M,), and the last line that tells of it.
 
         It is the cross-spectrum of measurement and prediction over the power of the prediction, in
-        bands of half an octave, where that power is well above the noise. In between it is
-        interpolated, beyond it stays. Its size is kept within ``_GAIN``, its phase within
-        ``_PHASE``.
+        bands of ``ratio_octaves``, where that power is well above the noise. In between it is
+        interpolated, beyond it stays. Its size and its phase are kept within those of the settings.
         """
+        settings = self._settings
         moved, more = (
             np.fft.rfft(np.where(self._inside, row, 0.0)) for row in (self._now.reading, lacking)
         )
         lines = np.arange(moved.size)
-        low = np.maximum(np.minimum(np.floor(lines / 2**0.25), lines - _LOWEST), 0).astype(int)
-        high = np.maximum(np.ceil(lines * 2**0.25), lines + _LOWEST).astype(int)
-        high = np.minimum(high, lines[-1]) + 1
+        low, high = _bands(moved.size, settings.ratio_octaves)
 
         def around(values: np.ndarray) -> np.ndarray:
             summed = np.concatenate([[0.0], np.cumsum(values)])
@@ -403,12 +393,13 @@ class Learner:
 
         power = around(np.abs(moved) ** 2)
         noise = self._noise**2 * np.count_nonzero(self._inside) * (high - low)
-        told = np.flatnonzero(power > _CLEAR * noise)
+        told = np.flatnonzero(power > settings.clear * noise)
         if told.size == 0:
             return np.ones(moved.size, dtype=complex), 1
         ratio = (around((moved + more) * np.conj(moved)) / np.maximum(power, noise))[told]
-        size = np.clip(np.abs(ratio), *_GAIN)
-        phase = np.clip(np.angle(ratio), -_PHASE, _PHASE)
+        size = np.clip(np.abs(ratio), 1.0 / settings.ratio_max, settings.ratio_max)
+        most = np.radians(settings.phase_max_deg)
+        phase = np.clip(np.angle(ratio), -most, most)
         found = size * np.exp(1j * phase)
         whole = np.interp(lines, told, found.real) + 1j * np.interp(lines, told, found.imag)
         whole[0] = abs(whole[0])
@@ -435,68 +426,30 @@ class Learner:
 
     def _around(self, amplitudes: np.ndarray) -> np.ndarray:
         """Return the power (M,) of ``amplitudes`` (M,) in two octaves about each frequency."""
-        low, high = self._near()
+        low, high = self._bands
         power = np.concatenate([[0.0], np.cumsum(np.abs(amplitudes) ** 2)])
         return power[high] - power[low]
 
     def _noise_around(self, samples: int) -> np.ndarray:
         """Return the power (M,) of the noise of so many ``samples``, as of ``_around``."""
-        low, high = self._near()
+        low, high = self._bands
         power = self._noise**2 * samples * (high - low)
         # the zero is the mean of the lead-in, and its error is that of all samples
         at_rest = max(self._task.lead_in, 1)
         power[:_LOWEST] += (self._noise * samples) ** 2 / at_rest
         return power
 
-    def _near(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first line, and the one after the last, of the two octaves about each.
-
-        A path has lines of little power between its own, so narrower bands tell of chance.
-        """
-        lines = np.arange(self._frequency.size)
-        low = np.maximum(np.minimum(lines // 2, lines - _LOWEST), 0)
-        high = np.minimum(np.maximum(2 * lines, lines + _LOWEST), lines[-1]) + 1
-        return low, high
-
     # ------------------------------------------------------------ readings
-
-    def _usable(
-        self, reading: np.ndarray, valid: np.ndarray | None
-    ) -> tuple[np.ndarray, np.ndarray, list[str]]:
-        """Return which readings may be used, the readings from rest, and notes."""
-        notes: list[str] = []
-        given = np.asarray(reading, dtype=np.float64)
-        n, size = self.first.time.size, given.size
-        if given.ndim != 1 or size != n:
-            # a run that was ended early has fewer
-            notes.append(f"{size} readings were recorded of {n}")
-            row = np.full(n, np.nan)
-            row[: min(size, n)] = given.ravel()[:n]
-            given = row
-            valid = None if valid is None else np.resize(valid, n)
-        with np.errstate(invalid="ignore", over="ignore"):
-            usable = np.isfinite(given) & (np.abs(given) < 1.0)  # 1 m: no film moves so far
-        if valid is not None:
-            usable &= np.asarray(valid, dtype=bool)
-        given = np.where(usable, given, 0.0)
-        lead = usable & (np.arange(n) < self._task.lead_in)
-        if lead.any():
-            given = given - mean_without_outliers(given[lead], self._noise)
-        off = given - self._now.reading
-        spikes = usable & (np.abs(off - median_filter(off, _SPIKE_WINDOW)) > _SPIKE * self._noise)
-        stuck = self._stuck(given) & usable
-        for mask, words in ((spikes, "spikes"), (stuck, "stuck readings")):
-            if mask.any():
-                notes.append(f"{np.count_nonzero(mask)} {words} are left out")
-        return usable & ~spikes & ~stuck, given, notes
 
     def _let_go(self, reading: np.ndarray, notes: list[str]) -> np.ndarray:
         """Return where the film is above the reference though nothing pulls: it returns slower."""
-        width = max(round(_RELEASED * self._rate), 1)
+        settings = self._settings
+        width = max(round(settings.released_s * self._rate), 1)
         highest = maximum_filter1d(self._now.voltage, width, origin=(width - 1) // 2)
         away = uniform_filter1d(reading - self.first.reference, width, mode="nearest")
-        least = max(2.0 * self._noise, _WEAK**2 * float(self.first.reference.max()))
-        found = self._inside & (highest <= _WEAK * self._task.limits.voltage) & (away > least)
+        weak = settings.released_part
+        least = max(settings.significant * self._noise, weak**2 * float(self.first.reference.max()))
+        found = self._inside & (highest <= weak * self._task.limits.voltage) & (away > least)
         if np.count_nonzero(found) < width:
             return np.zeros(found.size, dtype=bool)
         time = self.first.time[found]
@@ -506,26 +459,6 @@ class Learner:
             f"which no voltage changes"
         )
         return found
-
-    def _stuck(self, reading: np.ndarray) -> np.ndarray:
-        """Return where the reading stands still while the film is predicted to move."""
-        width = max(round(_STUCK * self._rate), 2)
-        same = np.concatenate([[False], np.diff(reading) == 0.0]).astype(float)
-        stands = uniform_filter1d(same, width, mode="nearest") > 1.0 - 0.5 / width
-        predicted = self._now.reading
-        moves = maximum_filter1d(predicted, width) + maximum_filter1d(-predicted, width)
-        return np.asarray(
-            binary_dilation(stands & (moves > _MOVED * self._noise), np.ones(width, dtype=bool))
-        )
-
-    def _bridged(self, lacking: np.ndarray, usable: np.ndarray) -> np.ndarray:
-        """Return ``lacking`` (N,) m with what is known already where it was not measured."""
-        if usable.all():
-            return lacking
-        at = np.arange(lacking.size)
-        # the difference from what is known is joined across a gap, so that no step is learned
-        more = np.interp(at, at[usable], (lacking - self._known)[usable])
-        return np.where(usable, lacking, self._known + more)
 
     def _repeated(self, lacking: np.ndarray, notes: list[str]) -> np.ndarray:
         """Return ``lacking`` (N,) m without what this run or the last one had alone.
@@ -537,28 +470,27 @@ class Learner:
         if len(self._lacking) < 2:
             return lacking
         change = self._lacking[-1] - self._lacking[-2]
-        if not self._jumps(change):
+        if not has_jump(change, self._inside, self._noise, self._rate, self._settings):
             return lacking
         notes.append("something happened in one run only: it is not learned")
         return np.median(np.array(self._lacking), axis=0)
 
-    def _jumps(self, change: np.ndarray) -> bool:
-        """Return whether ``change`` (N,) m has a jump: as large at once as over a longer time."""
-        width = max(round(_JUMP_WINDOW * self._rate), 3)
-        near, far = (_differences(change, width, k * width) for k in (1, _APART))
-        usual = float(np.median(np.abs(near[self._inside]))) / 0.67
-        least = _JUMP * max(self._noise * np.sqrt(2.0 / width), usual)
-        sudden = (np.abs(near) > least) & (np.abs(near) > _SUDDEN * np.abs(far))
-        return bool(np.any(sudden[self._inside]))
+
+def _bands(lines: int, octaves: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first line (M,), and the one after the last, of a band about each of M lines."""
+    at, half = np.arange(lines), 2.0 ** (0.5 * octaves)
+    low = np.maximum(np.minimum(np.floor(at / half), at - _LOWEST), 0).astype(int)
+    high = np.maximum(np.ceil(half * at), at + _LOWEST).astype(int)
+    return low, np.minimum(high, lines - 1) + 1
+
+
+def _widest(frequency: np.ndarray, off: np.ndarray, contraction: float) -> float:
+    """Return the largest edge in Hz of a band with which ``pass_band`` times ``off`` is no more."""
+    beyond = off > contraction
+    # the gain 1/2 (1 + cos(pi part)) of pass_band is contraction/off at the part
+    part = np.arccos(2.0 * contraction / off[beyond] - 1.0) / np.pi
+    return float(np.min(frequency[beyond] / (1.0 + part), initial=np.inf))
 
 
 def _mean_square(values: np.ndarray) -> float:
     return float(np.mean(np.square(values))) if values.size else 0.0
-
-
-def _differences(values: np.ndarray, width: int, apart: int) -> np.ndarray:
-    """Return the differences (N,) of means over ``width`` samples that are ``apart`` samples."""
-    mean = uniform_filter1d(values, width, mode="nearest")
-    half = apart // 2
-    padded = np.pad(mean, (half, apart - half), mode="edge")
-    return np.asarray(padded[apart:] - padded[: values.size])

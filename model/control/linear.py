@@ -14,7 +14,7 @@ from dearig.model.effects.description import Effect
 from dearig.model.errors import ModelError
 from dearig.model.kernel import OK
 
-__all__ = ["Linearised", "linearise", "repeatable_part"]
+__all__ = ["Linearised", "level_of", "linearise", "repeatable_part"]
 
 _STEP = 0.02  # of the voltage squared
 _FLOOR = 1e-4  # of the largest gain: what is less is not inverted
@@ -59,6 +59,14 @@ def smooth_part(model: Actuator) -> Actuator:
     """Return ``model`` without its hysteretic effects, which no linear response describes."""
     kept = tuple((n, v) for n, v in model.effects if not EFFECTS[n].is_hysteretic)
     return replace(model, effects=kept)
+
+
+def level_of(square: np.ndarray) -> float:
+    """Return the mean in V^2 of the voltage squared (N,), each weighted by itself.
+
+    What stands at 0 V, where the film does nothing, so does not count.
+    """
+    return float(np.sum(square * square) / np.sum(square))
 
 
 def linearise(

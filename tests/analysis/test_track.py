@@ -204,20 +204,32 @@ def test_an_interrupt_ends_at_zero_and_keeps_what_was_done(tmp_path):
     assert abs(last.voltage_command[-1]) < 1.0
 
 
-def test_intervals_make_alternatives():
-    estimates = [
-        {"name": "mu_0", "value": 1.0, "low95": 40e3, "high95": 50e3, "determined": True},
-        {"name": "T_1", "value": 1.0, "low95": 0.3, "high95": 0.5, "determined": True},
-        {"name": "J_1", "value": 1.0, "low95": 1.0, "high95": 2.0, "determined": True},
-        {"name": "mu_2", "value": 1.0, "low95": 1.0, "high95": 2.0, "determined": False},
-        {"name": "mu_9", "value": 1.0, "low95": 1.0, "determined": True},
-        {"name": "sensor lag: time_constant", "low95": 0.01, "determined": True},
-        "nonsense",
-    ]
+def _with_covariance(names, matrix):
     lagged = replace(MODEL.model, effects=(("sensor lag", (("time_constant", 0.02),)),))
-    found = alternatives_of(ModelFile("fitted", lagged, {"estimate": estimates}))
-    assert len(found) == 5
-    assert found[0].network.equilibrium.modulus == 40e3
-    assert found[3].network.branches[0].relaxation_time == 0.5
-    assert found[4].effects == (("sensor lag", (("time_constant", 0.01),)),)
+    return ModelFile("fitted", lagged, {"covariance": {"names": names, "matrix": matrix}})
+
+
+def test_a_joint_covariance_makes_an_alternative_of_each_independent_direction():
+    lag = "sensor lag: time_constant"
+    # mu_1 and mu_2 are known by their sum alone
+    matrix = np.array([[4e6, -4e6, 0.0], [-4e6, 4e6, 0.0], [0.0, 0.0, 1e-6]])
+    found = alternatives_of(_with_covariance(["mu_1", "mu_2", lag], matrix.tolist()))
+    base = _with_covariance([], []).model
+    moduli = [[b.spring.modulus for b in m.network.branches[:2]] for m in (base, *found)]
+    lags = sorted(dict(m.effects)["sensor lag"][0][1] for m in found)
+    np.testing.assert_allclose(np.sum(moduli, axis=1), np.sum(moduli[0]), rtol=1e-9)
+    (shared,) = {round(abs(m[0] - moduli[0][0])) for m in moduli[1:]} - {0}
+    assert shared == pytest.approx(1.96 * 2e3, rel=1e-3)
+    assert lags[0] == pytest.approx(0.02 - 1.96e-3, rel=1e-2) or lags[-1] == pytest.approx(
+        0.02 + 1.96e-3, rel=1e-2
+    )
+
+
+@pytest.mark.parametrize(
+    ("names", "matrix"),
+    [(["mu_9"], [[1.0]]), (["mu_1"], [[1.0, 2.0]]), (["mu_1"], [["x"]]), (3, [[1.0]])],
+    ids=["another model's", "not square", "words", "no names"],
+)
+def test_a_covariance_that_is_not_the_models_makes_no_alternatives(names, matrix):
+    assert alternatives_of(_with_covariance(names, matrix)) == ()
     assert alternatives_of(MODEL) == ()

@@ -9,8 +9,7 @@ from dearig.acquisition.prediction import PredictedFilm
 from dearig.drivers.gate import Limits, admit
 from dearig.drivers.samples import Listed
 from dearig.model.actuator import Drive
-from dearig.model.control import Learner, TrackingTask, VoltageLimits
-from dearig.model.control.learning import CONTRACTION
+from dearig.model.control import Learner, LearningSettings, TrackingTask, VoltageLimits
 from dearig.model.errors import ModelError
 from tests.tools.effect_cases import THESIS, numbers, with_effect
 from tests.tools.targets import LEAD_IN, RATE, TAIL, path, task
@@ -60,7 +59,7 @@ def test_the_error_falls_to_the_noise(name):
     assert lessons[0].rms > 2.0 * NOISE
     assert lessons[-1].rms < 1.25 * NOISE
     assert lessons[0].learned
-    assert lessons[0].contraction <= CONTRACTION
+    assert lessons[0].contraction <= LearningSettings().contraction
 
 
 @pytest.mark.parametrize("name", ["dry friction", "elastoplastic hysteresis", "Mullins softening"])
