@@ -117,8 +117,14 @@ MEASUREMENTS = {
         ("tests.benchmarks.bench_diagnosis --train thesis --seeds 2003,79,225",),
     ),
     "track": Measurement(
-        "Following a path beside a PI loop and learning without a model",
-        ("tests.benchmarks.bench_track --rigs 12",),
+        "Following a path beside a PID loop and learning without a model",
+        ("tests.benchmarks.bench_track",),
+    ),
+    "learning": Measurement(
+        "What each number of the learning is worth", ("tests.benchmarks.bench_learning",)
+    ),
+    "inversion": Measurement(
+        "How near the film comes under the computed voltage", ("tests.benchmarks.bench_inversion",)
     ),
     "hold": Measurement(
         "Holding a displacement for an hour, beside the feedforward alone",
