@@ -10,7 +10,7 @@ from __future__ import annotations
 import unicodedata
 from typing import TextIO
 
-__all__ = ["MESSAGE_MAX", "PrintableStream", "printable"]
+__all__ = ["MESSAGE_MAX", "PrintableStream", "no_formula", "printable"]
 
 #: Unicode categories that are shown as escapes: controls, formats (bidirectional overrides, tags,
 #: zero-width space), lone surrogates, private use, unassigned, line and paragraph separators.
@@ -20,6 +20,9 @@ _JOINERS = "\u200c\u200d"
 #: Longest text of one message or line in characters: more than a path has on Linux (4096). Longer
 #: ones are cut in the middle.
 MESSAGE_MAX = 5000
+
+#: First characters of a formula, and their full-width forms.
+_FORMULA = "=+-@\t\r\n\uff1d\uff0b\uff0d\uff20"
 
 
 def printable(text: str, keep: str = "", most: int | None = None) -> str:
@@ -33,6 +36,15 @@ def printable(text: str, keep: str = "", most: int | None = None) -> str:
     if text.isprintable():  # the usual case, without a look at each character
         return text
     return "".join(c if c.isprintable() or c in keep or _is_shown(c) else _escape(c) for c in text)
+
+
+def no_formula(text: str) -> str:
+    """Return ``text`` for a cell of a table (CSV), so that a spreadsheet does not compute it.
+
+    A cell that begins with one of ``= + - @``, a tab or an end of line can be a formula, which may
+    start programs. The apostrophe before it is the mark for text. Numbers are not passed here.
+    """
+    return f"'{text}" if text[:1] in _FORMULA and text else text
 
 
 def _is_shown(character: str) -> bool:

@@ -126,6 +126,7 @@ def _comparison_json(comparison: Comparison) -> dict[str, Any]:
         "role": comparison.role,
         "table": comparison.table,
         "row": comparison.row,
+        "simulated": None if comparison.origin is None else comparison.origin.simulated,
         "samples": int(e.samples),
         **measures,
         **_noise_json(comparison.kind, (comparison,)),

@@ -46,7 +46,7 @@ def before_after_figure(before: Comparison, after: Comparison) -> Figure:
     shown = SHOWN[after.kind]
     time = after.time
     with base.style():
-        figure = base.blank(base.WIDTH, 5.8)
+        figure = base.blank(base.WIDTH, 4.8)
         axes = figure.subplots(4, 1, sharex=True, height_ratios=(0.8, 1.7, 1.0, 1.0))
         drive, both, first, last = axes
         drive.plot(
@@ -173,7 +173,7 @@ def dependence_figure(dependence: Dependence, kind: str) -> Figure:
 def missing_time_figure(before: MissingStress, after: MissingStress | None) -> Figure:
     """Draw the missing stress over time, before and after."""
     with base.style():
-        figure = base.blank(2.1 * base.WIDTH, 2.5)
+        figure = base.blank(1.3 * base.WIDTH, 2.2)
         ax = figure.subplots()
         for missing, name, colour in ((before, "before", BEFORE), (after, "after", AFTER)):
             if missing is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -30,7 +30,7 @@ from dearig.report.figures import comparison_figure
 from dearig.report.head import head_of, origins_of
 from dearig.report.html import Picture, picture, prefixes, write_page
 from dearig.report.numbers import seconds, significant
-from dearig.report.residual_figures import residual_panels
+from dearig.report.residual_figures import bin_words, residual_panels
 from dearig.report.sentences import describe_model
 from dearig.report.tables import Table
 from dearig.units import SHOWN, readable
@@ -78,14 +78,14 @@ class DiagnosisPage:
     errors: tuple[tuple[str, tuple[Table, ...]], ...]
     bars: tuple[Picture, ...]
     step_table: Table
+    pictures: tuple[Picture, ...]
     steps: tuple[FoundEffect, ...]
     effects: Table
     unnamed: tuple[str, ...]
     residuals: tuple[Group, ...]
     missing: tuple[Group, ...]
-    rankings: tuple[Table, ...]
+    rankings: tuple[tuple[Table, Table], ...]
     dropped_effects: str
-    pictures: tuple[Picture, ...]
     after: tuple[tuple[str, tuple[str, ...]], ...]
     after_pictures: tuple[Picture, ...]
     experiment_words: str
@@ -146,6 +146,7 @@ def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
         errors=tuple(errors),
         bars=bars,
         step_table=step_table(outcome),
+        pictures=_validation_pictures(outcome, changed, names),
         steps=_steps(outcome, names),
         effects=effect_table(outcome),
         unnamed=_unnamed(outcome),
@@ -155,9 +156,8 @@ def _page(outcome: DiagnoseOutcome, names: Iterator[str]) -> DiagnosisPage:
             for m in finding.missing_before
             if any(m.record == s.record for s in worst)
         ),
-        rankings=rankings(outcome),
+        rankings=_rankings(outcome),
         dropped_effects=_capitalised(dropped_effects(outcome)),
-        pictures=_validation_pictures(outcome, changed, names),
         after=tuple(
             (s.record, tuple(readable(_with_full_stop(_capitalised(w))) for w in s.words))
             for s in finding.after
@@ -200,6 +200,19 @@ def _steps(outcome: DiagnoseOutcome, names: Iterator[str]) -> tuple[FoundEffect,
                 curves,
             )
         )
+    return tuple(found)
+
+
+def _rankings(outcome: DiagnoseOutcome) -> tuple[tuple[Table, Table], ...]:
+    """Return for each round the table of the leading candidates, and that of all others."""
+    found = []
+    for table, made in zip(rankings(outcome), outcome.finding.rounds, strict=True):
+        leads = [c.verdict in ("chosen", "indistinguishable") for c in made.candidates]
+        sides = [
+            tuple(row for row, lead in zip(table.rows, leads, strict=True) if lead is wanted)
+            for wanted in (True, False)
+        ]
+        found.append((replace(table, rows=sides[0]), replace(table, rows=sides[1], note="")))
     return tuple(found)
 
 
@@ -318,7 +331,7 @@ def _after_pictures(
     if not chosen:
         return ()
     captions = (
-        "histogram of the error, and the distribution of noise alone.",
+        f"histogram of the error{bin_words(chosen[0])}, and the distribution of noise alone.",
         "autocorrelation of the error; that of noise lies in the grey band.",
         "amplitude density of the error; that of white noise is flat.",
     )

@@ -42,7 +42,7 @@ __all__ = ["comparison_figure", "loop_figure", "overview_figure"]
 def comparison_figure(comparison: Comparison) -> Figure:
     """Draw drive, measurement and model, and error over time (as the thesis's Fig. 10-16)."""
     with style():
-        figure = blank(WIDTH, 5.0)
+        figure = blank(WIDTH, 4.1)
         axes = figure.subplots(3, 1, sharex=True, height_ratios=(1.0, 1.7, 1.2))
         _stack(list(axes), comparison)
         figure.align_ylabels(axes)

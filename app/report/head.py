@@ -19,21 +19,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "NOT_RECORDED",
-    "SIMULATED_CAVEAT",
     "Head",
     "RecordingLine",
-    "any_simulated",
     "command_line",
     "head_of",
     "origins_of",
     "simulated_words",
 ]
-
-#: Beside every comparison of errors on simulated recordings with the thesis's measured errors.
-SIMULATED_CAVEAT = (
-    "The recordings are simulated, and the thesis's errors are measured ones of another rig and "
-    "film: this comparison does not show how well the model describes a real film."
-)
 
 #: What is said of a value that no recording has.
 NOT_RECORDED = "not recorded"
@@ -102,11 +94,6 @@ def origins_of(comparisons: Iterable[Comparison]) -> tuple[Origin, ...]:
     from dearig.recording.origin import Origin  # imports h5py
 
     return tuple(Origin(c.name) if c.origin is None else c.origin for c in comparisons)
-
-
-def any_simulated(comparisons: Iterable[Comparison]) -> bool:
-    """Return True if one of the recordings is simulated."""
-    return any(c.is_simulated for c in comparisons)
 
 
 def simulated_words(origins: Sequence[Origin]) -> str:

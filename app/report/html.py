@@ -10,12 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dearig.analysis.outcomes import pooled_over_noise
+from dearig.printable import printable
+from dearig.report.figure_data import Column, csv_url, figure_columns, to_csv
 from dearig.report.figure_export import svg
 from dearig.report.figures import comparison_figure, loop_figure
 from dearig.report.head import head_of, origins_of
 from dearig.report.numbers import NO_VALUE, seconds, significant
-from dearig.report.parameter_figures import branches_figure, parameters_figure
-from dearig.report.residual_figures import residual_panels
+from dearig.report.parameter_figures import (
+    branches_figure,
+    parameter_columns,
+    parameters_figure,
+)
+from dearig.report.residual_figures import bin_words, residual_panels
 from dearig.report.sentences import (
     describe_model,
     identify_summary,
@@ -53,16 +59,22 @@ __all__ = [
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 #: Sections from which on a page has a list of them.
 _CONTENTS_MIN = 4
+#: Characters of a word that fits on a phone beside the columns of a table.
+_WORD_MAX = 18
+#: Places after separators, where a long name may be broken.
+_SEPARATED = re.compile(r"(?<=[-.:,;=@+])(?=[^\W\d])|(?<=[_/\\])(?=\w)")
 #: Where the list of contents is put; escaped text cannot contain it.
 _CONTENTS_PLACE = "<!-- contents -->"
 
 
 @dataclass(frozen=True)
 class Picture:
-    """Figure of a page with its caption."""
+    """Figure of a page: its drawing, number, caption, and the address that holds its data."""
 
     svg: Markup
+    number: str
     caption: str
+    data: str
 
 
 @dataclass(frozen=True)
@@ -163,10 +175,12 @@ def _render(template: str, contents: dict[str, Any]) -> str:
         loader=PackageLoader("dearig.report"),
         autoescape=True,
         undefined=StrictUndefined,
+        finalize=_shown,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     environment.filters["non_breaking"] = _non_breaking
+    environment.filters["breakable"] = _breakable
     page = environment.get_template(template).render(
         contents,
         policy=_POLICY,
@@ -195,6 +209,27 @@ def _non_breaking(sentence: str) -> str:
     )
 
 
+def _shown(value: object) -> object:
+    """Return text of others without characters that reverse or hide what is around them."""
+    is_text = isinstance(value, str) and not hasattr(value, "__html__")
+    return printable(str(value), "\n\t") if is_text else value
+
+
+def _breakable(name: str, longest: int = _WORD_MAX) -> Markup:
+    """Return ``name`` as HTML whose words of more than ``longest`` characters can be broken.
+
+    They break after separators, and within only where a part is still longer.
+    """
+    from markupsafe import Markup
+
+    words = []
+    for word in re.split(r"(\s+)", printable(str(name))):
+        parts = [word] if len(word) <= longest else _SEPARATED.split(word)
+        pieces = [p[i : i + longest] for p in parts for i in range(0, len(p), longest)]
+        words.append(Markup("<wbr>").join(pieces))  # escapes them
+    return Markup("").join(words)
+
+
 def prefixes() -> Iterator[str]:
     """Yield a different prefix for each figure of a page."""
     return (f"f{n}" for n in count(1))
@@ -209,6 +244,17 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
     pictures = [("Training", _comparison_pictures(outcome.train, prefixes))]
     if outcome.validation:
         pictures.append(("Validation", _comparison_pictures(outcome.validation, prefixes)))
+    parameter_pictures = (
+        picture(
+            parameters_figure(fit),
+            prefixes,
+            "Parameters with their 95 % intervals. An arrow is an open end; grey parameters "
+            "are not determined by the data."
+            if fit.covariance.size > 0
+            else "Parameters; no intervals were computed.",
+            parameter_columns(fit),
+        ),
+    )
     branch_tables: tuple[Table, ...] = ()
     branch_pictures: tuple[Picture, ...] = ()
     if outcome.springs:
@@ -232,16 +278,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
         warnings=warnings_of(outcome),
         errors=tuple(errors),
         parameters=(parameter_table(fit),),
-        parameter_pictures=(
-            picture(
-                parameters_figure(fit),
-                prefixes,
-                "Parameters with their 95 % intervals. An arrow is an open end; grey parameters "
-                "are not determined by the data."
-                if fit.covariance.size > 0
-                else "Parameters; no intervals were computed.",
-            ),
-        ),
+        parameter_pictures=parameter_pictures,
         branches=branch_tables,
         branch_pictures=branch_pictures,
         pictures=tuple(pictures),
@@ -310,12 +347,20 @@ def _validation_sides(comparisons: Sequence[Comparison], alone: str) -> list[Sid
     return [_side(title, members, None) for title, members in groups]
 
 
-def picture(figure: Figure, prefixes: Iterator[str], caption: str) -> Picture:
-    """Return ``figure`` for a page; ``prefixes`` yields one prefix for each figure."""
+def picture(
+    figure: Figure, prefixes: Iterator[str], caption: str, data: Sequence[Column] | None = None
+) -> Picture:
+    """Return ``figure`` for a page; ``prefixes`` yields one prefix for each figure.
+
+    ``data`` is what is saved as its data, by default the curves as drawn.
+    """
     from markupsafe import Markup
 
+    prefix = next(prefixes)
     # matplotlib has escaped all text in the drawing, and the label is an escaped attribute
-    return Picture(Markup(svg(figure, next(prefixes), caption)), caption)  # noqa: S704
+    drawing = Markup(svg(figure, prefix, caption))  # noqa: S704
+    table = to_csv(figure_columns(figure) if data is None else data)
+    return Picture(drawing, prefix.removeprefix("f"), caption, csv_url(table))
 
 
 def _comparison_pictures(
@@ -342,7 +387,7 @@ def _comparison_pictures(
 
 def _residual_pictures(comparison: Comparison, prefixes: Iterator[str]) -> tuple[Picture, ...]:
     captions = (
-        "Histogram of the error, and the distribution of noise alone.",
+        f"Histogram of the error{bin_words(comparison)}, and the distribution of noise alone.",
         "Autocorrelation of the error; that of noise lies in the grey band.",
         "Amplitude density of the error; that of white noise is flat.",
     )

@@ -23,6 +23,7 @@ from dearig.report.figure_style import (
     style,
 )
 from dearig.report.numbers import symbol
+from dearig.report.thesis import table_3
 from dearig.units import SHOWN, parameter_unit
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from dearig.analysis.outcomes import BranchTrial
     from dearig.model.fitting import Estimate, Identification
 
-__all__ = ["branches_figure", "parameters_figure"]
+__all__ = ["branches_figure", "parameter_columns", "parameters_figure"]
 
 
 def parameters_figure(fit: Identification) -> Figure:
@@ -58,6 +59,27 @@ def parameters_figure(fit: Identification) -> Figure:
         figure.legend([handles[name] for name in names], names, loc="outside upper left", ncols=2)
         figure.align_ylabels(axes)
     return figure
+
+
+def parameter_columns(fit: Identification) -> tuple[tuple[str, list[object]], ...]:
+    """Return the data of ``parameters_figure``; NaN stands for an open end."""
+    known = fit.covariance.size > 0
+    published = table_3(fit.model)
+    rows = []
+    for e in fit.estimates:
+        factor, unit = parameter_unit(e.unit)
+        low, high = (e.low, e.high) if known and e.free else (math.nan, math.nan)
+        ends = (low * factor if low > 0.0 else math.nan, high * factor)
+        rows.append(
+            (
+                e.name, unit, e.value * factor,
+                *(end if math.isfinite(end) else math.nan for end in ends),
+                "yes" if e.determined else "no", published.get(e.name, math.nan) * factor,
+            )
+        )  # fmt: skip
+    names = ("parameter", "unit", "value", "low95", "high95", "determined", "thesis_table_3")
+    columns = zip(*rows, strict=True)
+    return tuple((name, list(column)) for name, column in zip(names, columns, strict=True))
 
 
 def branches_figure(trials: Sequence[BranchTrial], kind: str) -> Figure:
@@ -126,8 +148,6 @@ _PARAMETER_LABELS = (_FITTED, _BARE, _FOLLOWS, _UNDETERMINED, _TABLE_3)
 
 
 def _intervals(ax: Axes, label: str, estimates: Sequence[Estimate], fit: Identification) -> None:
-    from dearig.report.thesis import table_3
-
     known = fit.covariance.size > 0
     published = table_3(fit.model)
     factor = parameter_unit(estimates[0].unit)[0]

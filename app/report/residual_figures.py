@@ -22,6 +22,7 @@ from dearig.report.figure_style import (
     log_axis,
     style,
 )
+from dearig.report.numbers import significant
 from dearig.units import SHOWN
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
     from dearig.analysis.outcomes import Comparison
 
-__all__ = ["residual_figure", "residual_panels"]
+__all__ = ["bin_words", "residual_figure", "residual_panels"]
 
 
 def residual_figure(comparison: Comparison) -> Figure:
@@ -56,13 +57,9 @@ def residual_panels(comparison: Comparison) -> tuple[Figure, Figure, Figure]:
 def _histogram(ax: Axes, comparison: Comparison) -> None:
     shown = SHOWN[comparison.kind]
     residual = _residual(comparison) * shown.error_factor
-    # a few outliers must not squeeze everything else into one bar
-    centre = float(np.median(residual))
-    reach = min(4.5 * float(np.std(residual)), 1.1 * float(np.max(np.abs(residual - centre))))
     noise = None if comparison.noise is None else comparison.noise * shown.error_factor
-    reach = max(reach, 4.0 * noise if noise else 0.0) or 1.0
-    bins = int(np.clip(math.sqrt(residual.size), 12, 60))
-    counts, edges = np.histogram(residual, bins, (centre - reach, centre + reach))
+    edges = _edges(residual, noise or 0.0, comparison.step * shown.error_factor)
+    counts, _ = np.histogram(residual, edges)
     width = edges[1] - edges[0]
     ax.bar(
         edges[:-1], counts / (residual.size * width), width, align="edge", color=MEASURED,
@@ -80,6 +77,37 @@ def _histogram(ax: Axes, comparison: Comparison) -> None:
     ax.set_ylabel(f"Density (1/{shown.error_unit})")
     few_ticks(ax, x=4, y=4)
     legend(ax)
+
+
+def _edges(residual: np.ndarray, noise: float, step: float) -> np.ndarray:
+    """Return the edges of the bins of a histogram.
+
+    A bin is a whole number of converter steps wide: otherwise some would hold one step more than
+    others, and the histogram of plain noise would have teeth. Its edges are between two steps.
+    """
+    # a few outliers must not squeeze everything else into one bar
+    centre = float(np.median(residual))
+    reach = min(4.5 * float(np.std(residual)), 1.1 * float(np.max(np.abs(residual - centre))))
+    reach = max(reach, 4.0 * noise, step) or 1.0
+    bins = int(np.clip(math.sqrt(residual.size), 12, 60))
+    if step <= 0.0:
+        return np.linspace(centre - reach, centre + reach, bins + 1)
+    steps = max(round(2.0 * reach / bins / step), 1)
+    first, last = (math.floor((centre + side * reach) / (steps * step)) for side in (-1.0, 1.0))
+    return (np.arange(first, last + 2) * steps - steps // 2 - 0.5) * step
+
+
+def bin_words(comparison: Comparison) -> str:
+    """Return how wide the bins of the histogram are, in converter steps where these are known."""
+    if comparison.step <= 0.0:
+        return ""
+    shown = SHOWN[comparison.kind]
+    step = comparison.step * shown.error_factor
+    noise = (comparison.noise or 0.0) * shown.error_factor
+    edges = _edges(_residual(comparison) * shown.error_factor, noise, step)
+    steps = round((edges[1] - edges[0]) / step)
+    many = "a converter step" if steps == 1 else f"{steps} converter steps"
+    return f" in bins of {many} ({significant(steps * step)} {shown.error_unit})"
 
 
 def _correlation(ax: Axes, comparison: Comparison) -> None:

@@ -9,6 +9,7 @@ from dearig.analysis.outcomes import noise_from, pooled_noise, pooled_over_noise
 from dearig.model.noise import LEAD_IN
 from dearig.report.numbers import seconds, significant, symbol
 from dearig.report.spring_names import spring_name
+from dearig.report.thesis import SIMULATED_CAVEAT
 from dearig.units import SHOWN
 
 if TYPE_CHECKING:
@@ -93,6 +94,8 @@ def identify_summary(outcome: IdentifyOutcome) -> tuple[str, ...]:
             f"{outcome.published_fit.e_m_pct:g} % for its own fit; by the same formulas this one "
             f"has {_worst(train, 'e_rms_thesis_pct')} and {_worst(train, 'e_m_thesis_pct')}."
         )
+        if any(c.is_simulated for c in train):
+            said.append(SIMULATED_CAVEAT)
     said += _spring_sentence(outcome.springs)
     chosen = [t for t in outcome.trials if t.chosen]
     if chosen:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from dearig.report.numbers import NO_VALUE, interval, quoted, significant, symbol
 from dearig.report.spring_names import spring_name
-from dearig.report.thesis import table_3
+from dearig.report.thesis import SIMULATED_CAVEAT, table_3
 from dearig.units import SHOWN, parameter_unit
 
 if TYPE_CHECKING:
@@ -27,6 +27,10 @@ __all__ = [
     "spring_candidates",
     "thesis_error_table",
 ]
+
+
+#: Characters of a table's line on a phone of 390 pixels, and of a word that is not broken there.
+_PHONE_WIDTH, _WORD_MAX = 46, 18
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,20 @@ class Table:
     head: tuple[tuple[str, str], ...]
     rows: tuple[Row, ...]
     note: str = ""
+
+    @property
+    def is_wide(self) -> bool:
+        """True if a phone has no room for the columns beside the longest word of the first."""
+        columns = zip(*(row.cells for row in self.rows), strict=False)
+        widths = [
+            max(
+                len(word)
+                for text in (*head, *cells)
+                for word in (text.split() if i == 0 else [text])
+            )
+            for i, (head, cells) in enumerate(zip(self.head, columns, strict=False))
+        ]
+        return sum(min(width, _WORD_MAX) + 1 for width in widths) > _PHONE_WIDTH
 
     def beside(self, other: Table) -> Table:
         """Return both tables as one. Raises ``ValueError`` unless they have the same rows."""
@@ -151,7 +169,8 @@ def thesis_error_table(
         ("e_m", "here"),
         ("e_m", "thesis"),
     )
-    return Table(title, head, tuple(rows))
+    compared = any(c.is_simulated and (c.published or published) for c in comparisons)
+    return Table(title, head, tuple(rows), SIMULATED_CAVEAT if compared else "")
 
 
 def parameter_table(fit: Identification) -> Table:

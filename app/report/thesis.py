@@ -8,7 +8,13 @@ if TYPE_CHECKING:
     from dearig.model.actuator import Actuator
     from dearig.model.film import Strip
 
-__all__ = ["table_3"]
+__all__ = ["SIMULATED_CAVEAT", "table_3"]
+
+#: Beside every comparison of errors on simulated recordings with the thesis's measured errors.
+SIMULATED_CAVEAT = (
+    "These recordings are simulated. The thesis's errors are of a measured film, so the comparison "
+    "does not show how well the model describes a real film."
+)
 
 
 def table_3(model: Actuator | Strip) -> dict[str, float]:
