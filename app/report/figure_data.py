@@ -14,7 +14,7 @@ from dearig.printable import no_formula, printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.collections import PolyCollection
+    from matplotlib.collections import Collection
     from matplotlib.figure import Figure
 
 __all__ = ["Column", "csv_url", "figure_columns", "to_csv"]
@@ -89,7 +89,7 @@ def _curves(ax: Axes) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
             yield from _outline(name, band)
 
 
-def _outline(name: str, band: PolyCollection) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
+def _outline(name: str, band: Collection) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
     for path in band.get_paths():
         points = np.asarray(path.vertices, dtype=np.float64)
         yield f"outline of {name}", points[:, 0], points[:, 1]
@@ -97,10 +97,12 @@ def _outline(name: str, band: PolyCollection) -> Iterator[tuple[str, np.ndarray,
 
 def _bars(ax: Axes) -> Iterator[Column]:
     """Yield two columns for each group of bars: their places or names, and their lengths."""
+    from matplotlib.container import BarContainer
+
     names = [label.get_text() for label in ax.get_yticklabels()]
     places = [float(place) for place in ax.get_yticks()]
     for group in ax.containers:
-        if not hasattr(group, "orientation"):
+        if not isinstance(group, BarContainer):
             continue
         bars = group.patches
         name = _public(group.get_label())
