@@ -23,6 +23,7 @@ from dearig.batch.after import Compute, compute, left_band
 from dearig.batch.extremes import write_extremes
 from dearig.batch.forecast import Forecast, foresee
 from dearig.batch.journal import FORMAT, JOURNAL, REQUESTS, Journal, read_lines
+from dearig.batch.notify import Notifier
 from dearig.batch.queue import (
     DONE,
     LOST,
@@ -34,6 +35,7 @@ from dearig.batch.queue import (
 )
 from dearig.config.campaignfile import Campaign, PlannedRun, digest_of, settings_text
 from dearig.config.modelfile import load_actuator
+from dearig.config.notify import Notify
 from dearig.config.rigfile import RigFile
 from dearig.config.sequencefile import LoadedSequence
 from dearig.errors import (
@@ -110,6 +112,7 @@ def play_campaign(
     noted: Noted | None = None,
     interrupts: Interrupts | None = None,
     computing: Compute | None = None,
+    notify: Notify | None = None,
     progress: Progress = quiet,
     now: Callable[[], float] = time.time,
     wait: Callable[[float], None] = time.sleep,
@@ -122,7 +125,7 @@ def play_campaign(
     ``ended`` is called with the outcome before an error is raised, ``noted`` with the entries that
     are in the journal, and then with each new one. ``interrupts`` lets another thread end the run
     and the campaign; by default ctrl-C does. ``computing`` stands in for ``compute`` after each
-    run.
+    run. ``notify`` says whom to tell, by default those that the plan names.
 
     Raises ``InputError`` before anything is played, and for a run that the gate refuses at its
     turn; ``SafetyStop``, ``InstrumentFault`` or ``NotSafe`` where a run ended so that a person must
@@ -140,6 +143,7 @@ def play_campaign(
             raise Interrupted("interrupted while the campaign was planned; nothing was played")
         progress(stage, part)
 
+    notifier = Notifier(campaign.notify if notify is None else notify, now)
     planning("planning", 0.0)
     forecast = foresee(campaign, rig_file, folder, options.actuator, options.film_id, planning)
     if arming.shown not in ((), forecast.digests):
@@ -156,7 +160,7 @@ def play_campaign(
     with Journal(folder, now) as journal:
         session = _Session(
             campaign, address, rig_file, folder, options, journal, observer, noted, interrupts,
-            computing or compute, progress, now, wait,
+            computing or compute, notifier, progress, now, wait,
         )  # fmt: skip
         session.begin(forecast, arming)
         stop: DearigError | None
@@ -169,8 +173,13 @@ def play_campaign(
                 f"campaign with --resume"
             )
             status, reason = "interrupted", str(stop)
+        except Exception as error:
+            why = f"the program failed: {type(error).__name__}"
+            notifier.tell_stop(session.outcome("failed", why))
+            raise
         session.note("session-ended", status=status, reason=reason)
-        outcome = CampaignOutcome(campaign.name, folder, session.queue, status, reason)
+        outcome = session.outcome(status, reason)
+        notifier.tell_stop(outcome)
         if ended is not None:
             ended(outcome)
         if stop is not None:
@@ -228,6 +237,7 @@ class _Session:
         noted: Noted | None,
         interrupts: Interrupts | None,
         computing: Compute,
+        notifier: Notifier,
         progress: Progress,
         now: Callable[[], float],
         wait: Callable[[float], None],
@@ -236,6 +246,8 @@ class _Session:
         self._folder, self._options, self._journal = folder, options, journal
         self._observer, self._progress, self._now, self._wait = observer, progress, now, wait
         self._noted, self._interrupts, self._computing = noted, interrupts, computing
+        self._notifier = notifier
+        self._output: OutputState | None = None  # after the last run
         self._simulated = is_simulated(address)
         self._planned = {run.name: run for run in campaign.runs}
         self.queue = Queue.after(journal.entries, journal.path)
@@ -254,6 +266,10 @@ class _Session:
     def _check_interrupts(self) -> None:
         if self._interrupts is not None and self._interrupts.asked():
             raise Interrupted("interrupted between two runs, at 0 V")
+
+    def outcome(self, status: str, reason: str = "") -> CampaignOutcome:
+        """Return how the campaign stands."""
+        return CampaignOutcome(self._campaign.name, self._folder, self.queue, status, reason)
 
     # ------------------------------------------------------------ begin
 
@@ -447,6 +463,7 @@ class _Session:
             return self._failed(state, path, error)
         finally:
             self._rested = False
+        self._output = result.output_state
         recording = result.path.name if result.path.parent == path.parent else str(result.path)
         # a halt is written before what it is about, so that no kill comes between them
         if not result.output_state.confirmed:
@@ -494,7 +511,7 @@ class _Session:
             self.note("not-started", run=state.name, reason=str(error))
             reason = f"run {state.name}: {error}"
             return "refused", reason, InputError(reason)
-        output = error.output_state
+        output = self._output = error.output_state
         doubt = output is None or not output.confirmed
         looks = isinstance(error, SafetyStop | InstrumentFault | NotSafe) or doubt
         if looks:
@@ -502,7 +519,8 @@ class _Session:
         if not path.exists():
             self.note("not-started", run=state.name, reason=str(error))
         else:
-            self._end(state, STOPPED if isinstance(error, SafetyStop) else LOST, str(error))
+            how = STOPPED if isinstance(error, SafetyStop) else LOST
+            self._end(state, how, str(error), tripped=looks)
         if looks:
             return "halted", self.queue.halted, error
         if isinstance(error, DiskFault):
@@ -545,9 +563,15 @@ class _Session:
         self.note("reduced", run=state.name, extremes=out.name)
         return out.name
 
-    def _end(self, state: RunState, how: str, reason: str, **facts: Any) -> None:
+    def _end(
+        self, state: RunState, how: str, reason: str, tripped: bool = False, **facts: Any
+    ) -> None:
         self.note(
             "ended", run=state.name, state=how, reason=reason, recording=state.recording, **facts
+        )
+        doubt = self._output is not None and not self._output.confirmed
+        self._notifier.tell_run(
+            self.outcome("running"), state, how, self._output, tripped=tripped or doubt
         )
 
 

@@ -14,10 +14,14 @@ from dearig.cli.options import (
     Fsync,
     Json,
     Notes,
+    NotifyCommand,
+    NotifyOn,
+    NotifyWebhook,
     Paced,
     Rig,
     RigFileOption,
     Seed,
+    notify_from,
 )
 from dearig.cli.output import (
     check_files,
@@ -105,6 +109,9 @@ def campaign(
     seed: Seed = 0,
     film: FilmName = "",
     notes: Notes = "",
+    notify_command: NotifyCommand = None,
+    notify_webhook: NotifyWebhook = None,
+    notify_on: NotifyOn = None,
     json: Json = None,
     force: Force = False,
 ) -> None:
@@ -162,6 +169,7 @@ def campaign(
         play_campaign(
             loaded, rig, settings, out, options, Arming(operator, runs, hours, acknowledge),
             resume=resume, ended=finish, progress=progress,
+            notify=notify_from(notify_command, notify_webhook, notify_on, loaded.notify),
         )  # fmt: skip
 
 

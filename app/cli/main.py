@@ -28,6 +28,7 @@ from dearig import log_file
 from dearig.cli import campaign, files, fit, hold, run, study, tools, track, trends, watch
 from dearig.cli.last_words import LastingStream, leave, silence_libraries
 from dearig.cli.lost_interrupt import note_lost
+from dearig.cli.options import without_secrets
 from dearig.cli.output import version
 from dearig.errors import DearigError, DiskFault, InputError, Interrupted
 from dearig.printable import MESSAGE_MAX, PrintableStream, printable
@@ -72,7 +73,7 @@ def _options(
             handler.show(verbose)
     if verbose > 1:
         root.setLevel(logging.DEBUG)
-    log.info("started: %s", shlex.join(["dearig", *sys.argv[1:]]))
+    log.info("started: %s", shlex.join(["dearig", *without_secrets(sys.argv[1:])]))
 
 
 class _Terminal(logging.StreamHandler[TextIO]):
@@ -106,9 +107,17 @@ def main() -> None:
         _unexpected_errors_told(written), _library_warnings_logged(),
     ):  # fmt: skip
         status = _run(written)
+        _await_notifications()
         if written.stream is not None:  # a command has started, not only --help
             log.info("ended with exit code %d", status)
     leave(status)
+
+
+def _await_notifications() -> None:
+    """Wait until those who want to know are told how a run ended; the person here knows."""
+    notify = sys.modules.get("dearig.batch.notify")
+    if notify is not None:
+        notify.await_notifications()
 
 
 @contextmanager

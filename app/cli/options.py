@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import os
+import shlex
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand
+
+from dearig.errors import InputError
+
+if TYPE_CHECKING:
+    from dearig.config.notify import Notify
 
 __all__ = [
     "Branches",
@@ -24,6 +32,9 @@ __all__ = [
     "ManyToValidate",
     "Method",
     "Notes",
+    "NotifyCommand",
+    "NotifyOn",
+    "NotifyWebhook",
     "Operator",
     "Paced",
     "Recording",
@@ -34,6 +45,8 @@ __all__ = [
     "SpringChoice",
     "SpringKind",
     "Validation",
+    "notify_from",
+    "without_secrets",
 ]
 
 
@@ -84,6 +97,14 @@ class EndedEarly(StrEnum):
     keep = "keep"
     cut = "cut"
     leave_out = "leave-out"
+
+
+class NotifyEvent(StrEnum):
+    """What a notification can be about."""
+
+    run_ended = "run-ended"
+    tripped = "tripped"
+    queue_stopped = "queue-stopped"
 
 
 class Kinematics(StrEnum):
@@ -160,6 +181,81 @@ Paced = Annotated[
     typer.Option("--paced", help="Simulate in real time.", show_default="as fast as possible"),
 ]
 Operator = Annotated[str, typer.Option(help="Name of the operator, kept in the recording.")]
+
+# ---------------------------------------------------------------- notifications
+
+_WEBHOOK = "--notify-webhook"
+NotifyCommand = Annotated[
+    str | None,
+    typer.Option(
+        "--notify-command",
+        metavar="COMMAND",
+        help="Start this program, with its arguments, when a run has ended; it gets JSON on its "
+        "standard input. No shell is used.",
+        show_default="that of the plan, if there is one",
+    ),
+]
+NotifyWebhook = Annotated[
+    str | None,
+    typer.Option(
+        _WEBHOOK,
+        metavar="ADDRESS",
+        help="Send JSON to this address when a run has ended; env:NAME takes it from a variable.",
+        show_default="that of the plan, if there is one",
+    ),
+]
+NotifyOn = Annotated[
+    list[NotifyEvent] | None,
+    typer.Option(
+        "--notify-on",
+        help="What is told: the end of a run, one that a person must look at, the end of the "
+        "queue. Can be repeated.",
+        show_default="all",
+    ),
+]
+
+
+def notify_from(
+    command: str | None, webhook: str | None, on: list[NotifyEvent] | None, plan: Notify
+) -> Notify:
+    """Return whom to tell: what the options say, and of the rest what the ``plan`` says.
+
+    Raises ``InputError`` for a command whose quotes do not match.
+    """
+    from dataclasses import replace
+
+    changes: dict[str, Any] = {}
+    if command is not None:
+        changes["command"] = _words(command)
+    if webhook is not None:
+        changes["webhook"] = webhook
+    if on:
+        changes["on"] = tuple(event.value for event in on)
+    return replace(plan, **changes)
+
+
+def _words(command: str) -> tuple[str, ...]:
+    # a backslash separates folders on Windows
+    try:
+        words = shlex.split(command, posix=os.name != "nt")
+    except ValueError as error:
+        raise InputError(f"--notify-command {command!r}: a quote has no end") from error
+    if os.name == "nt":
+        words = [w[1:-1] if len(w) > 1 and w[0] == w[-1] == '"' else w for w in words]
+    return tuple(words)
+
+
+def without_secrets(arguments: Sequence[str]) -> list[str]:
+    """Return the ``arguments`` of a command as they may be logged: without a webhook's address."""
+    shown: list[str] = []
+    for argument in arguments:
+        if shown and shown[-1] == _WEBHOOK:
+            argument = "..."
+        elif argument.startswith(f"{_WEBHOOK}="):
+            argument = f"{_WEBHOOK}=..."
+        shown.append(argument)
+    return shown
+
 
 # ---------------------------------------------------------------- output
 

@@ -16,11 +16,15 @@ from dearig.cli.options import (
     Fsync,
     Json,
     Notes,
+    NotifyCommand,
+    NotifyOn,
+    NotifyWebhook,
     Operator,
     Paced,
     Rig,
     RigFileOption,
     Seed,
+    notify_from,
 )
 from dearig.cli.output import announce_compilation, check_files, print_line, working, write_result
 from dearig.errors import InputError
@@ -91,6 +95,9 @@ def record(
     operator: Operator = "",
     film: FilmName = "",
     notes: Notes = "",
+    notify_command: NotifyCommand = None,
+    notify_webhook: NotifyWebhook = None,
+    notify_on: NotifyOn = None,
     json: Json = None,
     force: Force = False,
 ) -> None:
@@ -103,7 +110,9 @@ def record(
     from dearig.acquisition.run import RunOptions
     from dearig.acquisition.run import record as run
     from dearig.analysis.compatibility import of_rig
+    from dearig.batch.notify import Notifier
     from dearig.config.modelfile import load_actuator
+    from dearig.config.notify import Notify
     from dearig.config.rigfile import load_rig_file
     from dearig.config.sequencefile import load_sequence
     from dearig.config.toml_input import read_text
@@ -133,11 +142,16 @@ def record(
         text, operator, film, notes, overwrite=force, fsync=fsync,
         seed=seed, paced=paced, actuator=actuator, faults=faults,
     )  # fmt: skip
+    notifier = Notifier(notify_from(notify_command, notify_webhook, notify_on, Notify()))
     with working(json) as (console, progress):
-        result = run(
-            loaded, rig, settings, out, options, overlay=overlaid, progress=progress,
-            observer=_announcer(console, settings),
-        )  # fmt: skip
+
+        def play() -> RunResult:
+            return run(
+                loaded, rig, settings, out, options, overlay=overlaid, progress=progress,
+                observer=_announcer(console, settings),
+            )  # fmt: skip
+
+        result = notifier.tell_of(out, play)
     _show_run(console, result)
     write_result(_run_json(result), json)
 

@@ -25,6 +25,7 @@ from pydantic import Field, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
+from dearig.config.notify import Notify, NotifyTable
 from dearig.config.presets import PRESETS
 from dearig.config.sequence_paths import clean, filled, flat, with_settings
 from dearig.config.sequencefile import LoadedSequence, parse_sequence
@@ -92,6 +93,12 @@ branches = 3                    # of the fitted model
 # a lifetime test: the recordings of other runs are reduced to the extremes of each segment
 [keep]
 every = 1                       # keep the recording of every n-th run; 1 keeps all
+
+# whom to tell, after a run, at 0 V
+# [notify]
+# command = ["python", "tell.py"]             # a program, which gets JSON on its standard input
+# webhook = "env:LAB_WEBHOOK"                 # an address, or a variable that has it
+# on = ["run-ended", "tripped", "queue-stopped"]
 """
 
 
@@ -162,6 +169,7 @@ class _File(Table):
     warm_up: _WarmUp = Field(default=_WarmUp(runs=0), description="runs before the others")
     after: _After = Field(default=_After(), description="what is computed after each run")
     keep: _Keep = Field(default=_Keep(), description="which recordings are kept whole")
+    notify: NotifyTable = Field(default=NotifyTable(), description="whom to tell")
 
 
 _COMPARISONS: Mapping[str, Callable[[float, float], bool]] = MappingProxyType(
@@ -209,7 +217,7 @@ class Campaign:
     ``source`` names it in messages. ``branches`` is the number of Maxwell branches of what is
     fitted. ``model`` is the file of the first model of ``validate``, None for none. Of
     ``keep_every`` runs one recording is kept whole. ``sequences`` has the TOML of each sequence by
-    its name in the plan.
+    its name in the plan. ``notify`` says whom to tell when a run ends.
     """
 
     name: str
@@ -227,6 +235,7 @@ class Campaign:
     stop_when: tuple[Band, ...]
     keep_every: int
     sequences: Mapping[str, str]
+    notify: Notify
 
     def load(self, run: PlannedRun) -> LoadedSequence:
         """Return the sequence of ``run``. Raises ``InputError`` for one that is not valid."""
@@ -311,6 +320,7 @@ class _Expansion:
             stop_when=tuple(self._bands()),
             keep_every=file.keep.every,
             sequences=MappingProxyType(self._sequences),
+            notify=file.notify.settings(),
         )
 
     def _settings(self) -> Iterator[tuple[str, dict[str, Any], int]]:
@@ -498,7 +508,7 @@ def _beside(folder: Path, name: str, key: str) -> Path:
 # ---------------------------------------------------------------- messages
 
 _TABLES: Mapping[str, type[Table]] = MappingProxyType(
-    {"run": _Run, "warm_up": _WarmUp, "after": _After, "keep": _Keep}
+    {"run": _Run, "warm_up": _WarmUp, "after": _After, "keep": _Keep, "notify": NotifyTable}
 )
 
 

@@ -1,0 +1,100 @@
+"""Whom to tell when a run ends: the keys of ``[notify]`` in a plan, and what they may be."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from dataclasses import dataclass, field
+from typing import Literal
+from urllib.parse import urlsplit
+
+from pydantic import Field
+
+from dearig.config.toml_input import Table
+from dearig.errors import InputError
+
+__all__ = ["EVENTS", "Notify", "NotifyTable", "redacted"]
+
+Event = Literal["run-ended", "tripped", "queue-stopped"]
+
+#: What can be told: a run has ended; one has ended so that a person must look; no run follows.
+EVENTS: tuple[Event, ...] = ("run-ended", "tripped", "queue-stopped")
+#: Begins the name of a variable of the environment that has the address.
+_VARIABLE = "env:"
+
+
+class NotifyTable(Table):
+    """The table ``[notify]`` of a plan."""
+
+    command: list[str] = Field(
+        default_factory=list, max_length=100, description="a program and its arguments"
+    )
+    webhook: str = Field(
+        default="", description="an address that takes JSON, or env:NAME for a variable with one"
+    )
+    on: list[Event] = Field(default_factory=lambda: list(EVENTS), description="what is told")
+
+    def settings(self) -> Notify:
+        """Return what the table says."""
+        return Notify(tuple(self.command), self.webhook, tuple(self.on))
+
+
+@dataclass(frozen=True)
+class Notify:
+    """Whom to tell of the events ``on``: a ``command``, a ``webhook``, both or nobody.
+
+    ``command`` is a program with its arguments, () for none. ``webhook`` is an address, which may
+    be a secret, or ``env:NAME``; "" for none.
+    """
+
+    command: tuple[str, ...] = ()
+    webhook: str = field(default="", repr=False)
+    on: tuple[Event, ...] = EVENTS
+
+    def checked(self) -> Notify:
+        """Return the settings with the program's path and the webhook's address.
+
+        Raises ``InputError`` for what could never be told: then nobody would notice, for days.
+        """
+        command = self.command
+        if command:
+            if any("\0" in part for part in command):
+                raise InputError("notify.command has a character of number 0 in it")
+            program = shutil.which(command[0])
+            if program is None:
+                raise InputError(
+                    f"notify.command: the program {command[0]!r} is not there, or is none; give "
+                    f"its path, or install it"
+                )
+            command = (program, *command[1:])
+        return Notify(command, _address(self.webhook), self.on)
+
+
+def _address(webhook: str) -> str:
+    """Return the address that ``webhook`` is or names, "" for none. Raises ``InputError``."""
+    where = "notify.webhook"
+    if webhook.startswith(_VARIABLE):
+        name = webhook.removeprefix(_VARIABLE)
+        where = f"the variable {name} of notify.webhook"
+        webhook = os.environ.get(name, "")
+        if not webhook:
+            raise InputError(f"notify.webhook: the environment has no variable {name!r}")
+    if not webhook:
+        return ""
+    try:
+        parts = urlsplit(webhook)
+        good = bool(parts.hostname) and parts.scheme in ("http", "https") and parts.port != 0
+        named = parts.username is not None
+    except ValueError:
+        good = named = False
+    if not good or not webhook.isascii() or not webhook.isprintable() or " " in webhook:
+        raise InputError(f"{where} is not an address such as https://example.org/hook")
+    if named:
+        raise InputError(f"{where} has a name or a password before its host: it is not sent so")
+    return webhook
+
+
+def redacted(webhook: str) -> str:
+    """Return the webhook's server, without the rest of its address, which may be a secret."""
+    parts = urlsplit(webhook)
+    return f"{parts.scheme}://{parts.netloc}/..."
