@@ -39,7 +39,9 @@ __all__ = [
     "actuator_of",
     "check_hold",
     "hold",
+    "loop_of",
     "measured",
+    "numbers_of",
     "plan_hold",
 ]
 
@@ -212,8 +214,22 @@ def check_hold(
 
     Raises ``InputError`` for one that does not, with the whole authority of its feedback.
     """
-    sequence = plan(planned.sequence, rig_file, None, run_options.film_id, progress)
-    loop = FeedbackLoop(planned.feedback, sequence, rig_file, None, run_options.film_id, progress)
+    return numbers_of(planned, loop_of(planned, rig_file, run_options.film_id, progress))
+
+
+def loop_of(
+    planned: HoldPlan, rig_file: RigFile, film: str = "", progress: Progress = quiet
+) -> FeedbackLoop:
+    """Return the feedback of a hold that passes the gate; ``film`` as of a run.
+
+    Raises ``InputError`` for one that does not, with the whole authority of its feedback.
+    """
+    sequence = plan(planned.sequence, rig_file, None, film, progress)
+    return FeedbackLoop(planned.feedback, sequence, rig_file, None, film, progress)
+
+
+def numbers_of(planned: HoldPlan, loop: FeedbackLoop) -> dict[str, float]:
+    """Return the numbers of a hold before any run."""
     return {
         "setpoint_mm": planned.feedback.setpoint * 1e3,
         "voltage_kV": planned.voltage * 1e-3,

@@ -1,4 +1,4 @@
-"""Page Follow: make the film follow a displacement, and learn from run to run.
+"""Page Follow: make the film follow a displacement and learn from run to run, or hold one.
 
 The page proposes voltages and plays none. Each goes to the page Run as a sequence, where it is
 planned, armed and started as any other; when its recording is there, the page learns from it.
@@ -47,6 +47,7 @@ from dearig.window.follow_jobs import (
 from dearig.window.follow_model import ModelChoice
 from dearig.window.follow_plots import ErrorPlot, FollowPlots
 from dearig.window.follow_target import TargetEditor
+from dearig.window.hold_panel import HoldPanel
 from dearig.window.layout_state import remember
 from dearig.window.report_page import ReportPage
 from dearig.window.report_table import ReportTable
@@ -92,12 +93,19 @@ class FollowPage(QWidget):
         self.split.addWidget(self._make_results())
         self.split.setStretchFactor(1, 1)
         self.split.setChildrenCollapsible(False)
+        self.hold = HoldPanel(session, self._worker)
+        self.hold.use_model.connect(self.use_model)
+        self.hold.waits.connect(self.waits)
+        self.modes = QTabWidget()
+        self.modes.setDocumentMode(True)
+        self.modes.addTab(self._padded(self.split), "Follow a path")
+        self.modes.addTab(self.hold, "Hold a displacement")
         self.reset_layout()
         remember(self.split, session.settings, "follow/columns")
         remember(self.rows, session.settings, "follow/rows")
         outer = QVBoxLayout(self)
-        outer.setContentsMargins(SPACE, SPACE, SPACE, SPACE)
-        outer.addWidget(self.split)
+        outer.setContentsMargins(SPACE, SPACE // 2, SPACE, SPACE)
+        outer.addWidget(self.modes)
 
         self.target.changed.connect(self._refresh)
         self.model.changed.connect(self._refresh)
@@ -168,11 +176,13 @@ class FollowPage(QWidget):
         """Give every part its default size."""
         self.split.setSizes([_LEFT, 860])
         self.rows.setSizes([420, 230])
+        self.hold.reset_layout()
 
     def close_work(self) -> None:
         """End the job and its process, and wait for the threads."""
         self._worker.close()
         self._job = None
+        self.hold.close_work()
         self.target.close_work()
         self.model.close_work()
 
@@ -369,6 +379,15 @@ class FollowPage(QWidget):
         return (f"{settled[:1].upper()}{settled[1:]}." if settled else ""), "good"
 
     # layout
+
+    @staticmethod
+    def _padded(inner: QWidget) -> QWidget:
+        """Return ``inner`` with the distance of the other mode to the tabs above."""
+        outer = QWidget()
+        column = QVBoxLayout(outer)
+        column.setContentsMargins(0, SPACE, 0, 0)
+        column.addWidget(inner)
+        return outer
 
     def _make_inputs(self) -> QWidget:
         session = self._session

@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from dearig.analysis.hold import HoldPlan
 from dearig.config.toml_input import read_text
 from dearig.errors import InputError
 from dearig.window.banners import Banners
@@ -317,8 +318,12 @@ class MainWindow(QMainWindow):
         self.study_page.open_sequence.connect(self._play_sequence)
         self.study_page.show_model.connect(self._show_model)
         self.study_page.study_finished.connect(self.follow_page.model.find_studies)
+        self.study_page.study_finished.connect(self.follow_page.hold.model.find_studies)
         self.follow_page.play_sequence.connect(self._play_file)
         self.follow_page.use_model.connect(run.show_model)
+        self.follow_page.hold.play_hold.connect(self._play_hold)
+        run.started.connect(self.follow_page.hold.watch)
+        run.runner.ended.connect(self.follow_page.hold.run_ended)
         self.follow_page.waits.connect(run.follow_button.setVisible)
         self.campaign_page.show_recording.connect(self._show_recording)
         run.show_follow.connect(lambda: self.show_page(self.follow_page))
@@ -371,6 +376,13 @@ class MainWindow(QMainWindow):
             return
         self.session.set_sequence(toml, path.parent, path)
         self.show_page(self.run_page)
+
+    @Slot(object)
+    def _play_hold(self, hold: HoldPlan) -> None:
+        """Show a hold with its feedback on the Run page; the operator arms it as usual."""
+        if self.sequence_page.take(hold.sequence.toml):
+            self.session.set_hold(hold)
+            self.show_page(self.run_page)
 
     @Slot(Path)
     def _show_model(self, path: Path) -> None:

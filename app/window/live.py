@@ -20,6 +20,7 @@ from dearig.acquisition.plan import Plan
 from dearig.acquisition.run import RunObserver
 from dearig.drivers.channels import CHANNEL_NAMES, Channel
 from dearig.drivers.rig import Block, Event, RigIdentity
+from dearig.model.control import HoldAnswer
 from dearig.model.errors import ModelError
 from dearig.recording.rest_noise import lead_in
 from dearig.window.traces import ErrorsSoFar, Newest, Pyramid, RunningErrors
@@ -43,6 +44,7 @@ _TOO_LONG = (
 # Newest samples of a signal that spectra and loops are made of: 131 s at 1 kHz, 1 MB a signal
 _NEWEST = 2**17
 _NEWEST_OF = ("command", "displacement", "residual 0", "residual 1")
+_ANSWERS_MAX = 2**16  # of a feedback that are kept: all of 1.8 h at ten a second, then fewer
 _GAP = 2**16  # samples, pushed together for a model that has no past
 
 
@@ -88,6 +90,9 @@ class Live(RunObserver):
         self._wanted = (tuple(overlays), drive)
         self._run: _Run | None = None
         self._events: list[LiveEvent] = []
+        self._answers: list[tuple[float, HoldAnswer]] = []
+        self._answered, self._stride = 0, 1  # answers that came; every so many are kept
+        self.last_answer: HoldAnswer | None = None  #: of a feedback
         self._thread: threading.Thread | None = None
 
     # called from the rig's thread
@@ -106,7 +111,22 @@ class Live(RunObserver):
         with self._lock:
             self._events.append(LiveEvent(event, datetime.now().astimezone()))
 
+    def answered(self, time: float, answer: HoldAnswer) -> None:
+        with self._lock:
+            self.last_answer = answer
+            if self._answered % self._stride == 0:
+                self._answers.append((time, answer))
+            self._answered += 1
+            if len(self._answers) > _ANSWERS_MAX:
+                self._answers, self._stride = self._answers[::2], 2 * self._stride
+
     # called from the interface thread
+
+    def answers(self) -> np.ndarray:
+        """Return the answers of a feedback, (n, 3): time in s, error in m, and correction."""
+        with self._lock:
+            rows = [(time, answer.error, answer.correction) for time, answer in self._answers]
+        return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
     def follow(self, overlays: Sequence[OverlayModel], drive: str) -> None:
         """Use other overlay models; they are simulated from the start of the run."""

@@ -18,6 +18,7 @@ from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.rigs import is_simulated
 from dearig.drivers.daqmx.watchdog import watchdog_words
 from dearig.sim_backend.faults import FaultPlan
+from dearig.window.hold_jobs import answer_words, hold_words
 from dearig.window.hv import HighVoltage
 from dearig.window.hv_status import Reading
 from dearig.window.live import Live
@@ -43,6 +44,7 @@ class RunPage(QWidget):
     show_recording = Signal(Path)
     show_sequence = Signal()
     show_follow = Signal()
+    started = Signal(object)  #: what looks on at a run that has begun
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -88,6 +90,7 @@ class RunPage(QWidget):
             operator=session.operator, film=session.film, notes=session.notes,
             seed=self._next_seed(), paced=self.paced.isChecked(), faults=self.faults,
             overlay=self._recorded_overlay(), marks=marks, waveform_digest=self.display.digest,
+            feedback=None if session.hold is None else session.hold.feedback,
         )  # fmt: skip
         if not self.runner.start(request, live):
             return
@@ -98,6 +101,7 @@ class RunPage(QWidget):
         self.result.show_text("")
         self.show_button.hide()
         self._numbers.start()
+        self.started.emit(live)
         session.set_running(True)
         self._refresh()
 
@@ -167,6 +171,8 @@ class RunPage(QWidget):
         if running:
             return
         self._describe_plan()
+        held = session.hold
+        self.hold_state.show_text("" if held is None else hold_words(held), "muted")
         self.to_sequence.setVisible(preview is not None and not preview.playable)
 
     def _describe_watchdog(self) -> None:
@@ -215,6 +221,9 @@ class RunPage(QWidget):
             if reason
         ]
         self.overlay_failures.show_text("; ".join(failures), "warn")
+        answer = live.last_answer
+        if answer is not None:
+            self.hold_state.show_text(*answer_words(answer))
         seconds, total = now.samples / now.rate, now.total / now.rate
         monitor = now.values.get("monitor", float("nan"))
         self.runner.status.show_reading(Reading(monitor, seconds, total))
@@ -283,6 +292,8 @@ class RunPage(QWidget):
         self.overlay_failures = Message()
         right.addWidget(self.overlays.message)
         right.addWidget(self.overlay_failures)
+        self.hold_state = Message()
+        right.addWidget(self.hold_state)
         right.addWidget(self.display, 1)
         right.addLayout(self._end_row())
         outer.addLayout(right, 1)
@@ -304,6 +315,8 @@ class RunPage(QWidget):
         self.display.mark_bar.left.connect(self.stop_button.setFocus)
         session.overlays_changed.connect(self._overlays_changed)
         session.blocks_changed.connect(self._refresh)
+        session.hold_changed.connect(self._refresh)
+        session.notes_changed.connect(self._refresh)  # a hold is of one film
 
     def _metadata_row(self) -> QHBoxLayout:
         session = self.session

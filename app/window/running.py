@@ -11,6 +11,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, QThread, Signal, Slot
 
+from dearig.acquisition.feedback import Feedback
 from dearig.acquisition.interrupts import Interrupts
 from dearig.acquisition.marks import RunMarks
 from dearig.acquisition.overlay import OverlayModel
@@ -27,6 +28,7 @@ from dearig.errors import (
     Interrupted,
     SafetyStop,
 )
+from dearig.model.control import HoldAnswer
 from dearig.output_state import Known, OutputState
 from dearig.sim_backend.faults import FaultPlan
 from dearig.window.hv import HighVoltage
@@ -72,7 +74,8 @@ class RunRequest:
 
     For a simulated rig, ``seed`` is that of its noise, ``paced`` runs it in real time, and
     ``faults`` occur in it. The displacement of the model ``overlay`` is kept in the recording, and
-    so are the ``marks``. A waveform other than that of ``waveform_digest`` is refused.
+    so are the ``marks``. A waveform other than that of ``waveform_digest`` is refused. ``feedback``
+    corrects the voltage while it is played.
     """
 
     loaded: LoadedSequence
@@ -89,6 +92,7 @@ class RunRequest:
     overlay: OverlayModel | None = None
     marks: RunMarks | None = None
     waveform_digest: str = ""
+    feedback: Feedback | None = None
 
 
 @dataclass(frozen=True)
@@ -145,6 +149,7 @@ class Runner(QObject):
         session.blocks_changed.connect(self._blocks_changed)
         session.rig_changed.connect(self._disarm)  # another rig was armed
         session.sequence_changed.connect(self._disarm)  # another sequence was armed
+        session.hold_changed.connect(self._disarm)  # with another feedback
 
     @property
     def state(self) -> HighVoltage:
@@ -261,6 +266,9 @@ class _Observed(RunObserver):
     def block(self, block: Block) -> None:
         self._live.block(block)
 
+    def answered(self, time: float, answer: HoldAnswer) -> None:
+        self._live.answered(time, answer)
+
     def event(self, event: Event) -> None:
         self._live.event(event)
 
@@ -299,7 +307,7 @@ class _RunThread(PlayThread):
             result = record(
                 order.loaded, order.address, order.rig_file, out, options, overlay=order.overlay,
                 observer=observer, interrupts=self.interrupts, marks=order.marks,
-                clock=time.monotonic,
+                clock=time.monotonic, feedback=order.feedback,
             )  # fmt: skip
         except DearigError as error:
             played = self._live.now() is not None

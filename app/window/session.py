@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject, QSettings, Signal
 
 from dearig.acquisition.overlay import OverlayModel
 from dearig.acquisition.plan import Plan
+from dearig.analysis.hold import HoldPlan
 from dearig.config.modelfile import model_toml
 from dearig.config.presets import PRESETS
 from dearig.config.rigfile import RigFile
@@ -94,6 +95,7 @@ class Session(QObject):
     recent_changed = Signal()
     recorded = Signal(Path)
     running_changed = Signal(bool)
+    hold_changed = Signal()  #: another feedback belongs to the sequence
     blocks_changed = Signal()
     message = Signal(str)  #: text for the status bar
 
@@ -126,6 +128,7 @@ class Session(QObject):
         self.theme = theme
         self.running = False
         self.armed = False
+        self._hold: tuple[HoldPlan, tuple[object, ...]] | None = None
         self._blocks: dict[str, Block] = {}
         self.recovery = Recovery(settings, self)  #: unsaved sequence and rig file
 
@@ -152,6 +155,24 @@ class Session(QObject):
         self.sequence_toml, self.sequence_folder, self.sequence_path = toml, folder, path
         self.preview = None  # the plan of the previous sequence
         self.sequence_changed.emit()
+
+    def set_hold(self, hold: HoldPlan) -> None:
+        """Let the feedback of ``hold`` correct the runs of the present sequence, which is its own.
+
+        Any change of the sequence, the rig, the rig file or the film removes it.
+        """
+        self._hold = hold, self._hold_holds_for()
+        self.hold_changed.emit()
+
+    @property
+    def hold(self) -> HoldPlan | None:
+        """The hold that the present sequence belongs to, None for a run without feedback."""
+        if self._hold is None or self._hold[1] != self._hold_holds_for():
+            return None
+        return self._hold[0]
+
+    def _hold_holds_for(self) -> tuple[object, ...]:
+        return self.sequence_toml, self.address, self.rig_file, self.film
 
     def set_preview(self, preview: Preview) -> None:
         """Set the plan of the present sequence."""

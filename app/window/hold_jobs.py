@@ -1,0 +1,161 @@
+"""Work of the page Follow on a hold, which its worker's process does, and words on it."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dearig.acquisition.run import RunResult
+from dearig.analysis.hold import (
+    HoldOptions,
+    HoldOutcome,
+    HoldPlan,
+    actuator_of,
+    loop_of,
+    measured,
+    numbers_of,
+    plan_hold,
+)
+from dearig.analysis.tracking import misfits_of
+from dearig.api.holding import HoldResult
+from dearig.config.modelfile import ModelFile, load_model
+from dearig.config.rigfile import RigFile
+from dearig.drivers.gate import Margin
+from dearig.errors import InputError
+from dearig.model.actuator import Actuator
+from dearig.model.control import HoldAnswer
+from dearig.model.material import TABLE_3
+from dearig.output_state import Known, OutputState
+from dearig.progress import Progress, quiet
+from dearig.recording.reader import open_recording
+from dearig.report.numbers import seconds
+
+__all__ = [
+    "HoldForecast",
+    "HoldRequest",
+    "answer_words",
+    "forecast_hold",
+    "hold_words",
+    "measure_hold",
+    "write_hold_report",
+]
+
+
+@dataclass(frozen=True)
+class HoldRequest:
+    """What is to be held: ``displacement`` in m for ``duration`` in s with ``options``.
+
+    ``model`` is a model file, None for the thesis model. The rig is at ``address``; ``film`` is the
+    name of the film on it.
+    """
+
+    displacement: float
+    duration: float
+    options: HoldOptions
+    model: Path | None
+    address: str
+    rig_file: RigFile
+    film: str
+
+
+@dataclass(frozen=True, eq=False)
+class HoldForecast:
+    """A hold that passes the gate, with the whole authority of its feedback.
+
+    ``numbers`` are those of ``dearig hold --check``. ``time`` in s and ``voltage`` in V, (n,) each,
+    are the corners of the feedforward. ``warnings`` say where the model is not that of the rig.
+    """
+
+    request: HoldRequest
+    plan: HoldPlan
+    model: ModelFile
+    numbers: dict[str, float]
+    margins: tuple[Margin, ...]
+    warnings: tuple[str, ...]
+    time: np.ndarray
+    voltage: np.ndarray
+
+
+def forecast_hold(request: HoldRequest, progress: Progress = quiet) -> HoldForecast:
+    """Plan a hold, and check it with the gate. Raises ``InputError`` where it cannot be held."""
+    progress("computing the voltage", 0.0)
+    rig_file = request.rig_file
+    if request.model is None:
+        actuator = Actuator(rig_file.as_film(), rig_file.as_load(), TABLE_3)
+        model = ModelFile("thesis (Table 3)", actuator)
+    else:
+        model = load_model(request.model)
+        actuator = actuator_of(model)
+    planned = plan_hold(request.displacement, request.duration, actuator, rig_file, request.options)
+    progress("checking with the gate", 0.0)
+    loop = loop_of(planned, rig_file, request.film, progress)
+    time, voltage = _corners(planned)
+    return HoldForecast(
+        request, planned, model, numbers_of(planned, loop), loop.gate.waveform.margins,
+        tuple(misfits_of(actuator, rig_file)), time, voltage,
+    )  # fmt: skip
+
+
+def measure_hold(
+    forecast: HoldForecast, recording: Path, result: RunResult | None, progress: Progress = quiet
+) -> HoldOutcome:
+    """Return the errors of a hold; ``result`` is None for a run that ended early.
+
+    Raises ``InputError`` for one that ended before the displacement was held.
+    """
+    progress("reading the recording", 0.0)
+    if result is None:
+        found = open_recording(recording)
+        rate = (found.samples - 1) / found.duration if found.samples > 1 else math.nan
+        held = found.samples / rate - forecast.plan.feedback.start
+        if not held > 0.0:
+            raise InputError("the run ended before the displacement was held; no error is counted")
+        result = RunResult(
+            recording, found.samples, rate, "ended early", (), (), OutputState(Known.UNKNOWN, 0)
+        )
+    request = forecast.request
+    return measured(forecast.plan, forecast.model, request.address, request.rig_file, result)
+
+
+def write_hold_report(outcome: HoldOutcome, progress: Progress = quiet) -> Path:
+    """Write the report of a hold beside its recording, and return its path."""
+    progress("writing the report", 0.0)
+    return HoldResult(outcome).to_html(outcome.recording.with_suffix(".html"))
+
+
+def hold_words(planned: HoldPlan) -> str:
+    """Return a sentence on a hold before its run."""
+    feedback = planned.feedback
+    return (
+        f"Feedback holds {feedback.setpoint * 1e3:.4g} mm for "
+        f"{seconds(feedback.stop - feedback.start)} and corrects the voltage by up to "
+        f"{feedback.authority:.3g} of it. Any change of the sequence, the rig or the film removes "
+        f"it."
+    )
+
+
+def answer_words(answer: HoldAnswer) -> tuple[str, str]:
+    """Return a sentence on the newest answer of a feedback, and its role."""
+    error = "no usable reading" if math.isnan(answer.error) else f"{answer.error * 1e6:+.1f} µm"
+    said = f"Hold: error {error}, correction {answer.correction:+.2%}"
+    states = {
+        "limited": " · the correction stands at its limit: the displacement is not held",
+        "frozen": " · the readings cannot be used: the correction stays as it is",
+    }
+    return f"{said}{states.get(answer.state, '')}", "" if answer.state == "holding" else "warn"
+
+
+def _corners(planned: HoldPlan) -> tuple[np.ndarray, np.ndarray]:
+    """Return times in s and voltages in V, (n,) each, between which the feedforward is straight."""
+    data = tomllib.loads(planned.sequence.toml)
+    times, volts = [0.0, float(data["lead_in_s"])], [0.0, 0.0]
+    for segment in data["segment"]:
+        times.append(times[-1] + float(segment["duration_s"]))
+        volts.append(float(segment["to_kV"]) * 1e3 if "to_kV" in segment else volts[-1])
+    times.append(times[-1] + float(data["tail_s"]))
+    volts.append(volts[-1])
+    return np.array(times), np.array(volts)
