@@ -43,6 +43,7 @@ __all__ = [
     "measured",
     "numbers_of",
     "plan_hold",
+    "settling_time",
 ]
 
 _RATE = 100.0  # Hz of the inversion: four times what is faster in a path than is followed
@@ -260,7 +261,7 @@ def measured(
     first, last = round(feedback.start * rate), round(feedback.stop * rate)
     error = feedback.setpoint - recording.signal[first:last]
     seen = np.isfinite(error)
-    settled = _SETTLED * (feedback.response + feedback.ahead + feedback.block)
+    settled = settling_time(feedback)
     later = seen.copy()
     later[: round(settled * rate)] = False
     return HoldOutcome(
@@ -279,6 +280,11 @@ def measured(
         run=result,
         warnings=tuple(misfits_of(actuator_of(model), rig_file)),
     )
+
+
+def settling_time(feedback: Feedback) -> float:
+    """Return the time in s from the begin of the hold, after which the loop has settled."""
+    return _SETTLED * (feedback.response + feedback.ahead + feedback.block)
 
 
 def _check(displacement: float, duration: float, options: HoldOptions) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from dearig.analysis.hold import (
     measured,
     numbers_of,
     plan_hold,
+    settling_time,
 )
 from dearig.analysis.tracking import misfits_of
 from dearig.api.holding import HoldResult
@@ -101,24 +102,30 @@ def forecast_hold(request: HoldRequest, progress: Progress = quiet) -> HoldForec
 
 
 def measure_hold(
-    forecast: HoldForecast, recording: Path, result: RunResult | None, progress: Progress = quiet
+    forecast: HoldForecast,
+    recording: Path,
+    result: RunResult | None,
+    until: float,
+    progress: Progress = quiet,
 ) -> HoldOutcome:
     """Return the errors of a hold; ``result`` is None for a run that ended early.
 
-    Raises ``InputError`` for one that ended before the displacement was held.
+    Of such a run the error is counted ``until`` this time in s, that of the last answer. Raises
+    ``InputError`` where the loop had not settled by then.
     """
     progress("reading the recording", 0.0)
+    planned, request = forecast.plan, forecast.request
     if result is None:
+        feedback = planned.feedback
+        planned = replace(planned, feedback=replace(feedback, stop=min(feedback.stop, until)))
+        if planned.feedback.stop - feedback.start <= settling_time(feedback):
+            raise InputError("the run ended before the loop had settled; no error is counted")
         found = open_recording(recording)
-        rate = (found.samples - 1) / found.duration if found.samples > 1 else math.nan
-        held = found.samples / rate - forecast.plan.feedback.start
-        if not held > 0.0:
-            raise InputError("the run ended before the displacement was held; no error is counted")
+        rate = (found.samples - 1) / found.duration
         result = RunResult(
-            recording, found.samples, rate, "ended early", (), (), OutputState(Known.UNKNOWN, 0)
+            recording, found.samples, rate, "ended early", (), (), OutputState(Known.UNKNOWN, 0.0)
         )
-    request = forecast.request
-    return measured(forecast.plan, forecast.model, request.address, request.rig_file, result)
+    return measured(planned, forecast.model, request.address, request.rig_file, result)
 
 
 def write_hold_report(outcome: HoldOutcome, progress: Progress = quiet) -> Path:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from PySide6.QtCore import Qt, QTimer, QUrl, Signal, Slot
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
@@ -157,6 +158,7 @@ class HoldPanel(QWidget):
         self._live, self._running, self._outcome = live, True, None
         self.message.show_text("")
         self._draw()
+        self.area.auto_range()
         self._drawing.start()
 
     @Slot(object)
@@ -170,8 +172,10 @@ class HoldPanel(QWidget):
         self.waits.emit(False)
         if end.result is None:
             self.message.show_text(f"{end.headline}: {end.sentence}", "warn")
+        answers = np.empty((0, 3)) if self._live is None else self._live.answers()
+        until = float(answers[-1, 0]) if answers.size else 0.0
         if end.path is not None and self._forecast is not None and self._job is None:
-            job = self.worker.submit(measure_hold, self._forecast, end.path, end.result)
+            job = self.worker.submit(measure_hold, self._forecast, end.path, end.result, until)
             self._submit(job, self._measured, keep_message=end.result is None)
 
     @Slot()
@@ -251,6 +255,7 @@ class HoldPanel(QWidget):
         ]
         self.words.show_pieces(pieces, tuple(readable(f"{w}.") for w in forecast.warnings))
         self._draw()
+        self.area.auto_range()
 
     @Slot(object)
     def _measured(self, outcome: HoldOutcome) -> None:
@@ -262,6 +267,7 @@ class HoldPanel(QWidget):
         )
         summary: list[str | Table] = list(hold_summary(outcome))
         self.words.show_pieces([*summary, f"Recording: {outcome.recording}"])
+        self.state.show_text("")
         self._draw()
 
     @Slot(object)

@@ -61,6 +61,7 @@ GUIDE = {
     "recordings.png": ("recordings-several", "light"),
     "study.png": ("study-residual", "light"),
     "follow.png": ("follow-learned", "light"),
+    "hold.png": ("hold-going", "light"),
     "campaign.png": ("campaign-going", "light"),
     "dark.png": ("run-going", "dark"),
 }
@@ -167,6 +168,7 @@ def views(window: MainWindow) -> Iterator[str]:
         study.tabs.setCurrentIndex(index)
         yield f"study-{study.tabs.tabText(index).lower()}"
     yield from following(window)
+    yield from holding(window)
     yield from campaigning(window)
 
 
@@ -195,6 +197,39 @@ def following(window: MainWindow) -> Iterator[str]:
         until(follow.compute_button.isEnabled, "what is learned")
     window.show_page(follow)
     yield "follow-learned"
+
+
+def holding(window: MainWindow) -> Iterator[str]:
+    """The hold on the page Follow: before it, refused, checked, while it runs, and measured."""
+    run, follow = window.run_page, window.follow_page
+    panel = follow.hold
+    window.session.set_address("sim")
+    window.show_page(follow)
+    follow.modes.setCurrentWidget(panel)
+    yield "hold"
+
+    def checked(millimetres: float) -> None:
+        panel.displacement.setValue(millimetres)
+        panel.check()
+        until(panel.check_button.isEnabled, "what can be held")
+
+    checked(20.0)
+    yield "hold-refused"
+    panel.duration.setValue(30.0)
+    checked(0.5)
+    yield "hold-checked"
+    panel.run_button.click()
+    until(run.arm_button.isEnabled, "the plan of a run")
+    run.paced.setChecked(True)
+    run.arm_button.click()
+    run.start_button.click()
+    until(lambda: far(run, 20.0), "a hold")
+    yield "hold-run"
+    window.show_page(follow)
+    yield "hold-going"
+    until(lambda: panel.outcome is not None, "the end of a hold")
+    until(panel.check_button.isEnabled, "the error of a hold")
+    yield "hold-measured"
 
 
 def campaigning(window: MainWindow) -> Iterator[str]:
