@@ -147,8 +147,10 @@ def hold_words(planned: HoldPlan) -> str:
 
 def answer_words(answer: HoldAnswer) -> tuple[str, str]:
     """Return a sentence on the newest answer of a feedback, and its role."""
-    error = "no usable reading" if math.isnan(answer.error) else f"{answer.error * 1e6:+.1f} µm"
-    said = f"Hold: error {error}, correction {answer.correction:+.2%}"
+    # + 0.0 turns a negative zero into zero
+    off = round(answer.error * 1e6, 1) + 0.0
+    error = "no usable reading" if math.isnan(off) else f"{off:+.1f} µm"
+    said = f"Hold: error {error}, correction {round(answer.correction, 4) + 0.0:+.2%}"
     states = {
         "limited": " · the correction stands at its limit: the displacement is not held",
         "frozen": " · the readings cannot be used: the correction stays as it is",
