@@ -82,10 +82,16 @@ def test_a_hold_is_checked_armed_on_run_watched_and_measured(
     assert run.live.answers().shape == (outcome.feedback.answers, 3)
     assert "0.3 mm: error" in panel.headline.text()
     assert panel.report_button.isEnabled()
-    monkeypatch.setattr("dearig.window.hold_panel.QDesktopServices.openUrl", lambda _: False)
+    opened: list[str] = []
+    monkeypatch.setattr(
+        "dearig.window.hold_panel.write_hold_report", lambda outcome, **_: outcome.recording
+    )
+    monkeypatch.setattr(
+        "dearig.window.hold_panel.QDesktopServices.openUrl",
+        lambda url: not opened.append(url.toLocalFile()),
+    )
     click(qtbot, panel.report_button)
-    qtbot.waitUntil(lambda: "No browser was found" in panel.message.text(), timeout=_PATIENCE)
-    assert path.with_suffix(".html").exists()
+    qtbot.waitUntil(lambda: opened == [str(path)], timeout=_PATIENCE)
     # of a run that ended early, the error until the last answer counts
     early = measure_hold(forecast, path, None, 15.0)
     assert early.duration == 11.0
