@@ -7,14 +7,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from dearig.analysis.decimate import decimate_path
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
 from dearig.recording.reader import open_recording
 
-__all__ = ["Cycle", "Loops", "cycles", "loop_area", "loops", "loops_of"]
+__all__ = ["Cycle", "Loops", "cycles", "loop_area", "loops", "loops_of", "valleys"]
 
 #: Depth of a valley of the drive that divides two cycles, as a part of the range of the drive:
 #: ripple and noise of a voltage are below it, lobes of a sequence above it.
@@ -71,19 +70,53 @@ def cycles(drive: np.ndarray) -> list[tuple[int, int]]:
     A rest between two cycles is divided in its middle. A part that does not come back, such as the
     end of a run that was stopped, is no cycle, and a drive that does not vary has none.
     """
-    known = np.nan_to_num(drive, nan=float(np.nanmin(drive)) if np.isfinite(drive).any() else 0.0)
+    known = _known(drive)
     span = float(np.ptp(known)) if known.size else 0.0
-    if span == 0.0:
-        return []
-    # a rest at an end is a valley too
-    walled = np.concatenate(([known.max()], known, [known.max()]))
-    valleys, _ = find_peaks(-walled, prominence=_VALLEY * span)
-    rows = (valleys - 1).tolist()
     return [
         (first, last)
-        for first, last in pairwise(rows)
+        for first, last in pairwise(valleys(drive))
         if abs(known[last] - known[first]) < _VALLEY * span
     ]
+
+
+def valleys(drive: np.ndarray) -> list[int]:
+    """Return the row of each valley of ``drive`` (n,), in the middle of one that is flat.
+
+    On both sides the drive rises by a tenth of its range before it falls below the valley. A rest
+    at an end is a valley too. The time is proportional to n, also for 10^5 equal cycles.
+    """
+    known = _known(drive)
+    depth = _VALLEY * float(np.ptp(known)) if known.size else 0.0
+    if depth == 0.0:
+        return []
+    # rows at which the drive turns, or begins or ends to be flat
+    step = np.sign(np.diff(known))
+    turns = np.flatnonzero(np.concatenate(([True], step[1:] != step[:-1], [True])))
+    found: list[int] = []
+    low = high = float(known[turns[0]])
+    first = last = int(turns[0])
+    falling = True  # there is a wall before the first row
+    for row, value in zip(turns.tolist(), known[turns].tolist(), strict=True):
+        if falling:
+            if value < low:
+                low, first, last = value, row, row
+            elif value == low and row > last and np.all(known[last : row + 1] == low):
+                last = row
+            elif value - low >= depth:
+                found.append((first + last) // 2)
+                falling, high = False, value
+        elif value > high:
+            high = value
+        elif high - value >= depth:
+            falling, low, first, last = True, value, row, row
+    return [*found, (first + last) // 2] if falling else found
+
+
+def _known(drive: np.ndarray) -> np.ndarray:
+    """Return ``drive`` with its lowest value where it is not known."""
+    lowest = float(np.nanmin(drive)) if np.isfinite(drive).any() else 0.0
+    known: np.ndarray = np.nan_to_num(drive, nan=lowest)
+    return known
 
 
 def loops_of(

@@ -556,7 +556,7 @@ class _Session:
         """Write the extremes of a recording that is not kept; return their file, "" for none."""
         out = recording.with_suffix(".csv")
         try:
-            write_extremes(recording, out)
+            write_extremes(recording, out, self._campaign.keep_cycles)
         except InputError as error:
             log.warning("%s is kept whole: %s", recording, error)
             return ""

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
+from dearig.analysis.loops import valleys
 from dearig.errors import InputError
 from dearig.recording.files import write_whole
 from dearig.recording.reader import open_recording
-from dearig.recording.recording import Recording
 
-__all__ = ["cycles_of", "write_extremes"]
+__all__ = ["write_extremes"]
 
 #: Channels in the table where the recording has them, with the factor and the unit of a column.
 _COLUMNS = (
@@ -23,55 +24,67 @@ _COLUMNS = (
     ("displacement", 1e3, "mm"),
     ("temperature", 1.0, "celsius"),
 )
-_LEVEL = 0.5  # of the largest commanded voltage: a cycle begins where the command rises through it
 
 
-def cycles_of(command: np.ndarray) -> np.ndarray:
-    """Return the first sample of each cycle of the commanded voltage (N,) in V.
-
-    A cycle begins where the magnitude of the command rises through half of its largest value. The
-    command has no noise, so that one rise is one crossing.
-    """
-    size = np.abs(command)
-    above = size >= _LEVEL * size.max() if size.size and size.max() > 0.0 else size > 0.0
-    return np.flatnonzero(above[1:] & ~above[:-1]) + 1
-
-
-def write_extremes(recording: Path, out: Path) -> int:
+def write_extremes(recording: Path, out: Path, every: int = 0) -> int:
     """Write the extremes of each cycle of ``recording`` to the table ``out`` (CSV).
 
-    Returns the number of cycles. The file is on the disk when this returns. Raises ``InputError``.
+    A cycle goes from one valley of the commanded voltage to the next. What comes before the first
+    valley belongs to the first cycle, and what comes after the last one to the last, so that no
+    extreme is lost. With ``every`` the samples of cycles 1, 1 + every, 1 + 2 every, ... are written
+    to a table beside it, whose name ends in -cycles.
+
+    Returns the number of cycles. The files are on the disk when this returns. Raises
+    ``InputError``.
     """
     opened = open_recording(recording)
     command = opened.voltage_command
     if command is None:
         raise InputError(f"{recording} has no commanded voltage, and so no cycles")
+    present = [column for column in _COLUMNS if column[0] in opened.arrays.names]
+    values = [opened.arrays.read(name) * factor for name, factor, _ in present]
+    names = [(name, unit) for name, _, unit in present]
+    edges = valleys(command)
+    if len(edges) == 1:  # a run that was cut off on its first way up
+        edges.append(command.size - 1)
+    starts = np.array(edges[:-1], dtype=np.int64)
+    if every:
+        head = ["cycle", "time_s", *(f"{name}_{unit}" for name, unit in names)]
+        rows = _samples(opened.time, values, edges, every)
+        _write(out.with_name(f"{out.stem}-cycles{out.suffix}"), head, rows)
+    head = ["cycle", "start_s"]
+    for name, unit in names:
+        head += [f"{name}_min_{unit}", f"{name}_max_{unit}"]
+    _write(out, head, _extremes(opened.time, values, starts))
+    return int(starts.size)
+
+
+def _write(path: Path, head: list[str], rows: Iterable[list[str]]) -> None:
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    present = [column for column in _COLUMNS if column[0] in opened.arrays.names]
-    head = ["cycle", "start_s"]
-    for name, _, unit in present:
-        head += [f"{name}_min_{unit}", f"{name}_max_{unit}"]
     table.writerow(head)
-    rows = list(_rows(opened, command, present))
     table.writerows(rows)
-    write_whole(out, text.getvalue().encode())
-    return len(rows)
+    write_whole(path, text.getvalue().encode())
 
 
-def _rows(
-    recording: Recording, command: np.ndarray, present: list[tuple[str, float, str]]
+def _extremes(
+    time: np.ndarray, values: list[np.ndarray], starts: np.ndarray
 ) -> Iterator[list[str]]:
-    starts = cycles_of(command)
     if not starts.size:
         return
-    time = recording.time
-    found = []
-    for name, factor, _ in present:
-        values = recording.arrays.read(name) * factor
-        found.append((np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)))
+    parts = np.concatenate(([0], starts[1:]))
+    found = [(np.minimum.reduceat(row, parts), np.maximum.reduceat(row, parts)) for row in values]
     for i, start in enumerate(starts):
         row = [str(i + 1), f"{time[start]:.6g}"]
         for low, high in found:
             row += [f"{low[i]:.6g}", f"{high[i]:.6g}"]
         yield row
+
+
+def _samples(
+    time: np.ndarray, values: list[np.ndarray], edges: list[int], every: int
+) -> Iterator[list[str]]:
+    for i, (first, last) in enumerate(pairwise(edges)):
+        if i % every == 0:
+            for at in range(first, last + 1):
+                yield [str(i + 1), f"{time[at]:.9g}", *(f"{row[at]:.6g}" for row in values)]

@@ -90,9 +90,10 @@ branches = 3                    # of the fitted model
 # model = "model.toml"          # the first model of validate, beside this file
 # stop_when = ["mu_0_kPa < 40"] # the campaign stops when a number leaves its band
 
-# a lifetime test: the recordings of other runs are reduced to the extremes of each segment
+# a lifetime test: the recordings of other runs are reduced to the extremes of each cycle
 [keep]
 every = 1                       # keep the recording of every n-th run; 1 keeps all
+every_cycle = 0                 # of the others keep every n-th cycle at full rate; 0 keeps none
 
 # whom to tell, after a run, at 0 V
 # [notify]
@@ -139,6 +140,9 @@ class _After(Table):
 
 class _Keep(Table):
     every: int = Field(default=1, ge=1, le=RUNS_MAX, description="recordings that are kept whole")
+    every_cycle: int = Field(
+        default=0, ge=0, le=10**9, description="cycles of the others that are kept at full rate"
+    )
 
 
 class _File(Table):
@@ -216,8 +220,9 @@ class Campaign:
 
     ``source`` names it in messages. ``branches`` is the number of Maxwell branches of what is
     fitted. ``model`` is the file of the first model of ``validate``, None for none. Of
-    ``keep_every`` runs one recording is kept whole. ``sequences`` has the TOML of each sequence by
-    its name in the plan. ``notify`` says whom to tell when a run ends.
+    ``keep_every`` runs one recording is kept whole, and of the others one of ``keep_cycles``
+    cycles, 0 for none. ``sequences`` has the TOML of each sequence by its name in the plan.
+    ``notify`` says whom to tell when a run ends.
     """
 
     name: str
@@ -234,6 +239,7 @@ class Campaign:
     model: Path | None
     stop_when: tuple[Band, ...]
     keep_every: int
+    keep_cycles: int
     sequences: Mapping[str, str]
     notify: Notify
 
@@ -319,6 +325,7 @@ class _Expansion:
             model=model,
             stop_when=tuple(self._bands()),
             keep_every=file.keep.every,
+            keep_cycles=file.keep.every_cycle,
             sequences=MappingProxyType(self._sequences),
             notify=file.notify.settings(),
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from dearig.acquisition.interrupts import Interrupts
@@ -367,6 +368,17 @@ def test_recordings_that_are_not_kept_are_reduced_to_their_extremes(bench: Bench
     rows = (bench.out / "three-0002.csv").read_text("utf-8").splitlines()
     assert rows[0].startswith("cycle,start_s,voltage_monitor_min_kV,voltage_monitor_max_kV")
     assert len(rows) > 1
+    assert not list(bench.out.glob("*-cycles.csv"))
+
+
+def test_every_nth_cycle_of_the_others_is_kept_at_full_rate(bench: Bench) -> None:
+    bench.play(PLAN + "[keep]\nevery = 2\nevery_cycle = 1\n")
+    rows = (bench.out / "three-0002-cycles.csv").read_text("utf-8").splitlines()
+    assert rows[0].startswith("cycle,time_s,voltage_monitor_kV,current_monitor_mA")
+    times = np.array([float(row.split(",")[1]) for row in rows[1:]])
+    assert times.size > 100
+    steps = np.diff(times)
+    assert steps[steps > 0.0] == pytest.approx(1e-3)
 
 
 @pytest.mark.parametrize("place", range(10, 20))
