@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,7 @@ from dearig.config.modelfile import ModelFile
 from dearig.config.rigfile import RigFile
 from dearig.errors import InputError
 from dearig.model.diagnosis.spring_choice import choose_springs
+from dearig.model.effects import EffectValues
 from dearig.model.errors import ModelError
 from dearig.model.fitting import Identification, add_intervals, identify, with_budget
 from dearig.model.material import Network
@@ -64,6 +66,7 @@ def identify_recordings(
     branches: Sequence[int] = (3,),
     spring: str = "gent",
     branch_spring: str = "",
+    effects: EffectValues = (),
     drive: str = "command",
     rest_length_mm: float | None = None,
     rig_file: RigFile | None = None,
@@ -81,6 +84,7 @@ def identify_recordings(
     ``spring`` is the strain energy of the equilibrium spring; with ``choose`` each one is fitted
     with each number of branches, and the most probable on the training data is kept
     (``choose_springs``). ``branch_spring`` is that of the branches, "" for the usual one.
+    ``effects`` are fitted too, from these values.
     ``ended_early`` is keep, cut or leave-out: what is done with recordings whose runs ended early.
     ``clock`` gives seconds. Nothing is written; ``save_fitted_model`` writes the model. Raises
     ``InputError`` for everything that cannot be fitted.
@@ -97,7 +101,11 @@ def identify_recordings(
     counts = sorted(set(branches))
 
     def base_of(count: int, spring: str) -> Any:
-        return base_model(recordings, count, spring, rest_length_mm, rig_file, branch_spring)
+        base = base_model(recordings, count, spring, rest_length_mm, rig_file, branch_spring)
+        try:
+            return replace(base, effects=effects)
+        except ModelError as error:
+            raise InputError(f"these recordings cannot be fitted: {error}") from error
 
     springs: tuple[SpringCandidate, ...] = ()
     if spring == CHOOSE:

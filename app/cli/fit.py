@@ -160,6 +160,12 @@ def identify(
         ),
     ] = SpringChoice.gent,
     branch_spring: BranchSpring = None,
+    effects_of: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="MODEL.toml", help="Fit the effects of this model too, from its values."
+        ),
+    ] = None,
     drive: Drive = DriveChannel.command,
     rest_length_mm: Annotated[
         float | None,
@@ -186,11 +192,13 @@ def identify(
     from dearig.analysis.identify import identify_recordings
     from dearig.analysis.outcomes import save_fitted_model
     from dearig.cli.terminal import branch_table, identify_table, spring_table
+    from dearig.config.modelfile import load_model
     from dearig.config.rigfile import load_rig_file
     from dearig.report.as_json import outcome_json
 
     numbers = _branches(branches)
-    check_files(force, (*train, *(validate_ or []), rig_file), out, *optional(report), json=json)
+    given = (*train, *(validate_ or []), rig_file, effects_of)
+    check_files(force, given, out, *optional(report), json=json)
     with working(json) as (console, progress):
         print_early_ends(console, [*train, *(validate_ or [])], ended_early.value)
         outcome = identify_recordings(
@@ -200,6 +208,7 @@ def identify(
             branches=numbers,
             spring=spring.value,
             branch_spring="" if branch_spring is None else branch_spring.value,
+            effects=() if effects_of is None else load_model(effects_of).model.effects,
             drive=drive.value,
             rest_length_mm=rest_length_mm,
             rig_file=None if rig_file is None else load_rig_file(rig_file),

@@ -96,6 +96,7 @@ class Part:
     errors: tuple[Side, ...]
     parameters: tuple[Table, ...]
     parameter_pictures: tuple[Picture, ...]
+    springs: tuple[Table, ...]
     branches: tuple[Table, ...]
     branch_pictures: tuple[Picture, ...]
     pictures: tuple[tuple[str, tuple[Picture, ...]], ...]
@@ -257,10 +258,11 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
     )
     branch_tables: tuple[Table, ...] = ()
     branch_pictures: tuple[Picture, ...] = ()
+    springs: tuple[Table, ...] = ()
     if outcome.springs:
-        branch_tables = (spring_candidates(outcome.springs, outcome.kind),)
+        springs = (spring_candidates(outcome.springs, outcome.kind),)
     if outcome.trials:
-        branch_tables = (*branch_tables, branch_trials(outcome.trials, outcome.kind))
+        branch_tables = (branch_trials(outcome.trials, outcome.kind),)
         branch_pictures = (
             picture(
                 branches_figure(outcome.trials, outcome.kind),
@@ -279,6 +281,7 @@ def _identify_part(outcome: IdentifyOutcome, prefixes: Iterator[str]) -> Part:
         errors=tuple(errors),
         parameters=(parameter_table(fit),),
         parameter_pictures=parameter_pictures,
+        springs=springs,
         branches=branch_tables,
         branch_pictures=branch_pictures,
         pictures=tuple(pictures),
@@ -311,6 +314,7 @@ def _validate_part(outcome: ValidateOutcome, prefixes: Iterator[str]) -> Part:
         errors=tuple(_validation_sides(outcome.comparisons, "By recording")),
         parameters=(),
         parameter_pictures=(),
+        springs=(),
         branches=(),
         branch_pictures=(),
         pictures=(("Recordings", _comparison_pictures(outcome.comparisons, prefixes)),),
