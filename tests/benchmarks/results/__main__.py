@@ -135,6 +135,7 @@ MEASUREMENTS = {
         ("tests.benchmarks.bench_ni_examples --source FOLDER",),
     ),
     "film": Measurement("Diagnosis of a measured film", ("tests.benchmarks.bench_film",)),
+    "springs": Measurement("Strain energies of silicones", ("tests.benchmarks.bench_springs",)),
 }
 
 
