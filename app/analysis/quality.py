@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dearig.analysis.spikes import spikes
 from dearig.errors import InputError
 from dearig.model.material import THESIS_FILM, VACUUM_PERMITTIVITY, Film
 from dearig.recording.recording import Recording
@@ -64,6 +65,13 @@ def inspect(recording: Recording, drive: str = "command", *, to_fit: bool = True
             findings.append(_where(recording, what, fresh))
         for a, b in fresh:
             bad[max(a - _MARGIN, 0) : b + _MARGIN] = True
+    if recording.kind == "actuator":
+        alone = spikes(recording.time, signal, pull, recording.quiet_samples) & ~bad
+        if alone.any():
+            places = [(int(i), int(i) + 1) for i in np.flatnonzero(alone)]
+            what = "a single reading is far outside of the noise at rest"
+            findings.append(_where(recording, what, places))
+            bad |= alone
     if not bad.any():
         return Quality(None, tuple(findings))
     if bad.mean() > 0.5:

@@ -179,7 +179,7 @@ class _Conclusion:
                 stage = stage_of(
                     with_it,
                     self.judge,
-                    self.fitter.full,
+                    self.fitter.raw,
                     for_others=self.predicting(with_it, with_it),
                 )
             families = tuple(dict.fromkeys(family_of(other) for other, _ in alike))
@@ -207,11 +207,11 @@ def conclude(
     judge, full = found.judge, fitter.full
     doubtful = not end.is_small and end.explained < _TRUSTED_SHARE
     others = end.first.model if doubtful else end.predicting(found.best, end.last)
-    first = stage_of(end.first, judge, full)
+    first = stage_of(end.first, judge, fitter.raw)
     final = stage_of(
         end.last,
         judge,
-        full,
+        fitter.raw,
         profiled=fitter.means_about(end.last, found.best.drift),
         for_others=others,
     )
@@ -273,6 +273,11 @@ def _notes(
 ) -> list[str]:
     """Return sentences for the operator."""
     said = []
+    if end.fitter.has_tails:
+        said.append(
+            "the readings at rest have heavier tails than a normal distribution; the fits weigh "
+            "readings by their likelihood under Student's t"
+        )
     if end.found.status == "budget":
         said.append("the search stopped at its computing budget; --thorough searches further")
     if end.found.status == "stopped" and not (end.found.races or end.found.best.members):
@@ -323,7 +328,7 @@ def _round(race: Race, judge: Judge, fitter: Fitter) -> Round:
                 name,
                 effect.family,
                 effect.acts_on,
-                stage_of(fit, judge, fitter.full),
+                stage_of(fit, judge, fitter.raw),
                 promised,
                 1.0 - fit.cost / parent.cost,
                 gain,

@@ -18,7 +18,7 @@ from dearig.model.diagnosis.noise import (
     drift_basis,
     pink_density,
 )
-from dearig.model.diagnosis.preparation import prepared, with_model_error
+from dearig.model.diagnosis.preparation import prepared, with_model_error, without_tails
 from dearig.model.diagnosis.regression import Values
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
@@ -173,6 +173,7 @@ def with_effect(model: Actuator | Strip, name: str, values: Sequence[float]) -> 
 class Fitter:
     """Training ``records``, ``full`` and as the search uses them, and the fits made to them.
 
+    ``raw`` are the full ones as they were measured, noise with heavy tails included.
     ``watched`` is called after each population of simulations, from any thread, and may raise to
     end the search.
     """
@@ -187,7 +188,7 @@ class Fitter:
     ) -> None:
         self.base, self.settings, self.workers = base, settings, workers
         self._measured = tuple(records)
-        self.full = tuple(with_model_error(r) for r in records)
+        self.full = self.raw = tuple(with_model_error(r) for r in records)
         self.records = self._prepared(base)
         self.work, self.watched = Work(), watched
         longest = max(float(r.time[-1] - r.time[0]) for r in records)
@@ -208,6 +209,11 @@ class Fitter:
         """Whether the records are driven by voltage."""
         return isinstance(self.base, Actuator)
 
+    @property
+    def has_tails(self) -> bool:
+        """Whether the noise of a record at rest has heavier tails than a normal distribution."""
+        return any(a is not b for a, b in zip(self.full, self.raw, strict=True))
+
     def space(self, full: bool = False) -> DriftSpace:
         """Return the directions in which the records may drift."""
         if full not in self._space:
@@ -219,11 +225,29 @@ class Fitter:
             )
         return self._space[full]
 
-    def read_colour(self) -> None:
-        """Read the 1/f noise of the records at rest; the noise of later problems has it.
+    def read_noise(self, model: Actuator | Strip) -> None:
+        """Read the noise at rest; later problems are those of its tails and its colour.
 
-        Springs are sought in white noise: in slow noise their likelihood has more valleys.
+        ``model`` is fitted to the records. Springs are sought in white normal noise: in slow noise
+        their likelihood has more valleys.
         """
+        self.records = self._without_tails(self.records, model, kernel.QUICK)
+        self.full = self._without_tails(self.raw, model, kernel.CAREFUL)
+        self.read_colour()
+
+    def _without_tails(
+        self, records: Sequence[Record], model: Actuator | Strip, fidelity: int
+    ) -> tuple[Record, ...]:
+        layout = Layout(model)
+        x = layout.coordinates(layout.initial())
+        found = []
+        for record in records:
+            problem = WhitenedProblem([record], layout, workers=1, fidelity=fidelity)
+            found.append(without_tails(record, -problem.residuals(x) * record.noise))
+        return tuple(found)
+
+    def read_colour(self) -> None:
+        """Read the 1/f noise of the records at rest; the noise of later problems has it."""
         self._pink_density = pink_density(self.records, self.settings.odds)
         self._space.clear()
 
@@ -399,7 +423,7 @@ class Fitter:
             else r
             for r in self._prepared(model)
         )
-        self.read_colour()
+        self.read_noise(model)
         self._coarse.clear()
 
     def _strip_baseline(

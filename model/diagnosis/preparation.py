@@ -9,11 +9,19 @@ import numpy as np
 
 from dearig.model.actuator import Actuator
 from dearig.model.film import Strip
+from dearig.model.fitting.intervals import correlation_time
 from dearig.model.fitting.thinning import thinned
-from dearig.model.noise import noise_at_rest
-from dearig.model.records import ActuatorRecord, FilmRecord, Record
+from dearig.model.noise import Tails, about_rest, noise_at_rest, tails_of
+from dearig.model.records import ActuatorRecord, FilmRecord, Record, counted
 
-__all__ = ["FILM_MODEL_ERROR", "bridged", "prepared", "with_model_error"]
+__all__ = [
+    "FILM_MODEL_ERROR",
+    "bridged",
+    "prepared",
+    "rest_tails",
+    "with_model_error",
+    "without_tails",
+]
 
 #: Of the largest stress: the error to which a model of a rubber is taken to be true.
 FILM_MODEL_ERROR = 5e-3
@@ -21,6 +29,9 @@ FILM_MODEL_ERROR = 5e-3
 _RATE = 200.0  # Hz, to which records may be thinned: mains and a load's ringing still show
 _QUIET_MIN = 100  # samples of a lead-in from which a thinned record's noise is read again
 _FILM_SAMPLES = 1500
+_LEVEL = 8  # neighbours on either side, whose mean is the level of a reading: 80 ms at 200 Hz
+_FAR = 0.05  # share of the noise at rest that is called far off
+_CROWD = 2  # of the next two on either side far off: by chance at one reading in seventy
 
 
 def prepared(record: Record, model: Actuator | Strip) -> Record:
@@ -68,3 +79,46 @@ def with_model_error(record: Record) -> Record:
     stress = record.stress if record.valid is None else record.stress[record.valid]
     error = FILM_MODEL_ERROR * float(np.max(np.abs(stress)))
     return replace(record, noise=math.hypot(record.noise, error))
+
+
+def rest_tails(record: Record) -> Tails | None:
+    """Return the distribution of the readings at rest; None where they are too few."""
+    if isinstance(record, FilmRecord) or record.lead_in < _QUIET_MIN:
+        return None
+    rest = np.arange(record.lead_in)
+    if record.valid is not None:
+        rest = rest[record.valid[rest]]
+    if rest.size < _QUIET_MIN:
+        return None
+    noise, _ = about_rest(record.time[rest], record.displacement[rest])
+    return tails_of(noise, 1.0 / correlation_time(noise))
+
+
+def without_tails(record: Record, residual: np.ndarray) -> Record:
+    """Return ``record`` with pseudo-values in place of readings whose noise has heavy tails.
+
+    A fit to them by least squares is, to first order, that of the greatest likelihood under the
+    distribution of the noise at rest (``Tails.pseudo``). The noise of each reading is its
+    ``residual`` (N,), measured less model in m, about the mean of its neighbours': what a model may
+    still explain lasts longer than one reading. Readings stay as they are where several that follow
+    each other are far off, and all of them where more are so than at rest.
+    """
+    tails = rest_tails(record)
+    if tails is None or tails.is_normal or not isinstance(record, ActuatorRecord):
+        return record
+    valid = np.ones(residual.size) if record.valid is None else record.valid.astype(float)
+    about = np.ones(2 * _LEVEL + 1)
+    about[_LEVEL] = 0.0
+    count = np.convolve(valid, about, "same")
+    level = np.convolve(valid * residual, about, "same") / np.maximum(count, 1.0)
+    noise = residual - level
+    far = (np.abs(noise) > tails.limit(_FAR)) & (valid > 0.0)
+    if np.mean(far) > 2.0 * _FAR:
+        return record
+    alone = np.convolve(far, [1, 1, 0, 1, 1], "same") < _CROWD
+    change = np.where(alone & (valid > 0.0), tails.pseudo(noise) - noise, 0.0)
+    return replace(
+        record,
+        displacement=counted(record.displacement + change, record.lead_in),
+        noise=min(record.noise, tails.noise),
+    )

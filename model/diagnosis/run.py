@@ -106,7 +106,7 @@ def _may_be_held(found: Found, search: Search, as_held: Sequence[Record]) -> boo
     if best is found.baseline:
         return False
     fitter = Fitter(as_held, found.baseline.model, search.settings, search.fitter.workers)
-    fitter.read_colour()
+    fitter.read_noise(found.baseline.model)
     for left_out in (None, *best.effects):
         effects = tuple(e for e in best.model.effects if e[0] != left_out)
         problem = fitter.problem(replace(best.model, effects=effects), best.drift)

@@ -1,10 +1,12 @@
 """The noise of readings: drift, mains and an averaging sensor are told from it."""
 
+import math
+
 import numpy as np
 import pytest
 
 from dearig.model.errors import ModelError
-from dearig.model.noise import noise_at_rest, noise_of
+from dearig.model.noise import Tails, noise_at_rest, noise_of, tails_of
 
 
 @pytest.mark.parametrize("slope", [0.0, 1.0, -300.0])
@@ -39,3 +41,41 @@ def test_noise_that_a_sensor_has_averaged_is_noise():
 def test_noise_of_nothing():
     with pytest.raises(ModelError, match="3 samples are too few to read a noise from"):
         noise_of(np.zeros(3))
+
+
+def test_normal_noise_has_no_heavy_tails():
+    rng = np.random.default_rng(1)
+    for step in (0.0, 1.2):
+        found = []
+        for _ in range(20):
+            values = rng.standard_normal(400)
+            found.append(tails_of(step * np.round(values / step) if step else values))
+        assert all(tails.is_normal for tails in found)
+        assert np.mean([tails.scale for tails in found]) == pytest.approx(1.0, rel=0.05)
+
+
+@pytest.mark.parametrize("step", [0.0, 1.0])
+def test_heavy_tails_are_found_with_their_scale(step):
+    rng = np.random.default_rng(2)
+    values = rng.standard_t(4.0, (20, 400))
+    found = [tails_of(step * np.round(v / step) if step else v) for v in values]
+    heavy = [tails for tails in found if not tails.is_normal]
+    # of 400 readings that are rounded to their scale, a few do not show it
+    assert len(heavy) >= 17
+    assert np.median([tails.freedom for tails in heavy]) == pytest.approx(4.0, abs=1.0)
+    assert np.median([tails.scale for tails in heavy]) == pytest.approx(1.0, rel=0.1)
+
+
+def test_pseudo_values_know_the_level_as_well_as_any_estimate_can():
+    tails = Tails(4.0, 2.0)
+    noise = 2.0 * np.random.default_rng(3).standard_t(4.0, (2000, 100))
+    levels = tails.pseudo(noise).mean(axis=1)
+    # Fisher's information of Student's t is (freedom + 1)/(freedom + 3)
+    assert np.std(levels) == pytest.approx(2.0 * math.sqrt(7.0 / 5.0 / 100.0), rel=0.05)
+    assert np.std(tails.pseudo(noise)) == pytest.approx(tails.noise, rel=0.02)
+    assert np.std(levels) < 0.87 * np.std(noise.mean(axis=1))
+
+
+def test_a_limit_is_that_of_the_distribution():
+    assert Tails(math.inf, 2.0).limit(0.05) == pytest.approx(2.0 * 1.959964)
+    assert Tails(4.0, 1.0).limit(0.01) == pytest.approx(4.604095)

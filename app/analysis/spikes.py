@@ -1,0 +1,98 @@
+"""Spikes: single readings far outside of the noise at rest.
+
+A sensor that loses its spot for one sample reads anything. No film moves so, and a model that is
+fitted to such readings is worse. Masked is one reading at a time, between neighbours that lie on a
+smooth curve within the noise at rest: a jump, a kink, ringing or a slow error shows in several
+readings, and stays.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from dearig.model.noise import Tails, about_rest, tails_of
+
+__all__ = ["spikes"]
+
+#: Good readings of a recording that are masked by mistake, on average, where the noise is that at
+#: rest.
+_MASKED_WRONGLY = 0.01
+_REST_MIN = 100  # readings: fewer give the noise to worse than 7 %
+_FEW = 0.01  # of the readings: where more are far off, the noise is not that at rest
+_RINGING = 6  # samples: two periods of ringing at a third of the rate, which no cubic shows
+_CUT = 0.962  # standard deviation of a normal distribution without its largest hundredth
+#: Displacement over that in proportion to the pull: a film that rings goes twice as far, and one
+#: that is stretched is twice as soft as on average.
+_DRIVEN = 4.0
+
+#: Neighbours of a reading, and what projects off the parabolas and cubics through these.
+_REACH = 4
+_PLACES = np.delete(np.arange(-_REACH, _REACH + 1.0), _REACH)
+_CURVES = np.vander(_PLACES, 4, increasing=True)
+_BESIDE = np.eye(_PLACES.size) - _CURVES @ np.linalg.pinv(_CURVES)
+#: The reading less the curve there; its noise, over that of one reading.
+_OFF = np.insert(-np.linalg.pinv(_CURVES)[0], _REACH, 1.0)
+_OFF_NOISE = math.sqrt(float(_OFF @ _OFF))
+#: Sum of the squares beside the curve, over the noise's, that normal noise exceeds once in a
+#: hundred times: four degrees of freedom.
+_BESIDE_MAX = 13.3
+
+
+def spikes(time: np.ndarray, signal: np.ndarray, pull: np.ndarray, quiet: int) -> np.ndarray:
+    """Return which readings (N,) bool of ``signal`` (N,) are spikes.
+
+    ``pull`` (N,) is what moves the film. The first ``quiet`` readings are at rest: their
+    distribution, normal or Student's t, says how far off a reading may be.
+    """
+    found = np.zeros(signal.size, dtype=bool)
+    if quiet < _REST_MIN or signal.size < _OFF.size:
+        return found
+    tails = _at_rest(time[:quiet], signal[:quiet])
+    # rounding alone moves a reading off its curve by a step
+    limit = _OFF_NOISE * tails.limit(_MASKED_WRONGLY / signal.size) + tails.step
+    # what the drive may have moved, just now or before, is no spike
+    driven = maximum_filter1d(np.abs(_off(pull)), 2 * _REACH + 1) / float(np.max(np.abs(pull)))
+    moved = _DRIVEN * float(np.ptp(signal)) * driven
+    width = math.hypot(tails.scale, tails.step / math.sqrt(12.0))
+    off = np.abs(_off(signal))
+    far = np.flatnonzero(off - moved > limit)
+    alone = [_beside(signal, i) < width and not _rings(off, i) for i in map(int, far)]
+    found[far[alone]] = True
+    return found if np.mean(found) <= _FEW else np.zeros_like(found)
+
+
+def _at_rest(time: np.ndarray, signal: np.ndarray) -> Tails:
+    """Return the distribution of the noise at rest; that of all but spikes where it is normal."""
+    noise, _ = about_rest(time, signal)
+    size = np.abs(noise)
+    middle = tails_of(noise[size <= np.quantile(size, 1.0 - _FEW)])
+    if middle.is_normal:
+        return replace(middle, scale=middle.scale / _CUT)
+    return tails_of(noise)
+
+
+def _off(values: np.ndarray) -> np.ndarray:
+    """Return ``values`` (N,) less the curves through their neighbours, 0 at the ends."""
+    return np.pad(np.correlate(values, _OFF, "valid"), _REACH)
+
+
+def _beside(signal: np.ndarray, i: int) -> float:
+    """Return how far the neighbours of reading ``i`` are beside their curve.
+
+    Less than the noise of one reading, but for once in a hundred times.
+    """
+    neighbours = np.delete(signal[i - _REACH : i + _REACH + 1], _REACH)
+    return math.sqrt(float(neighbours @ _BESIDE @ neighbours) / _BESIDE_MAX)
+
+
+def _rings(off: np.ndarray, i: int) -> bool:
+    """Whether readings near ``i`` are half as far ``off`` (N,): ringing of some three samples.
+
+    Not its next two neighbours on either side, whose curves pass through it.
+    """
+    others = np.concatenate([off[max(i - _RINGING, 0) : i - 2], off[i + 3 : i + 1 + _RINGING]])
+    return bool(np.max(others) > 0.5 * off[i])

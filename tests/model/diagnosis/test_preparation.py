@@ -1,0 +1,47 @@
+"""Readings whose noise has heavy tails, as the fits of a diagnosis use them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dearig.model.actuator import Drive
+from dearig.model.diagnosis.preparation import without_tails
+from dearig.model.records import ActuatorRecord
+
+N, QUIET = 4000, 400
+TIME = 5e-3 * np.arange(N)
+DRIVE = Drive(TIME, np.where(np.arange(N) < QUIET, 0.0, 1e3))
+
+
+def record_with(noise: np.ndarray) -> ActuatorRecord:
+    return ActuatorRecord("made", DRIVE, noise, float(np.std(noise)), lead_in=QUIET)
+
+
+def test_normal_noise_stays_as_it_is() -> None:
+    record = record_with(1e-6 * np.random.default_rng(0).standard_normal(N))
+    assert without_tails(record, record.displacement) is record
+
+
+def test_a_level_is_known_better_beside_heavy_tails() -> None:
+    levels, plain = [], []
+    for seed in range(30):
+        noise = 1e-6 * np.random.default_rng(seed).standard_t(3.0, N)
+        found = without_tails(record_with(noise), noise)
+        assert found.noise < 0.9 * float(np.std(noise))
+        levels.append(found.displacement[QUIET:].mean() - found.displacement[:QUIET].mean())
+        plain.append(noise[QUIET:].mean() - noise[:QUIET].mean())
+    assert np.std(levels) < 0.9 * np.std(plain)
+
+
+def test_what_a_model_could_explain_stays() -> None:
+    noise = 1e-6 * np.random.default_rng(1).standard_t(4.0, N)
+    index = np.arange(N)
+    missing = 40e-6 * (index >= 1500) + 15e-6 * np.sin(2.0 * np.pi * TIME)
+    found = without_tails(record_with(noise), noise + missing)
+    left = found.displacement - noise
+    # about the jump of 40 um the readings are as they were
+    assert np.max(np.abs((left - np.median(left))[1496:1504])) < 2e-6
+    # where the misfit is no smooth curve, all of them are
+    mains = noise + 15e-6 * np.sin(2.0 * np.pi * 50.0 * TIME + 0.3)
+    record = record_with(noise)
+    assert without_tails(record, mains) is record
