@@ -120,12 +120,6 @@ class Tails:
         square = (noise / self.scale) ** 2
         return np.asarray(noise * (self.freedom + 3.0) / (self.freedom + square))
 
-    @property
-    def noise(self) -> float:
-        """Standard deviation of the pseudo-values, with that of rounding."""
-        information = 1.0 if self.is_normal else (self.freedom + 1.0) / (self.freedom + 3.0)
-        return math.sqrt(self.scale**2 / information + self.step**2 / 12.0)
-
 
 def tails_of(noise: np.ndarray, independent: float = 1.0) -> Tails:
     """Return the more probable distribution of ``noise`` (N,) about 0: normal, or Student's t.

@@ -45,7 +45,9 @@ class _Conclusion:
     def __init__(self, found: Found, fitter: Fitter, without: Callable[[Fit, str], Fit]) -> None:
         self.found, self.fitter, self.judge = found, fitter, found.judge
         self._without = without
-        self.first = fitter.careful(found.baseline, _ITERATIONS)
+        noise = self.judge.is_noise(found.baseline)
+        fit = fitter.careful if noise else fitter.identified
+        self.first = fit(found.baseline, _ITERATIONS)
         self.last = fitter.careful(found.best, _ITERATIONS) if found.best.members else self.first
 
     @property

@@ -43,6 +43,7 @@ _GAIN = 0.5  # of chi-square: what is left to gain changes no choice, whose odds
 _GAIN_PART = 1e-3  # of chi-square: the same, where more than twice the noise's power is left
 _POLISHED = 2.0  # mean square over noise: what leaves more only polishes a misfit
 _NO_WEIGHT = 1e-6  # of the typical one: what the bounds of a descent leave of a weight at 0
+_AT_ONCE = 1e-3  # s: a branch that relaxes faster than any record shows
 _BASELINE_STARTS = 5  # of the global search
 _BASELINE_ITERATIONS = 20
 
@@ -265,9 +266,13 @@ class Fitter:
         drift: float = 0.0,
         fidelity: int = kernel.QUICK,
         full: bool = False,
+        layout: Layout | None = None,
     ) -> WhitenedProblem:
-        """Return the records with the numbers of ``model`` free, under a ``drift`` in the noise."""
-        layout = Layout(model, self.times if self.of_actuator else None)
+        """Return the records with the numbers of ``model`` free, under a ``drift`` in the noise.
+
+        Relaxation times are those of the search unless a ``layout`` is given.
+        """
+        layout = layout or Layout(model, self.times if self.of_actuator else None)
         problem = WhitenedProblem(
             self.full if full else self.records,
             layout,
@@ -364,19 +369,22 @@ class Fitter:
         found = descend(problem, fit.x, fit.fixed, iterations, _gain(fit), damping=1e-4)
         return replace(fit_of(problem, fit.fixed, found), converged=True)
 
-    def careful_problem(self, model: Actuator | Strip, drift: float) -> WhitenedProblem:
+    def careful_problem(
+        self, model: Actuator | Strip, drift: float, layout: Layout | None = None
+    ) -> WhitenedProblem:
         """Return every sample with careful steps; ``drift`` is that of the thinned records."""
         # its variance is in units of one reading's noise, which thinning has lowered
         ratios = [(t.noise / f.noise) ** 2 for t, f in zip(self.records, self.full, strict=True)]
         scaled = drift * sum(ratios) / len(ratios)
-        return self.problem(model, scaled, kernel.CAREFUL, full=True)
+        return self.problem(model, scaled, kernel.CAREFUL, full=True, layout=layout)
 
     def means_about(self, careful: Fit, drift: float) -> WhitenedProblem:
         """Return the thinned records, moved so that their optimum is that of a ``careful`` fit.
 
         ``drift`` is that of the thinned records.
         """
-        problem = self.problem(careful.model, drift)
+        layout = careful.problem.layout
+        problem = self.problem(careful.model, drift, layout=layout)
         recentre(problem, careful.problem, careful.problem.layout.values(careful.x))
         return problem
 
@@ -405,15 +413,59 @@ class Fitter:
         problem = self.problem(base)
         if not self.of_actuator:
             return self._strip_baseline(problem, progress)
+        best = self._from_springs(problem, progress)
+        self._prepare(best.model)
+        return self.refined(replace(best, problem=self.problem(best.model)))
+
+    def _from_springs(
+        self, problem: WhitenedProblem, progress: Callable[[str, float], None]
+    ) -> Fit:
+        """Return the best fit from several starts of the springs, to the end of its valley."""
         starts = voltage_starts(problem, progress, _BASELINE_STARTS)
         fits = self.map(lambda x: self.descend(problem, x, 8), list(starts))
         leaders = sorted(fits, key=lambda f: f.cost)[:2]
         fits = self.map(
             lambda f: self.descend(problem, f.x, _BASELINE_ITERATIONS, sure=True), leaders
         )
-        best = self.refined(min(fits, key=lambda f: f.cost))
-        self._prepare(best.model)
-        return self.refined(replace(best, problem=self.problem(best.model)))
+        return self.refined(min(fits, key=lambda f: f.cost))
+
+    def identified(self, baseline: Fit, iterations: int) -> Fit:
+        """Return the model without effects as ``identify`` fits it, on every sample.
+
+        The search holds the locking limits, and seeks a branch that relaxes at once as a drag, one
+        that never does as a stiffer spring. Here relaxation times are free, and so are the limits
+        where that explains significantly more. The fit is ``baseline`` where nothing is better.
+        """
+        fits = [self.careful(baseline, iterations)]
+        if not self.of_actuator:
+            return fits[0]
+        layout = Layout(baseline.model)
+        problem = self.problem(baseline.model, layout=layout)
+        own = baseline.problem.layout.values(baseline.x)
+        # the shortest branch as a drag: modulus times relaxation time is what slow motion shows
+        drag = own.copy()
+        times = layout.column("T")
+        shortest = times[np.argmin(own[times])]
+        modulus = layout.column("mu")[-times.size :][np.argmin(own[times])]
+        drag[shortest], drag[modulus] = _AT_ONCE, own[modulus] * own[shortest] / _AT_ONCE
+        starts = np.clip(layout.coordinates(np.array([own, drag])), layout.lower, layout.upper)
+        wide = [
+            self._from_springs(problem, lambda *_: None),
+            *self.map(
+                lambda x: self.descend(problem, x, _BASELINE_ITERATIONS, sure=True), list(starts)
+            ),
+        ]
+        best = min(wide, key=lambda f: f.cost)
+        fixed, gain = best.fixed, _gain(best)
+        found = descend(problem, best.x, fixed, _BASELINE_ITERATIONS, damping=1e-4, quick=True)
+        none = np.zeros_like(fixed)
+        freed = descend(problem, found.x, none, _BASELINE_ITERATIONS, gain, quick=True)
+        if is_worth_freeing(problem, found.cost, freed, int(fixed.sum())):
+            found, fixed = freed, none
+        every = self.careful_problem(baseline.model, 0.0, layout)
+        found = descend(every, found.x, fixed, iterations, gain, damping=1e-4)
+        fits.append(replace(fit_of(every, fixed, found), converged=True))
+        return min(fits, key=lambda f: f.cost)
 
     def _prepare(self, model: Actuator | Strip) -> None:
         """Thin the records as the fitted ``model`` allows, and find their coarse drives."""

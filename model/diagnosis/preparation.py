@@ -11,14 +11,13 @@ from dearig.model.actuator import Actuator
 from dearig.model.film import Strip
 from dearig.model.fitting.intervals import correlation_time
 from dearig.model.fitting.thinning import thinned
-from dearig.model.noise import Tails, about_rest, noise_at_rest, tails_of
+from dearig.model.noise import about_rest, noise_at_rest, tails_of
 from dearig.model.records import ActuatorRecord, FilmRecord, Record, counted
 
 __all__ = [
     "FILM_MODEL_ERROR",
     "bridged",
     "prepared",
-    "rest_tails",
     "with_model_error",
     "without_tails",
 ]
@@ -81,17 +80,10 @@ def with_model_error(record: Record) -> Record:
     return replace(record, noise=math.hypot(record.noise, error))
 
 
-def rest_tails(record: Record) -> Tails | None:
-    """Return the distribution of the readings at rest; None where they are too few."""
-    if isinstance(record, FilmRecord) or record.lead_in < _QUIET_MIN:
-        return None
+def _rest_of(record: ActuatorRecord) -> np.ndarray:
+    """Return the indices (M,) of the readings at rest that may be used."""
     rest = np.arange(record.lead_in)
-    if record.valid is not None:
-        rest = rest[record.valid[rest]]
-    if rest.size < _QUIET_MIN:
-        return None
-    noise, _ = about_rest(record.time[rest], record.displacement[rest])
-    return tails_of(noise, 1.0 / correlation_time(noise))
+    return rest if record.valid is None else rest[record.valid[rest]]
 
 
 def without_tails(record: Record, residual: np.ndarray) -> Record:
@@ -103,8 +95,12 @@ def without_tails(record: Record, residual: np.ndarray) -> Record:
     still explain lasts longer than one reading. Readings stay as they are where several that follow
     each other are far off, and all of them where more are so than at rest.
     """
-    tails = rest_tails(record)
-    if tails is None or tails.is_normal or not isinstance(record, ActuatorRecord):
+    if not isinstance(record, ActuatorRecord) or _rest_of(record).size < _QUIET_MIN:
+        return record
+    rest = _rest_of(record)
+    at_rest, _ = about_rest(record.time[rest], record.displacement[rest])
+    tails = tails_of(at_rest, 1.0 / correlation_time(at_rest))
+    if tails.is_normal:
         return record
     valid = np.ones(residual.size) if record.valid is None else record.valid.astype(float)
     about = np.ones(2 * _LEVEL + 1)
@@ -117,8 +113,7 @@ def without_tails(record: Record, residual: np.ndarray) -> Record:
         return record
     alone = np.convolve(far, [1, 1, 0, 1, 1], "same") < _CROWD
     change = np.where(alone & (valid > 0.0), tails.pseudo(noise) - noise, 0.0)
-    return replace(
-        record,
-        displacement=counted(record.displacement + change, record.lead_in),
-        noise=min(record.noise, tails.noise),
-    )
+    changed = counted(record.displacement + change, record.lead_in)
+    # the tails are known from few readings: what they leave of the noise is read again
+    left = noise_at_rest(record.time[rest], changed[rest])
+    return replace(record, displacement=changed, noise=min(record.noise, left))

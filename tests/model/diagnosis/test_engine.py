@@ -9,8 +9,11 @@ import pytest
 
 from dearig.model.actuator import Drive
 from dearig.model.diagnosis import diagnose
+from dearig.model.diagnosis.fits import Fitter
 from dearig.model.diagnosis.settings import DiagnosisSettings
 from dearig.model.effects import EFFECTS
+from dearig.model.fitting import identify
+from dearig.model.material import Network
 from dearig.model.noise import noise_at_rest
 from dearig.model.records import ActuatorRecord
 from tests.tools.diagnoses import HIDDEN, of_hidden, plant
@@ -54,6 +57,16 @@ def test_nothing_is_missing_where_nothing_is_hidden() -> None:
     assert found.verdict == "nothing_missing"
     assert found.steps == ()
     assert dict(found.families) == {"none": 1.0}
+
+
+def test_the_baseline_is_as_good_as_that_of_an_identification() -> None:
+    # a drag is a branch that relaxes at once, which the search does not allow
+    record = record_of(replace(PLAIN, effects=effect("linear drag", drag=3000.0)))
+    two = replace(PLAIN, network=Network.gent((45e3, 60e3, 20e3), (1e4, 1e4, 1e4), (0.4, 2.0)))
+    fitter = Fitter([record], two, DiagnosisSettings(), workers=1)
+    searched = fitter.baseline(lambda *_: None)
+    fitted = identify([record], two, intervals=False, workers=1)
+    assert fitter.identified(searched, 8).cost < 1.002 * fitted.cost < 0.9 * searched.cost
 
 
 def test_a_form_that_no_law_with_a_name_has_is_found_by_the_general_law() -> None:
