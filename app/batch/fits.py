@@ -40,9 +40,11 @@ __all__ = [
     "Row",
     "StudyOptions",
     "Task",
+    "about",
     "code_digest",
     "fit_sent",
     "fit_task",
+    "parameter_columns",
 ]
 
 log = logging.getLogger(__name__)
@@ -55,7 +57,7 @@ Row = dict[str, Any]
 _SOURCES = ("analysis", "batch", "config", "drivers", "model", "recording")
 _LIBRARIES = ("numpy", "scipy", "numba", "h5py")
 # linear algebra is limited to one thread for the whole process: fits in it go one after the other
-_ONE_AT_A_TIME = threading.Lock()
+ONE_AT_A_TIME = threading.Lock()
 
 
 class OtherVersion(Exception):  # noqa: N818  (what was found)
@@ -68,7 +70,8 @@ class StudyOptions:
 
     ``do`` is one of ``KINDS``, with Maxwell ``branches``, a ``spring`` (for identify) and ``drive``
     command or monitor. ``ended_early`` is keep, cut or leave-out. ``intervals``: 95 % intervals
-    are computed. ``model`` is the text of the model file of a validation.
+    are computed. ``model`` is the text of the model file of a validation. ``own`` are parameters
+    that each recording of a film has for itself, where its recordings are fitted together.
     """
 
     do: str
@@ -78,6 +81,7 @@ class StudyOptions:
     ended_early: str = "keep"
     intervals: bool = True
     model: str = ""
+    own: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -139,9 +143,9 @@ def fit_sent(
 
 def _row(path: Path, name: str, options: StudyOptions, progress: Progress) -> Row:
     row: Row = {"recording": name, "state": "failed", "reason": ""}
-    with _ONE_AT_A_TIME:
+    with ONE_AT_A_TIME:
         try:
-            row |= _about(path)
+            row |= about(path)
             row |= _computed(path, options, progress)
             row["state"] = "ok"
         except InputError as error:
@@ -154,7 +158,7 @@ def _row(path: Path, name: str, options: StudyOptions, progress: Progress) -> Ro
     return row
 
 
-def _about(path: Path) -> Row:
+def about(path: Path) -> Row:
     """Return what the columns before the results are of."""
     entry = glance(path, path.name, path.stat().st_size)
     if entry.trouble:
@@ -210,7 +214,7 @@ def _computed(path: Path, options: StudyOptions, progress: Progress) -> Row:
             intervals=options.intervals, ended_early=options.ended_early, progress=progress,
         )  # fmt: skip
         return {
-            **_parameters(parameters_of(fitted)),
+            **parameter_columns(parameters_of(fitted)),
             **errors_of(fitted.train[0]),
             "converged": bool(fitted.fit.converged),
         }
@@ -224,13 +228,14 @@ def _computed(path: Path, options: StudyOptions, progress: Progress) -> Row:
     return {
         "verdict": found.verdict,
         "effects": ", ".join(step.effect for step in found.finding.steps),
-        **_parameters(parameters_of(found)),
+        **parameter_columns(parameters_of(found)),
         **errors_of(found.after.train[0]),
         **{f"{name}_before": value for name, value in errors_of(found.before.train[0]).items()},
     }
 
 
-def _parameters(found: list[dict[str, Any]]) -> Row:
+def parameter_columns(found: list[dict[str, Any]]) -> Row:
+    """Return the columns of parameters as ``parameters_of`` has them."""
     row: Row = {}
     for parameter in found:
         name = parameter["name"]

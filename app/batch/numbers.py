@@ -9,7 +9,7 @@ from typing import Any
 from dearig.analysis.outcomes import Comparison, DiagnoseOutcome, IdentifyOutcome, ValidateOutcome
 from dearig.units import SHOWN, parameter_unit
 
-__all__ = ["errors_of", "numbers_of", "parameters_of"]
+__all__ = ["errors_of", "numbers_of", "parameters_of", "told"]
 
 
 def parameters_of(outcome: IdentifyOutcome | DiagnoseOutcome) -> list[dict[str, Any]]:
@@ -25,23 +25,23 @@ def parameters_of(outcome: IdentifyOutcome | DiagnoseOutcome) -> list[dict[str, 
         estimates = [
             (f"{step.effect}.", e) for step in outcome.finding.steps for e in step.estimates
         ]
-    found = []
-    for before, estimate in estimates:
-        factor, unit = parameter_unit(estimate.unit)
-        name = estimate.name.replace(": ", ".").replace(" ", "_")
-        if "." not in name:
-            name = before.replace(" ", "_") + name
-        ending = unit.replace("/", "_per_").replace("²", "2").replace("³", "3").replace(" ", "_")
-        found.append(
-            {
-                "name": f"{name}_{ending}" if ending else name,
-                "value": _finite(estimate.value * factor),
-                "low95": _finite(estimate.low * factor) if estimate.low != 0.0 else None,
-                "high95": _finite(estimate.high * factor),
-                "determined": bool(estimate.determined),
-            }
-        )
-    return found
+    return [told(estimate, before) for before, estimate in estimates]
+
+
+def told(estimate: Any, before: str = "") -> dict[str, Any]:
+    """Return an estimate as in ``parameters_of``; its name begins with that of an effect."""
+    factor, unit = parameter_unit(estimate.unit)
+    name = estimate.name.replace(": ", ".").replace(" ", "_")
+    if "." not in name:
+        name = before.replace(" ", "_") + name
+    ending = unit.replace("/", "_per_").replace("²", "2").replace("³", "3").replace(" ", "_")
+    return {
+        "name": f"{name}_{ending}" if ending else name,
+        "value": _finite(estimate.value * factor),
+        "low95": _finite(estimate.low * factor) if estimate.low != 0.0 else None,
+        "high95": _finite(estimate.high * factor),
+        "determined": bool(estimate.determined),
+    }
 
 
 def errors_of(comparison: Comparison) -> dict[str, float]:

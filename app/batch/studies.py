@@ -13,6 +13,7 @@ from dearig.batch.engines import ClusterLost, Engine, LocalEngine
 from dearig.batch.fits import KINDS, Row, StudyOptions, Task, key_of
 from dearig.batch.journal import JOURNAL
 from dearig.batch.queue import Queue
+from dearig.batch.shared_fits import film_task, fit_film, rows_of
 from dearig.batch.table_file import write_csv, write_parquet
 from dearig.config.modelfile import load_model
 from dearig.config.toml_input import read_text
@@ -20,10 +21,10 @@ from dearig.errors import InputError
 from dearig.input_file import read_input
 from dearig.progress import Progress, quiet
 from dearig.recording.files import in_words
-from dearig.recording.index import ENDINGS, list_folder
+from dearig.recording.index import ENDINGS, glance, list_folder
 from dearig.recording.json_file import write_json
 
-__all__ = ["StudyTable", "Subject", "study_recordings", "subjects_of", "with_model"]
+__all__ = ["StudyTable", "Subject", "study_films", "study_recordings", "subjects_of", "with_model"]
 
 log = logging.getLogger(__name__)
 
@@ -144,6 +145,8 @@ def with_model(options: StudyOptions, model: Path | None) -> StudyOptions:
             if model is None
             else f"--model is of --do validate; --do {options.do} fits a model"
         )
+    if options.own and options.do != "identify":
+        raise InputError(f"--own is of --do identify; --do {options.do} shares no parameters")
     if model is None:
         return options
     load_model(model)  # refuses what is none
@@ -164,11 +167,7 @@ def study_recordings(
     from the cache in ``out``. A study that is ended keeps its rows there. Where a cluster is lost,
     the rest is computed on this computer.
     """
-    cache = out / "cache"
-    try:
-        cache.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{cache} cannot be created: {in_words(error)}") from error
+    cache = _cache_in(out)
     rows: dict[str, Row] = {}
     tasks: list[Task] = []
     unreadable = 0
@@ -179,8 +178,7 @@ def study_recordings(
                 subject.name, subject.path, key_of(subject.path, subject.name, options), options
             )
         except OSError as error:
-            reason = f"{subject.name} cannot be read: {in_words(error)}"
-            rows[subject.name] = {"recording": subject.name, "state": "failed", "reason": reason}
+            rows[subject.name] = _unreadable(subject, error)
             unreadable += 1
             continue
         known = _kept(cache / f"{task.key}.json")
@@ -197,12 +195,82 @@ def study_recordings(
         log.warning("%s", moved)
         rest = [task for task in tasks if task.name not in rows]
         _compute(rest, LocalEngine(), rows, cache, len(subjects), progress)
+    return _table(subjects, rows, options, out, cached, moved)
+
+
+def study_films(
+    subjects: Sequence[Subject],
+    options: StudyOptions,
+    out: Path,
+    workers: int | None = None,
+    *,
+    progress: Progress = quiet,
+) -> StudyTable:
+    """Fit the recordings of each film together, and write their rows to ``out``.
+
+    The parameters ``options.own`` each recording has for itself, the others are of the film. Films
+    are fitted in so many processes of this computer, and cached as ``study_recordings`` does it. A
+    recording without the name of a film has no result.
+    """
+    cache = _cache_in(out)
+    rows: dict[str, Row] = {}
+    films: dict[str, list[tuple[Subject, str]]] = {}
+    for i, subject in enumerate(subjects):
+        progress("reading", i / len(subjects))
+        try:
+            key = key_of(subject.path, subject.name, options)
+            film = glance(subject.path, subject.name, subject.path.stat().st_size).film_id
+        except OSError as error:
+            rows[subject.name] = _unreadable(subject, error)
+            continue
+        if film:
+            films.setdefault(film, []).append((subject, key))
+        else:
+            reason = f"{subject.name}: it does not name its film, whose parameters it would share"
+            rows[subject.name] = {"recording": subject.name, "state": "failed", "reason": reason}
+    tasks = [film_task(film, members, options) for film, members in films.items()]
+    found: dict[str, Row] = {}
+    for task in tasks:
+        known = _kept(cache / f"{task.key}.json")
+        if known is not None:
+            found[task.name] = known
+    cached = sum(len(found[task.name]["rows"]) for task in tasks if task.name in found)
+    rest = [task for task in tasks if task.name not in found]
+    _compute(rest, LocalEngine(workers, fit_film), found, cache, max(len(tasks), 1), progress)
+    for task in tasks:
+        rows |= rows_of(task, found[task.name])
+    return _table(subjects, rows, options, out, cached, "")
+
+
+def _table(
+    subjects: Sequence[Subject],
+    rows: Mapping[str, Row],
+    options: StudyOptions,
+    out: Path,
+    cached: int,
+    moved: str,
+) -> StudyTable:
+    """Write the rows in the order of their starts, with what is known beside the recordings."""
     made = [{**rows[s.name], **s.beside} for s in subjects]
     made.sort(key=lambda row: (str(row.get("started", "")), row["recording"]))
     table = out / "study.csv"
     write_csv(made, table)
     parquet = write_parquet(made, out / "study.parquet")
     return StudyTable(options, tuple(made), cached, table, parquet, moved)
+
+
+def _cache_in(out: Path) -> Path:
+    cache = out / "cache"
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{cache} cannot be created: {in_words(error)}") from error
+    return cache
+
+
+def _unreadable(subject: Subject, error: OSError) -> Row:
+    reason = f"{subject.name} cannot be read: {in_words(error)}"
+    return {"recording": subject.name, "state": "failed", "reason": reason}
 
 
 def _compute(

@@ -18,7 +18,7 @@ from dearig.cli.options import (
     SpringKind,
 )
 from dearig.cli.output import check_files, print_line, working, write_result
-from dearig.errors import Interrupted
+from dearig.errors import InputError, Interrupted
 
 __all__ = ["commands"]
 
@@ -74,30 +74,49 @@ def study(
     drive: Drive = DriveChannel.command,
     intervals: Annotated[bool, typer.Option(help="Compute 95 % confidence intervals.")] = True,
     ended_early: EndedEarlyOption = EndedEarly.keep,
+    own: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PARAMETER",
+            help="With --do identify: fit the recordings of each film together. This parameter "
+            "(mu_0, permittivity, ...; can be repeated) each recording has for itself, the others "
+            "are of the film.",
+            show_default=False,
+        ),
+    ] = None,
     json: Json = None,
     force: Force = False,
 ) -> None:
     """Fit, diagnose or validate many recordings, each by itself, into one table.
 
-    A broken recording fails alone; its row says why. What was computed is kept in the cache, so
-    that a study that was ended goes on where it stood. Ctrl-C ends it.
+    With --own the recordings of a film share parameters and are fitted together. A broken recording
+    fails alone; its row says why. What was computed is kept in the cache, so that a study that was
+    ended goes on where it stood. Ctrl-C ends it.
     """  # fmt: skip
     from dearig.batch.engines import engine_at
     from dearig.batch.fits import StudyOptions
-    from dearig.batch.studies import study_recordings, subjects_of, with_model
+    from dearig.batch.studies import study_films, study_recordings, subjects_of, with_model
     from dearig.cli.terminal import study_rows
     from dearig.report.study_table import study_table_json
 
     check_files(force, (model, *(s for s in sources if s.is_file())), json=json)
     options = with_model(
-        StudyOptions(do.value, branches, spring.value, drive.value, ended_early.value, intervals),
+        StudyOptions(
+            do.value, branches, spring.value, drive.value, ended_early.value, intervals,
+            own=tuple(own or ()),
+        ),
         model,
-    )
+    )  # fmt: skip
+    if own and on != "local":
+        raise InputError("--own fits the recordings of a film on this computer: leave --on out")
     subjects = subjects_of(sources, out)
     engine = engine_at(on, workers)
     with working(json) as (console, progress):
         try:
-            table = study_recordings(subjects, options, out, engine, progress=progress)
+            if own:
+                table = study_films(subjects, options, out, workers, progress=progress)
+            else:
+                table = study_recordings(subjects, options, out, engine, progress=progress)
         except KeyboardInterrupt:
             raise Interrupted(
                 f"interrupted: the rows that were computed are kept in {out}; the same command "

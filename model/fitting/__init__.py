@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dearig.model.fitting.budget import with_budget
+from dearig.model.fitting.hierarchy import SharedFit, fit_shared
 from dearig.model.fitting.identify import Identification, add_intervals, identify
 from dearig.model.fitting.parameters import Contribution, Estimate, GivenValue
 
@@ -11,7 +12,9 @@ __all__ = [
     "Estimate",
     "GivenValue",
     "Identification",
+    "SharedFit",
     "add_intervals",
+    "fit_shared",
     "identify",
     "with_budget",
 ]

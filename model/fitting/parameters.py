@@ -10,6 +10,8 @@ import numpy as np
 
 from dearig.model.actuator import Actuator
 from dearig.model.coefficients import (
+    CAPACITANCE,
+    ELECTRIC,
     FORCE,
     HELD,
     KIND,
@@ -46,15 +48,16 @@ NORMAL_95 = 1.959963984540054
 
 # Lower ends for logarithmic coordinates; below, a spring or branch has no measurable influence.
 _FLOOR = {"mu": 1e-2, "T": 1e-6}
+_PERMITTIVITY_RANGE = (1.0, 100.0)  # relative: of vacuum, and above that of any elastomer
 
 
 @dataclass(frozen=True)
 class Quantity:
     """One free parameter.
 
-    ``kind`` is mu, J, T or ``shape`` of spring ``index`` (0 is the equilibrium spring), or
-    ``effect``: then it is parameter ``index`` of the effect ``effect``. J and ``shape`` are
-    parameter ``place`` of the strain energy ``law``.
+    ``kind`` is mu, J, T or ``shape`` of spring ``index`` (0 is the equilibrium spring),
+    ``permittivity``, or ``effect``: then it is parameter ``index`` of the effect ``effect``. J and
+    ``shape`` are parameter ``place`` of the strain energy ``law``.
     """
 
     kind: str
@@ -82,6 +85,8 @@ class Quantity:
             return f"{self.effect}: {self.parameter.name}"
         if self.is_shape:
             return f"{SPRING_LAWS[self.law].parameters[self.place].symbol}_{self.index}"
+        if self.kind == "permittivity":
+            return self.kind
         return f"{self.kind}_{self.index}"
 
     @property
@@ -96,6 +101,8 @@ class Quantity:
         """Search range."""
         if self.kind in ("effect", "J", "shape"):
             return self.parameter.fit_bounds
+        if self.kind == "permittivity":
+            return _PERMITTIVITY_RANGE
         return _FLOOR[self.kind], THESIS_RANGES[self.kind][1]
 
     @property
@@ -103,7 +110,7 @@ class Quantity:
         """Whether the coordinate is the logarithm."""
         if self.kind in ("effect", "J", "shape"):
             return self.parameter.logarithmic
-        return self.kind == "T"
+        return self.kind in ("T", "permittivity")
 
     @property
     def typical(self) -> float:
@@ -115,6 +122,8 @@ class Quantity:
         """Index in the coefficient vector (a relaxation time is stored as its inverse)."""
         if self.kind == "effect":
             return PLACES[self.effect].at + self.index
+        if self.kind == "permittivity":
+            return ELECTRIC
         at = {"mu": MODULUS, "J": LIMIT, "T": RATE}.get(self.kind)
         if at is None:
             at = SHAPE + self.place - SPRING_LAWS[self.law].has_limit
@@ -184,10 +193,17 @@ class Layout:
     ``base`` carries everything that is not free. A fit moves in *coordinates*: moduli as they are,
     limits and times as logarithms. The data fix sums of moduli long before their parts, and such
     valleys are straight only while the moduli stay linear; times and limits spread over decades.
-    ``times`` narrows the range of the relaxation times, in s.
+    ``times`` narrows the range of the relaxation times, in s. With ``permittivity`` the relative
+    permittivity of an actuator's film is free too; a fit of one record hardly tells it from a
+    common factor of all moduli.
     """
 
-    def __init__(self, base: Actuator | Strip, times: tuple[float, float] | None = None) -> None:
+    def __init__(
+        self,
+        base: Actuator | Strip,
+        times: tuple[float, float] | None = None,
+        permittivity: bool = False,
+    ) -> None:
         self.base = base
         self.network = base.network
         self.held = base.film.held if isinstance(base, Actuator) else base.held
@@ -200,6 +216,7 @@ class Layout:
             *(Quantity("mu", i) for i in range(len(springs)) if i or self._rest is None),
             *_shapes(springs),
             *(Quantity("T", i) for i in range(1, len(springs))),
+            *((Quantity("permittivity", 0),) if permittivity else ()),
             *(
                 Quantity("effect", i, name)
                 for name, _ in base.effects
@@ -277,6 +294,8 @@ class Layout:
         values = self._c[self._columns].copy()
         rates = self.column("T")
         values[rates] = self.network.times
+        if isinstance(self.base, Actuator):
+            values[self.column("permittivity")] = self.base.film.permittivity
         return self.values(np.clip(self.coordinates(values), self.lower, self.upper))
 
     def padded(self, network: Network) -> np.ndarray:
@@ -304,6 +323,11 @@ class Layout:
         values = np.atleast_2d(values)
         c = np.tile(self._c, (values.shape[0], 1))
         c[:, self._columns] = values
+        if isinstance(self.base, Actuator):
+            for j in self.column("permittivity"):
+                ratio = values[:, j] / self.base.film.permittivity
+                c[:, ELECTRIC] = ratio * self._c[ELECTRIC]
+                c[:, CAPACITANCE] = ratio * self._c[CAPACITANCE]
         rates = self._columns[self.column("T")]
         c[:, rates] = 1.0 / np.maximum(c[:, rates], 1e-9)
         for j in self.column("J"):
@@ -329,7 +353,12 @@ class Layout:
 
     def model(self, values: np.ndarray) -> Actuator | Strip:
         """Return the base with the free parameters at natural ``values`` (d,)."""
-        return replace(self.base, network=self.build(values), effects=self._effects(values))
+        base = self.base
+        if isinstance(base, Actuator):
+            for j in self.column("permittivity"):
+                film = replace(base.film, permittivity=float(values[j]))
+                base = replace(base, film=film)
+        return replace(base, network=self.build(values), effects=self._effects(values))
 
     def _effects(self, values: np.ndarray) -> EffectValues:
         given = {

@@ -1,0 +1,111 @@
+"""One task of a study whose films share parameters: the recordings of one film, fitted together."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dearig.analysis.shared import identify_shared
+from dearig.batch.fits import ONE_AT_A_TIME, Row, StudyOptions, about, parameter_columns
+from dearig.batch.numbers import errors_of, told
+from dearig.errors import InputError
+from dearig.progress import Progress, quiet
+from dearig.recording.files import one_line
+
+if TYPE_CHECKING:
+    from dearig.batch.studies import Subject
+
+__all__ = ["FilmTask", "film_task", "fit_film", "rows_of"]
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class FilmTask:
+    """The recordings of a film: ``name`` of the film, ``members`` as names and files, their key."""
+
+    name: str
+    members: tuple[tuple[str, Path], ...]
+    key: str
+    options: StudyOptions
+
+
+def film_task(film: str, members: Sequence[tuple[Subject, str]], options: StudyOptions) -> FilmTask:
+    """Return the task of ``film``; ``members`` are its recordings with the keys of their rows."""
+    ordered = sorted(members, key=lambda member: member[0].name)
+    digest = hashlib.sha256("\n".join(key for _, key in ordered).encode()).hexdigest()
+    return FilmTask(film, tuple((s.name, s.path) for s, _ in ordered), digest, options)
+
+
+def fit_film(task: FilmTask, progress: Progress = quiet) -> Row:
+    """Return the ``rows`` of a film's recordings; one that cannot be read has no result.
+
+    Where the others cannot be fitted together either, no recording has a result.
+    """
+    rows: dict[str, Row] = {}
+    good: list[tuple[str, Path]] = []
+    with ONE_AT_A_TIME:
+        for name, path in task.members:
+            row: Row = {"recording": name, "state": "failed", "reason": ""}
+            try:
+                row |= about(path)
+                good.append((name, path))
+            except InputError as error:
+                row["reason"] = str(error).replace(str(path), name)
+            rows[name] = row
+        done: Row = {"recording": task.name, "state": "ok", "reason": "", "sha256": task.key}
+        try:
+            _fit(task.options, good, rows, progress)
+        except InputError as error:
+            for name, path in good:
+                rows[name]["reason"] = str(error).replace(str(path), name)
+        except Exception as error:  # one film must not cost the rows of the others
+            log.exception("unexpected error with film %s", task.name)
+            for name, _ in good:
+                told_why = f"unexpected error ({type(error).__name__}: {one_line(error)})"
+                rows[name]["reason"] = f"{name}: {told_why}"
+            del done["sha256"]  # such rows are not kept
+    return {**done, "rows": list(rows.values())}
+
+
+def _fit(
+    options: StudyOptions,
+    good: Sequence[tuple[str, Path]],
+    rows: dict[str, Row],
+    progress: Progress,
+) -> None:
+    """Fit the recordings ``good`` together, and enter the results in their ``rows``."""
+    if not good:
+        return
+    fitted = identify_shared(
+        [path for _, path in good], options.own, branches=options.branches, spring=options.spring,
+        drive=options.drive, ended_early=options.ended_early, progress=progress,
+    )  # fmt: skip
+    by_path = {outcome.path: outcome for outcome in fitted}
+    for name, path in good:
+        outcome = by_path.get(path)
+        if outcome is None:
+            rows[name]["reason"] = f"{name}: its run ended early, and such ones are left out"
+            continue
+        rows[name] |= {
+            "state": "ok",
+            "fitted_together": len(fitted),
+            **parameter_columns([told(estimate) for estimate in outcome.estimates]),
+            **errors_of(outcome.comparison),
+            "converged": outcome.converged,
+        }
+
+
+def rows_of(task: FilmTask, found: Row) -> dict[str, Row]:
+    """Return the rows of the recordings of ``task`` by their names, from what it gave."""
+    if "rows" not in found:
+        # its process died
+        return {
+            name: {"recording": name, "state": "failed", "reason": found["reason"]}
+            for name, _ in task.members
+        }
+    return {row["recording"]: row for row in found["rows"]}
