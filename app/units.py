@@ -15,6 +15,7 @@ _KEY_UNITS = MappingProxyType({
     "kg_m3": "kg/m³", "kV": "kV", "Hz": "Hz", "kHz": "kHz", "MHz": "MHz", "deg": "°", "mm": "mm",
     "um": "µm", "us": "µs", "ms": "ms", "s": "s", "mA": "mA", "mV": "mV", "mK": "mK", "V": "V",
     "g": "g", "J": "J", "MB": "MB", "ppm": "ppm", "celsius": "°C",
+    "kPa": "kPa", "pct": "%",
 })  # fmt: skip
 
 

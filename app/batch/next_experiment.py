@@ -19,11 +19,15 @@ _WIDE = 0.5  # half an interval over its slope, above which a seen effect is poo
 
 @dataclass(frozen=True)
 class Proposal:
-    """What to vary: ``kind`` is vary, separate, record, films, repeat or narrow; and why."""
+    """What to vary: ``kind`` is vary, separate, record, films, repeat or narrow; and why.
+
+    ``number`` is the column of the table that the sentence names, "" where it names none.
+    """
 
     kind: str
     columns: tuple[str, ...]
     sentence: str
+    number: str = ""
 
 
 def proposals(design: Design, trends: Sequence[Trend], films: int) -> tuple[Proposal, ...]:
@@ -82,6 +86,7 @@ def proposals(design: Design, trends: Sequence[Trend], films: int) -> tuple[Prop
                         (effect.column.label,),
                         f"Repeat film {film} over its range of {effect.column.label}: its "
                         f"{trend.name} changes otherwise than that of the other films.",
+                        trend.name,
                     )
                 )
     return (*found, *_least_known(trends))
@@ -108,5 +113,6 @@ def _least_known(trends: Sequence[Trend]) -> list[Proposal]:
             f"Repeat runs at both ends of {column.label} ({low:.4g} and {high:.4g} "
             f"{column.unit}".rstrip()
             + f"): its effect on {name} is known within {100.0 * part:.0f} % only.",
+            name,
         )
     ]

@@ -66,7 +66,8 @@ def trends(
     source = table_of(table)
     folder = source.parent if out is None else out
     report = folder / "trends.html"
-    check_files(force, (source,), report, json=json)
+    # a folder that is not there has no report yet
+    check_files(force, (source,), *([report] if folder.exists() else []), json=json)
     with working(json, computes=False) as (console, progress):
         found = find_trends(
             read_table(source), source=source, numbers=number or (), against=against or (),

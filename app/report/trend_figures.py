@@ -19,6 +19,7 @@ from dearig.report.figure_style import (
     few_ticks,
     style,
 )
+from dearig.report.trend_words import number_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,7 +58,7 @@ def trend_figure(trend: Trend) -> Figure:
         for ax in axes[count:]:
             ax.set_visible(False)
         for ax in axes[:count:wide]:
-            ax.set_ylabel(drawable(trend.name, 24))
+            ax.set_ylabel(drawable(number_name(trend.name), 24))
     return figure
 
 
@@ -79,7 +80,7 @@ def life_figure(trends: Trends, trend: Trend) -> Figure:
         for ax in axes[len(shown) :]:
             ax.set_visible(False)
         figure.supxlabel(_axis(trends, trend), fontsize=9)
-        figure.supylabel(drawable(trend.name, 30), fontsize=9)
+        figure.supylabel(drawable(number_name(trend.name), 30), fontsize=9)
     return figure
 
 

@@ -7,13 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from dearig.batch.trends import VERDICTS, Change, Effect, Trend, Trends
-from dearig.report.numbers import interval, quoted, significant
+from dearig.report.numbers import interval, quoted, significant, symbol
 from dearig.report.tables import Row, Table
+from dearig.units import name_and_unit
 
 __all__ = [
     "change_table",
     "effect_table",
+    "number_name",
     "own_table",
+    "proposal_sentences",
     "trend_title",
     "trends_json",
     "trends_sentences",
@@ -109,7 +112,11 @@ def _models(trends: Trends) -> Iterator[str]:
             "A run has the weight of its own error and of the scatter beyond it."
         )
     for why in whys:
-        names = [t.name for t in trends.trends if not t.fit.mixed and t.fit.why == why]
+        names = [
+            number_name(t.name, unit=False)
+            for t in trends.trends
+            if not t.fit.mixed and t.fit.why == why
+        ]
         those = ", ".join(names) if len(names) < len(trends.trends) else "The numbers"
         yield (
             f"{those}: ordinary least squares in place of a mixed model, because {why}; the "
@@ -121,7 +128,7 @@ def _effect_sentence(trend: Trend, effect: Effect) -> str:
     per = _per(effect)
     low, high = sorted((effect.low, effect.high))
     size = f"{_signed(effect.slope, effect)} {_unit(trend)} {per} (95 %: {interval_of(low, high)})"
-    name = f"{trend.name} over {effect.column.label}"
+    name = f"{number_name(trend.name, unit=False)} over {effect.column.label}"
     if effect.verdict == "common":
         return f"{name}: {size}, common to all films."
     if effect.verdict == "untold":
@@ -139,7 +146,7 @@ def _effect_sentence(trend: Trend, effect: Effect) -> str:
 def _change_sentence(trend: Trend, change: Change) -> str:
     when = f" ({change.started[:16].replace('T', ' ')})" if change.started else ""
     return (
-        f"Film {change.film or 'without a name'}: {trend.name} jumps by "
+        f"Film {change.film or 'without a name'}: {number_name(trend.name, unit=False)} jumps by "
         f"{quoted(change.size, change.low, change.high)} {_unit(trend)} "
         f"({interval_of(change.low, change.high)}) between {change.last} and {change.first}{when}."
     )
@@ -158,7 +165,16 @@ def _signed(value: float, effect: Effect) -> str:
 
 
 def _unit(trend: Trend) -> str:
-    return "%" if trend.relative else trend.name.rpartition("_")[2]
+    return "%" if trend.relative else name_and_unit(trend.name)[1]
+
+
+def number_name(column: str, unit: bool = True) -> str:
+    """Return the name of a number for a person, with its unit in brackets: mu_0_kPa, rms_um."""
+    name, of = name_and_unit(column)
+    key = name.replace(" ", "_")
+    # mu_0, T_1, ... have symbols
+    shown = symbol(key) if symbol(key) != key else {"rms": "RMS", "nrmse": "NRMSE"}.get(name, name)
+    return f"{shown} ({of})" if of and unit else shown
 
 
 def _per(effect: Effect) -> str:
@@ -174,7 +190,7 @@ def trend_title(trend: Trend) -> str:
     parts.append(f"runs scatter by {significant(trend.spread(fit.scatter), 2)} {unit}")
     if fit.measured > 0.0:
         parts.append(f"a fit is known within {significant(trend.spread(fit.measured), 2)} {unit}")
-    return f"{trend.name}: {', '.join(parts)} (standard deviations)"
+    return f"{number_name(trend.name, unit=False)}: {', '.join(parts)} (standard deviations)"
 
 
 def effect_table(trends: Trends) -> Table:
@@ -182,7 +198,7 @@ def effect_table(trends: Trends) -> Table:
     rows = [
         Row(
             (
-                f"{trend.name}, {effect.column.label}",
+                f"{number_name(trend.name, unit=False)}, {effect.column.label}",
                 f"{_signed(effect.slope, effect)} {_unit(trend)} {_per(effect)}",
                 interval_of(*sorted((effect.low, effect.high))),
                 VERDICTS[effect.verdict],
@@ -194,7 +210,7 @@ def effect_table(trends: Trends) -> Table:
         for effect in trend.effects
     ]
     head = (("", ""), ("Slope", ""), ("95 % interval", ""), ("Films", ""))
-    return Table("Effects", head, tuple(rows), " ".join(trends.left_out))
+    return Table("Effects", head, tuple(rows), " ".join(map(_left_out, trends.left_out)))
 
 
 def own_table(trends: Trends) -> Table | None:
@@ -202,7 +218,7 @@ def own_table(trends: Trends) -> Table | None:
     rows = [
         Row(
             (
-                f"{own.film}: {trend.name} over {effect.column.label}",
+                f"{own.film}: {number_name(trend.name, unit=False)} over {effect.column.label}",
                 significant(own.slope, 3),
                 interval_of(*sorted((own.low, own.high))),
                 f"{_unit(trend)} {_per(effect)}",
@@ -221,7 +237,7 @@ def change_table(trends: Trends) -> Table | None:
     rows = [
         Row(
             (
-                f"{change.film}: {trend.name}",
+                f"{change.film}: {number_name(trend.name, unit=False)}",
                 quoted(change.size, change.low, change.high),
                 interval_of(change.low, change.high),
                 _unit(trend),
@@ -242,8 +258,17 @@ def change_table(trends: Trends) -> Table | None:
 
 def proposal_sentences(trends: Trends) -> tuple[str, ...]:
     """Return what the next experiment should vary, the most useful first."""
-    found = tuple(p.sentence for p in trends.proposals[:_PROPOSALS])
+    found = tuple(
+        p.sentence.replace(p.number, number_name(p.number, unit=False)) if p.number else p.sentence
+        for p in trends.proposals[:_PROPOSALS]
+    )
     return found or (
         "Nothing stands out: all columns were varied, and can be told apart. More runs narrow all "
         "intervals.",
     )
+
+
+def _left_out(sentence: str) -> str:
+    """Return a sentence on a number or a column, which begins with its name."""
+    name, colon, why = sentence.partition(": ")
+    return f"{number_name(name, unit=False)}{colon}{why}"

@@ -14,6 +14,7 @@ from dearig.report.html import picture, prefixes, write_page
 from dearig.report.trend_words import (
     change_table,
     effect_table,
+    number_name,
     own_table,
     proposal_sentences,
     trend_title,
@@ -49,11 +50,11 @@ def _contents(trends: Trends, title: str) -> Callable[[], dict[str, Any]]:
                 picture(
                     life_figure(trends, trend),
                     names,
-                    f"{trend.name} of each film with its 95 % intervals; line: the model; dashed: "
-                    f"change points.",
+                    f"{number_name(trend.name)} of each film with its 95 % intervals; line: the "
+                    f"model; dashed: change points.",
                 ),
             ]
-            drawn.append((trend.name, pictures))
+            drawn.append((number_name(trend.name), pictures))
         tables = [t for t in (effect_table(trends), own_table(trends), change_table(trends)) if t]
         return {
             "title": title,
@@ -63,7 +64,7 @@ def _contents(trends: Trends, title: str) -> Callable[[], dict[str, Any]]:
             "tables": tables,
             "next": proposal_sentences(trends),
             "drawn": drawn,
-            "not_drawn": ", ".join(t.name for t in trends.trends[_DRAWN:]),
+            "not_drawn": ", ".join(number_name(t.name) for t in trends.trends[_DRAWN:]),
         }
 
     return contents

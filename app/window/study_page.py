@@ -40,6 +40,7 @@ from dearig.window.residual_plots import ResidualPlots
 from dearig.window.session import Session
 from dearig.window.theme import SPACE
 from dearig.window.training_table import TrainingTable
+from dearig.window.trends_panel import TrendsPanel
 from dearig.window.widgets import Message, button, card, label, menu_button, plain_tip, set_role
 from dearig.window.worker import Job, Worker
 
@@ -208,6 +209,7 @@ class StudyPage(QWidget):
         self.residual = ResidualPlots(self._session)
         self.ranking = ReportPage()
         self.experiment = ReportPage()
+        self.trends = TrendsPanel(self._session)
         self.tabs = QTabWidget()
         for widget, name, tip in (
             (self.verdict, "Result", "Result, and the errors before and after"),
@@ -215,11 +217,12 @@ class StudyPage(QWidget):
             (self.residual, "Residual", "Residual over time, frequency and other quantities"),
             (self.ranking, "Ranking", "Every effect that was tried, by round"),
             (self.experiment, "Experiment", "Experiment that separates rival explanations"),
+            (self.trends, "Trends", "What the recordings of a study say together"),
         ):
             self.tabs.setTabToolTip(self.tabs.addTab(widget, name), tip)
         self.verdict.show_pieces(_INTRODUCTION)
-        for index in range(1, self.tabs.count()):
-            self.tabs.setTabEnabled(index, False)  # until there is a result
+        for widget in (self.curves, self.residual, self.ranking, self.experiment):
+            self.tabs.setTabEnabled(self.tabs.indexOf(widget), False)  # until there is a result
         side = QWidget()
         outer = QVBoxLayout(side)
         outer.setContentsMargins(SPACE, 0, 0, 0)
@@ -329,6 +332,7 @@ class StudyPage(QWidget):
         self._worker.close()
         self._listing.close()
         self._opening.close()
+        self.trends.close_work()
         self._job = None
         self._library.close()
 
