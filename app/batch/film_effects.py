@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dearig.batch.changes import RUNS_MIN, find_jumps, jump_penalty
-from dearig.batch.mixed_model import LinearFit, Sample, fit_linear, with_extra
+from dearig.batch.mixed_model import LinearFit, Sample, fit_linear, with_extra, within_films
 
 __all__ = ["DIFFER", "Explained", "Extra", "explain"]
 
@@ -17,6 +17,10 @@ DIFFER = 0.01
 _CALMER_MIN = 0.3  # of the scatter: neighbours that differ less have drifted together
 #: Part of the films that may have a slope of their own; of more it is said that films differ.
 _OWN_MAX = 1.0 / 3.0
+#: Gain over that of the best one from which others are taken in the same round.
+_SHARE_MIN = 0.5
+_ROUNDS_MAX = 20
+_EXTRAS_MAX = 60  # of a number: more say that a column is missing, and make the fit slow
 
 
 @dataclass(frozen=True)
@@ -67,38 +71,61 @@ class Explained:
 
 
 def explain(sample: Sample, films: tuple[str, ...], relative: bool) -> Explained:
-    """Return the model of ``sample`` with what single films do otherwise, one after the other.
+    """Return the model of ``sample`` with what single films do otherwise.
 
-    Own slopes and jumps compete: the one that explains most beyond what chance does is taken
-    first, since each looks like the other in a few runs. Rows are in the order of time.
+    Own slopes and jumps compete: those that explain most beyond what chance does are taken first,
+    since each looks like the other in a few runs, and since one film's own slope moves the common
+    one away from the others. Rows are in the order of time.
     """
     columns = sample.x.shape[1]
     extras: list[Extra] = []
-    fit = fit_linear(sample)
-    while len(extras) < 2 * sample.films:
-        best = max(
-            [*_slopes(sample, fit, columns, extras), *_jumps(sample, fit, extras)],
-            key=lambda each: each[0],
-            default=None,
-        )
-        if best is None or best[0] <= 0.0:
+    for _ in range(_ROUNDS_MAX):
+        variances, slopes = within_films(sample)
+        tried = [
+            *_slopes(sample, variances, columns, extras),
+            *_jumps(sample, variances, slopes, extras),
+        ]
+        tried.sort(key=lambda each: -each[0])
+        taken = _taken(tried, sample.films, extras)
+        if not taken:
             break
-        extras.append(best[1])
-        sample = sample.extended(best[1].values(sample))
-        fit = fit_linear(sample)
-    return Explained(sample, films, columns, tuple(extras), fit, relative)
+        for extra in taken:
+            extras.append(extra)
+            sample = sample.extended(extra.values(sample))
+    return Explained(sample, films, columns, tuple(extras), fit_linear(sample), relative)
+
+
+def _taken(tried: list[tuple[float, Extra]], films: int, extras: list[Extra]) -> list[Extra]:
+    """Return what is taken of ``tried``, in falling order of gain: of each film one at most."""
+    taken: list[Extra] = []
+    for gain, extra in tried:
+        if gain <= 0.0 or gain < _SHARE_MIN * tried[0][0]:
+            break
+        if len(extras) + len(taken) >= _EXTRAS_MAX:
+            break
+        same = sum(e.column == extra.column for e in (*extras, *taken))
+        if extra.column is not None and same >= _own_max(films):
+            continue
+        if all(extra.film != other.film for other in taken):
+            taken.append(extra)
+    return taken
+
+
+def _own_max(films: int) -> float:
+    """Return how many films may have a slope of their own of one column."""
+    return max(_OWN_MAX * films, 1.0)
 
 
 def _slopes(
-    sample: Sample, fit: LinearFit, columns: int, extras: list[Extra]
+    sample: Sample, variances: np.ndarray, columns: int, extras: list[Extra]
 ) -> list[tuple[float, Extra]]:
     """Return films' own slopes, with the chi-square that each gains beyond what chance does."""
-    most = max(_OWN_MAX * sample.films, 1.0)
+    most = _own_max(sample.films)
     open_ones = [i for i in range(columns) if sum(e.column == i for e in extras) < most]
     tried = [Extra(film, i) for i in open_ones for film in range(sample.films)]
     if sample.films < 2 or not tried:
         return []
-    t, p = with_extra(sample, fit.variances, np.column_stack([e.values(sample) for e in tried]))
+    t, p = with_extra(sample, variances, np.column_stack([e.values(sample) for e in tried]))
     # of so many slopes the largest by chance has about this chi-square
     chance = 2.0 * math.log(len(tried) / DIFFER)
     return [
@@ -108,9 +135,11 @@ def _slopes(
     ]
 
 
-def _jumps(sample: Sample, fit: LinearFit, extras: list[Extra]) -> list[tuple[float, Extra]]:
+def _jumps(
+    sample: Sample, variances: np.ndarray, slopes: np.ndarray, extras: list[Extra]
+) -> list[tuple[float, Extra]]:
     """Return jumps, with the chi-square that each gains beyond what chance does."""
-    left = sample.y - (sample.x - fit.centre) @ fit.slopes
+    left = sample.y - sample.x @ slopes
     order = [np.flatnonzero(sample.film == film) for film in range(sample.films)]
     steps = np.concatenate([np.diff(left[mine]) for mine in order])
     if not steps.size:
@@ -118,17 +147,22 @@ def _jumps(sample: Sample, fit: LinearFit, extras: list[Extra]) -> list[tuple[fl
     # jumps must not count as scatter, so that it comes from neighbours: the median of |N(0, 1)| is
     # 0.6745, and a difference has twice the variance
     around = float(np.median(np.abs(steps))) / 0.6745 / math.sqrt(2.0)
-    errors = np.sqrt(fit.variances)
+    errors = np.sqrt(variances)
     calmer = float(np.clip(around / np.median(errors), _CALMER_MIN, 1.0))
-    found = []
+    tried = []
     for film, mine in enumerate(order):
-        penalty = jump_penalty(mine.size, sample.films)
         scaled = (left[mine] - left[mine].mean()) / (errors[mine] * calmer)
-        for run in find_jumps(scaled, penalty):
-            extra = Extra(film, run=run)
-            known = [e.run for e in extras if e.film == film and e.column is None]
-            if any(abs(run - other) < RUNS_MIN for other in known):
-                continue
-            t, _ = with_extra(sample, fit.variances * calmer**2, extra.values(sample)[:, None])
-            found.append((float(t[0]) ** 2 - penalty, extra))
-    return found
+        known = [e.run for e in extras if e.film == film and e.column is None]
+        tried += [
+            Extra(film, run=run)
+            for run in find_jumps(scaled, jump_penalty(mine.size, sample.films))
+            if all(abs(run - other) >= RUNS_MIN for other in known)
+        ]
+    if not tried:
+        return []
+    columns = np.column_stack([extra.values(sample) for extra in tried])
+    t, _ = with_extra(sample, variances * calmer**2, columns)
+    return [
+        (value**2 - jump_penalty(order[extra.film].size, sample.films), extra)
+        for value, extra in zip(t, tried, strict=True)
+    ]

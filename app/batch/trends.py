@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from dearig.analysis.cores import for_simulations
 from dearig.batch.film_effects import DIFFER, Explained, explain
 from dearig.batch.mixed_model import LinearFit, Sample, fit_linear, slopes_differ
 from dearig.batch.next_experiment import Proposal, proposals
@@ -273,6 +274,7 @@ def numbers_in(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     return [name for name in names if f"{name}_low95" in names or name in _ERRORS]
 
 
+@for_simulations()
 def find_trends(
     rows: Sequence[Mapping[str, Any]],
     *,
