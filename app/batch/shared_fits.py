@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dearig.analysis.shared import identify_shared
-from dearig.batch.fits import ONE_AT_A_TIME, Row, StudyOptions, about, parameter_columns
+from dearig.batch.fits import ONE_AT_A_TIME, Row, StudyOptions, Task, about, parameter_columns
 from dearig.batch.numbers import errors_of, told
 from dearig.errors import InputError
 from dearig.progress import Progress, quiet
@@ -25,27 +25,27 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class FilmTask:
-    """The recordings of a film: ``name`` of the film, ``members`` as names and files, their key."""
+class FilmTask(Task):
+    """The recordings of the film ``name``: ``members`` are their names and files."""
 
-    name: str
     members: tuple[tuple[str, Path], ...]
-    key: str
-    options: StudyOptions
 
 
 def film_task(film: str, members: Sequence[tuple[Subject, str]], options: StudyOptions) -> FilmTask:
     """Return the task of ``film``; ``members`` are its recordings with the keys of their rows."""
     ordered = sorted(members, key=lambda member: member[0].name)
     digest = hashlib.sha256("\n".join(key for _, key in ordered).encode()).hexdigest()
-    return FilmTask(film, tuple((s.name, s.path) for s, _ in ordered), digest, options)
+    named = tuple((subject.name, subject.path) for subject, _ in ordered)
+    return FilmTask(film, named[0][1], digest, options, named)
 
 
-def fit_film(task: FilmTask, progress: Progress = quiet) -> Row:
+def fit_film(task: Task, progress: Progress = quiet) -> Row:
     """Return the ``rows`` of a film's recordings; one that cannot be read has no result.
 
     Where the others cannot be fitted together either, no recording has a result.
     """
+    if not isinstance(task, FilmTask):
+        raise TypeError(f"{task.name} is no task of a film")
     rows: dict[str, Row] = {}
     good: list[tuple[str, Path]] = []
     with ONE_AT_A_TIME:
