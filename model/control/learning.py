@@ -93,13 +93,13 @@ class _Run:
     left: np.ndarray  # (M,) m: amplitudes of its error
     edge: float  # Hz: of what its voltage was learned with, 0 for the first
 
-    def mean_square(self, noise: float) -> tuple[float, float]:
-        """Return the mean square of the error in m^2, and its standard error.
+    def mean_square(self, noise: float, where: np.ndarray) -> tuple[float, float]:
+        """Return the mean square of the error in m^2 ``where`` (N,), and its standard error.
 
         With white ``noise`` n (standard deviation in m) on a repeatable error r, the variance of
         the mean of (r + n)^2 over N samples is (4 r^2 noise^2 + 2 noise^4)/N.
         """
-        squares = np.square(self.error[self.counted])
+        squares = np.square(self.error[where])
         if squares.size == 0:
             return np.inf, 0.0
         mean, power = float(np.mean(squares)), noise * noise
@@ -114,7 +114,7 @@ class _Run:
         """
         power = noise * noise
         alone = power * np.sqrt(2.0 / max(int(np.count_nonzero(self.counted)), 1) + 2.0 / readings)
-        return bool(self.mean_square(noise)[0] - power <= significant * alone)
+        return bool(self.mean_square(noise, self.counted)[0] - power <= significant * alone)
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +196,9 @@ class Learner:
             reading, valid, self._now.reading, noise, task.rate, task.lead_in, settings
         )
         self._noise = noise = found.noise
-        usable, reading, notes = found.usable, found.values, found.notes
+        usable, notes = found.usable, found.notes
+        lacking = bridged(found.values - self._now.reading, self._known, usable)
+        reading = self._now.reading + lacking  # without what was sorted out
         counted = usable & self.first.reachable & ~self._let_go(reading, notes)
         error = np.where(counted, self.first.reference - reading, 0.0)
         rms, largest, samples = np.nan, np.nan, int(np.count_nonzero(counted))
@@ -211,7 +213,6 @@ class Learner:
         if self.settled:
             notes.append(self.settled)
             return self._lesson(rms, largest, samples, learned=False, notes=notes)
-        lacking = bridged(reading - self._now.reading, self._known, usable)
         best = self._best
         if best is None:
             self._ratio, self._told_up_to = self._film_over_model(lacking)
@@ -219,7 +220,11 @@ class Learner:
         edge = 0.0 if self._learned is None else self._learned.edge
         run = _Run(self._now, self._known, lacking, rms, error, counted, left, edge)
         if best is not None:
-            (now, within), (before, before_within) = (one.mean_square(noise) for one in (run, best))
+            # where both were measured: a part that one run lacks says nothing of the other
+            both = run.counted & best.counted
+            (now, within), (before, before_within) = (
+                one.mean_square(noise, both) for one in (run, best)
+            )
             scatter = settings.significant * np.hypot(within, before_within)
             # what did not repeat and was learned adds its power to the error, and no more
             added = 0.0 if self._learned is None else self._learned.power

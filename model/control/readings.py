@@ -128,6 +128,8 @@ def bridged(lacking: np.ndarray, known: np.ndarray, usable: np.ndarray) -> np.nd
     """
     if usable.all():
         return lacking
+    if not usable.any():
+        return known
     at = np.arange(lacking.size)
     more = np.interp(at, at[usable], (lacking - known)[usable])
     return np.where(usable, lacking, known + more)

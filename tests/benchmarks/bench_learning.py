@@ -56,7 +56,7 @@ def _coarse(reading: np.ndarray, _run: int, _: np.random.Generator) -> np.ndarra
 
 
 def _spikes(reading: np.ndarray, _: int, generator: np.random.Generator) -> np.ndarray:
-    at = generator.integers(0, reading.size - 3, 30)
+    at = generator.integers(0, reading.size - 3, 6)
     reading[at] += 30e-6
     reading[at + 1] += 20e-6
     return reading

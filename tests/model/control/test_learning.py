@@ -173,6 +173,31 @@ def test_noise_is_above_zero():
         learner().learn(path(), 0.0)
 
 
+def test_what_a_gap_has_hidden_is_learned_from_the_next_run():
+    rig, teacher = Rig(THESIS), learner()
+    at = np.arange(teacher.first.time.size) / teacher.first.time.size
+    lacking = 3e-6 * np.sin(3.0 * np.pi * at) + 20e-6 * np.exp(-(((at - 0.5) / 0.05) ** 2))
+    first = rig.play(teacher) + lacking
+    first[np.abs(at - 0.5) < 0.2] = np.nan
+    teacher.learn(first, NOISE)
+    # its error is larger only where the first run was not measured
+    second = teacher.learn(rig.play(teacher) + lacking, NOISE)
+    assert second.learned
+    assert not any("stepped back" in note for note in second.notes)
+    assert teacher.learn(rig.play(teacher) + lacking, NOISE).rms < 0.3 * second.rms
+
+
+def test_a_spike_is_no_reading_of_a_film_that_was_let_go():
+    rig, teacher = hiding("leakage"), learner()
+    teacher.learn(rig.play(teacher), NOISE)
+    reading = rig.play(teacher)
+    sound = teacher.first.time.size
+    reading[:: round(0.1 * RATE)] += 200e-6
+    lesson = teacher.learn(reading, NOISE)
+    assert not any("no voltage changes" in note for note in lesson.notes)
+    assert lesson.samples > 0.7 * sound
+
+
 STEP = 1.22e-6  # m: of a converter of 16 bits over 80 mm
 
 
