@@ -354,8 +354,7 @@ class Learner:
         """Return the part (M,) of an error that is left, from amplitudes; NaN where it is noise."""
         noise = self._noise_around(int(np.count_nonzero(self.first.reachable)))
         had, left = self._around(before), self._around(after)
-        minor = self._settings.minor * np.sum(after**2)
-        told = np.maximum(had, left) > np.maximum(self._settings.told * noise, minor)
+        told = np.maximum(had, left) > self._settings.told * noise
         part = np.sqrt(np.maximum(left - noise, 0.0) / np.maximum(had, noise))
         return np.where(told, part, np.nan)
 

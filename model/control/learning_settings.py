@@ -17,9 +17,6 @@ class LearningSettings:
     significant
         Standard errors by which a mean square differs if it does: one in 44 differences is as large
         by chance, either way. An amplitude tells something from so many noises on.
-    minor
-        Part of the power of an error that decides nothing: a band with less may double in
-        amplitude, the most that ``ratio_max`` leaves, and adds 3 % to the RMS error.
     usable
         Part of the samples of a path without which a run teaches nothing: across a gap what is
         lacking is a straight line, so that at least as much must be measured as is drawn.
@@ -63,7 +60,6 @@ class LearningSettings:
     """
 
     significant: float = 2.0
-    minor: float = 0.02
     usable: float = 0.5
     contraction: float = 0.8
     ratio_max: float = 2.0
